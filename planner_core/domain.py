@@ -1,0 +1,352 @@
+"""The nouns of planning.
+
+Glossary
+--------
+Target
+    A point on the ground that someone wants imaged once.
+Access
+    A maximal interval in which geometry allows a satellite to see a target or a station.
+Opportunity
+    A *collect* (image of a target) or a *contact* (pass over a station) that a plan may take.
+Plan
+    The actions chosen. A *timeline* is the plan replayed by the referee.
+Horizon
+    The span that is planned; instants inside it are seconds from its start.
+Epoch
+    The instant an element set is given for.
+Off-nadir angle
+    At the satellite, between nadir and the line of sight. *Elevation* is measured at the ground.
+Slew, settle
+    The turn from one line of sight to another, and the wait after it.
+
+Every type is immutable and checks itself when made.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from datetime import UTC, datetime, timedelta
+from typing import Literal
+
+from planner_core.errors import InvalidScenario
+
+Dynamics = Literal["physical", "paper"]
+Nadir = Literal["geodetic", "geocentric"]
+LookSide = Literal["left", "right", "any"]
+
+
+def _require(condition: bool, where: str, message: str) -> None:
+    if not condition:
+        raise InvalidScenario("value_out_of_range", f"{where}: {message}", pointer="/" + where)
+
+
+def _require_finite(owner: object, *names: str) -> None:
+    for name in names:
+        value = getattr(owner, name)
+        if value is not None:
+            _require(math.isfinite(value), name, "must be a finite number")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Horizon:
+    """The span to plan, and the only converter between instants and seconds.
+
+    Attributes
+    ----------
+    start, end
+        Aware instants in UTC; ``start`` is before ``end``.
+    """
+
+    start: datetime
+    end: datetime
+
+    def __post_init__(self) -> None:
+        _require(self.start.tzinfo is not None, "start", "needs a time zone")
+        _require(self.end.tzinfo is not None, "end", "needs a time zone")
+        _require(self.end > self.start, "end", "must be later than start")
+
+    @property
+    def duration_s(self) -> float:
+        """Return the length of the horizon."""
+        return (self.end - self.start).total_seconds()
+
+    def instant(self, offset_s: float) -> datetime:
+        """Return the UTC instant that lies ``offset_s`` after the start, to the millisecond.
+
+        >>> h = Horizon(start=datetime(2026, 1, 1, tzinfo=UTC), end=datetime(2026, 1, 2, tzinfo=UTC))
+        >>> h.instant(90.0004).isoformat()
+        '2026-01-01T00:01:30+00:00'
+        """
+        return self.start.astimezone(UTC) + timedelta(milliseconds=round(offset_s * 1000.0))
+
+    def offset_s(self, instant: datetime) -> float:
+        """Return the seconds from the start to ``instant``."""
+        return (instant - self.start).total_seconds()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OrbitElements:
+    """One SGP4 mean element set, whatever format it came in.
+
+    Angles are mean elements in the TEME frame. ``norad_cat_id`` may have up to nine
+    digits; SGP4 itself never sees it.
+    """
+
+    name: str | None
+    norad_cat_id: int
+    object_id: str
+    epoch: datetime
+    mean_motion_rev_day: float
+    eccentricity: float
+    inclination_deg: float
+    raan_deg: float
+    arg_perigee_deg: float
+    mean_anomaly_deg: float
+    bstar: float = 0.0
+    mean_motion_dot: float = 0.0
+    mean_motion_ddot: float = 0.0
+    element_set_no: int = 999
+    rev_at_epoch: int = 0
+    classification: str = "U"
+
+    @property
+    def period_s(self) -> float:
+        """Return the mean (Kozai) orbital period."""
+        return 86400.0 / self.mean_motion_rev_day
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Agility:
+    """How fast the satellite turns. Defaults are the paper's 1 deg/s at once."""
+
+    slew_rate_deg_s: float = 1.0
+    acceleration_deg_s2: float | None = None
+    settle_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        _require_finite(self, "slew_rate_deg_s", "acceleration_deg_s2", "settle_s")
+        _require(self.slew_rate_deg_s > 0, "slew_rate_deg_s", "must be greater than 0")
+        _require(
+            self.acceleration_deg_s2 is None or self.acceleration_deg_s2 > 0,
+            "acceleration_deg_s2",
+            "must be greater than 0, or null for an instant start",
+        )
+        _require(self.settle_s >= 0, "settle_s", "must be 0 or more")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sensor:
+    """The pointing limits of the imager. Visibility (elevation >= 0) is always required."""
+
+    off_nadir_min_deg: float = 5.0
+    off_nadir_max_deg: float = 55.0
+    nadir: Nadir = "geodetic"
+    look_side: LookSide = "any"
+    min_elevation_deg: float = 0.0
+
+    def __post_init__(self) -> None:
+        _require_finite(self, "off_nadir_min_deg", "off_nadir_max_deg", "min_elevation_deg")
+        _require(0 <= self.off_nadir_min_deg <= 90, "off_nadir_min_deg", "must be between 0 and 90")
+        _require(
+            self.off_nadir_min_deg <= self.off_nadir_max_deg <= 90,
+            "off_nadir_max_deg",
+            "must be between off_nadir_min_deg and 90",
+        )
+        _require(
+            0 <= self.min_elevation_deg < 90, "min_elevation_deg", "must be from 0 to below 90"
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Resources:
+    """Battery and recorder in fractions of their capacity, per second.
+
+    All rates are magnitudes: the model knows which of them charge and which drain.
+
+    Attributes
+    ----------
+    sunpoint_charge_per_s
+        Net charge while sun-pointing.
+    collect_drain_per_s, contact_drain_per_s
+        Net draw of the two modes.
+    collect_fill_per_s, downlink_per_s, telemetry_per_s
+        What a collect writes, a contact takes down, and telemetry adds at all times.
+    recorder_capacity_mbit
+        Size of the recorder, or None where only fractions are known (the presets).
+    """
+
+    battery_min_fraction: float
+    initial_battery_fraction: float
+    sunpoint_charge_per_s: float
+    collect_drain_per_s: float
+    contact_drain_per_s: float
+    recorder_max_fraction: float
+    initial_recorder_fraction: float
+    collect_fill_per_s: float
+    downlink_per_s: float
+    telemetry_per_s: float
+    eclipse_aware: bool = False
+    recorder_capacity_mbit: float | None = None
+
+    @classmethod
+    def paper(cls, period_s: float) -> Resources:
+        """Return the paper's spacecraft with the rates of its text (section Experiments)."""
+        return cls._paper(period_s, telemetry_per_s=1e-6, downlink_ratio=4.0)
+
+    @classmethod
+    def paper_code(cls, period_s: float) -> Resources:
+        """Return the paper's spacecraft with the rates of the authors' code."""
+        return cls._paper(period_s, telemetry_per_s=1.0 / 3e7, downlink_ratio=10.0)
+
+    @classmethod
+    def _paper(cls, period_s: float, *, telemetry_per_s: float, downlink_ratio: float) -> Resources:
+        image_fill_per_s = 1.0 / 3000.0  # a 30 s image is 1 % of the recorder
+        image_drain_per_s = 1.0 / (0.1 * period_s)  # 10 % duty cycle
+        return cls(
+            battery_min_fraction=0.3,
+            initial_battery_fraction=1.0,
+            sunpoint_charge_per_s=1.0 / (0.9 * period_s),
+            collect_drain_per_s=image_drain_per_s,
+            contact_drain_per_s=image_drain_per_s / 4.0,
+            recorder_max_fraction=0.75,
+            initial_recorder_fraction=0.0,
+            collect_fill_per_s=image_fill_per_s,
+            downlink_per_s=downlink_ratio * image_fill_per_s,
+            telemetry_per_s=telemetry_per_s,
+        )
+
+    def __post_init__(self) -> None:
+        names = [
+            "battery_min_fraction",
+            "initial_battery_fraction",
+            "recorder_max_fraction",
+            "initial_recorder_fraction",
+        ]
+        _require_finite(self, *names)
+        for name in names:
+            _require(0 <= getattr(self, name) <= 1, name, "must be between 0 and 1")
+        rates = [
+            "sunpoint_charge_per_s",
+            "collect_drain_per_s",
+            "contact_drain_per_s",
+            "collect_fill_per_s",
+            "downlink_per_s",
+            "telemetry_per_s",
+        ]
+        _require_finite(self, *rates)
+        for name in rates:
+            _require(getattr(self, name) >= 0, name, "must be 0 or more")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Satellite:
+    """A satellite: its orbit and what it can do."""
+
+    id: str
+    name: str
+    orbit: OrbitElements
+    agility: Agility = Agility()
+    sensor: Sensor = Sensor()
+    resources: Resources
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Target:
+    """A point on the ground to be imaged once, by any satellite.
+
+    ``off_nadir_min_deg`` and ``off_nadir_max_deg`` narrow the sensor's limits.
+    """
+
+    id: str
+    lat_deg: float
+    lon_deg: float
+    alt_m: float = 0.0
+    reward: float = 1.0
+    collect_s: float = 30.0
+    off_nadir_min_deg: float | None = None
+    off_nadir_max_deg: float | None = None
+    catalog_id: str | None = None
+
+    def __post_init__(self) -> None:
+        _require_finite(self, "lat_deg", "lon_deg", "alt_m", "reward", "collect_s")
+        _require(-90 <= self.lat_deg <= 90, "lat_deg", "must be between -90 and 90")
+        _require(-180 <= self.lon_deg <= 360, "lon_deg", "must be between -180 and 360")
+        _require(-500 <= self.alt_m <= 10000, "alt_m", "must be between -500 and 10000")
+        _require(self.reward >= 0, "reward", "must be 0 or more")
+        _require(self.collect_s > 0, "collect_s", "must be greater than 0")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GroundStation:
+    """A ground station that serves ``antennas`` satellites at a time.
+
+    ``elevation_mask`` is a tuple of (azimuth_deg, elevation_deg) knots, linear between
+    them and round the compass; the higher of mask and ``min_elevation_deg`` holds.
+    """
+
+    id: str
+    name: str
+    lat_deg: float
+    lon_deg: float
+    alt_m: float = 0.0
+    min_elevation_deg: float = 5.0
+    min_contact_s: float = 0.0
+    elevation_mask: tuple[tuple[float, float], ...] = ()
+    antennas: int = 1
+
+    def __post_init__(self) -> None:
+        _require_finite(self, "lat_deg", "lon_deg", "alt_m", "min_elevation_deg", "min_contact_s")
+        _require(-90 <= self.lat_deg <= 90, "lat_deg", "must be between -90 and 90")
+        _require(-180 <= self.lon_deg <= 360, "lon_deg", "must be between -180 and 360")
+        _require(
+            0 <= self.min_elevation_deg < 90, "min_elevation_deg", "must be from 0 to below 90"
+        )
+        _require(self.min_contact_s >= 0, "min_contact_s", "must be 0 or more")
+        _require(self.antennas >= 1, "antennas", "must be 1 or more")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scenario:
+    """The frozen question: who may image what, when, and under which rules."""
+
+    horizon: Horizon
+    satellites: tuple[Satellite, ...]
+    targets: tuple[Target, ...]
+    ground_stations: tuple[GroundStation, ...] = ()
+    use_resources: bool = True
+    dynamics: Dynamics = "physical"
+    collect_spacing_s: float | None = None
+    continuous_starts: bool = False
+    warnings: tuple[str, ...] = field(default=(), compare=False)
+
+    def __post_init__(self) -> None:
+        _require(len(self.satellites) > 0, "satellites", "at least one is needed")
+        _require(
+            self.collect_spacing_s is None or self.collect_spacing_s > 0,
+            "collect_spacing_s",
+            "must be greater than 0",
+        )
+        for what, ids in (
+            ("satellite", [s.id for s in self.satellites]),
+            ("target", [t.id for t in self.targets]),
+            ("ground_station", [g.id for g in self.ground_stations]),
+        ):
+            duplicate = _first_duplicate(ids)
+            if duplicate is not None:
+                position, value = duplicate
+                raise InvalidScenario(
+                    f"duplicate_{what}_id",
+                    f"The {what} id {value!r} appears twice.",
+                    pointer=f"/{what}s/{position}/id",
+                )
+
+
+def _first_duplicate(ids: Iterable[str]) -> tuple[int, str] | None:
+    seen: set[str] = set()
+    for position, value in enumerate(ids):
+        if value in seen:
+            return position, value
+        seen.add(value)
+    return None

@@ -1,0 +1,88 @@
+"""What can be wrong with data given to the planner.
+
+``ValueError`` is kept for a caller's mistake in code. Everything here is about
+*data*: it carries what a machine needs (code, place) and a sentence for people.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """One thing that is wrong, and where.
+
+    Attributes
+    ----------
+    code
+        Stable machine-readable name, for example ``tle_checksum``.
+    detail
+        One sentence that names the value and the limit.
+    pointer
+        JSON pointer into the input, where it was JSON.
+    row
+        Line of the file, from 1, where it was a file.
+    """
+
+    code: str
+    detail: str
+    pointer: str | None = None
+    row: int | None = None
+
+
+class PlannerError(Exception):
+    """Data that the planner cannot accept; the base of every error below."""
+
+    def __init__(
+        self, code: str, detail: str, *, pointer: str | None = None, row: int | None = None
+    ):
+        super().__init__(detail)
+        self.fault = Fault(code=code, detail=detail, pointer=pointer, row=row)
+
+    @property
+    def code(self) -> str:
+        """Return the machine-readable name of the fault."""
+        return self.fault.code
+
+    @property
+    def detail(self) -> str:
+        """Return the sentence for people."""
+        return self.fault.detail
+
+
+class InvalidElements(PlannerError):
+    """Orbital elements that cannot be read, or whose theory is not supported."""
+
+
+class InvalidScenario(PlannerError):
+    """A planning question that makes no sense as a whole."""
+
+
+class InvalidParameters(PlannerError):
+    """Solver parameters that the solver does not have or cannot take."""
+
+
+class UnknownSolver(PlannerError):
+    """No solver of that name."""
+
+
+class PropagationFailed(PlannerError):
+    """SGP4 stopped before the end of the horizon.
+
+    Attributes
+    ----------
+    satellite
+        Name of the satellite.
+    sgp4_code
+        The error code of SGP4 (1 to 6).
+    """
+
+    def __init__(self, satellite: str, sgp4_code: int, detail: str):
+        super().__init__("propagation_failed", detail)
+        self.satellite = satellite
+        self.sgp4_code = sgp4_code
+
+
+class Cancelled(Exception):
+    """Work that has no partial answer was told to stop (access search, compiling)."""

@@ -1,0 +1,1 @@
+"""Element sets, propagation, frames, sun and shadow."""

@@ -1,0 +1,296 @@
+"""The frozen problem: all that a solver and the referee ever see.
+
+Geometry has been turned into numbers here. Opportunities lie in one table of columns,
+ordered by (start, end, satellite, kind, place); each satellite has a view of its own rows
+with a sparse table of which of them may follow each other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from planner_core.domain import Agility, Dynamics, Resources
+from planner_core.jit import kernel
+from planner_core.slew import INSTANT, TIME_TOLERANCE_S, angle_between_deg, slew_s
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int32]
+Longs = npt.NDArray[np.int64]
+Bytes = npt.NDArray[np.uint8]
+Bools = npt.NDArray[np.bool_]
+
+COLLECT: Final = 0
+CONTACT: Final = 1
+
+ACCESS_FOUND: Final = 0
+NEVER_VISIBLE: Final = 1
+OUTSIDE_LIMITS: Final = 2
+ACCESS_TOO_SHORT: Final = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Opportunities:
+    """All collects and contacts of a scenario, one row each, in the order of the plan model.
+
+    Instants are seconds from the start of the horizon, rounded inward to the millisecond.
+    Angles and distances hold at the middle of the opportunity. Lines of sight are unit
+    vectors from the satellite in the inertial (TEME) frame. Shape ``(n,)`` or ``(n, 3)``.
+
+    Attributes
+    ----------
+    satellite
+        Index of the satellite in the scenario.
+    kind
+        ``COLLECT`` or ``CONTACT``.
+    place
+        Index of the target (collect) or of the ground station (contact).
+    access
+        Number of the access it lies in, unique in the scenario.
+    start_s, end_s
+        Span of the task itself.
+    access_start_s, access_end_s
+        Span of its access.
+    los_start, los_end
+        Line of sight at ``start_s`` and at ``end_s``.
+    off_nadir_deg, elevation_deg, azimuth_deg, range_m
+        At the satellite; at the ground; at the ground from north over east; between both.
+    sun_elevation_deg, in_eclipse
+        Of the sun at the target or station; whether the satellite is in the Earth's shadow.
+    """
+
+    satellite: Ints
+    kind: npt.NDArray[np.int8]
+    place: Ints
+    access: Ints
+    start_s: Floats
+    end_s: Floats
+    access_start_s: Floats
+    access_end_s: Floats
+    los_start: Floats
+    los_end: Floats
+    off_nadir_deg: Floats
+    elevation_deg: Floats
+    azimuth_deg: Floats
+    range_m: Floats
+    sun_elevation_deg: Floats
+    in_eclipse: Bools
+
+    def __len__(self) -> int:
+        return len(self.start_s)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Sunlight:
+    """When one satellite is in sunlight: ``enter_s[i] <= t < exit_s[i]``, ascending."""
+
+    enter_s: Floats
+    exit_s: Floats
+
+    def seconds_until(self, t_s: Floats) -> Floats:
+        """Return the sunlit seconds between 0 and each instant.
+
+        >>> Sunlight(enter_s=np.array([0.0, 50.0]), exit_s=np.array([10.0, 60.0])).seconds_until(
+        ...     np.array([5.0, 20.0, 55.0]))
+        array([ 5., 10., 15.])
+        """
+        lengths = self.exit_s - self.enter_s
+        before = np.concatenate([[0.0], np.cumsum(lengths)])
+        i = np.searchsorted(self.enter_s, t_s, side="right")
+        last = np.maximum(i - 1, 0)
+        if len(lengths) == 0:
+            return np.zeros_like(t_s)
+        into = np.clip(t_s - self.enter_s[last], 0.0, lengths[last])
+        return np.where(i == 0, 0.0, before[last] + into)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Transitions:
+    """Which opportunity of one satellite may follow which: C(a, b) of eq. 4, sparse.
+
+    Local row ``b`` may follow ``a`` when ``b >= far_from[a]`` (even the longest slew fits), or
+    ``near_from[a] <= b < far_from[a]`` and bit ``offset[a] + b - near_from[a]`` is set.
+
+    Attributes
+    ----------
+    near_from, far_from
+        Shape ``(m,)``; the near rows of ``a`` are ``near_from[a]`` up to ``far_from[a]``.
+    offset
+        First bit of each row's near part. Shape ``(m + 1,)``.
+    bits
+        Packed, least significant bit first.
+    """
+
+    near_from: Ints
+    far_from: Ints
+    offset: Longs
+    bits: Bytes
+
+    def allows(self, a: int, b: int) -> bool:
+        """Return whether local row ``b`` may follow local row ``a`` directly."""
+        return bool(may_follow(a, b, self.near_from, self.far_from, self.offset, self.bits))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SatelliteProblem:
+    """One satellite's part: its rows of the opportunity table, and what may follow what.
+
+    Attributes
+    ----------
+    rows
+        Rows of the scenario's table that belong to this satellite, ascending. Shape ``(m,)``.
+    sunlight
+        Only what ``eclipse_aware`` needs; the whole horizon otherwise.
+    """
+
+    id: str
+    name: str
+    agility: Agility
+    resources: Resources
+    rows: Ints
+    kind: npt.NDArray[np.int8]
+    place: Ints
+    start_s: Floats
+    end_s: Floats
+    transitions: Transitions
+    sunlight: Sunlight
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Problem:
+    """A compiled scenario.
+
+    Attributes
+    ----------
+    target_reward
+        Shape ``(num_targets,)``.
+    target_access
+        Why a target has no opportunity, or ``ACCESS_FOUND``. Shape ``(num_targets,)``.
+    station_antennas
+        How many satellites each station serves at a time. Shape ``(num_stations,)``.
+    """
+
+    horizon_s: float
+    use_resources: bool
+    dynamics: Dynamics
+    continuous_starts: bool
+    target_ids: tuple[str, ...]
+    target_reward: Floats
+    target_access: npt.NDArray[np.int8]
+    station_ids: tuple[str, ...]
+    station_antennas: Ints
+    opportunities: Opportunities
+    satellites: tuple[SatelliteProblem, ...]
+
+    @cached_property
+    def local_row(self) -> Ints:
+        """Return, for each opportunity, its row in its own satellite's view. Shape ``(n,)``."""
+        local = np.empty(len(self.opportunities), dtype=np.int32)
+        for satellite in self.satellites:
+            local[satellite.rows] = np.arange(len(satellite), dtype=np.int32)
+        return local
+
+    @cached_property
+    def target_opportunities(self) -> tuple[Ints, Longs]:
+        """Return collects grouped by target: rows, and offsets of shape ``(num_targets + 1,)``."""
+        collects = np.flatnonzero(self.opportunities.kind == COLLECT).astype(np.int32)
+        order = np.argsort(self.opportunities.place[collects], kind="stable")
+        counts = np.bincount(self.opportunities.place[collects], minlength=len(self.target_ids))
+        offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+        return collects[order], offsets
+
+    def collects_of(self, target: int) -> Ints:
+        """Return the rows of a target's collects, in order."""
+        rows, offsets = self.target_opportunities
+        return rows[offsets[target] : offsets[target + 1]]
+
+
+def build_satellite_problem(
+    index: int,
+    opportunities: Opportunities,
+    *,
+    id: str,  # noqa: A002 - the field's own name
+    name: str,
+    agility: Agility,
+    resources: Resources,
+    sunlight: Sunlight,
+) -> SatelliteProblem:
+    """Return one satellite's view of the table, with its transitions worked out."""
+    rows = np.flatnonzero(opportunities.satellite == index).astype(np.int32)
+    start_s, end_s = opportunities.start_s[rows], opportunities.end_s[rows]
+    return SatelliteProblem(
+        id=id,
+        name=name,
+        agility=agility,
+        resources=resources,
+        rows=rows,
+        kind=opportunities.kind[rows],
+        place=opportunities.place[rows],
+        start_s=start_s,
+        end_s=end_s,
+        transitions=_transitions(
+            start_s, end_s, opportunities.los_start[rows], opportunities.los_end[rows], agility
+        ),
+        sunlight=sunlight,
+    )
+
+
+def _transitions(
+    start_s: Floats, end_s: Floats, los_start: Floats, los_end: Floats, agility: Agility
+) -> Transitions:
+    acceleration = agility.acceleration_deg_s2 or INSTANT
+    longest_s = slew_s(180.0, agility.slew_rate_deg_s, acceleration) + agility.settle_s
+    near_from = np.searchsorted(start_s, end_s - TIME_TOLERANCE_S).astype(np.int32)
+    # A task of no length would come before its own end: it never follows itself.
+    near_from = np.maximum(near_from, np.arange(1, len(start_s) + 1, dtype=np.int32))
+    far_from = np.searchsorted(start_s, end_s + longest_s).astype(np.int32)
+    far_from = np.maximum(far_from, near_from)
+    offset = np.concatenate([[0], np.cumsum((far_from - near_from).astype(np.int64))])
+    bits = np.zeros((int(offset[-1]) + 7) // 8, dtype=np.uint8)
+    _fill_near_bits(
+        start_s, end_s, np.ascontiguousarray(los_start), np.ascontiguousarray(los_end),
+        agility.slew_rate_deg_s, acceleration, agility.settle_s,
+        near_from, far_from, offset, bits,
+    )  # fmt: skip
+    return Transitions(near_from=near_from, far_from=far_from, offset=offset, bits=bits)
+
+
+@kernel
+def _fill_near_bits(
+    start_s: Floats,
+    end_s: Floats,
+    los_start: Floats,
+    los_end: Floats,
+    rate_deg_s: float,
+    acceleration_deg_s2: float,
+    settle_s: float,
+    near_from: Ints,
+    far_from: Ints,
+    offset: Longs,
+    bits: Bytes,
+) -> None:
+    for a in range(len(start_s)):
+        for b in range(near_from[a], far_from[a]):
+            angle_deg = angle_between_deg(los_end[a], los_start[b])
+            needed_s = slew_s(angle_deg, rate_deg_s, acceleration_deg_s2) + settle_s
+            if start_s[b] - end_s[a] >= needed_s - TIME_TOLERANCE_S:
+                bit = offset[a] + b - near_from[a]
+                bits[bit >> 3] |= np.uint8(1 << (bit & 7))
+
+
+@kernel
+def may_follow(a: int, b: int, near_from: Ints, far_from: Ints, offset: Longs, bits: Bytes) -> bool:
+    """Return whether local row ``b`` may follow ``a``; ``a`` of -1 is "no task yet"."""
+    if a < 0 or b >= far_from[a]:
+        return True
+    if b < near_from[a]:
+        return False
+    bit = offset[a] + b - near_from[a]
+    return bool((bits[bit >> 3] >> (bit & 7)) & 1)

@@ -1,0 +1,1 @@
+"""The Slewline service: HTTP API, jobs and command line over the planning core."""

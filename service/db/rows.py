@@ -1,0 +1,183 @@
+"""All tables on one page.
+
+Ids are UUIDv7 strings, instants are UTC. Inputs are never changed under a scenario that
+uses them: a scenario stores its whole content.
+"""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from typing import Any
+
+import sqlalchemy as sa
+from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
+
+Json = dict[str, Any]
+
+
+class UtcDateTime(sa.TypeDecorator[datetime]):
+    """An aware UTC instant on every database (SQLite itself forgets the zone)."""
+
+    impl = sa.DateTime(timezone=True)
+    cache_ok = True
+
+    def process_bind_param(self, value: datetime | None, dialect: sa.Dialect) -> datetime | None:
+        """Refuse naive instants and store UTC."""
+        if value is None:
+            return None
+        if value.tzinfo is None:
+            raise ValueError("naive datetime")
+        return value.astimezone(UTC)
+
+    def process_result_value(self, value: datetime | None, dialect: sa.Dialect) -> datetime | None:
+        """Give back an aware instant."""
+        if value is None:
+            return None
+        return value.replace(tzinfo=UTC) if value.tzinfo is None else value.astimezone(UTC)
+
+
+class Row(DeclarativeBase):
+    """Base of all rows."""
+
+    type_annotation_map = {Json: sa.JSON, datetime: UtcDateTime, str: sa.Text}  # noqa: RUF012
+
+
+class SatelliteRow(Row):
+    """A satellite; its element sets stand in their own table, newest epoch in force."""
+
+    __tablename__ = "satellite"
+
+    id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
+    name: Mapped[str]
+    norad_cat_id: Mapped[int] = mapped_column(sa.BigInteger, index=True)
+    agility: Mapped[Json]
+    sensor: Mapped[Json]
+    resources: Mapped[Any] = mapped_column(sa.JSON)
+    created_at: Mapped[datetime]
+    deleted_at: Mapped[datetime | None]
+
+
+class ElementSetRow(Row):
+    """One element set of a satellite, as it came (``tle`` or ``omm``), never changed."""
+
+    __tablename__ = "element_set"
+
+    id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
+    satellite_id: Mapped[str] = mapped_column(sa.ForeignKey("satellite.id"), index=True)
+    epoch: Mapped[datetime]
+    orbit: Mapped[Json]
+    created_at: Mapped[datetime]
+
+
+class GroundStationRow(Row):
+    """A ground station; ``body`` is what its POST takes, defaults filled in."""
+
+    __tablename__ = "ground_station"
+
+    id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
+    name: Mapped[str]
+    body: Mapped[Json]
+    created_at: Mapped[datetime]
+    deleted_at: Mapped[datetime | None]
+
+
+class TargetCatalogRow(Row):
+    """A catalogue of targets."""
+
+    __tablename__ = "target_catalog"
+
+    id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
+    name: Mapped[str]
+    num_targets: Mapped[int]
+    created_at: Mapped[datetime]
+    deleted_at: Mapped[datetime | None]
+
+
+class TargetRow(Row):
+    """One target of a catalogue, in the order of its file."""
+
+    __tablename__ = "target"
+
+    catalog_id: Mapped[str] = mapped_column(sa.ForeignKey("target_catalog.id"), primary_key=True)
+    position: Mapped[int] = mapped_column(primary_key=True)
+    target_id: Mapped[str]
+    body: Mapped[Json]
+
+
+class ScenarioRow(Row):
+    """A frozen question. ``content`` is the self-contained scenario file; ``sha256`` its hash."""
+
+    __tablename__ = "scenario"
+
+    id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
+    sha256: Mapped[str] = mapped_column(sa.String(64), unique=True)
+    name: Mapped[str | None]
+    summary: Mapped[Json]
+    content: Mapped[str] = mapped_column(sa.Text, deferred=True)
+    created_at: Mapped[datetime]
+
+
+class OpportunitySetRow(Row):
+    """The opportunities of a scenario, computed once, as a compressed columnar block."""
+
+    __tablename__ = "opportunity_set"
+
+    scenario_sha256: Mapped[str] = mapped_column(sa.String(64), primary_key=True)
+    version: Mapped[str]
+    block: Mapped[bytes] = mapped_column(sa.LargeBinary)
+    created_at: Mapped[datetime]
+
+
+class JobRow(Row):
+    """A job: the truth about one piece of queue work (DBOS only dispatches it).
+
+    ``dispatch`` counts how often it was handed to the queue; ``run`` counts starts and
+    is the fencing token: only the holder of the current run may renew or finish.
+    ``version`` grows with every visible change and is the job's ETag.
+    """
+
+    __tablename__ = "job"
+
+    id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
+    scenario_id: Mapped[str] = mapped_column(sa.ForeignKey("scenario.id"), index=True)
+    tenant: Mapped[str] = mapped_column(sa.String(64), default="local")
+    state: Mapped[str] = mapped_column(sa.String(16), index=True)
+    solver: Mapped[str] = mapped_column(sa.String(64))
+    params: Mapped[Json]
+    seed: Mapped[int] = mapped_column(sa.BigInteger)
+    limits: Mapped[Json]
+    priority: Mapped[int]
+    label: Mapped[str | None]
+    progress: Mapped[Json | None]
+    termination: Mapped[str | None] = mapped_column(sa.String(32))
+    error: Mapped[Json | None]
+    dispatch: Mapped[int] = mapped_column(default=1)
+    run: Mapped[int] = mapped_column(default=0)
+    lease_until: Mapped[datetime | None]
+    dispatched_at: Mapped[datetime]
+    cancel_requested: Mapped[bool] = mapped_column(default=False)
+    version: Mapped[int] = mapped_column(default=1)
+    created_at: Mapped[datetime]
+    started_at: Mapped[datetime | None]
+    finished_at: Mapped[datetime | None]
+
+
+class JobResultRow(Row):
+    """The answer of a job, written in the transaction that ends it: documents as JSON text."""
+
+    __tablename__ = "job_result"
+
+    job_id: Mapped[str] = mapped_column(sa.ForeignKey("job.id"), primary_key=True)
+    timeline: Mapped[str] = mapped_column(sa.Text, deferred=True)
+    targets: Mapped[str] = mapped_column(sa.Text, deferred=True)
+    created_at: Mapped[datetime]
+
+
+class WorkerRow(Row):
+    """A worker's heartbeat; readiness asks for a recent one."""
+
+    __tablename__ = "worker"
+
+    id: Mapped[str] = mapped_column(sa.String(128), primary_key=True)
+    started_at: Mapped[datetime]
+    seen_at: Mapped[datetime]

@@ -1,0 +1,1 @@
+"""Queue work: dispatch, leases, the solver process."""
