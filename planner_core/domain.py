@@ -75,8 +75,10 @@ class Horizon:
     def instant(self, offset_s: float) -> datetime:
         """Return the UTC instant that lies ``offset_s`` after the start, to the millisecond.
 
-        >>> h = Horizon(start=datetime(2026, 1, 1, tzinfo=UTC), end=datetime(2026, 1, 2, tzinfo=UTC))
-        >>> h.instant(90.0004).isoformat()
+        >>> day = Horizon(
+        ...     start=datetime(2026, 1, 1, tzinfo=UTC), end=datetime(2026, 1, 2, tzinfo=UTC)
+        ... )
+        >>> day.instant(90.0004).isoformat()
         '2026-01-01T00:01:30+00:00'
         """
         return self.start.astimezone(UTC) + timedelta(milliseconds=round(offset_s * 1000.0))
