@@ -1,0 +1,19 @@
+"""Fixtures for all tests."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+_ROOT = Path(__file__).resolve().parents[1]
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """Return the folder of real reference data, or skip where it is absent."""
+    place = Path(os.environ.get("SLEWLINE_TEST_DATA", _ROOT.parent / "shared" / "data"))
+    if not place.is_dir():
+        pytest.skip("the shared reference data is not on this machine")
+    return place
