@@ -4,7 +4,7 @@ PYTHON ?= python3
 UV ?= uv
 BIN := .venv/bin
 STAMP := .venv/.installed
-PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
+PIP := $(BIN)/python -m pip -qq --disable-pip-version-check
 
 .PHONY: help setup demo serve test check format lock clean
 
@@ -19,6 +19,7 @@ help:
 	@echo "make clean    remove all that these commands made"
 
 setup: $(STAMP)
+	@:
 
 # Everything pip fetches is checked against a hash; the build of the project itself fetches nothing.
 $(STAMP): pyproject.toml requirements.lock
@@ -26,7 +27,7 @@ $(STAMP): pyproject.toml requirements.lock
 		echo "Slewline needs Python 3.11 or later, and '$(PYTHON)' is not. Try: make PYTHON=python3.12" >&2; \
 		exit 1; }
 	@echo "Setting up .venv (once; about a minute) ..."
-	@test -x $(BIN)/python || $(PYTHON) -m venv .venv
+	@$(PYTHON) -m venv .venv
 	@$(PIP) install --require-hashes -r requirements.lock
 	@$(PIP) install --no-deps --no-build-isolation --editable .
 	@echo "Compiling the planning kernels (once) ..."
