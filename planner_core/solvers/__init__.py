@@ -1,1 +1,31 @@
-"""The solvers, one module each."""
+"""The solvers, one module each. A new solver joins the tuple below."""
+
+from __future__ import annotations
+
+from planner_core.errors import UnknownSolver
+from planner_core.solvers.base import Solver
+from planner_core.solvers.forward_search import ForwardSearch
+from planner_core.solvers.rule import Rule
+
+__all__ = ["SOLVERS", "ForwardSearch", "Rule", "solver_class"]
+
+SOLVERS: dict[str, type[Solver]] = {solver.name: solver for solver in (Rule, ForwardSearch)}
+"""Every solver by its name in the API."""
+
+
+def solver_class(name: str) -> type[Solver]:
+    """Return the solver of that name.
+
+    Raises
+    ------
+    UnknownSolver
+        Where there is none.
+    """
+    if name not in SOLVERS:
+        known = ", ".join(sorted(SOLVERS))
+        raise UnknownSolver(
+            "unknown_solver",
+            f"No solver is called {name!r}; there are: {known}.",
+            pointer="/solver",
+        )
+    return SOLVERS[name]

@@ -1,0 +1,84 @@
+"""How the paper's single-satellite methods plan several: one after another."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner_core.model import Track, compile_track
+from planner_core.plan import Plan
+from planner_core.problem import CONTACT, Bytes, Ints, Problem, SatelliteProblem
+from planner_core.solvers.base import Budget, Progress, Solution, Termination
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Turn:
+    """One satellite's turn: its arrays, and what the satellites before it have taken.
+
+    Attributes
+    ----------
+    collected
+        1 for each target that is taken. Shape ``(num_targets,)``; a turn works on a copy.
+    report
+        Call with the fraction of this turn and the reward it has gathered.
+    """
+
+    track: Track
+    collected: Bytes
+    report: Callable[[float, float], None]
+
+
+PlanTurn = Callable[[Turn], list[int]]
+"""Returns the rows (of the track) that the satellite takes, in order."""
+
+
+def plan_in_turn(problem: Problem, budget: Budget, plan_turn: PlanTurn) -> Solution:
+    """Let each satellite plan over the targets that remain and the antennas still free."""
+    table = problem.opportunities
+    collected = np.zeros(len(problem.target_ids), dtype=np.uint8)
+    taken: list[int] = []
+    for index, satellite in enumerate(problem.satellites):
+        if budget.is_spent():
+            break
+        reward_before = float(problem.target_reward[collected == 1].sum())
+
+        def report(
+            fraction: float, reward: float, index: int = index, so_far: float = reward_before
+        ) -> None:
+            budget.report(
+                Progress(
+                    phase="solve",
+                    fraction=(index + fraction) / len(problem.satellites),
+                    reward=so_far + reward,
+                )
+            )
+
+        blocked = blocked_rows(problem, satellite, taken)
+        track = compile_track(problem, satellite, blocked)
+        rows = plan_turn(Turn(track=track, collected=collected.copy(), report=report))
+        chosen = satellite.rows[np.asarray(rows, dtype=np.int64)]
+        taken.extend(int(row) for row in chosen)
+        images = chosen[table.kind[chosen] != CONTACT]
+        collected[table.place[images]] = 1
+    termination = budget.termination() if budget.is_spent() else Termination.HORIZON_COMPLETE
+    return Solution(plan=Plan.of(problem, taken), termination=termination)
+
+
+def blocked_rows(problem: Problem, satellite: SatelliteProblem, taken: list[int]) -> Bytes:
+    """Return 1 for each contact of ``satellite`` whose station is busy with others' contacts."""
+    blocked = np.zeros(len(satellite), dtype=np.uint8)
+    table = problem.opportunities
+    booked: Ints = np.asarray([i for i in taken if table.kind[i] == CONTACT], dtype=np.int32)
+    if len(booked) == 0:
+        return blocked
+    for row in np.flatnonzero(satellite.kind == CONTACT):
+        overlaps = (
+            (table.place[booked] == satellite.place[row])
+            & (table.start_s[booked] < satellite.end_s[row])
+            & (table.end_s[booked] > satellite.start_s[row])
+        )
+        antennas = problem.station_antennas[satellite.place[row]]
+        blocked[row] = int(overlaps.sum()) >= antennas
+    return blocked

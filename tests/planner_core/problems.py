@@ -1,0 +1,174 @@
+"""Small generated problems: geometry is drawn at random, the rest is the real thing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner_core.domain import Agility, Dynamics, Resources
+from planner_core.problem import (
+    ACCESS_FOUND,
+    COLLECT,
+    CONTACT,
+    NEVER_VISIBLE,
+    Floats,
+    Opportunities,
+    Problem,
+    Sunlight,
+    build_satellite_problem,
+)
+
+TIGHT = Resources(
+    battery_min_fraction=0.3,
+    initial_battery_fraction=0.7,
+    sunpoint_charge_per_s=1 / 2500,
+    collect_drain_per_s=1 / 300,
+    contact_drain_per_s=1 / 1200,
+    recorder_max_fraction=0.5,
+    initial_recorder_fraction=0.1,
+    collect_fill_per_s=1 / 200,
+    downlink_per_s=1 / 250,
+    telemetry_per_s=1e-4,
+)
+"""Resources that bind within a handful of tasks."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """One opportunity of a hand-made problem."""
+
+    kind: int
+    place: int
+    start_s: float
+    end_s: float
+    satellite: int = 0
+    angle_deg: float = 0.0
+    margin_s: float = 0.0
+
+
+def make_problem(
+    tasks: Sequence[Task],
+    *,
+    num_targets: int,
+    num_stations: int = 1,
+    num_satellites: int = 1,
+    horizon_s: float = 1000.0,
+    use_resources: bool = True,
+    dynamics: Dynamics = "physical",
+    resources: Resources = TIGHT,
+    agility: Agility = Agility(),  # noqa: B008 - immutable
+    rewards: Sequence[float] | None = None,
+    sunlight: Sunlight | None = None,
+    antennas: int = 1,
+) -> Problem:
+    """Return a problem whose lines of sight lie in a plane, at the tasks' angles."""
+    ordered = sorted(tasks, key=lambda t: (t.start_s, t.end_s, t.satellite, t.kind, t.place))
+    n = len(ordered)
+
+    def column(values: Sequence[float]) -> Floats:
+        return np.array(values, dtype=np.float64).reshape(n)
+
+    angle = np.radians(column([t.angle_deg for t in ordered]))
+    los = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(n)])
+    start_s, end_s = column([t.start_s for t in ordered]), column([t.end_s for t in ordered])
+    margin = column([t.margin_s for t in ordered])
+    table = Opportunities(
+        satellite=np.array([t.satellite for t in ordered], dtype=np.int32),
+        kind=np.array([t.kind for t in ordered], dtype=np.int8),
+        place=np.array([t.place for t in ordered], dtype=np.int32),
+        access=np.arange(n, dtype=np.int32),
+        start_s=start_s,
+        end_s=end_s,
+        access_start_s=start_s - margin,
+        access_end_s=end_s + margin,
+        los_start=los,
+        los_end=los,
+        off_nadir_deg=np.zeros(n),
+        elevation_deg=np.full(n, 45.0),
+        azimuth_deg=np.zeros(n),
+        range_m=np.full(n, 7e5),
+        sun_elevation_deg=np.zeros(n),
+        in_eclipse=np.zeros(n, dtype=np.bool_),
+    )
+    whole = Sunlight(enter_s=np.array([0.0]), exit_s=np.array([horizon_s]))
+    seen = set(table.place[table.kind == COLLECT].tolist())
+    return Problem(
+        horizon_s=horizon_s,
+        use_resources=use_resources,
+        dynamics=dynamics,
+        continuous_starts=False,
+        target_ids=tuple(f"t{i}" for i in range(num_targets)),
+        target_reward=np.array(rewards if rewards is not None else [1.0] * num_targets),
+        target_access=np.array(
+            [ACCESS_FOUND if i in seen else NEVER_VISIBLE for i in range(num_targets)],
+            dtype=np.int8,
+        ),
+        station_ids=tuple(f"g{i}" for i in range(num_stations)),
+        station_antennas=np.full(num_stations, antennas, dtype=np.int32),
+        opportunities=table,
+        satellites=tuple(
+            build_satellite_problem(
+                index,
+                table,
+                id=f"s{index}",
+                name=f"SAT {index}",
+                agility=agility,
+                resources=resources,
+                sunlight=sunlight or whole,
+            )
+            for index in range(num_satellites)
+        ),
+    )
+
+
+def random_problem(
+    seed: int,
+    *,
+    num_targets: int = 5,
+    num_collects: int = 8,
+    num_contacts: int = 2,
+    num_satellites: int = 1,
+    use_resources: bool = True,
+    dynamics: Dynamics = "physical",
+    has_rewards: bool = False,
+    resources: Resources = TIGHT,
+) -> Problem:
+    """Return a small crowded problem drawn from ``seed``."""
+    rng = np.random.default_rng(seed)
+    tasks = []
+    for _ in range(num_collects):
+        start_s = round(float(rng.uniform(0, 940)), 3)
+        tasks.append(
+            Task(
+                kind=COLLECT,
+                place=int(rng.integers(num_targets)),
+                satellite=int(rng.integers(num_satellites)),
+                start_s=start_s,
+                end_s=start_s + 30.0,
+                angle_deg=float(rng.uniform(-55, 55)),
+            )
+        )
+    for _ in range(num_contacts if use_resources else 0):
+        start_s = round(float(rng.uniform(0, 850)), 3)
+        tasks.append(
+            Task(
+                kind=CONTACT,
+                place=0,
+                satellite=int(rng.integers(num_satellites)),
+                start_s=start_s,
+                end_s=start_s + round(float(rng.uniform(40, 140)), 3),
+                angle_deg=float(rng.uniform(-60, 60)),
+            )
+        )
+    rewards = [float(r) for r in rng.integers(1, 9, num_targets)] if has_rewards else None
+    return make_problem(
+        tasks,
+        num_targets=num_targets,
+        num_satellites=num_satellites,
+        use_resources=use_resources,
+        dynamics=dynamics,
+        rewards=rewards,
+        resources=resources,
+    )

@@ -1,0 +1,189 @@
+"""Every solver, over generated problems: valid, deterministic, never above brute force."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from planner_core.domain import Dynamics
+from planner_core.model import NO_TASK, WAIT, Model, compile_track, take
+from planner_core.plan import Plan
+from planner_core.problem import Problem
+from planner_core.solvers import SOLVERS, ForwardSearch, Rule
+from planner_core.solvers.base import Budget, Solver, Termination
+from planner_core.solvers.forward_search import NOTHING, select_action
+from planner_core.timeline import plan_sha256, replay
+from tests.planner_core.brute_force import best_reward
+from tests.planner_core.problems import TIGHT, random_problem
+
+SEEDS = st.integers(0, 10**6)
+DYNAMICS = st.sampled_from(["physical", "paper"])
+VARIANTS: list[Solver] = [
+    *(cls() for cls in SOLVERS.values()),
+    ForwardSearch(unimaged_only=False),
+    ForwardSearch(depth=5, breadth=2, gamma=0.999),
+    Rule(contact_above_fraction=0.3),
+    Rule(unimaged_only=False),
+]
+
+
+def problems(seed: int, dynamics: Dynamics, use_resources: bool, **more: Any) -> Problem:
+    return random_problem(seed, dynamics=dynamics, use_resources=use_resources, **more)
+
+
+@pytest.mark.parametrize("solver", VARIANTS, ids=repr)
+@settings(max_examples=60, deadline=None)
+@given(seed=SEEDS, dynamics=DYNAMICS, use_resources=st.booleans(), num_satellites=st.integers(1, 3))
+def test_plans_are_valid_and_the_same_every_time(
+    solver: Solver, seed: int, dynamics: Dynamics, use_resources: bool, num_satellites: int
+) -> None:
+    problem = problems(
+        seed, dynamics, use_resources, num_satellites=num_satellites,
+        num_collects=25, num_targets=12, num_contacts=8,
+    )  # fmt: skip
+    solution = solver.solve(problem, Budget(), seed=0)
+    timeline = replay(problem, solution.plan)
+    assert timeline.is_valid, timeline.violations
+    assert solution.termination is Termination.HORIZON_COMPLETE
+    again = solver.solve(problem, Budget(), seed=0)
+    assert plan_sha256(problem, again.plan) == plan_sha256(problem, solution.plan)
+
+
+@settings(max_examples=60, deadline=None)
+@given(seed=SEEDS, dynamics=DYNAMICS, telemetry_per_s=st.sampled_from([2e-4, 4e-4, 8e-4]))
+def test_hard_plans_look_ahead_so_that_telemetry_never_fills_the_recorder(
+    seed: int, dynamics: Dynamics, telemetry_per_s: float
+) -> None:
+    """Where the contacts alone can keep the limits, every solver's plan keeps them."""
+    resources = replace(TIGHT, telemetry_per_s=telemetry_per_s)
+    problem = problems(
+        seed, dynamics, True, num_collects=25, num_targets=20, num_contacts=8, resources=resources
+    )
+    contacts_only = Rule(unimaged_only=True)
+    no_images = replace(problem, target_reward=problem.target_reward * 0)
+    for satellite in no_images.satellites:
+        track = compile_track(no_images, satellite, (satellite.kind == 0).astype("uint8"))
+        if not track.is_guarded:
+            return
+    for solver in (contacts_only, Rule(contact_above_fraction=0.4), ForwardSearch()):
+        assert replay(problem, solver.solve(problem, Budget(), 0).plan).is_valid
+
+
+@settings(max_examples=40, deadline=None)
+@given(seed=SEEDS, dynamics=DYNAMICS, use_resources=st.booleans(), has_rewards=st.booleans())
+def test_nobody_exceeds_brute_force(
+    seed: int, dynamics: Dynamics, use_resources: bool, has_rewards: bool
+) -> None:
+    problem = problems(seed, dynamics, use_resources, has_rewards=has_rewards, num_satellites=2)
+    best = best_reward(problem)
+    for solver in VARIANTS:
+        plan = solver.solve(problem, Budget(), 0).plan
+        assert replay(problem, plan).reward <= best + 1e-9
+
+
+@settings(max_examples=40, deadline=None)
+@given(seed=SEEDS, dynamics=DYNAMICS, use_resources=st.booleans(), has_rewards=st.booleans())
+def test_forward_search_at_full_depth_and_breadth_equals_brute_force(
+    seed: int, dynamics: Dynamics, use_resources: bool, has_rewards: bool
+) -> None:
+    problem = problems(seed, dynamics, use_resources, has_rewards=has_rewards, num_collects=6)
+    n = len(problem.opportunities)
+    solver = ForwardSearch(
+        depth=n, breadth=n, gamma=1.0, contact_reward_per_s=0.0, sunpoint_reward_per_s=0.0
+    )
+    timeline = replay(problem, solver.solve(problem, Budget(), 0).plan)
+    assert timeline.reward == pytest.approx(best_reward(problem))
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    seed=SEEDS,
+    dynamics=DYNAMICS,
+    use_resources=st.booleans(),
+    feasibility=st.sampled_from(["hard", "penalty"]),
+    unimaged_only=st.booleans(),
+    depth=st.integers(1, 4),
+    breadth=st.integers(1, 3),
+)
+def test_the_compiled_forward_search_plans_what_the_listing_plans(
+    seed: int,
+    dynamics: Dynamics,
+    use_resources: bool,
+    feasibility: Any,
+    unimaged_only: bool,
+    depth: int,
+    breadth: int,
+) -> None:
+    problem = problems(seed, dynamics, use_resources, num_collects=14, num_contacts=4)
+    solver = ForwardSearch(
+        depth=depth, breadth=breadth, feasibility=feasibility, unimaged_only=unimaged_only
+    )
+    satellite = problem.satellites[0]
+    model = Model(
+        track=compile_track(problem, satellite, (satellite.rows * 0).astype("uint8")),
+        target_reward=problem.target_reward,
+        guidance=solver.guidance,
+        is_hard=feasibility == "hard",
+        unimaged_only=unimaged_only,
+    )
+    state = model.initial_state()
+    rows = []
+    while (action := select_action(model, state, depth, breadth)[0]) != NOTHING:
+        state = model.step(state, action, model.actions(state, breadth)[0]).state
+        if action != WAIT:
+            rows.append(int(satellite.rows[action]))
+    expected = Plan.of(problem, rows)
+    assert solver.solve(problem, Budget(), 0).plan == expected
+
+
+@settings(max_examples=80, deadline=None)
+@given(seed=SEEDS, dynamics=DYNAMICS)
+def test_a_step_of_the_model_agrees_with_the_referees_integral(
+    seed: int, dynamics: Dynamics
+) -> None:
+    problem = problems(seed, dynamics, True, num_collects=20, num_targets=20, num_contacts=6)
+    plan = Rule().solve(problem, Budget(), 0).plan
+    satellite = problem.satellites[0]
+    track = compile_track(problem, satellite, (satellite.rows * 0).astype("uint8"))
+    judged = [a for a in replay(problem, plan).satellites[0].actions if a.mode != "sunpoint"]
+    last, battery, recorder = NO_TASK, track.battery_start, track.recorder_start
+    for action, expected in zip(plan.actions, judged, strict=True):
+        row = int(problem.local_row[action.opportunity])
+        battery, recorder, is_within = take(track, last, row, battery, recorder)
+        last = row
+        assert is_within
+        assert battery == pytest.approx(expected.battery_end, abs=1e-9)
+        assert recorder == pytest.approx(expected.recorder_end, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", sorted(SOLVERS))
+def test_a_cancelled_budget_answers_at_once_with_a_plan(name: str) -> None:
+    problem = random_problem(1, num_collects=25, num_targets=20)
+    budget = Budget()
+    budget.cancel()
+    solution = SOLVERS[name]().solve(problem, budget, 0)
+    assert solution.termination is Termination.CANCELLED
+    assert replay(problem, solution.plan).is_valid
+
+
+@pytest.mark.parametrize("name", sorted(SOLVERS))
+def test_an_empty_problem_has_an_empty_plan(name: str) -> None:
+    problem = random_problem(1, num_collects=0, num_contacts=0)
+    solution = SOLVERS[name]().solve(problem, Budget(), 0)
+    assert solution.plan == Plan()
+    assert replay(problem, solution.plan).is_valid
+
+
+def test_penalty_plans_may_break_limits_and_the_referee_says_so() -> None:
+    broken = 0
+    for seed in range(20):
+        problem = random_problem(seed, num_collects=25, num_targets=25, num_contacts=0)
+        solver = ForwardSearch(feasibility="penalty", penalty=0.0)
+        timeline = replay(problem, solver.solve(problem, Budget(), 0).plan)
+        broken += not timeline.is_valid
+        assert timeline.reward <= len(timeline.collected)
+    assert broken > 0
