@@ -1,0 +1,64 @@
+# Slewline: one command for everything. `make demo` and `make test` do their own set-up.
+
+PYTHON ?= python3
+UV ?= uv
+BIN := .venv/bin
+STAMP := .venv/.installed
+PIP := $(BIN)/python -m pip -qq --disable-pip-version-check
+
+.PHONY: help setup demo serve test check format lock clean
+
+help:
+	@echo "make demo     plan a real-size mission through the service's own API, and end"
+	@echo "make serve    the same, and keep serving"
+	@echo "make test     every check and every test"
+	@echo "make check    lint, format, types, import contracts, examples in docstrings"
+	@echo "make setup    the environment in .venv (the others call it)"
+	@echo "make format   rewrite the sources in the one layout"
+	@echo "make lock     resolve the dependencies again into requirements.lock (needs uv)"
+	@echo "make clean    remove all that these commands made"
+
+setup: $(STAMP)
+	@:
+
+# Everything pip fetches is checked against a hash; the build of the project itself fetches nothing.
+$(STAMP): pyproject.toml requirements.lock
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+		echo "Slewline needs Python 3.11 or later, and '$(PYTHON)' is not. Try: make PYTHON=python3.12" >&2; \
+		exit 1; }
+	@echo "Setting up .venv (once; about a minute) ..."
+	@$(PYTHON) -m venv .venv
+	@$(PIP) install --require-hashes -r requirements.lock
+	@$(PIP) install --no-deps --no-build-isolation --editable .
+	@echo "Compiling the planning kernels (once) ..."
+	@$(BIN)/python -m service.jobs.warm
+	@touch $@
+
+demo: setup
+	@$(BIN)/slewline demo
+
+serve: setup
+	@$(BIN)/slewline demo --serve
+
+test: check
+	$(BIN)/python -m pytest
+
+check: setup
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	$(BIN)/python -m pytest --quiet --doctest-modules planner_core service
+
+format: setup
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+lock:
+	$(UV) pip compile pyproject.toml --extra dev --universal --python-version 3.11 \
+		--generate-hashes --no-emit-index-url -o requirements.lock
+
+clean:
+	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf build demo-output *.egg-info
+	find planner_core service tests migrations benchmarks -name __pycache__ -prune -exec rm -rf {} +

@@ -1,0 +1,15 @@
+"""How Alembic reaches the database: on the connection and in the transaction of the caller."""
+
+from __future__ import annotations
+
+from alembic import context
+
+from service.db.rows import Row
+
+context.configure(
+    connection=context.config.attributes["connection"],
+    target_metadata=Row.metadata,
+    render_as_batch=True,
+)
+with context.begin_transaction():
+    context.run_migrations()

@@ -1,0 +1,1 @@
+"""One file per step; each is applied once, in order."""

@@ -1,0 +1,239 @@
+"""From exception to answer: every error leaves the server as an RFC 9457 problem document."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterable, Mapping, Sequence
+from http import HTTPStatus
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse
+from pydantic import BaseModel, Field, ValidationError
+from starlette.exceptions import HTTPException
+
+from planner_core.errors import Fault, PlannerError
+from service.api.problems import ServiceError, kind_of
+
+PROBLEM_JSON = "application/problem+json"
+MAX_FAULTS = 100
+
+logger = logging.getLogger(__name__)
+
+
+class FaultOut(BaseModel):
+    """One thing that is wrong, and where."""
+
+    pointer: str | None = Field(description="JSON pointer into the body, where it was JSON.")
+    code: str
+    row: int | None = Field(description="Line of the file, from 1; a header is line 1.")
+    detail: str
+
+
+class ProblemOut(BaseModel):
+    """A problem document (RFC 9457)."""
+
+    type: str = Field(description="Address of the explanation of this code.")
+    title: str
+    status: int
+    code: str = Field(description="Stable name of the problem. More codes may be added.")
+    detail: str
+    instance: str = Field(description="Path of the request.")
+    request_id: str
+    errors: list[FaultOut] = Field(description="At most 100; the detail says how many more.")
+
+
+def install_error_handlers(app: FastAPI) -> None:
+    """Route every exception, the framework's own included, to a problem document."""
+    app.add_exception_handler(ServiceError, _on_service_error)
+    app.add_exception_handler(PlannerError, _on_planner_error)
+    app.add_exception_handler(RequestValidationError, _on_validation_error)
+    app.add_exception_handler(HTTPException, _on_http_exception)
+    app.add_exception_handler(Exception, _on_bug)
+
+
+def problem_responses(*statuses: int) -> dict[int | str, dict[str, Any]]:
+    """Return the OpenAPI entries of these error statuses, for ``responses=``."""
+    schema = {"$ref": "#/components/schemas/Problem"}
+    return {
+        status: {
+            "description": HTTPStatus(status).phrase,
+            "content": {PROBLEM_JSON: {"schema": schema}},
+        }
+        for status in statuses
+    }
+
+
+def problem(
+    request: Request,
+    code: str,
+    detail: str,
+    *,
+    faults: Sequence[Fault] = (),
+    headers: Mapping[str, str] | None = None,
+    status: int | None = None,
+) -> JSONResponse:
+    """Return the response for one problem."""
+    kind = kind_of(code)
+    number = status or kind.status
+    if len(faults) > MAX_FAULTS:
+        detail = f"{detail} ({len(faults) - MAX_FAULTS} more errors are not listed.)"
+    body = ProblemOut(
+        type=f"/problems/{code.replace('_', '-')}",
+        title=kind.title,
+        status=number,
+        code=code,
+        detail=detail,
+        instance=request.url.path,
+        request_id=request.state.request_id,
+        errors=[
+            FaultOut(pointer=f.pointer, code=f.code, row=f.row, detail=f.detail)
+            for f in faults[:MAX_FAULTS]
+        ],
+    )
+    return JSONResponse(
+        body.model_dump(), status_code=number, headers=dict(headers or {}), media_type=PROBLEM_JSON
+    )
+
+
+def refuse(faults: Sequence[Fault], *, code: str | None = None) -> ServiceError:
+    """Return the error for a body with these faults; its code is theirs where they agree."""
+    codes = {fault.code for fault in faults}
+    common = codes.pop() if len(codes) == 1 else "invalid_request"
+    first = faults[0]
+    where = f"line {first.row}: " if first.row else f"{first.pointer}: " if first.pointer else ""
+    detail = f"{where}{first.detail}"
+    if len(faults) > 1:
+        detail = f"{len(faults)} errors; the first: {detail}"
+    return ServiceError(code or common, detail, faults=tuple(faults))
+
+
+def faults_of(errors: Iterable[Any], body: object) -> list[Fault]:
+    """Return what pydantic found, with JSON pointers into ``body``."""
+    return [
+        Fault(code=_code(e["type"]), detail=_sentence(e), pointer=_pointer(e["loc"], body))
+        for e in errors
+    ]
+
+
+def faults_of_validation(error: ValidationError, body: object) -> list[Fault]:
+    """Return the faults of a document that was validated outside FastAPI."""
+    return [
+        Fault(
+            code=_code(e["type"]), detail=_sentence(e), pointer=_pointer(("body", *e["loc"]), body)
+        )
+        for e in error.errors(include_url=False)
+    ]
+
+
+_CODES = {
+    "missing": "missing_field",
+    "extra_forbidden": "unknown_field",
+    "json_invalid": "malformed_json",
+    "literal_error": "unknown_value",
+    "enum": "unknown_value",
+    "finite_number": "not_finite",
+    "greater_than": "value_out_of_range",
+    "greater_than_equal": "value_out_of_range",
+    "less_than": "value_out_of_range",
+    "less_than_equal": "value_out_of_range",
+    "too_short": "value_out_of_range",
+    "too_long": "value_out_of_range",
+    "string_too_short": "value_out_of_range",
+    "string_too_long": "value_out_of_range",
+    "naive_time": "naive_time",
+    "invalid_time": "invalid_time",
+}
+
+
+def _code(pydantic_type: str) -> str:
+    return _CODES.get(pydantic_type, "invalid_value")
+
+
+def _sentence(error: Mapping[str, Any]) -> str:
+    message = str(error["msg"])
+    place, name = error["loc"][0], error["loc"][-1]
+    if error["type"] == "json_invalid":
+        return f"{error['ctx']['error']} at character {name}."
+    if place in ("query", "header", "path"):
+        return f"{place} parameter {name}: {message}."
+    if error["type"] == "extra_forbidden":
+        return f"There is no field {name!r}."
+    return message if message.endswith(".") else f"{message}."
+
+
+def _pointer(loc: Sequence[str | int], body: object) -> str | None:
+    # A pydantic location also names the branches of unions, which are no places in the
+    # document: only the parts that lead somewhere in the body are kept, and the last one,
+    # which may be a field that is missing.
+    if loc[0] != "body":
+        return None
+    parts: list[str] = []
+    here: object = body
+    for number, part in enumerate(loc[1:], start=2):
+        if isinstance(here, dict) and (part in here or number == len(loc)):
+            here = here.get(part)
+        elif isinstance(here, list) and isinstance(part, int) and part < len(here):
+            here = here[part]
+        else:
+            continue
+        parts.append(str(part).replace("~", "~0").replace("/", "~1"))
+    return "".join("/" + part for part in parts)
+
+
+def _on_service_error(request: Request, error: Exception) -> JSONResponse:
+    assert isinstance(error, ServiceError)
+    return problem(request, error.code, error.detail, faults=error.faults, headers=error.headers)
+
+
+def _on_planner_error(request: Request, error: Exception) -> JSONResponse:
+    assert isinstance(error, PlannerError)
+    return problem(request, error.code, error.detail, faults=(error.fault,))
+
+
+def _on_validation_error(request: Request, error: Exception) -> JSONResponse:
+    assert isinstance(error, RequestValidationError)
+    return _on_service_error(request, refuse(faults_of(error.errors(), error.body)))
+
+
+_HTTP_CODES = {
+    400: "malformed_json",  # FastAPI's word for a body it could not parse at all
+    404: "not_found",
+    405: "method_not_allowed",
+    406: "not_acceptable",
+    413: "body_too_large",
+    415: "unsupported_media_type",
+}
+
+
+def _on_http_exception(request: Request, error: Exception) -> JSONResponse:
+    assert isinstance(error, HTTPException)
+    code = _HTTP_CODES.get(error.status_code)
+    if code is None:
+        code = "_".join(HTTPStatus(error.status_code).phrase.lower().split())
+        return problem(request, code, error.detail, headers=error.headers, status=error.status_code)
+    return problem(request, code, _http_detail(request, error), headers=error.headers)
+
+
+def _http_detail(request: Request, error: HTTPException) -> str:
+    match error.status_code:
+        case 400:
+            return "The body cannot be read as JSON."
+        case 404:
+            return f"There is nothing at {request.url.path}."
+        case 405:
+            return f"{request.method} is not possible at {request.url.path}."
+    return error.detail
+
+
+def _on_bug(request: Request, error: Exception) -> JSONResponse:
+    # The server re-raises the exception after this answer and logs its traceback, but
+    # without the request; this line is the one that can be searched for by request_id.
+    logger.error("unhandled exception", exc_info=error)
+    return problem(
+        request,
+        "internal_error",
+        f"The service failed; its log has request {request.state.request_id}.",
+        headers={"X-Request-ID": request.state.request_id},
+    )

@@ -1,0 +1,95 @@
+"""Health, version, and what each problem code means."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime, timedelta
+
+import sqlalchemy as sa
+from fastapi import APIRouter
+from pydantic import BaseModel, Field
+
+import planner_core
+from service.api.deps import DatabaseDep
+from service.api.errors import problem_responses
+from service.api.problems import KINDS, ServiceError, kind_of
+from service.api.shapes import Instant
+from service.db.rows import WorkerRow
+from service.db.session import Database
+
+router = APIRouter(tags=["operations"])
+
+WORKER_SILENCE = timedelta(seconds=30)
+
+
+class Live(BaseModel):
+    """The process answers."""
+
+    status: str = "live"
+
+
+class Ready(BaseModel):
+    """Jobs can be taken and run."""
+
+    status: str = "ready"
+    database: str = "ok"
+    workers: int = Field(description="Workers heard of in the last 30 seconds.")
+    last_heartbeat: Instant
+
+
+class Version(BaseModel):
+    """What runs here."""
+
+    name: str = "slewline"
+    version: str
+
+
+class ProblemExplained(BaseModel):
+    """What a problem code means, and what to do about it."""
+
+    code: str
+    title: str
+    status: int
+    explanation: str
+
+
+@router.get("/health/live")
+def live() -> Live:
+    """Say that the process answers; nothing else is asked."""
+    return Live()
+
+
+@router.get("/health/ready", responses=problem_responses(503))
+def ready(database: DatabaseDep) -> Ready:
+    """Say whether the database answers and a worker has been heard of in the last 30 seconds."""
+    workers = _recent_workers(database)
+    if not workers:
+        raise ServiceError("not_live", "No worker has been heard of in the last 30 seconds.")
+    return Ready(workers=len(workers), last_heartbeat=max(workers))
+
+
+def _recent_workers(database: Database) -> list[datetime]:
+    oldest = datetime.now(UTC) - WORKER_SILENCE
+    try:
+        with database.reading() as session:
+            recent = sa.select(WorkerRow.seen_at).where(WorkerRow.seen_at >= oldest)
+            return list(session.scalars(recent))
+    except sa.exc.OperationalError as error:
+        raise ServiceError("not_live", "The database does not answer.") from error
+
+
+@router.get("/version")
+def version() -> Version:
+    """Return the version of the service."""
+    return Version(version=planner_core.__version__)
+
+
+@router.get("/problems/{code}", responses=problem_responses(404))
+def explain(code: str) -> ProblemExplained:
+    """Explain a problem code, written with hyphens or underscores."""
+    name = code.replace("-", "_")
+    if name not in KINDS:
+        raise ServiceError("not_found", f"There is no problem code {code!r}.")
+    kind = kind_of(name)
+    return ProblemExplained(
+        code=name, title=kind.title, status=kind.status, explanation=kind.explanation
+    )

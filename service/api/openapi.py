@@ -1,0 +1,163 @@
+"""The OpenAPI document, and the page that shows it without the internet."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import Any
+
+from fastapi import APIRouter, FastAPI, Request
+from fastapi.openapi.utils import get_openapi
+from fastapi.responses import HTMLResponse
+
+from service.api.errors import ProblemOut, problem_responses
+
+router = APIRouter(include_in_schema=False)
+
+_ALWAYS = (422, 500)
+_WITH_BODY = (413, 415)
+_HEADERS = {
+    "X-Request-ID": {
+        "description": "Names this request in the logs and in problem documents.",
+        "schema": {"type": "string"},
+    }
+}
+
+
+def install_openapi(app: FastAPI) -> None:
+    """Make ``app.openapi()`` return the document with every error response declared."""
+
+    def document() -> dict[str, Any]:
+        if app.openapi_schema is None:
+            app.openapi_schema = _with_problems(
+                get_openapi(
+                    title=app.title,
+                    version=app.version,
+                    description=app.description,
+                    routes=app.routes,
+                )
+            )
+        return app.openapi_schema
+
+    app.openapi = document  # type: ignore[method-assign]
+
+
+def _with_problems(document: dict[str, Any]) -> dict[str, Any]:
+    schemas = document.setdefault("components", {}).setdefault("schemas", {})
+    for name in ("HTTPValidationError", "ValidationError"):
+        schemas.pop(name, None)
+    problem_schema = ProblemOut.model_json_schema(ref_template="#/components/schemas/{model}")
+    schemas |= problem_schema.pop("$defs")
+    schemas["Problem"] = problem_schema | {"title": "Problem"}
+    for operations in document["paths"].values():
+        for operation in operations.values():
+            statuses = _ALWAYS + (_WITH_BODY if "requestBody" in operation else ())
+            for status, response in problem_responses(*statuses).items():
+                operation["responses"][str(status)] = response
+            for response in operation["responses"].values():
+                response["headers"] = _HEADERS | response.get("headers", {})
+    return document
+
+
+@router.get("/docs", response_class=HTMLResponse)
+def docs(request: Request) -> str:
+    """Return the list of all calls as one page of plain HTML."""
+    document = request.app.openapi()
+    parts = [
+        _operation(method, path, operation)
+        for path, operations in document["paths"].items()
+        for method, operation in operations.items()
+    ]
+    models = [
+        f"<details id='{escape(name)}'><summary><code>{escape(name)}</code></summary>"
+        f"{_fields(schema)}</details>"
+        for name, schema in sorted(document["components"]["schemas"].items())
+    ]
+    return _PAGE.format(
+        title=escape(document["info"]["title"]),
+        version=escape(document["info"]["version"]),
+        description=escape(document["info"]["description"]),
+        operations="\n".join(parts),
+        models="\n".join(models),
+    )
+
+
+def _operation(method: str, path: str, operation: dict[str, Any]) -> str:
+    parameters = "".join(
+        f"<tr><td><code>{escape(p['name'])}</code></td><td>{p['in']}</td>"
+        f"<td>{_type(p.get('schema', {}))}</td><td>{escape(p.get('description', ''))}</td></tr>"
+        for p in operation.get("parameters", [])
+    )
+    body = "".join(
+        f"<li><code>{escape(kind)}</code> {_type(content.get('schema', {}))}</li>"
+        for kind, content in operation.get("requestBody", {}).get("content", {}).items()
+    )
+    answers = "".join(
+        f"<li><code>{status}</code> {escape(response['description'])}"
+        + "".join(
+            f" {_type(content.get('schema', {}))}"
+            for content in response.get("content", {}).values()
+        )
+        + "</li>"
+        for status, response in sorted(operation["responses"].items())
+    )
+    return (
+        f"<details><summary><b>{method.upper()}</b> <code>{escape(path)}</code> "
+        f"{escape(operation.get('summary', ''))}</summary>"
+        f"<p>{escape(operation.get('description', ''))}</p>"
+        + (f"<table>{parameters}</table>" if parameters else "")
+        + (f"<p>Body</p><ul>{body}</ul>" if body else "")
+        + f"<p>Answers</p><ul>{answers}</ul></details>"
+    )
+
+
+def _fields(schema: dict[str, Any]) -> str:
+    required = set(schema.get("required", []))
+    rows = "".join(
+        f"<tr><td><code>{escape(name)}</code></td><td>{_type(field)}</td>"
+        f"<td>{'required' if name in required else _default(field)}</td>"
+        f"<td>{escape(field.get('description', ''))}</td></tr>"
+        for name, field in schema.get("properties", {}).items()
+    )
+    return f"<p>{escape(schema.get('description', ''))}</p><table>{rows}</table>"
+
+
+def _default(field: dict[str, Any]) -> str:
+    return f"default <code>{escape(str(field['default']))}</code>" if "default" in field else ""
+
+
+def _type(schema: dict[str, Any]) -> str:
+    if "$ref" in schema:
+        name = escape(schema["$ref"].rpartition("/")[2])
+        return f"<a href='#{name}'>{name}</a>"
+    for key in ("anyOf", "oneOf"):
+        if key in schema:
+            return " or ".join(_type(option) for option in schema[key])
+    if schema.get("type") == "array":
+        return f"list of {_type(schema.get('items', {}))}"
+    if "enum" in schema or "const" in schema:
+        return " or ".join(escape(repr(v)) for v in schema.get("enum", [schema.get("const")]))
+    return escape(str(schema.get("format") or schema.get("type", "any")))
+
+
+_PAGE = """<!doctype html>
+<html lang="en"><head><meta charset="utf-8"><title>{title} {version}: the HTTP API</title>
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<style>
+body {{ font: 16px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto;
+  padding: 0 1rem; }}
+summary {{ cursor: pointer; padding: .3rem 0; }}
+details {{ border-bottom: 1px solid #8884; }}
+td {{ padding: .1rem 1rem .1rem 0; vertical-align: top; }}
+</style></head><body>
+<h1>{title} {version}</h1><p>{description}</p>
+<p>The same as a machine reads it: <a href="/openapi.json">/openapi.json</a> (OpenAPI 3.1).</p>
+<h2>Calls</h2>
+{operations}
+<h2>Shapes</h2>
+{models}
+<script>
+const show = () => {{ const d = document.getElementById(location.hash.slice(1));
+  if (d) d.open = true; }};
+addEventListener("hashchange", show); show();
+</script>
+</body></html>"""

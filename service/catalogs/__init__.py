@@ -1,0 +1,1 @@
+"""Target catalogues that ship with the package."""

@@ -1,0 +1,67 @@
+"""The HTTP application, put together."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import TYPE_CHECKING
+
+from fastapi import Depends, FastAPI
+
+import planner_core
+from service.api import meta, openapi
+from service.api.deps import check_request
+from service.api.errors import install_error_handlers
+from service.api.middleware import BodyLimit, RequestContext
+from service.db.session import Database
+from service.settings import Settings
+
+if TYPE_CHECKING:
+    from service.jobs.queue import JobQueue
+
+DESCRIPTION = (
+    "Operations planning for agile Earth-observation satellites, with a referee for every "
+    "timeline. Instants are RFC 3339 in UTC; units end the names; unknown fields are refused; "
+    "errors are problem documents (RFC 9457)."
+)
+
+ROUTERS = (meta.router, openapi.router)
+
+
+def create_app(settings: Settings, queue: JobQueue | None = None) -> FastAPI:
+    """Return the application. The database must have been migrated.
+
+    Parameters
+    ----------
+    settings
+        The configuration of this process.
+    queue
+        Where jobs are sent; without one the service takes none.
+    """
+    app = FastAPI(
+        title="Slewline",
+        version=planner_core.__version__,
+        description=DESCRIPTION,
+        docs_url=None,  # FastAPI's own pages load scripts from the internet
+        redoc_url=None,
+        lifespan=_close_database,
+        dependencies=[Depends(check_request)],
+        redirect_slashes=False,
+    )
+    app.state.settings = settings
+    app.state.database = Database(settings.database_url)
+    app.state.queue = queue
+    for router in ROUTERS:
+        app.include_router(router)
+    install_error_handlers(app)
+    openapi.install_openapi(app)
+    # The last one added is the outermost.
+    app.add_middleware(BodyLimit, max_bytes=int(settings.max_body_mb * 1_000_000))
+    app.add_middleware(RequestContext)
+    return app
+
+
+@asynccontextmanager
+async def _close_database(app: FastAPI) -> AsyncIterator[None]:
+    yield
+    app.state.database.close()

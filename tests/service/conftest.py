@@ -1,0 +1,70 @@
+"""The real service on a free port, with a database of its own."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import httpx
+import pytest
+import uvicorn
+from fastapi import FastAPI
+
+from service.db.migrate import upgrade
+from service.db.session import Database
+from service.main import create_app
+from service.settings import Settings
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Service:
+    """A running service and how to reach it."""
+
+    app: FastAPI
+    client: httpx.Client
+    database: Database
+    settings: Settings
+
+
+@contextmanager
+def serve(app: FastAPI) -> Iterator[str]:
+    """Run an application in a thread; yield its address."""
+    server = uvicorn.Server(uvicorn.Config(app, port=0, log_level="critical"))
+    thread = threading.Thread(target=server.run)
+    thread.start()
+    while not server.started:
+        assert thread.is_alive(), "the server did not start"
+        time.sleep(0.005)
+    port = server.servers[0].sockets[0].getsockname()[1]
+    try:
+        yield f"http://127.0.0.1:{port}"
+    finally:
+        server.should_exit = True
+        thread.join()
+
+
+@pytest.fixture
+def settings(tmp_path: Path) -> Settings:
+    """Settings of a service with a database in a temporary folder."""
+    return Settings(database_url=f"sqlite:///{tmp_path / 'service.db'}", max_body_mb=4.0)
+
+
+@pytest.fixture
+def service(settings: Settings) -> Iterator[Service]:
+    """A service with an empty database."""
+    upgrade(settings.database_url)
+    app = create_app(settings)
+    with serve(app) as address, httpx.Client(base_url=address, timeout=60) as client:
+        yield Service(
+            app=app, client=client, database=app.state.database, settings=app.state.settings
+        )
+
+
+@pytest.fixture
+def client(service: Service) -> httpx.Client:
+    """An HTTP client of an empty service."""
+    return service.client

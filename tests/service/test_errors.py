@@ -1,0 +1,122 @@
+"""Every error, the framework's own included, is a problem document."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import httpx
+import pytest
+
+from planner_core.errors import InvalidElements
+from service.db.migrate import upgrade
+from service.main import create_app
+from service.settings import Settings
+from tests.service.conftest import Service, serve
+
+KEYS = {"type", "title", "status", "code", "detail", "instance", "request_id", "errors"}
+
+
+def assert_problem(response: httpx.Response, status: int, code: str) -> dict[str, object]:
+    assert response.status_code == status, response.text
+    assert response.headers["content-type"] == "application/problem+json"
+    body: dict[str, object] = response.json()
+    assert set(body) == KEYS
+    assert body["status"] == status
+    assert body["code"] == code
+    assert body["type"] == "/problems/" + code.replace("_", "-")
+    assert body["instance"] == response.request.url.path
+    assert body["request_id"] == response.headers["x-request-id"]
+    return body
+
+
+def test_an_unknown_path_is_404(client: httpx.Client) -> None:
+    assert_problem(client.get("/nowhere"), 404, "not_found")
+
+
+def test_a_wrong_method_is_405_and_names_the_right_ones(client: httpx.Client) -> None:
+    response = client.delete("/version")
+    assert_problem(response, 405, "method_not_allowed")
+    assert response.headers["allow"] == "GET"
+
+
+def test_a_mistyped_query_parameter_is_refused_rather_than_ignored(client: httpx.Client) -> None:
+    body = assert_problem(client.get("/version?vorsion=1"), 422, "unknown_parameter")
+    assert "vorsion" in str(body["detail"])
+
+
+@pytest.fixture
+def broken(settings: Settings) -> Iterator[httpx.Client]:
+    """The real application with two routes that fail."""
+    upgrade(settings.database_url)
+    app = create_app(settings)
+
+    @app.get("/bug")
+    def bug() -> None:
+        raise RuntimeError("a secret of the server")
+
+    @app.get("/data")
+    def data() -> None:
+        raise InvalidElements("tle_checksum", "Line 2: expected 7, got 3", pointer="/tle/1")
+
+    with serve(app) as address, httpx.Client(base_url=address) as client:
+        yield client
+
+
+def test_a_bug_is_500_and_tells_nothing_but_its_request_id(broken: httpx.Client) -> None:
+    response = broken.get("/bug")
+    body = assert_problem(response, 500, "internal_error")
+    assert str(body["request_id"]) in str(body["detail"])
+    assert "secret" not in response.text
+    assert "Traceback" not in response.text
+
+
+def test_an_error_of_the_planner_is_422_with_its_pointer(broken: httpx.Client) -> None:
+    body = assert_problem(broken.get("/data"), 422, "tle_checksum")
+    assert body["errors"] == [
+        {
+            "pointer": "/tle/1",
+            "code": "tle_checksum",
+            "row": None,
+            "detail": "Line 2: expected 7, got 3",
+        }
+    ]
+
+
+def test_the_callers_request_id_is_kept_only_where_it_is_harmless(client: httpx.Client) -> None:
+    kept = client.get("/version", headers={"X-Request-ID": "abc-1"})
+    assert kept.headers["x-request-id"] == "abc-1"
+    replaced = client.get("/version", headers={"X-Request-ID": 'a"b<c>'})
+    assert len(replaced.headers["x-request-id"]) == 36
+
+
+def test_each_code_is_explained_under_its_type(client: httpx.Client) -> None:
+    problem = client.get("/nowhere").json()
+    explained = client.get(problem["type"]).json()
+    assert explained["code"] == "not_found"
+    assert explained["status"] == 404
+    assert explained["explanation"]
+    assert_problem(client.get("/problems/no-such"), 404, "not_found")
+
+
+def test_health_is_not_ready_without_a_worker(service: Service) -> None:
+    assert service.client.get("/health/live").json() == {"status": "live"}
+    assert_problem(service.client.get("/health/ready"), 503, "not_live")
+
+
+def test_docs_render_without_the_internet(client: httpx.Client) -> None:
+    page = client.get("/docs")
+    assert page.status_code == 200
+    assert "/health/live" in page.text
+    assert "http://" not in page.text
+    assert "https://" not in page.text
+
+
+def test_openapi_declares_every_error_as_a_problem(client: httpx.Client) -> None:
+    document = client.get("/openapi.json").json()
+    assert document["openapi"].startswith("3.1")
+    for operations in document["paths"].values():
+        for operation in operations.values():
+            errors = {k: v for k, v in operation["responses"].items() if k >= "400"}
+            assert {"422", "500"} <= set(errors)
+            for response in errors.values():
+                assert list(response["content"]) == ["application/problem+json"]
