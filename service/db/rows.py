@@ -133,6 +133,7 @@ class JobRow(Row):
 
     ``dispatch`` counts how often it was handed to the queue; ``run`` counts starts and
     is the fencing token: only the holder of the current run may renew or finish.
+    ``lost_runs`` counts the runs whose worker died.
     ``version`` grows with every visible change and is the job's ETag.
     """
 
@@ -153,6 +154,7 @@ class JobRow(Row):
     error: Mapped[Json | None]
     dispatch: Mapped[int] = mapped_column(default=1)
     run: Mapped[int] = mapped_column(default=0)
+    lost_runs: Mapped[int] = mapped_column(default=0)
     lease_until: Mapped[datetime | None]
     dispatched_at: Mapped[datetime]
     cancel_requested: Mapped[bool] = mapped_column(default=False)

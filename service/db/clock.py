@@ -1,0 +1,39 @@
+"""The database's clock: leases and heartbeats of several machines are judged by one clock."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Any
+
+import sqlalchemy as sa
+from sqlalchemy.ext.compiler import compiles
+from sqlalchemy.sql.compiler import SQLCompiler
+from sqlalchemy.sql.functions import FunctionElement
+
+from service.db.rows import UtcDateTime
+
+
+class utc_now(FunctionElement[datetime]):  # noqa: N801 - reads as an SQL function
+    """``utc_now()`` or ``utc_now(offset_s)``: this instant, or so many seconds from it.
+
+    It moves on within a transaction, so that one that waited for a lock sees the later time.
+    """
+
+    type = UtcDateTime()
+    inherit_cache = True
+
+    def __init__(self, offset_s: float = 0.0):
+        super().__init__(sa.literal(float(offset_s), sa.Float))
+
+
+@compiles(utc_now, "sqlite")
+def _sqlite(element: utc_now, compiler: SQLCompiler, **kw: Any) -> str:
+    # Six digits of fraction: that is how rows hold instants, and text compares as text.
+    offset = compiler.process(element.clauses, **kw)
+    return f"(strftime('%Y-%m-%d %H:%M:%f', 'now', {offset} || ' seconds') || '000')"
+
+
+@compiles(utc_now, "postgresql")
+def _postgresql(element: utc_now, compiler: SQLCompiler, **kw: Any) -> str:
+    offset = compiler.process(element.clauses, **kw)
+    return f"(clock_timestamp() + make_interval(secs => {offset}))"

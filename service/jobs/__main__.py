@@ -1,0 +1,46 @@
+"""``python -m service.jobs``: one worker process, as the supervisor starts it."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import signal
+import sys
+
+from service.jobs.parent import die_with_parent
+from service.jobs.runner import Work
+from service.jobs.worker import Worker
+from service.logs import configure_logging
+from service.settings import Settings
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run a worker until SIGTERM, or until the process ``--supervisor`` is gone."""
+    parser = argparse.ArgumentParser(prog="python -m service.jobs")
+    parser.add_argument("--work", default=Work().function, help="module:function")
+    parser.add_argument("--preload", default=Work().preload, help="module")
+    parser.add_argument("--supervisor", type=int, default=None, help="process id")
+    options = parser.parse_args(arguments)
+    run_worker(
+        Settings(),
+        Work(function=options.work, preload=options.preload),
+        supervisor=options.supervisor,
+    )
+    return 0
+
+
+def run_worker(settings: Settings, work: Work, *, supervisor: int | None = None) -> None:
+    """Run one worker in this process, which must be its main thread."""
+    configure_logging()
+    worker = Worker(settings, work)
+    signal.signal(signal.SIGTERM, lambda *_: worker.stop())
+    signal.signal(signal.SIGINT, lambda *_: worker.stop())
+    if supervisor is None:
+        worker.run()
+        return
+    die_with_parent(signal.SIGTERM)
+    worker.run(lambda: os.getppid() == supervisor)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,140 @@
+"""The solver's process: what happens between fork and exit.
+
+It talks to its worker over one pipe: ``Cancel`` and ``Expire`` come in, progress and at last
+one ending go out. When the worker's end closes, the process is gone at once.
+"""
+
+from __future__ import annotations
+
+import importlib
+import logging
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum, auto
+from multiprocessing.connection import Connection
+from typing import Any, Final, cast
+
+from planner_core.errors import Cancelled, PlannerError
+from planner_core.solvers.base import Budget, Progress
+from service.jobs.parent import die_with_parent
+from service.jobs.plan_job import PlanAnswer, PlanRequest
+
+log = logging.getLogger(__name__)
+
+REPORT_EVERY_S: Final = 0.1
+
+WorkFunction = Callable[[PlanRequest, Budget], PlanAnswer]
+
+
+class Command(Enum):
+    """What the worker may say."""
+
+    CANCEL = auto()
+    EXPIRE = auto()
+
+
+@dataclass(frozen=True, slots=True)
+class Started:
+    """The first word: the kernels are loaded and the clock runs."""
+
+
+@dataclass(frozen=True, slots=True)
+class Answered:
+    """The work is done, or was cut short and has a plan all the same."""
+
+    answer: PlanAnswer
+
+
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """The work cannot be done."""
+
+    code: str
+    detail: str
+
+
+@dataclass(frozen=True, slots=True)
+class Stopped:
+    """The work was told to stop before there was any plan."""
+
+
+Ending = Answered | Refused | Stopped
+
+
+def main(
+    connection: Connection[Any, Any], work: str, request: PlanRequest, time_s: float
+) -> None:
+    """Do one piece of work and send how it ended.
+
+    Parameters
+    ----------
+    work
+        The work function as ``"module:function"``.
+    time_s
+        Its budget.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    die_with_parent(signal.SIGKILL)
+    outbox = _Outbox(connection)
+    budget = Budget(time_s, outbox.report)
+    outbox.send(Started())
+    threading.Thread(target=_obey, args=(connection, budget), daemon=True).start()
+    outbox.send(_do(load(work), request, budget))
+
+
+def load(name: str) -> WorkFunction:
+    """Return the function called ``"module:function"``."""
+    module, _, function = name.partition(":")
+    return cast(WorkFunction, getattr(importlib.import_module(module), function))
+
+
+def _do(work: WorkFunction, request: PlanRequest, budget: Budget) -> Ending:
+    try:
+        return Answered(work(request, budget))
+    except Cancelled:
+        return Stopped()
+    except PlannerError as error:
+        return Refused(error.code, error.detail)
+    except MemoryError:
+        return Refused("memory_limit", "The solver ran out of memory.")
+    except Exception:
+        log.exception("job failed", extra={"job_id": request.job_id})
+        return Refused("internal_error", "The planner failed. The log has the details.")
+
+
+class _Outbox:
+    """The sending side: reports at most every ``REPORT_EVERY_S``, from any thread."""
+
+    def __init__(self, connection: Connection[Any, Any]):
+        self._connection = connection
+        self._lock = threading.Lock()
+        self._phase: str | None = None
+        self._next_s = 0.0
+
+    def send(self, message: object) -> None:
+        with self._lock:
+            self._connection.send(message)
+
+    def report(self, progress: Progress) -> None:
+        now_s = time.monotonic()
+        if progress.phase == self._phase and now_s < self._next_s:
+            return
+        self._phase, self._next_s = progress.phase, now_s + REPORT_EVERY_S
+        self.send(progress)
+
+
+def _obey(connection: Connection[Any, Any], budget: Budget) -> None:
+    while True:
+        try:
+            command = connection.recv()
+        except (EOFError, OSError):
+            # Nobody waits for an answer. Threads and kernels would delay a polite exit.
+            os._exit(1)
+        if command is Command.CANCEL:
+            budget.cancel()
+        elif command is Command.EXPIRE:
+            budget.expire()

@@ -1,0 +1,207 @@
+"""A job's life: start, renew, finish, hand back, cancel.
+
+Every change is one guarded update on the job's row. ``run`` is the fencing token: only the
+holder of the current run can renew or finish, however late a worker wakes up. All times are
+the database's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final, Literal, cast
+
+import sqlalchemy as sa
+from sqlalchemy.orm import Session
+
+from service.db.clock import utc_now
+from service.db.rows import JobResultRow, JobRow
+from service.jobs.queue import JobQueue
+
+JobState = Literal[
+    "queued", "running", "cancelling", "succeeded", "failed", "cancelled", "expired"
+]
+ACTIVE: Final[tuple[JobState, ...]] = ("queued", "running", "cancelling")
+FINAL: Final[tuple[JobState, ...]] = ("succeeded", "failed", "cancelled", "expired")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lease:
+    """The right to run a job, until another run begins."""
+
+    job_id: str
+    dispatch: int
+    run: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """How a run ended. ``timeline`` and ``targets`` are documents as JSON text, or None."""
+
+    state: JobState
+    termination: str | None = None
+    error: Mapping[str, str] | None = None
+    timeline: str | None = None
+    targets: str | None = None
+
+    @classmethod
+    def failed(cls, code: str, detail: str) -> Outcome:
+        """Return the end of a job that could not be done."""
+        return cls(state="failed", error={"code": code, "detail": detail})
+
+
+def start(session: Session, job_id: str, dispatch: int, *, lease_s: float) -> Lease | None:
+    """Begin a run, or return None where this dispatch has nothing to do any more.
+
+    A job that still says ``running`` may be started only once its lease has lapsed.
+    """
+    may_start = sa.or_(
+        JobRow.state == "queued",
+        sa.and_(JobRow.state == "running", JobRow.lease_until < utc_now()),
+    )
+    run = session.execute(
+        sa.update(JobRow)
+        .where(JobRow.id == job_id, JobRow.dispatch == dispatch, may_start)
+        .values(
+            state="running",
+            run=JobRow.run + 1,
+            lease_until=utc_now(lease_s),
+            started_at=sa.func.coalesce(JobRow.started_at, utc_now()),
+            progress=sa.null(),
+            version=JobRow.version + 1,
+        )
+        .returning(JobRow.run)
+        .execution_options(synchronize_session=False)
+    ).scalar_one_or_none()
+    return None if run is None else Lease(job_id=job_id, dispatch=dispatch, run=run)
+
+
+def renew(
+    session: Session, lease: Lease, *, lease_s: float, progress: Mapping[str, Any] | None
+) -> JobState | None:
+    """Keep the job for another ``lease_s``.
+
+    Parameters
+    ----------
+    progress
+        The newest report, or None where there is nothing new.
+
+    Returns
+    -------
+    The job's state (``running`` or ``cancelling``), or None where the lease is lost.
+    """
+    changes: dict[str, Any] = {"lease_until": utc_now(lease_s)}
+    if progress is not None:
+        changes |= {"progress": dict(progress), "version": JobRow.version + 1}
+    state = session.execute(
+        sa.update(JobRow)
+        .where(_held(lease))
+        .values(**changes)
+        .returning(JobRow.state)
+        .execution_options(synchronize_session=False)
+    ).scalar_one_or_none()
+    return cast("JobState | None", state)
+
+
+def finish(session: Session, lease: Lease, outcome: Outcome) -> bool:
+    """Write how the job ended, result included; return False where the lease is lost."""
+    changed = _update(
+        session,
+        _held(lease),
+        state=outcome.state,
+        termination=outcome.termination,
+        error=sa.null() if outcome.error is None else dict(outcome.error),
+        **_ended(),
+    )
+    if changed and outcome.timeline is not None and outcome.targets is not None:
+        session.execute(
+            sa.insert(JobResultRow).values(
+                job_id=lease.job_id,
+                timeline=outcome.timeline,
+                targets=outcome.targets,
+                created_at=utc_now(),
+            )
+        )
+    return changed
+
+
+def hand_back(session: Session, queue: JobQueue, lease: Lease) -> None:
+    """Give a running job back to the queue; it does not count as an attempt."""
+    if _update(session, _held(lease) & (JobRow.state == "cancelling"), state="cancelled", **_ended()):
+        return
+    redispatch(session, queue, _held(lease), lease.job_id)
+
+
+def return_unstarted(session: Session, queue: JobQueue, job_id: str, dispatch: int) -> bool:
+    """Put a job back whose dispatch was taken from the queue but will never start it."""
+    waiting = sa.and_(JobRow.dispatch == dispatch, JobRow.state == "queued")
+    return redispatch(session, queue, waiting, job_id)
+
+
+def redispatch(
+    session: Session, queue: JobQueue, guard: sa.ColumnElement[bool], job_id: str, **changes: Any
+) -> bool:
+    """Queue a job anew under its next dispatch number, if ``guard`` still holds."""
+    found = session.execute(
+        sa.update(JobRow)
+        .where(JobRow.id == job_id, guard)
+        .values(
+            state="queued",
+            dispatch=JobRow.dispatch + 1,
+            dispatched_at=utc_now(),
+            lease_until=None,
+            progress=sa.null(),
+            version=JobRow.version + 1,
+            **changes,
+        )
+        .returning(JobRow.dispatch, JobRow.priority, JobRow.tenant)
+        .execution_options(synchronize_session=False)
+    ).one_or_none()
+    if found is None:
+        return False
+    dispatch, priority, tenant = found
+    queue.enqueue(session, job_id, dispatch, priority=priority, tenant=tenant)
+    return True
+
+
+def request_cancel(session: Session, job_id: str) -> bool:
+    """Cancel a job: at once where it waits, else by asking its worker.
+
+    Returns
+    -------
+    Whether the job was active; asking twice is no mistake.
+    """
+    waits = sa.and_(JobRow.id == job_id, JobRow.state == "queued")
+    if _update(session, waits, state="cancelled", cancel_requested=True, **_ended()):
+        return True
+    runs = sa.and_(JobRow.id == job_id, JobRow.state == "running")
+    asked = {"state": "cancelling", "cancel_requested": True, "version": JobRow.version + 1}
+    if _update(session, runs, **asked):
+        return True
+    return session.scalar(sa.select(JobRow.state).where(JobRow.id == job_id)) == "cancelling"
+
+
+def end_expired(
+    session: Session, guard: sa.ColumnElement[bool], *, outcome: Outcome, **changes: Any
+) -> bool:
+    """End a job whose worker is gone, if ``guard`` still holds."""
+    error = sa.null() if outcome.error is None else dict(outcome.error)
+    return _update(session, guard, state=outcome.state, error=error, **_ended(), **changes)
+
+
+def _held(lease: Lease) -> sa.ColumnElement[bool]:
+    return sa.and_(
+        JobRow.id == lease.job_id,
+        JobRow.run == lease.run,
+        JobRow.state.in_(("running", "cancelling")),
+    )
+
+
+def _ended() -> dict[str, Any]:
+    return {"finished_at": utc_now(), "lease_until": None, "version": JobRow.version + 1}
+
+
+def _update(session: Session, guard: sa.ColumnElement[bool], **values: Any) -> bool:
+    statement = sa.update(JobRow).where(guard).values(**values)
+    result = session.execute(statement.execution_options(synchronize_session=False))
+    return cast("sa.CursorResult[Any]", result).rowcount == 1

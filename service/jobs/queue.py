@@ -1,0 +1,209 @@
+"""The queue: a small port, and DBOS behind it.
+
+A job's row is the truth; the queue only decides where and when a *dispatch* of it runs. A
+dispatch is named ``"{job_id}:{dispatch}"`` and is never used twice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Final, Protocol
+
+import sqlalchemy as sa
+from dbos import DBOS, DBOSClient, DBOSConfig, EnqueueOptions
+from sqlalchemy.orm import Session
+
+APPLICATION: Final = "slewline"
+QUEUE: Final = "plan"
+WORKFLOW: Final = "run_job"
+# Pinned: with a version of its own, each release would hide the jobs of the one before.
+VERSION: Final = "1"
+# Of a job; the queue itself counts the other way round.
+MOST_URGENT: Final = 9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Claim:
+    """A dispatch that some worker has taken from the queue and not yet ended."""
+
+    job_id: str
+    dispatch: int
+    claimed_at: datetime
+
+
+class JobQueue(Protocol):
+    """What the service needs of a queue."""
+
+    def enqueue(
+        self, session: Session, job_id: str, dispatch: int, *, priority: int, tenant: str
+    ) -> None:
+        """Add a dispatch within the caller's transaction. Higher ``priority`` runs sooner."""
+        ...
+
+    def cancel(self, job_id: str, dispatch: int) -> None:
+        """Forget a dispatch. Opens its own transaction: call it when yours has ended."""
+        ...
+
+    def claims(self) -> list[Claim]:
+        """Return what workers, dead or alive, have taken."""
+        ...
+
+    def lost(self, dispatches: Iterable[tuple[str, int]]) -> set[tuple[str, int]]:
+        """Return those dispatches that neither wait nor run any more."""
+        ...
+
+
+def dispatch_name(job_id: str, dispatch: int) -> str:
+    """Return the queue's name for one dispatch of a job."""
+    return f"{job_id}:{dispatch}"
+
+
+def parse_dispatch_name(name: str) -> tuple[str, int]:
+    """Return job id and dispatch number of a name made by ``dispatch_name``."""
+    job_id, _, dispatch = name.rpartition(":")
+    return job_id, int(dispatch)
+
+
+def make_queue_engine(database_url: str) -> sa.Engine | None:
+    """Return the engine DBOS must use, or None where its own will do (SQLite)."""
+    if sa.make_url(database_url).get_backend_name() == "sqlite":
+        return None
+    engine = sa.create_engine(database_url, pool_pre_ping=True, pool_size=10)
+    sa.event.listen(engine, "handle_error", _mark_disconnect)
+    return engine
+
+
+def _mark_disconnect(context: sa.engine.ExceptionContext) -> None:
+    # DBOS tells a lost connection by words that psycopg no longer uses ("connection is bad"),
+    # and then gives up on writing an outcome. SQLAlchemy's own flag it does honour.
+    import psycopg
+
+    error = context.original_exception
+    if isinstance(error, psycopg.OperationalError) and error.sqlstate != "57014":
+        context.is_disconnect = True
+
+
+def migrate_queue(database_url: str, *, tenant_limit: int, poll_s: float = 0.1) -> None:
+    """Create or update the queue's own tables, and the queue in them."""
+    DBOS.migrate(database_url)
+    queue = DbosQueue(database_url)
+    try:
+        queue.configure(tenant_limit=tenant_limit, poll_s=poll_s)
+    finally:
+        queue.close()
+
+
+class DbosQueue:
+    """The queue in the service's own database, by DBOS.
+
+    Parameters
+    ----------
+    database_url
+        Where ``migrate_queue`` has been run.
+    """
+
+    def __init__(self, database_url: str):
+        self._engine = make_queue_engine(database_url)
+        self._client = DBOSClient(
+            system_database_url=database_url,
+            system_database_engine=self._engine,
+            application_name=APPLICATION,
+            retry_connection_errors=False,
+            lazy=True,
+        )
+
+    def configure(self, *, tenant_limit: int, poll_s: float) -> None:
+        """Set the queue's rules: one job per worker, ``tenant_limit`` at once per tenant."""
+        self._client.register_queue(
+            QUEUE,
+            worker_concurrency=1,
+            partition_concurrency=tenant_limit,
+            polling_interval_sec=poll_s,
+        )
+
+    def enqueue(
+        self, session: Session, job_id: str, dispatch: int, *, priority: int, tenant: str
+    ) -> None:
+        """Add a dispatch within the caller's transaction."""
+        options = EnqueueOptions(
+            workflow_name=WORKFLOW,
+            queue_name=QUEUE,
+            workflow_id=dispatch_name(job_id, dispatch),
+            priority=1 + MOST_URGENT - priority,
+            queue_partition_key=tenant,
+            app_version=VERSION,
+            application_name=APPLICATION,
+        )
+        self._client.enqueue_in_transaction(session, options, job_id, dispatch)
+
+    def cancel(self, job_id: str, dispatch: int) -> None:
+        """Take a dispatch from the queue, or free the place of one that was claimed."""
+        self._client.cancel_workflow(dispatch_name(job_id, dispatch))
+
+    def claims(self) -> list[Claim]:
+        """Return what workers, dead or alive, have taken."""
+        found = self._client.list_workflows(
+            status="PENDING", queue_name=QUEUE, load_input=False, load_output=False
+        )
+        claims = []
+        for workflow in found:
+            job_id, dispatch = parse_dispatch_name(workflow.workflow_id)
+            claimed_at = datetime.fromtimestamp((workflow.dequeued_at or 0) / 1000.0, UTC)
+            claims.append(Claim(job_id=job_id, dispatch=dispatch, claimed_at=claimed_at))
+        return claims
+
+    def lost(self, dispatches: Iterable[tuple[str, int]]) -> set[tuple[str, int]]:
+        """Return those dispatches that neither wait nor run any more."""
+        asked = set(dispatches)
+        alive = self._client.list_workflows(
+            workflow_ids=[dispatch_name(*each) for each in asked],
+            status=["ENQUEUED", "DELAYED", "PENDING"],
+            load_input=False,
+            load_output=False,
+        )
+        return asked - {parse_dispatch_name(workflow.workflow_id) for workflow in alive}
+
+    def close(self) -> None:
+        """Close the connections."""
+        self._client.destroy()
+        if self._engine is not None:
+            self._engine.dispose()
+
+
+class DbosConsumer:
+    """The worker's side of the queue: calls ``handle(job_id, dispatch)`` for what it claims.
+
+    Only one may live in a process. ``handle`` runs in a thread of its own, one at a time.
+
+    Parameters
+    ----------
+    executor_id
+        Must never have been used before: DBOS would restart that worker's dispatches.
+    """
+
+    def __init__(self, database_url: str, executor_id: str, handle: Callable[[str, int], None]):
+        self._engine = make_queue_engine(database_url)
+        config = DBOSConfig(
+            name=APPLICATION,
+            system_database_url=database_url,
+            system_database_engine=self._engine,
+            executor_id=executor_id,
+            application_version=VERSION,
+            run_migrations=False,
+            log_level="WARNING",
+        )
+        DBOS(config=config)
+        DBOS.workflow(name=WORKFLOW)(handle)
+
+    def start(self) -> None:
+        """Begin to claim dispatches."""
+        DBOS.listen_queues([QUEUE])
+        DBOS.launch()
+
+    def stop(self) -> None:
+        """Claim no more, and let go of the database."""
+        DBOS.destroy(destroy_registry=True)
+        if self._engine is not None:
+            self._engine.dispose()

@@ -1,0 +1,128 @@
+"""Repair: find jobs that nobody runs and claims that nobody needs.
+
+Every worker does this every few seconds; the guards on the rows make it safe to do at once.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterable, Sequence
+from datetime import timedelta
+
+import sqlalchemy as sa
+
+from service.db.clock import utc_now
+from service.db.rows import JobRow
+from service.db.session import Database
+from service.jobs import lease
+from service.jobs.queue import Claim, JobQueue
+
+log = logging.getLogger(__name__)
+
+_PAGE = 200
+
+
+class Reconciler:
+    """Repairs the jobs of one database.
+
+    Parameters
+    ----------
+    lease_s
+        How long a claim may go without a sign of life.
+    max_attempts
+        A job whose worker died so often is failed: it is probably the cause.
+    """
+
+    def __init__(self, database: Database, queue: JobQueue, *, lease_s: float, max_attempts: int):
+        self._database = database
+        self._queue = queue
+        self._lease_s = lease_s
+        self._max_attempts = max_attempts
+        self._checked_up_to = ""
+
+    def run(self) -> None:
+        """Look at everything once."""
+        for job_id in self._expired():
+            self._recover(job_id)
+        claims = self._old_claims()
+        current = self._current(claim.job_id for claim in claims)
+        for claim in claims:
+            if current.get(claim.job_id) == (claim.dispatch, "queued"):
+                self._return(claim.job_id, claim.dispatch)
+            elif current.get(claim.job_id) not in (
+                (claim.dispatch, "running"),
+                (claim.dispatch, "cancelling"),
+            ):
+                self._queue.cancel(claim.job_id, claim.dispatch)
+        for job_id, dispatch in sorted(self._queue.lost(self._next_waiting())):
+            self._return(job_id, dispatch)
+
+    def _expired(self) -> Sequence[str]:
+        with self._database.reading() as session:
+            return session.scalars(
+                sa.select(JobRow.id).where(
+                    JobRow.state.in_(("running", "cancelling")), JobRow.lease_until < utc_now()
+                )
+            ).all()
+
+    def _recover(self, job_id: str) -> None:
+        """End a job whose lease has lapsed, or queue it anew: one transaction."""
+        expired = sa.and_(
+            JobRow.id == job_id,
+            JobRow.lease_until < utc_now(),
+        )
+        cancelling = expired & (JobRow.state == "cancelling")
+        running = expired & (JobRow.state == "running")
+        last = running & (JobRow.lost_runs + 1 >= self._max_attempts)
+        lost = JobRow.lost_runs + 1
+        detail = f"The worker died {self._max_attempts} times while it ran this job."
+        too_many = lease.Outcome.failed("too_many_attempts", detail)
+        with self._database.transaction() as session:
+            done = (
+                lease.end_expired(session, cancelling, outcome=lease.Outcome(state="cancelled"))
+                or lease.end_expired(session, last, outcome=too_many, lost_runs=lost)
+                or lease.redispatch(session, self._queue, running, job_id, lost_runs=lost)
+            )
+        if done:
+            log.warning("recovered a job whose worker is gone", extra={"job_id": job_id})
+
+    def _old_claims(self) -> list[Claim]:
+        claims = self._queue.claims()
+        if not claims:
+            return []
+        with self._database.reading() as session:
+            now = session.execute(sa.select(utc_now())).scalar_one()
+        oldest = now - timedelta(seconds=self._lease_s)
+        return [claim for claim in claims if claim.claimed_at < oldest]
+
+    def _current(self, job_ids: Iterable[str]) -> dict[str, tuple[int, str]]:
+        wanted = sa.select(JobRow.id, JobRow.dispatch, JobRow.state).where(
+            JobRow.id.in_(set(job_ids))
+        )
+        with self._database.reading() as session:
+            return {row.id: (row.dispatch, row.state) for row in session.execute(wanted)}
+
+    def _next_waiting(self) -> list[tuple[str, int]]:
+        """Return the next page of long-queued jobs, so that a long queue is read by and by."""
+        page = (
+            sa.select(JobRow.id, JobRow.dispatch)
+            .where(
+                JobRow.state == "queued",
+                JobRow.dispatched_at < utc_now(-self._lease_s),
+                JobRow.id > self._checked_up_to,
+            )
+            .order_by(JobRow.id)
+            .limit(_PAGE)
+        )
+        with self._database.reading() as session:
+            found = [(row.id, row.dispatch) for row in session.execute(page)]
+        self._checked_up_to = found[-1][0] if len(found) == _PAGE else ""
+        return found
+
+    def _return(self, job_id: str, dispatch: int) -> None:
+        with self._database.transaction() as session:
+            returned = lease.return_unstarted(session, self._queue, job_id, dispatch)
+        if returned:
+            # Its old claim, if any, must not keep a place of the tenant.
+            self._queue.cancel(job_id, dispatch)
+            log.warning("queued a job again that had never started", extra={"job_id": job_id})

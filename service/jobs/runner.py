@@ -1,0 +1,256 @@
+"""The worker's side of a solver process: start it, keep its limits, end it."""
+
+from __future__ import annotations
+
+import logging
+import math
+import os
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum, auto
+from multiprocessing import get_context
+from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
+from typing import Any, Final
+
+import psutil
+
+from planner_core.solvers.base import Progress
+from service.jobs import child
+from service.jobs.child import Answered, Command, Ending, Refused, Started, Stopped
+from service.jobs.plan_job import PlanRequest
+
+log = logging.getLogger(__name__)
+
+POLL_S: Final = 0.05
+START_S: Final = 120.0
+"""How long a first start may take; it includes compiling the kernels."""
+CANCEL_GRACE_S: Final = 1.25
+"""From "cancel" to the kill, for a search that does not stop by itself."""
+TIME_GRACE_S: Final = 5.0
+"""From the end of the time limit to the kill."""
+VERIFY_GRACE_S: Final = 30.0
+"""The same once the search is over and the referee works: its plan is worth the wait."""
+
+_SINGLE_THREADED: Final = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "NUMBA_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+)
+
+
+class Order(Enum):
+    """What the worker wants of a run, asked at every tick."""
+
+    GO_ON = auto()
+    CANCEL = auto()
+    ABANDON = auto()
+
+
+@dataclass(frozen=True, slots=True)
+class Abandoned:
+    """The run was ended without an answer: somebody else will do the job."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """What one solver process may use. Memory is what it holds, shared libraries included."""
+
+    time_s: float
+    memory_mb: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Work:
+    """What solver processes do.
+
+    Attributes
+    ----------
+    function
+        ``"module:function"``, called with a ``PlanRequest`` and a ``Budget``.
+    preload
+        Module that the fork server imports before the first job.
+    """
+
+    function: str = "service.jobs.plan_job:run_plan_job"
+    preload: str = "service.jobs.preload"
+
+
+class Runner:
+    """Runs one piece of work at a time, each in a fresh fork of a warm process."""
+
+    def __init__(self, work: Work):
+        # One solver is one thread: the workers share the machine between them.
+        os.environ |= dict.fromkeys(_SINGLE_THREADED, "1")
+        self._work = work
+        self._context = get_context("forkserver")
+        self._context.set_forkserver_preload([work.preload])
+
+    def warm_up(self) -> None:
+        """Start the fork server and return when it is ready to fork."""
+        process = self._context.Process(target=_nothing, daemon=True)
+        process.start()
+        process.join()
+
+    def run(
+        self,
+        request: PlanRequest,
+        limits: Limits,
+        *,
+        tick_s: float,
+        tick: Callable[[Progress | None], Order],
+    ) -> Ending | Abandoned:
+        """Do the work and return how it ended.
+
+        Parameters
+        ----------
+        tick
+            Called every ``tick_s`` with the newest progress, or None where there is nothing
+            new; says how to go on.
+        """
+        ours, theirs = self._context.Pipe()
+        process = self._context.Process(
+            target=child.main,
+            args=(theirs, self._work.function, request, limits.time_s),
+            daemon=True,
+        )
+        try:
+            process.start()
+            theirs.close()
+            return _Run(process, ours, limits, tick_s, tick).until_end()
+        finally:
+            ours.close()
+            _end(process)
+
+
+class _Run:
+    """One running process."""
+
+    def __init__(
+        self,
+        process: BaseProcess,
+        pipe: Connection[Any, Any],
+        limits: Limits,
+        tick_s: float,
+        tick: Callable[[Progress | None], Order],
+    ):
+        self._process = process
+        self._pipe = pipe
+        self._limits = limits
+        self._tick_s = tick_s
+        self._tick = tick
+        self._memory = psutil.Process(process.pid)
+        self._progress: Progress | None = None
+        self._verifying = False
+        self._next_tick_s = 0.0
+        self._expire_at_s = math.inf
+        self._cancelled = False
+        self._kill_at_s = time.monotonic() + START_S
+
+    def until_end(self) -> Ending | Abandoned:
+        while True:
+            ending = self._listen() or self._check_limits() or self._tick_if_due()
+            if ending is not None:
+                return ending
+
+    def _listen(self) -> Ending | None:
+        if not wait([self._pipe], POLL_S):
+            return None
+        try:
+            message = self._pipe.recv()
+        except (EOFError, OSError):
+            return self._crashed()
+        if isinstance(message, Answered | Refused | Stopped):
+            return self._settled(message)
+        if isinstance(message, Started):
+            self._expire_at_s = time.monotonic() + self._limits.time_s
+            self._kill_at_s = self._expire_at_s + TIME_GRACE_S
+        elif isinstance(message, Progress):
+            self._note(message)
+        return None
+
+    def _note(self, progress: Progress) -> None:
+        self._progress = progress
+        if progress.phase == "verify" and not self._verifying:
+            self._verifying = True
+            if self._kill_at_s < math.inf:
+                self._kill_at_s += VERIFY_GRACE_S
+
+    def _settled(self, ending: Ending) -> Ending:
+        if isinstance(ending, Stopped) and not self._cancelled:
+            return self._out_of_time()
+        return ending
+
+    def _crashed(self) -> Ending:
+        self._process.join(TIME_GRACE_S)
+        if self._cancelled:
+            return Stopped()
+        code = self._process.exitcode
+        how = f"signal {-code}" if code is not None and code < 0 else f"exit status {code}"
+        return Refused("solver_crashed", f"The solver's process ended by itself ({how}).")
+
+    def _check_limits(self) -> Ending | None:
+        held_mb = self._held_mb()
+        if held_mb > self._limits.memory_mb:
+            detail = f"The solver held {held_mb:.0f} MB; its limit is {self._limits.memory_mb} MB."
+            return Refused("memory_limit", detail)
+        now_s = time.monotonic()
+        if now_s >= self._expire_at_s:
+            # A budget ends a search by itself; a kernel that cannot read a clock needs telling.
+            self._expire_at_s = math.inf
+            self._say(Command.EXPIRE)
+        if now_s >= self._kill_at_s:
+            return Stopped() if self._cancelled else self._out_of_time()
+        return None
+
+    def _held_mb(self) -> float:
+        try:
+            return float(self._memory.memory_info().rss) / 1e6
+        except psutil.NoSuchProcess:
+            return 0.0
+
+    def _out_of_time(self) -> Refused:
+        detail = f"No plan within the limit of {self._limits.time_s:g} s."
+        return Refused("time_limit", detail)
+
+    def _tick_if_due(self) -> Abandoned | None:
+        now_s = time.monotonic()
+        if now_s < self._next_tick_s:
+            return None
+        self._next_tick_s = now_s + self._tick_s
+        progress, self._progress = self._progress, None
+        order = self._tick(progress)
+        if order is Order.ABANDON:
+            return Abandoned()
+        if order is Order.CANCEL and not self._cancelled:
+            self._cancelled = True
+            grace_s = VERIFY_GRACE_S if self._verifying else CANCEL_GRACE_S
+            self._kill_at_s = min(self._kill_at_s, time.monotonic() + grace_s)
+            self._say(Command.CANCEL)
+        return None
+
+    def _say(self, command: Command) -> None:
+        try:
+            self._pipe.send(command)
+        except OSError:
+            log.debug("the solver's process ended before it was told %s", command.name)
+
+
+def _nothing() -> None:
+    pass
+
+
+def _end(process: BaseProcess) -> None:
+    """End a process, politely for half a second, and collect it."""
+    if process.pid is None:
+        return
+    if process.is_alive():
+        process.terminate()
+        process.join(0.5)
+    if process.is_alive():
+        process.kill()
+    process.join()
+    process.close()

@@ -1,0 +1,213 @@
+"""One worker: claims jobs, runs each in a solver process, and repairs what others left behind."""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+import os
+import secrets
+import socket
+import threading
+from collections.abc import Callable
+from typing import Final, TypeVar
+
+import sqlalchemy as sa
+from sqlalchemy.exc import OperationalError
+from sqlalchemy.orm import Session
+
+from planner_core.solvers.base import Progress
+from service.db.clock import utc_now
+from service.db.rows import JobRow, ScenarioRow, WorkerRow
+from service.db.session import Database
+from service import opportunity_store
+from service.jobs import lease
+from service.jobs.child import Answered, Ending, Refused, Stopped
+from service.jobs.lease import Lease, Outcome
+from service.jobs.plan_job import PlanRequest
+from service.jobs.queue import DbosConsumer, DbosQueue
+from service.jobs.reconcile import Reconciler
+from service.jobs.runner import Abandoned, Limits, Order, Runner, Work
+from service.settings import Settings
+
+log = logging.getLogger(__name__)
+T = TypeVar("T")
+
+_RETRY_S: Final = 1.0
+_STOP_WITHIN_S: Final = 5.0
+_FORGET_WORKER_S: Final = 86400.0
+
+
+class Worker:
+    """Runs one job at a time until told to stop.
+
+    Parameters
+    ----------
+    settings
+        The service's settings; the database must have been migrated.
+    work
+        What solver processes do.
+    """
+
+    def __init__(self, settings: Settings, work: Work):
+        self.id = f"{socket.gethostname()}-{os.getpid()}-{secrets.token_hex(4)}"
+        self._settings = settings
+        self._database = Database(settings.database_url)
+        self._queue = DbosQueue(settings.database_url)
+        self._runner = Runner(work)
+        self._reconciler = Reconciler(
+            self._database,
+            self._queue,
+            lease_s=settings.lease_s,
+            max_attempts=settings.max_attempts,
+        )
+        self._stopping = threading.Event()
+        self._idle = threading.Event()
+        self._idle.set()
+
+    def stop(self) -> None:
+        """Hand the running job back and let ``run`` return; safe in a signal handler."""
+        self._stopping.set()
+
+    def run(self, is_wanted: Callable[[], bool] = lambda: True) -> None:
+        """Work until ``stop`` is called or ``is_wanted`` says no."""
+        self._runner.warm_up()
+        consumer = DbosConsumer(self._settings.database_url, self.id, self.handle)
+        self._enrol()
+        consumer.start()
+        try:
+            while is_wanted() and not self._stopping.wait(self._settings.reconcile_s):
+                self._look_after_others()
+        finally:
+            self._stopping.set()
+            self._idle.wait(_STOP_WITHIN_S)
+            consumer.stop()
+            self._leave()
+
+    def handle(self, job_id: str, dispatch: int) -> None:
+        """Run one dispatch from the queue; the queue learns nothing of how it ended."""
+        self._idle.clear()
+        try:
+            self._handle(job_id, dispatch)
+        except Exception:
+            # The row still says that the job waits or runs: the reconciler will find it.
+            log.exception("dispatch failed", extra={"job_id": job_id})
+        finally:
+            self._idle.set()
+
+    def _handle(self, job_id: str, dispatch: int) -> None:
+        if self._stopping.is_set():
+            with self._database.transaction() as session:
+                lease.return_unstarted(session, self._queue, job_id, dispatch)
+            return
+        with self._database.transaction() as session:
+            held = lease.start(session, job_id, dispatch, lease_s=self._settings.lease_s)
+        if held is None:
+            return
+        request = self._request(job_id)
+        limits = Limits(
+            time_s=float(request.limits["time_s"]), memory_mb=int(request.limits["memory_mb"])
+        )
+        ending = self._runner.run(
+            request,
+            limits,
+            tick_s=self._settings.heartbeat_s,
+            tick=lambda progress: self._tick(held, progress),
+        )
+        self._conclude(held, request, ending)
+
+    def _request(self, job_id: str) -> PlanRequest:
+        wanted = (
+            sa.select(JobRow, ScenarioRow.sha256, ScenarioRow.content)
+            .join(ScenarioRow, ScenarioRow.id == JobRow.scenario_id)
+            .where(JobRow.id == job_id)
+        )
+        with self._database.reading() as session:
+            job, sha256, content = session.execute(wanted).one()._tuple()
+            return PlanRequest(
+                job_id=job.id,
+                scenario_sha256=sha256,
+                content=content,
+                solver=job.solver,
+                params=job.params,
+                seed=job.seed,
+                limits=job.limits,
+                opportunity_block=opportunity_store.load(session, sha256),
+            )
+
+    def _tick(self, held: Lease, progress: Progress | None) -> Order:
+        if self._stopping.is_set():
+            return Order.ABANDON
+        report = None if progress is None else dataclasses.asdict(progress)
+        try:
+            with self._database.transaction() as session:
+                state = lease.renew(
+                    session, held, lease_s=self._settings.lease_s, progress=report
+                )
+        except OperationalError:
+            log.warning("could not renew a lease", extra={"job_id": held.job_id}, exc_info=True)
+            return Order.GO_ON
+        if state is None:
+            return Order.ABANDON
+        return Order.CANCEL if state == "cancelling" else Order.GO_ON
+
+    def _conclude(self, held: Lease, request: PlanRequest, ending: Ending | Abandoned) -> None:
+        if isinstance(ending, Abandoned):
+            self._persist(lambda session: lease.hand_back(session, self._queue, held))
+            return
+        if isinstance(ending, Answered) and ending.answer.opportunity_block is not None:
+            block = ending.answer.opportunity_block
+            self._persist(
+                lambda session: opportunity_store.save(session, request.scenario_sha256, block)
+            )
+        outcome = outcome_of(ending)
+        if not self._persist(lambda session: lease.finish(session, held, outcome)):
+            log.warning("a job went on without this worker", extra={"job_id": held.job_id})
+
+    def _persist(self, write: Callable[[Session], T]) -> T:
+        """Write in one transaction, as often as it takes while the database is away."""
+        while True:
+            try:
+                with self._database.transaction() as session:
+                    return write(session)
+            except OperationalError:
+                if self._stopping.is_set():
+                    raise
+                log.warning("the database is away; trying again", exc_info=True)
+                self._stopping.wait(_RETRY_S)
+
+    def _enrol(self) -> None:
+        with self._database.transaction() as session:
+            forgotten = WorkerRow.seen_at < utc_now(-_FORGET_WORKER_S)
+            session.execute(sa.delete(WorkerRow).where(forgotten))
+            row = {"id": self.id, "started_at": utc_now(), "seen_at": utc_now()}
+            session.execute(sa.insert(WorkerRow).values(**row))
+
+    def _look_after_others(self) -> None:
+        try:
+            with self._database.transaction() as session:
+                mine = sa.update(WorkerRow).where(WorkerRow.id == self.id)
+                session.execute(mine.values(seen_at=utc_now()))
+            self._reconciler.run()
+        except Exception:
+            log.warning("could not look for stranded jobs", exc_info=True)
+
+    def _leave(self) -> None:
+        with self._database.transaction() as session:
+            session.execute(sa.delete(WorkerRow).where(WorkerRow.id == self.id))
+        self._queue.close()
+        self._database.close()
+
+
+def outcome_of(ending: Ending) -> Outcome:
+    """Return what an ending means for the job."""
+    if isinstance(ending, Refused):
+        return Outcome.failed(ending.code, ending.detail)
+    if isinstance(ending, Stopped):
+        return Outcome(state="cancelled")
+    answer = ending.answer
+    return Outcome(
+        state="cancelled" if answer.termination == "cancelled" else "succeeded",
+        termination=answer.termination,
+        timeline=answer.timeline,
+        targets=answer.targets,
+    )
