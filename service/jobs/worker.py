@@ -16,10 +16,10 @@ from sqlalchemy.exc import OperationalError
 from sqlalchemy.orm import Session
 
 from planner_core.solvers.base import Progress
+from service import opportunity_store
 from service.db.clock import utc_now
 from service.db.rows import JobRow, ScenarioRow, WorkerRow
 from service.db.session import Database
-from service import opportunity_store
 from service.jobs import lease
 from service.jobs.child import Answered, Ending, Refused, Stopped
 from service.jobs.lease import Lease, Outcome
