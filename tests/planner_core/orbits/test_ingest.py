@@ -68,9 +68,6 @@ def xml(*, version: str = "2.0", **changes: object) -> str:
     )
 
 
-# --- two and three lines --------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
 @pytest.mark.parametrize("mark", ["", "\ufeff"])
 def test_line_ends_and_byte_order_mark_make_no_difference(end: str, mark: str) -> None:
@@ -143,9 +140,6 @@ def test_uncatalogued_satellites_are_told_apart_by_name() -> None:
     assert rows(read_text("A", *lines, "B", *lines)) == [2, 5]
 
 
-# --- files as a whole -----------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("data", "media_type", "code"),
     [
@@ -206,12 +200,22 @@ def test_any_json_gives_faults_and_no_error(value: object) -> None:
     assert read_elements(json.dumps(value).encode(), "application/json").faults
 
 
+@given(st.text())
+def test_any_csv_record_gives_faults_and_no_error(record: str) -> None:
+    header = ",".join(omm())
+    ingested = read_elements(f"{header}\n{record},\n".encode("utf-8", "replace"), "text/csv")
+    assert ingested.entries == ()
+    assert ingested.faults
+
+
+@given(st.lists(st.text("ABT_=[] \t19.#", max_size=30), max_size=6))
+def test_any_keyword_lines_give_faults_and_no_error(lines: list[str]) -> None:
+    assert read_text("CCSDS_OMM_VERS = 3.0", *lines).faults
+
+
 @given(st.text("<>/&![]\"'= \nomdxENTITY0", max_size=80))
 def test_any_markup_gives_faults_and_no_error(text: str) -> None:
     assert read_elements(f"<omm>{text}</omm>".encode(), "application/xml").faults
-
-
-# --- messages -------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
