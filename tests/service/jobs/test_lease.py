@@ -139,6 +139,15 @@ def test_a_running_job_is_asked_to_stop_and_may_be_asked_twice(jobs: Jobs) -> No
     assert not cancel(jobs, job_id)
 
 
+def test_a_plan_that_beats_the_cancelling_is_kept_in_a_cancelled_job(jobs: Jobs) -> None:
+    job_id = jobs.submit("answer")
+    held = started(jobs, job_id)
+    cancel(jobs, job_id)
+    assert finish(jobs, held)
+    assert (jobs.job(job_id).state, jobs.job(job_id).termination) == ("cancelled", "optimal")
+    assert jobs.result(job_id) is not None
+
+
 def test_a_job_handed_back_waits_again_and_has_lost_no_attempt(jobs: Jobs) -> None:
     job_id = jobs.submit("answer")
     held = started(jobs, job_id)
