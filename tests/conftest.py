@@ -1,4 +1,4 @@
-"""Fixtures of all tests."""
+"""Fixtures for all tests."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ from pathlib import Path
 
 import pytest
 
+_ROOT = Path(__file__).resolve().parents[1]
+
 
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
-    """The folder of real data beside the repository; its tests skip where it is absent."""
-    beside = Path(__file__).resolve().parents[2] / "shared" / "data"
-    folder = Path(os.environ.get("SLEWLINE_TEST_DATA", beside))
-    if not folder.is_dir():
-        pytest.skip(f"no shared data at {folder} (SLEWLINE_TEST_DATA names another place)")
-    return folder
+    """Return the folder of real reference data, or skip where it is absent."""
+    place = Path(os.environ.get("SLEWLINE_TEST_DATA", _ROOT.parent / "shared" / "data"))
+    if not place.is_dir():
+        pytest.skip("the shared reference data is not on this machine")
+    return place

@@ -65,9 +65,7 @@ class Stopped:
 Ending = Answered | Refused | Stopped
 
 
-def main(
-    connection: Connection[Any, Any], work: str, request: PlanRequest, time_s: float
-) -> None:
+def main(connection: Connection[Any, Any], work: str, request: PlanRequest, time_s: float) -> None:
     """Do one piece of work and send how it ended.
 
     Parameters

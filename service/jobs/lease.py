@@ -18,9 +18,7 @@ from service.db.clock import utc_now
 from service.db.rows import JobResultRow, JobRow
 from service.jobs.queue import JobQueue
 
-JobState = Literal[
-    "queued", "running", "cancelling", "succeeded", "failed", "cancelled", "expired"
-]
+JobState = Literal["queued", "running", "cancelling", "succeeded", "failed", "cancelled", "expired"]
 ACTIVE: Final[tuple[JobState, ...]] = ("queued", "running", "cancelling")
 FINAL: Final[tuple[JobState, ...]] = ("succeeded", "failed", "cancelled", "expired")
 
@@ -127,7 +125,9 @@ def finish(session: Session, lease: Lease, outcome: Outcome) -> bool:
 
 def hand_back(session: Session, queue: JobQueue, lease: Lease) -> None:
     """Give a running job back to the queue; it does not count as an attempt."""
-    if _update(session, _held(lease) & (JobRow.state == "cancelling"), state="cancelled", **_ended()):
+    if _update(
+        session, _held(lease) & (JobRow.state == "cancelling"), state="cancelled", **_ended()
+    ):
         return
     redispatch(session, queue, _held(lease), lease.job_id)
 

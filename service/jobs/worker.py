@@ -16,10 +16,10 @@ from sqlalchemy.exc import OperationalError
 from sqlalchemy.orm import Session
 
 from planner_core.solvers.base import Progress
+from service import opportunity_store
 from service.db.clock import utc_now
 from service.db.rows import JobRow, ScenarioRow, WorkerRow
 from service.db.session import Database
-from service import opportunity_store
 from service.jobs import lease
 from service.jobs.child import Answered, Ending, Refused, Stopped
 from service.jobs.lease import Lease, Outcome
@@ -140,9 +140,7 @@ class Worker:
         report = None if progress is None else dataclasses.asdict(progress)
         try:
             with self._database.transaction() as session:
-                state = lease.renew(
-                    session, held, lease_s=self._settings.lease_s, progress=report
-                )
+                state = lease.renew(session, held, lease_s=self._settings.lease_s, progress=report)
         except OperationalError:
             log.warning("could not renew a lease", extra={"job_id": held.job_id}, exc_info=True)
             return Order.GO_ON

@@ -180,7 +180,7 @@ def test_telemetry_alone_can_fill_the_recorder_and_no_action_is_blamed() -> None
     timeline = replay(make_problem([], num_targets=0, resources=filling), Plan())
     assert codes(timeline) == ["recorder"]
     violation = timeline.violations[0]
-    assert violation.at_s == pytest.approx(400.0)
+    assert violation.at_s == pytest.approx(400.37)
     assert violation.blamed == ()
 
 

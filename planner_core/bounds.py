@@ -1,0 +1,157 @@
+r"""An upper bound on what any plan of a problem can earn.
+
+Weak duality: give each target a price :math:`0 \le \lambda_i \le r_i`. Then no plan earns more
+than :math:`\sum_i \lambda_i` plus, for each satellite, the longest chain of collects in which
+an image of :math:`i` is worth :math:`r_i - \lambda_i` (and may be taken again and again).
+Battery, recorder and stations are left out, which can only raise the bound. Prices come from
+a subgradient search; whatever they are, the bound holds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from planner_core.jit import kernel
+from planner_core.problem import COLLECT, Bytes, Floats, Ints, Longs, Problem
+
+_PAIRS_TO_SPEND = 40_000_000
+_ROUNDING = 1e-6  # relative; far above the rounding of the sums, far below one reward
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Bound:
+    """A proven upper bound, and the prices that prove it (``lagrangian_value`` checks them).
+
+    Attributes
+    ----------
+    prices
+        One per target. Shape ``(num_targets,)``.
+    """
+
+    value: float
+    proof: Literal["lagrangian"]
+    prices: Floats
+
+
+@kernel
+def longest_chain(
+    weight: Floats, near_from: Ints, far_from: Ints, offset: Longs, bits: Bytes, before: Ints
+) -> tuple[float, int]:
+    """Return the greatest weight of a chain of tasks that may follow each other, and its end.
+
+    Parameters
+    ----------
+    weight
+        Worth of each task, not negative; tasks worth 0 are passed over. Shape ``(m,)``.
+    before
+        Filled with the task before each on its best chain, or -1. Shape ``(m,)``.
+    """
+    m = len(weight)
+    value = np.zeros(m)
+    # Beyond the longest slew everything may follow: only the best so far counts there.
+    far_value = np.zeros(m + 1)
+    far_task = np.full(m + 1, -1, dtype=np.int32)
+    best_far, best_far_task = 0.0, -1
+    best, best_task = 0.0, -1
+    for a in range(m):
+        if far_value[a] > best_far:
+            best_far, best_far_task = far_value[a], far_task[a]
+        if weight[a] <= 0.0:
+            continue
+        if best_far > value[a]:
+            value[a] = best_far
+            before[a] = best_far_task
+        elif value[a] == 0.0:
+            before[a] = -1
+        value[a] += weight[a]
+        if value[a] > best:
+            best, best_task = value[a], a
+        for b in range(near_from[a], far_from[a]):
+            bit = offset[a] + b - near_from[a]
+            if (bits[bit >> 3] >> (bit & 7)) & 1 and value[a] > value[b]:
+                value[b] = value[a]
+                before[b] = a
+        if value[a] > far_value[far_from[a]]:
+            far_value[far_from[a]] = value[a]
+            far_task[far_from[a]] = a
+    return best, best_task
+
+
+def lagrangian_value(problem: Problem, prices: Floats) -> tuple[float, Ints]:
+    """Return the bound that ``prices`` prove, and how often its chains take each target.
+
+    This is the whole proof: it needs no search, only the problem.
+    """
+    prices = np.clip(prices, 0.0, problem.target_reward)
+    total = float(prices[_reachable(problem)].sum())
+    counts = np.zeros(len(prices), dtype=np.int32)
+    for satellite in problem.satellites:
+        is_collect = satellite.kind == COLLECT
+        weight = np.zeros(len(satellite))
+        places = satellite.place[is_collect]
+        weight[is_collect] = problem.target_reward[places] - prices[places]
+        before = np.full(len(satellite), -1, dtype=np.int32)
+        t = satellite.transitions
+        value, task = longest_chain(weight, t.near_from, t.far_from, t.offset, t.bits, before)
+        total += value
+        while task >= 0:
+            counts[satellite.place[task]] += 1
+            task = int(before[task])
+    return total, counts
+
+
+def _reachable(problem: Problem) -> npt.NDArray[np.bool_]:
+    _, offsets = problem.target_opportunities
+    return np.diff(offsets) > 0
+
+
+def lagrangian_bound(problem: Problem, reward: float, iterations: int | None = None) -> Bound:
+    """Return a bound, tightened by subgradient steps towards ``reward`` (of a known plan).
+
+    Parameters
+    ----------
+    iterations
+        How many steps; by default as many as a fraction of a second allows, counted from
+        the size of the problem so that the same problem always gets the same bound.
+    """
+    if iterations is None:
+        pairs = sum(int(s.transitions.offset[-1]) + 20 * len(s) for s in problem.satellites)
+        iterations = int(np.clip(_PAIRS_TO_SPEND / max(1, pairs), 4, 300))
+    is_reachable = _reachable(problem)
+    prices = np.where(is_reachable, problem.target_reward, 0.0)
+    best_value, best_prices = float(prices.sum()), prices
+    prices = prices * 0.5
+    theta, stalled = 1.0, 0
+    for _ in range(iterations):
+        value, counts = lagrangian_value(problem, prices)
+        if value < best_value - 1e-9:
+            best_value, best_prices, stalled = value, prices, 0
+        else:
+            stalled += 1
+        if stalled == 12:
+            theta, stalled, prices = theta * 0.6, 0, best_prices
+            continue
+        gradient = np.where(is_reachable, 1.0 - counts, 0.0)
+        # At a price of zero (or of the whole reward) a step outward leads nowhere.
+        gradient[(prices <= 0.0) & (gradient > 0.0)] = 0.0
+        gradient[(prices >= problem.target_reward) & (gradient < 0.0)] = 0.0
+        norm = float(gradient @ gradient)
+        if norm == 0.0 or value - reward < 1e-9:
+            break
+        step = theta * max(value - max(reward, 0.97 * best_value), 0.0) / norm
+        prices = np.clip(prices - step * gradient, 0.0, problem.target_reward)
+    return Bound(
+        value=_tightened(problem, best_value, reward), proof="lagrangian", prices=best_prices
+    )
+
+
+def _tightened(problem: Problem, value: float, reward: float) -> float:
+    """Round a bound up for safety, then down to what whole rewards can add up to."""
+    safe = value * (1.0 + 1e-12) + 1e-9
+    if np.all(problem.target_reward == np.round(problem.target_reward)):
+        safe = float(np.floor(safe + _ROUNDING))
+    return max(safe, reward)

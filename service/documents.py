@@ -1,0 +1,221 @@
+"""A judged plan as the documents that the API serves: the timeline and the targets."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from typing import Any
+
+from planner_core import __version__
+from planner_core.reasons import TargetOutcome
+from planner_core.run import Judged
+from planner_core.timeline import JudgedAction, Resourceline, Violation, plan_sha256
+
+SCHEMA_VERSION = "1.0"
+
+Document = dict[str, Any]
+
+
+def instant_text(instant: datetime) -> str:
+    """Return RFC 3339 in UTC with milliseconds.
+
+    >>> instant_text(datetime(2026, 1, 1, 12, 30, 0, 250_000, tzinfo=UTC))
+    '2026-01-01T12:30:00.250Z'
+    """
+    text = instant.astimezone(UTC).isoformat(timespec="milliseconds")
+    return text.removesuffix("+00:00") + "Z"
+
+
+class Documents:
+    """Renders one judged plan; action ids run through all satellites, ``a1``, ``a2``, ..."""
+
+    def __init__(self, judged: Judged, *, job_id: str, scenario_sha256: str):
+        self.judged = judged
+        self.job_id = job_id
+        self.scenario_sha256 = scenario_sha256
+        actions = [a for s in judged.timeline.satellites for a in s.actions]
+        self._action_ids = {
+            action.position: f"a{number}"
+            for number, action in enumerate(actions, start=1)
+            if action.position is not None
+        }
+
+    def timeline(
+        self, *, solver: str, params: Mapping[str, Any], seed: int, termination: str
+    ) -> Document:
+        """Return the timeline document of api.md."""
+        judged, horizon = self.judged, self.judged.scenario.horizon
+        runtime = judged.runtime_s
+        number = 0
+        satellites = []
+        for satellite, line in zip(
+            judged.problem.satellites, judged.timeline.satellites, strict=True
+        ):
+            actions = []
+            for action in line.actions:
+                number += 1
+                actions.append(self._action(f"a{number}", action))
+            satellites.append(
+                {
+                    "id": satellite.id,
+                    "name": satellite.name,
+                    "actions": actions,
+                    "resources": None
+                    if line.resources is None
+                    else {
+                        **self._curves(line.resources),
+                        "battery_min_fraction": satellite.resources.battery_min_fraction,
+                        "recorder_max_fraction": satellite.resources.recorder_max_fraction,
+                    },
+                }
+            )
+        return {
+            "schema_version": SCHEMA_VERSION,
+            "job": self.job_id,
+            "scenario_sha256": self.scenario_sha256,
+            "plan_sha256": plan_sha256(judged.problem, judged.solution.plan),
+            "solver": {
+                "name": solver,
+                "version": __version__,
+                "params": dict(params),
+                "seed": seed,
+            },
+            "horizon": {"start": instant_text(horizon.start), "end": instant_text(horizon.end)},
+            "dynamics": judged.problem.dynamics,
+            "use_resources": judged.problem.use_resources,
+            "termination": termination,
+            "runtime_s": {
+                "access": round(runtime.access, 6),
+                "compile": round(runtime.compile, 6),
+                "solve": round(runtime.solve, 6),
+                "verify": round(runtime.verify, 6),
+            },
+            "validity": "valid" if judged.timeline.is_valid else "violations",
+            "violations": [self._violation(v) for v in judged.timeline.violations],
+            "totals": self._totals(),
+            "warnings": list(judged.opportunities.warnings),
+            "satellites": satellites,
+        }
+
+    def targets(self) -> list[Document]:
+        """Return every target once, with outcome and reason."""
+        return [self._target(outcome) for outcome in self.judged.outcomes]
+
+    def _instant(self, offset_s: float) -> str:
+        return instant_text(self.judged.scenario.horizon.instant(offset_s))
+
+    def _totals(self) -> Document:
+        judged, timeline = self.judged, self.judged.timeline
+        outcomes = Counter(outcome.outcome for outcome in judged.outcomes)
+        modes = Counter(a.mode for s in timeline.satellites for a in s.actions)
+        capacities = [s.resources.recorder_capacity_mbit for s in judged.scenario.satellites]
+        downlinked_mbit: float | None = None
+        if judged.problem.use_resources and None not in capacities:
+            downlinked_mbit = sum(
+                share * (capacity or 0.0)
+                for share, capacity in zip(timeline.downlinked, capacities, strict=True)
+            )
+        bound = judged.bound.value if judged.bound else None
+        gap = None
+        if bound is not None:
+            gap = (bound - timeline.reward) / bound if bound > 0.0 else 0.0
+        return {
+            "reward": timeline.reward,
+            "bound": bound,
+            "gap": gap,
+            "bound_proof": judged.bound.proof if judged.bound else None,
+            "collects": modes["collect"],
+            "contacts": modes["contact"],
+            "targets": {
+                name: outcomes[name]
+                for name in ("downlinked", "collected", "unscheduled", "excluded")
+            },
+            "downlinked_mbit": downlinked_mbit,
+            "downlinked_fraction": sum(timeline.downlinked)
+            if judged.problem.use_resources
+            else None,
+            "battery_min_fraction": timeline.battery_min,
+            "recorder_max_fraction": timeline.recorder_max,
+        }
+
+    def _action(self, action_id: str, action: JudgedAction) -> Document:
+        table, scenario = self.judged.problem.opportunities, self.judged.scenario
+        row = action.opportunity
+        target_id = station_id = off_nadir_deg = azimuth_deg = None
+        if row is not None:
+            off_nadir_deg = round(float(table.off_nadir_deg[row]), 4)
+            azimuth_deg = round(float(table.azimuth_deg[row]), 4)
+            place = int(table.place[row])
+            if action.mode == "collect":
+                target_id = scenario.targets[place].id
+            else:
+                station_id = scenario.ground_stations[place].id
+        return {
+            "id": action_id,
+            "mode": action.mode,
+            "start": self._instant(action.start_s),
+            "end": self._instant(action.end_s),
+            "target_id": target_id,
+            "station_id": station_id,
+            "opportunity_id": None if row is None else f"o{row}",
+            "off_nadir_deg": off_nadir_deg,
+            "azimuth_deg": azimuth_deg,
+            "slew": None
+            if action.slew is None
+            else {
+                "angle_deg": round(action.slew.angle_deg, 6),
+                "needed_s": round(action.slew.needed_s, 6),
+                "available_s": round(action.slew.available_s, 3),
+            },
+            "reward": action.reward,
+            "battery_fraction_end": _rounded(action.battery_end),
+            "recorder_fraction_end": _rounded(action.recorder_end),
+        }
+
+    def _curves(self, line: Resourceline) -> Document:
+        return {
+            "time": [self._instant(float(t)) for t in line.time_s],
+            "battery_fraction": [round(float(v), 9) for v in line.battery],
+            "recorder_fraction": [round(float(v), 9) for v in line.recorder],
+        }
+
+    def _violation(self, violation: Violation) -> Document:
+        return {
+            "code": violation.code,
+            "satellite_id": self.judged.problem.satellites[violation.satellite].id,
+            "at": self._instant(violation.at_s),
+            "needed": violation.needed,
+            "available": violation.available,
+            "actions": [self._action_ids[p] for p in violation.blamed],
+            "detail": violation.detail,
+        }
+
+    def _target(self, outcome: TargetOutcome) -> Document:
+        judged = self.judged
+        target = judged.scenario.targets[outcome.target]
+        satellite = outcome.satellite
+        reason: Document | None = None
+        if outcome.reason is not None:
+            found = outcome.reason
+            reason = {
+                "code": found.code,
+                "certainty": found.certainty,
+                "blocking_actions": [self._action_ids[p] for p in found.blocking],
+                "opportunity_id": None if found.opportunity is None else f"o{found.opportunity}",
+                "at": None if found.at_s is None else self._instant(found.at_s),
+                "change": None,
+                "detail": found.detail,
+            }
+        return {
+            "target_id": target.id,
+            "target_catalog_id": target.catalog_id,
+            "outcome": outcome.outcome,
+            "action_id": None if outcome.position is None else self._action_ids[outcome.position],
+            "satellite_id": None if satellite is None else judged.problem.satellites[satellite].id,
+            "reason": reason,
+        }
+
+
+def _rounded(value: float | None) -> float | None:
+    return None if value is None else round(value, 9)

@@ -1,0 +1,206 @@
+"""What clients send, as JSON: one strict schema for each noun, defaults documented.
+
+The ranges here are for the OpenAPI document and early answers; `planner_core.domain` has the
+last word. Scenario files (`ScenarioFile`) are made of the same schemas.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, Discriminator, Field, StringConstraints, Tag, model_validator
+from pydantic_core import PydanticCustomError
+
+from planner_core.domain import Dynamics, LookSide, Nadir
+from service.api.shapes import Body, Instant, Name
+
+Id = Annotated[
+    str, StringConstraints(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")
+]
+NonNegative = Annotated[float, Field(ge=0)]
+Positive = Annotated[float, Field(gt=0)]
+Fraction = Annotated[float, Field(ge=0, le=1)]
+Latitude = Annotated[float, Field(ge=-90, le=90, description="Geodetic (WGS84), north positive.")]
+Longitude = Annotated[
+    float, Field(ge=-180, le=360, description="East positive; both 190 and -170 are taken.")
+]
+Altitude = Annotated[float, Field(ge=-500, le=10000, description="Above the WGS84 ellipsoid.")]
+
+
+class AgilityIn(Body):
+    """How fast the satellite turns; the paper's 1 deg/s by default."""
+
+    slew_rate_deg_s: Positive = 1.0
+    acceleration_deg_s2: Positive | None = Field(
+        None, description="Limit of acceleration and braking; null for none."
+    )
+    settle_s: NonNegative = Field(0.0, description="Wait after each slew.")
+
+
+class SensorIn(Body):
+    """The pointing limits of the imager."""
+
+    off_nadir_min_deg: float = Field(5.0, ge=0, le=90)
+    off_nadir_max_deg: float = Field(55.0, ge=0, le=90)
+    nadir: Nadir = Field(
+        "geodetic", description="Perpendicular to the ellipsoid, or towards the Earth's centre."
+    )
+    look_side: LookSide = Field("any", description="Relative to the direction of flight.")
+    min_elevation_deg: float = Field(0.0, ge=0, lt=90, description="At the target.")
+
+
+class ResourcesIn(Body):
+    """Battery and recorder. All rates are magnitudes."""
+
+    battery_capacity_wh: Positive
+    battery_min_fraction: Fraction = 0.3
+    initial_battery_fraction: Fraction = 1.0
+    sunpoint_power_w: NonNegative = Field(description="Net charge while sun-pointing.")
+    collect_power_w: NonNegative = Field(description="Net draw during a collect.")
+    contact_power_w: NonNegative = Field(description="Net draw during a contact.")
+    recorder_capacity_mbit: Positive
+    recorder_max_fraction: Fraction = 0.75
+    initial_recorder_fraction: Fraction = 0.0
+    collect_rate_mbit_s: NonNegative = Field(description="What a collect writes.")
+    downlink_rate_mbit_s: NonNegative = Field(description="What a contact takes down.")
+    telemetry_rate_mbit_s: NonNegative = Field(description="What telemetry writes at all times.")
+    eclipse_aware: bool = Field(False, description="Charge only in sunlight.")
+
+
+Preset = Literal["paper", "paper_code"]
+
+
+def _form_of_resources(value: object) -> str:
+    return "object" if isinstance(value, (dict, ResourcesIn)) else "preset"
+
+
+ResourcesField = Annotated[
+    Annotated[Preset, Tag("preset")] | Annotated[ResourcesIn, Tag("object")],
+    Discriminator(_form_of_resources),
+]
+
+
+def _finite(omm: dict[str, Any]) -> dict[str, Any]:
+    # Python's JSON reader lets NaN and Infinity through; the schema of an OMM is open.
+    try:
+        json.dumps(omm, allow_nan=False)
+    except ValueError:
+        raise PydanticCustomError("finite_number", "NaN and infinity are no JSON") from None
+    return omm
+
+
+class OrbitIn(Body):
+    """An element set for SGP4: either ``tle`` or ``omm``."""
+
+    tle: list[str] | None = Field(
+        None, min_length=2, max_length=2, description="Line 1 and line 2 of a two-line element set."
+    )
+    omm: Annotated[dict[str, Any], AfterValidator(_finite)] | None = Field(
+        None, description="The keywords of a CCSDS OMM with mean elements for SGP4."
+    )
+
+    @model_validator(mode="after")
+    def _one_form(self) -> OrbitIn:
+        if (self.tle is None) == (self.omm is None):
+            raise PydanticCustomError("one_orbit", "Give the orbit either as tle or as omm")
+        return self
+
+
+class SatelliteIn(OrbitIn):
+    """A satellite. Everything but its name and orbit defaults to the paper's spacecraft."""
+
+    name: Name
+    agility: AgilityIn = AgilityIn()
+    sensor: SensorIn = SensorIn()
+    resources: ResourcesField = Field(
+        "paper",
+        description="The satellite's own figures, or a preset: the paper's normalised spacecraft "
+        "with the rates of its text (paper) or of the authors' code (paper_code).",
+    )
+
+
+class GroundStationIn(Body):
+    """A ground station."""
+
+    name: Name
+    lat_deg: Latitude
+    lon_deg: Longitude
+    alt_m: Altitude = 0.0
+    min_elevation_deg: float = Field(5.0, ge=0, lt=90)
+    min_contact_s: NonNegative = Field(0.0, description="Shorter passes are no contacts.")
+    elevation_mask: list[Annotated[list[float], Field(min_length=2, max_length=2)]] = Field(
+        [],
+        max_length=720,
+        description="Knots [azimuth_deg, elevation_deg] of the horizon, azimuth ascending from "
+        "north over east, linear between them and round the compass. The higher of mask and "
+        "min_elevation_deg holds.",
+    )
+    antennas: int = Field(1, ge=1, le=100, description="Satellites served at a time.")
+
+
+class TargetIn(Body):
+    """A point on the ground to be imaged once, by any satellite."""
+
+    id: Id = Field(description="Your own; unique in the catalogue.")
+    lat_deg: Latitude
+    lon_deg: Longitude
+    alt_m: Altitude = 0.0
+    reward: NonNegative = 1.0
+    collect_s: Positive = Field(30.0, description="How long one image takes.")
+    off_nadir_min_deg: float | None = Field(
+        None, ge=0, le=90, description="Narrows the sensor's limit."
+    )
+    off_nadir_max_deg: float | None = Field(
+        None, ge=0, le=90, description="Narrows the sensor's limit."
+    )
+
+
+class HorizonIn(Body):
+    """The span to plan."""
+
+    start: Instant
+    end: Instant
+
+
+class Question(Body):
+    """What scenarios and scenario files share."""
+
+    name: Name | None = None
+    horizon: HorizonIn
+    use_resources: bool = Field(
+        True, description="False: no contacts, no sun-pointing, no battery and recorder limits."
+    )
+    dynamics: Dynamics = Field("physical", description="How battery and recorder are integrated.")
+    collect_spacing_s: Positive | None = Field(
+        None, description="Several collects per access, this far apart; null for one, centred."
+    )
+    continuous_starts: bool = Field(
+        False, description="A solver may place a collect anywhere inside its access."
+    )
+
+
+class FileSatellite(SatelliteIn):
+    """A satellite of a scenario file."""
+
+    id: Id | None = Field(None, description="Its name by default, made unique.")
+
+
+class FileGroundStation(GroundStationIn):
+    """A ground station of a scenario file."""
+
+    id: Id | None = Field(None, description="Its name by default, made unique.")
+
+
+class FileTarget(TargetIn):
+    """A target of a scenario file."""
+
+    catalog_id: Id | None = Field(None, description="The catalogue it came from.")
+
+
+class ScenarioFile(Question):
+    """A self-contained scenario, as ``GET /v1/scenarios/{id}?expand=true`` answers it."""
+
+    satellites: list[FileSatellite] = Field(min_length=1)
+    targets: list[FileTarget] = Field(min_length=1)
+    ground_stations: list[FileGroundStation] = []

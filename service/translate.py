@@ -1,0 +1,278 @@
+"""JSON to domain types: the only module that knows both.
+
+A scenario's *content* is a self-contained scenario file (`ScenarioFile`). Its canonical form
+has every default filled in, instants in UTC with milliseconds, keys sorted and no name; its
+SHA-256 identifies the question.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any
+
+from pydantic import ValidationError
+
+from planner_core.domain import (
+    Agility,
+    GroundStation,
+    Horizon,
+    OrbitElements,
+    Resources,
+    Satellite,
+    Scenario,
+    Sensor,
+    Target,
+)
+from planner_core.errors import InvalidScenario, PlannerError
+from planner_core.orbits.omm import elements_from_omm
+from planner_core.orbits.tle import parse_tle
+from service.api.errors import faults_of_validation
+from service.inputs import (
+    FileGroundStation,
+    FileSatellite,
+    FileTarget,
+    GroundStationIn,
+    HorizonIn,
+    Preset,
+    ResourcesIn,
+    SatelliteIn,
+    ScenarioFile,
+    TargetIn,
+)
+
+_SECONDS_PER_HOUR = 3600.0
+
+
+def scenario_from_content(content: Mapping[str, Any]) -> Scenario:
+    """Return the scenario of a scenario file.
+
+    Raises
+    ------
+    InvalidScenario, InvalidElements
+        With a JSON pointer to the first thing that is wrong.
+    """
+    return scenario_from_file(read_file(content))
+
+
+def canonical(content: Mapping[str, Any]) -> str:
+    """Return the canonical form of a scenario file, as one line of JSON.
+
+    Raises
+    ------
+    InvalidScenario
+        Where the file is not of its schema.
+    """
+    return canonical_of_file(read_file(content))
+
+
+def sha256_of(canonical_text: str) -> str:
+    """Return the SHA-256 of a canonical form, in hexadecimal."""
+    return hashlib.sha256(canonical_text.encode()).hexdigest()
+
+
+def read_file(content: Mapping[str, Any]) -> ScenarioFile:
+    """Return a scenario file that fits the schema, every id filled in."""
+    try:
+        file = ScenarioFile.model_validate(content)
+    except ValidationError as error:
+        first = faults_of_validation(error, content)[0]
+        raise InvalidScenario(first.code, first.detail, pointer=first.pointer) from None
+    return file.model_copy(
+        update={
+            "satellites": _with_ids(file.satellites),
+            "ground_stations": _with_ids(file.ground_stations),
+        }
+    )
+
+
+def _with_ids(items: Sequence[FileSatellite | FileGroundStation]) -> list[object]:
+    taken = {item.id for item in items if item.id is not None}
+    named: list[object] = []
+    for item in items:
+        own = item.id
+        number = 1
+        while own is None:
+            candidate = item.name if number == 1 else f"{item.name}-{number}"
+            own = None if candidate in taken else candidate
+            number += 1
+        taken.add(own)
+        named.append(item.model_copy(update={"id": own}))
+    return named
+
+
+def canonical_of_file(file: ScenarioFile) -> str:
+    """Return the canonical form of a file that `read_file` has made."""
+    document = file.model_dump(mode="json", exclude={"name"})
+    for satellite in document["satellites"]:
+        del satellite["omm" if satellite["omm"] is None else "tle"]
+    for target in document["targets"]:
+        if target["catalog_id"] is None:
+            del target["catalog_id"]
+    return json.dumps(document, sort_keys=True, separators=(",", ":"), allow_nan=False)
+
+
+def scenario_from_file(file: ScenarioFile) -> Scenario:
+    """Return the scenario of a file that `read_file` has made."""
+    return Scenario(
+        horizon=horizon_from(file.horizon),
+        satellites=tuple(_satellites(file.satellites)),
+        targets=tuple(_targets(file.targets)),
+        ground_stations=tuple(_ground_stations(file.ground_stations)),
+        use_resources=file.use_resources,
+        dynamics=file.dynamics,
+        collect_spacing_s=file.collect_spacing_s,
+        continuous_starts=file.continuous_starts,
+    )
+
+
+def _satellites(items: Sequence[FileSatellite]) -> Iterator[Satellite]:
+    for position, item in enumerate(items):
+        with inside(f"/satellites/{position}"):
+            satellite = satellite_from(item, str(item.id))
+        yield satellite
+
+
+def _targets(items: Sequence[FileTarget]) -> Iterator[Target]:
+    for position, item in enumerate(items):
+        with inside(f"/targets/{position}"):
+            target = target_from(item, item.catalog_id)
+        yield target
+
+
+def _ground_stations(items: Sequence[FileGroundStation]) -> Iterator[GroundStation]:
+    for position, item in enumerate(items):
+        with inside(f"/ground_stations/{position}"):
+            station = ground_station_from(item, str(item.id))
+        yield station
+
+
+@contextmanager
+def inside(pointer: str) -> Iterator[None]:
+    """Put a pointer in front of those of the planner's errors raised within."""
+    try:
+        yield
+    except PlannerError as error:
+        error.fault = replace(error.fault, pointer=pointer + (error.fault.pointer or ""))
+        raise
+
+
+def horizon_from(body: HorizonIn) -> Horizon:
+    """Return the horizon; `InvalidScenario` ``horizon_inverted`` where it has no length."""
+    if body.end <= body.start:
+        raise InvalidScenario(
+            "horizon_inverted", "The end must be later than the start.", pointer="/horizon/end"
+        )
+    return Horizon(start=body.start, end=body.end)
+
+
+def elements_from(orbit: Mapping[str, Any]) -> OrbitElements:
+    """Return the elements of ``{"tle": [...]}`` or ``{"omm": {...}}``.
+
+    Raises
+    ------
+    InvalidElements
+        With a pointer such as ``/tle/1`` or ``/omm/EPOCH``.
+    """
+    if orbit.get("tle") is not None:
+        return parse_tle(orbit["tle"])
+    with inside("/omm"):
+        return elements_from_omm(orbit["omm"])
+
+
+def satellite_from(body: SatelliteIn, satellite_id: str) -> Satellite:
+    """Return the satellite of one body."""
+    elements = elements_from({"tle": body.tle, "omm": body.omm})
+    with inside("/agility"):
+        agility = Agility(**body.agility.model_dump())
+    with inside("/sensor"):
+        sensor = Sensor(**body.sensor.model_dump())
+    with inside("/resources"):
+        resources = resources_from(body.resources, elements.period_s)
+    return Satellite(
+        id=satellite_id,
+        name=body.name,
+        orbit=elements,
+        agility=agility,
+        sensor=sensor,
+        resources=resources,
+    )
+
+
+_FIELDS_OF_RATES = {
+    "/sunpoint_charge_per_s": "/sunpoint_power_w",
+    "/collect_drain_per_s": "/collect_power_w",
+    "/contact_drain_per_s": "/contact_power_w",
+    "/collect_fill_per_s": "/collect_rate_mbit_s",
+    "/downlink_per_s": "/downlink_rate_mbit_s",
+    "/telemetry_per_s": "/telemetry_rate_mbit_s",
+}
+
+
+def resources_from(body: Preset | ResourcesIn, period_s: float) -> Resources:
+    """Return battery and recorder as fractions of their capacity per second.
+
+    Presets depend on the orbital period.
+    """
+    if body == "paper":
+        return Resources.paper(period_s)
+    if body == "paper_code":
+        return Resources.paper_code(period_s)
+    assert isinstance(body, ResourcesIn)
+    battery_ws = body.battery_capacity_wh * _SECONDS_PER_HOUR
+    recorder_mbit = body.recorder_capacity_mbit
+    try:
+        return Resources(
+            battery_min_fraction=body.battery_min_fraction,
+            initial_battery_fraction=body.initial_battery_fraction,
+            sunpoint_charge_per_s=body.sunpoint_power_w / battery_ws,
+            collect_drain_per_s=body.collect_power_w / battery_ws,
+            contact_drain_per_s=body.contact_power_w / battery_ws,
+            recorder_max_fraction=body.recorder_max_fraction,
+            initial_recorder_fraction=body.initial_recorder_fraction,
+            collect_fill_per_s=body.collect_rate_mbit_s / recorder_mbit,
+            downlink_per_s=body.downlink_rate_mbit_s / recorder_mbit,
+            telemetry_per_s=body.telemetry_rate_mbit_s / recorder_mbit,
+            eclipse_aware=body.eclipse_aware,
+            recorder_capacity_mbit=recorder_mbit,
+        )
+    except InvalidScenario as error:
+        pointer = error.fault.pointer or ""
+        error.fault = replace(error.fault, pointer=_FIELDS_OF_RATES.get(pointer, pointer))
+        raise
+
+
+def target_from(body: TargetIn, catalog_id: str | None = None) -> Target:
+    """Return the target of one body."""
+    least, most = body.off_nadir_min_deg, body.off_nadir_max_deg
+    if least is not None and most is not None and most < least:
+        raise InvalidScenario(
+            "value_out_of_range",
+            f"off_nadir_max_deg is {most}: it must be at least off_nadir_min_deg, {least}.",
+            pointer="/off_nadir_max_deg",
+        )
+    fields = {name: getattr(body, name) for name in TargetIn.model_fields}
+    return Target(**fields, catalog_id=catalog_id)
+
+
+def ground_station_from(body: GroundStationIn, station_id: str) -> GroundStation:
+    """Return the ground station of one body."""
+    _check_mask(body.elevation_mask)
+    fields = {name: getattr(body, name) for name in GroundStationIn.model_fields}
+    mask = tuple((azimuth, elevation) for azimuth, elevation in body.elevation_mask)
+    return GroundStation(**fields | {"elevation_mask": mask}, id=station_id)
+
+
+def _check_mask(mask: Sequence[Sequence[float]]) -> None:
+    before = -1.0
+    for position, (azimuth, elevation) in enumerate(mask):
+        if not (before < azimuth <= 360.0 and -90.0 <= elevation <= 90.0):
+            raise InvalidScenario(
+                "value_out_of_range",
+                "Azimuths ascend from 0 to 360, elevations lie between -90 and 90.",
+                pointer=f"/elevation_mask/{position}",
+            )
+        before = max(azimuth, 0.0)

@@ -1,0 +1,54 @@
+"""The bound holds for every plan, whatever the prices."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from planner_core.bounds import lagrangian_bound, lagrangian_value
+from planner_core.solvers import ForwardSearch
+from planner_core.solvers.base import Budget
+from planner_core.timeline import replay
+from tests.planner_core.brute_force import best_reward
+from tests.planner_core.problems import random_problem
+
+SEEDS = st.integers(0, 10**6)
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    seed=SEEDS,
+    use_resources=st.booleans(),
+    num_satellites=st.integers(1, 2),
+    has_rewards=st.booleans(),
+)
+def test_no_plan_beats_the_bound(
+    seed: int, use_resources: bool, num_satellites: int, has_rewards: bool
+) -> None:
+    problem = random_problem(
+        seed, use_resources=use_resources, num_satellites=num_satellites, has_rewards=has_rewards
+    )
+    best = best_reward(problem)
+    assert lagrangian_bound(problem, reward=0.0).value >= best - 1e-9
+    rng = np.random.default_rng(seed)
+    for _ in range(5):
+        prices = rng.uniform(-1.0, 10.0, len(problem.target_ids))
+        assert lagrangian_value(problem, prices)[0] >= best - 1e-9
+
+
+@settings(max_examples=40, deadline=None)
+@given(seed=SEEDS)
+def test_the_stored_prices_prove_the_bound_again(seed: int) -> None:
+    problem = random_problem(seed, num_collects=60, num_targets=20, use_resources=False)
+    plan = ForwardSearch().solve(problem, Budget(), 0).plan
+    reward = replay(problem, plan).reward
+    bound = lagrangian_bound(problem, reward)
+    proven, _ = lagrangian_value(problem, bound.prices)
+    assert reward <= bound.value <= proven + 1e-6
+
+
+def test_prices_tighten_the_bound_where_targets_would_be_taken_twice() -> None:
+    problem = random_problem(3, num_collects=60, num_targets=8, use_resources=False)
+    free, _ = lagrangian_value(problem, np.zeros(8))
+    assert lagrangian_bound(problem, reward=0.0).value <= 8.0 < free
