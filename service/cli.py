@@ -168,7 +168,7 @@ def _worker(options: argparse.Namespace) -> int:
 def _migrate(options: argparse.Namespace) -> int:
     from service.server import prepare_database
 
-    prepare_database(_settings(options).database_url)
+    prepare_database(_settings(options))
     print("The database is up to date.")
     return OK
 
@@ -204,6 +204,8 @@ def _solve(options: argparse.Namespace) -> int:
 def _openapi(options: argparse.Namespace) -> int:
     from service.main import create_app
 
-    app = create_app(_settings(options).model_copy(update={"database_url": "sqlite://"}))
+    # The application opens its database at the first request: this one never.
+    settings = _settings(options).model_copy(update={"database_url": "sqlite:///unused.db"})
+    app = create_app(settings)
     print(json.dumps(app.openapi(), indent=2))
     return OK

@@ -77,7 +77,8 @@ def _plan_mission(client: httpx.Client, folder: Path) -> int:
     )
     solvers = [solver["name"] for solver in _get(client, "/v1/solvers")["items"]]
     jobs = [submit(client, scenario["id"], solver) for solver in solvers]
-    rows, are_valid = [HEADER], True
+    rows: list[tuple[str, ...]] = [HEADER]
+    are_valid = True
     for solver, job in zip(solvers, jobs, strict=True):
         timeline = answer(client, job["id"])
         _write(folder / f"timeline-{solver}.json", timeline)
@@ -151,7 +152,7 @@ def _service(port: int, workers: int, log: Path) -> Iterator[str]:
 
 def _start(port: int, workers: int, database_url: str, log: IO[bytes]) -> subprocess.Popen[str]:
     options = ["--host", "127.0.0.1", "--port", str(port), "--workers", str(max(workers, 1))]
-    return subprocess.Popen(
+    return subprocess.Popen(  # noqa: S603 - our own command
         [sys.executable, "-m", "service", "serve", *options, "--database-url", database_url],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,

@@ -20,8 +20,6 @@ from service.jobs.supervisor import Supervisor
 from service.main import create_app
 from service.settings import Settings
 
-# Jobs of one tenant that may run at once, over all workers of a database.
-TENANT_LIMIT: Final = 64
 _READY_WITHIN_S: Final = 300.0  # a first start may have kernels to compile
 _LOOK_EVERY_S: Final = 0.1
 _LAST_ANSWERS_WITHIN_S: Final = 3
@@ -31,10 +29,10 @@ class CannotServe(Exception):
     """The service cannot run as configured; the message says what to change."""
 
 
-def prepare_database(database_url: str) -> None:
+def prepare_database(settings: Settings) -> None:
     """Create or update the tables of the service and of its queue."""
-    upgrade(database_url)
-    migrate_queue(database_url, tenant_limit=TENANT_LIMIT)
+    upgrade(settings.database_url)
+    migrate_queue(settings)
 
 
 def listen(host: str, port: int) -> socket.socket:
@@ -73,7 +71,7 @@ def serve(settings: Settings, *, with_workers: bool) -> int:
         signal.signal(number, lambda *_: stop.set())
     with ExitStack() as stack:
         listener = stack.enter_context(listen(settings.host, settings.port))
-        prepare_database(settings.database_url)
+        prepare_database(settings)
         api = stack.enter_context(_running_api(settings, listener))
         health = "live"
         if with_workers and settings.workers:
