@@ -15,9 +15,7 @@ from pydantic_core import PydanticCustomError
 from planner_core.domain import Dynamics, LookSide, Nadir
 from service.api.shapes import Body, Instant, Name
 
-Id = Annotated[
-    str, StringConstraints(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")
-]
+Id = Annotated[str, StringConstraints(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")]
 NonNegative = Annotated[float, Field(ge=0)]
 Positive = Annotated[float, Field(gt=0)]
 Fraction = Annotated[float, Field(ge=0, le=1)]

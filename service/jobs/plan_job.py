@@ -2,13 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import json
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from datetime import UTC, datetime, timedelta
+from typing import Any, cast
 
-from planner_core.errors import UnknownSolver
-from planner_core.slew import slew_s
-from planner_core.solvers.base import Budget
+from planner_core.build import ScenarioOpportunities
+from planner_core.domain import (
+    GroundStation,
+    Horizon,
+    OrbitElements,
+    Resources,
+    Satellite,
+    Scenario,
+    Target,
+)
+from planner_core.run import plan_scenario
+from planner_core.solvers import SOLVERS, solver_class
+from planner_core.solvers.base import Budget, Solver
+from service.documents import Documents
+from service.translate import scenario_from_content
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,7 +77,7 @@ class PlanAnswer:
     opportunity_block: bytes | None = None
 
 
-def run_plan_job(request: PlanRequest, budget: Budget) -> PlanAnswer:  # noqa: ARG001
+def run_plan_job(request: PlanRequest, budget: Budget) -> PlanAnswer:
     """Return the judged answer to one request.
 
     Raises
@@ -73,9 +87,58 @@ def run_plan_job(request: PlanRequest, budget: Budget) -> PlanAnswer:  # noqa: A
     Cancelled
         Where the budget ended before there was any plan.
     """
-    raise UnknownSolver("unknown_solver", f"There is no solver {request.solver!r}.")
+    make_solver = cast(Callable[..., Solver], solver_class(request.solver))
+    block = request.opportunity_block
+    judged = plan_scenario(
+        scenario_from_content(json.loads(request.content)),
+        make_solver(**request.params),
+        request.seed,
+        budget,
+        ScenarioOpportunities.from_bytes(block) if block is not None else None,
+    )
+    documents = Documents(judged, job_id=request.job_id, scenario_sha256=request.scenario_sha256)
+    termination = judged.solution.termination.value
+    timeline = documents.timeline(
+        solver=request.solver, params=request.params, seed=request.seed, termination=termination
+    )
+    return PlanAnswer(
+        timeline=json.dumps(timeline),
+        targets=json.dumps(documents.targets()),
+        termination=termination,
+        reward=judged.timeline.reward,
+        bound=judged.bound.value if judged.bound else None,
+        opportunity_block=judged.opportunities.to_bytes() if block is None else None,
+    )
 
 
 def warm_up() -> None:
-    """Load the solvers and compile their kernels."""
-    slew_s(30.0, 1.0, 0.5)
+    """Plan a tiny mission with every solver, so that all kernels are compiled and loaded."""
+    start = datetime(2026, 1, 1, tzinfo=UTC)
+    orbit = OrbitElements(
+        name="WARM-UP",
+        norad_cat_id=1,
+        object_id="",
+        epoch=start,
+        mean_motion_rev_day=15.2,
+        eccentricity=0.001,
+        inclination_deg=90.0,
+        raan_deg=0.0,
+        arg_perigee_deg=0.0,
+        mean_anomaly_deg=0.0,
+    )
+    resources = Resources.paper(orbit.period_s)
+    scenario = Scenario(
+        horizon=Horizon(start=start, end=start + timedelta(hours=6)),
+        satellites=(Satellite(id="warm-up", name="WARM-UP", orbit=orbit, resources=resources),),
+        targets=tuple(
+            Target(id=f"{lat}/{lon}", lat_deg=float(lat), lon_deg=float(lon))
+            for lat in range(-80, 81, 20)
+            for lon in range(-180, 180, 30)
+        ),
+        ground_stations=(GroundStation(id="pole", name="Pole", lat_deg=85.0, lon_deg=0.0),),
+    )
+    opportunities = None
+    for solver in SOLVERS.values():
+        budget = Budget()
+        judged = plan_scenario(scenario, solver(), 0, budget, opportunities)
+        opportunities = judged.opportunities

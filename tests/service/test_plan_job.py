@@ -1,0 +1,58 @@
+"""What a job does, from a scenario file to documents, checked by a second opinion."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from typing import Any
+
+import pytest
+
+from planner_core.solvers import SOLVERS
+from planner_core.solvers.base import Budget
+from service.jobs.plan_job import PlanAnswer, PlanRequest, run_plan_job
+from service.translate import canonical, sha256_of
+from tests import independent
+from tests.missions import Document, drawn_targets, paper_mission
+
+
+def run(scenario: Document, solver: str, block: bytes | None = None) -> PlanAnswer:
+    content = canonical(scenario)
+    params: Any = SOLVERS[solver]()
+    request = PlanRequest(
+        job_id="j",
+        scenario_sha256=sha256_of(content),
+        content=content,
+        solver=solver,
+        params=asdict(params),
+        seed=0,
+        limits={"time_s": 60, "memory_mb": 2048},
+        opportunity_block=block,
+    )
+    return run_plan_job(request, Budget())
+
+
+@pytest.mark.parametrize("solver", sorted(SOLVERS))
+@pytest.mark.parametrize(
+    "flags",
+    [{}, {"dynamics": "paper"}, {"use_resources": False}, {"collect_spacing_s": 30.0}],
+    ids=str,
+)
+def test_timelines_pass_an_independent_check(solver: str, flags: dict[str, Any]) -> None:
+    scenario = paper_mission(drawn_targets(150), **flags)
+    answer = run(scenario, solver)
+    timeline = json.loads(answer.timeline)
+    file = json.loads(canonical(scenario))
+    independent.check(file, timeline, json.loads(answer.targets))
+    assert timeline["totals"]["reward"] > 50
+    assert timeline["totals"]["reward"] == answer.reward
+
+
+def test_stored_opportunities_give_the_same_plan_as_computed_ones() -> None:
+    scenario = paper_mission(drawn_targets(50))
+    first = run(scenario, "rule")
+    assert first.opportunity_block is not None
+    again = run(scenario, "rule", first.opportunity_block)
+    assert again.opportunity_block is None
+    assert json.loads(first.timeline)["plan_sha256"] == json.loads(again.timeline)["plan_sha256"]
+    assert first.targets == again.targets
