@@ -201,4 +201,4 @@ class ScenarioFile(Question):
 
     satellites: list[FileSatellite] = Field(min_length=1)
     targets: list[FileTarget] = Field(min_length=1)
-    ground_stations: list[FileGroundStation] = []
+    ground_stations: list[FileGroundStation] = Field([])

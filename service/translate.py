@@ -11,7 +11,7 @@ import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from pydantic import ValidationError
@@ -28,8 +28,8 @@ from planner_core.domain import (
     Target,
 )
 from planner_core.errors import InvalidScenario, PlannerError
-from planner_core.orbits.omm import elements_from_omm
-from planner_core.orbits.tle import parse_tle
+from planner_core.orbits.omm import elements_from_omm, omm_from_elements
+from planner_core.orbits.tle import read_tle
 from service.api.errors import faults_of_validation
 from service.inputs import (
     FileGroundStation,
@@ -37,6 +37,7 @@ from service.inputs import (
     FileTarget,
     GroundStationIn,
     HorizonIn,
+    OrbitIn,
     Preset,
     ResourcesIn,
     SatelliteIn,
@@ -169,23 +170,32 @@ def horizon_from(body: HorizonIn) -> Horizon:
     return Horizon(start=body.start, end=body.end)
 
 
-def elements_from(orbit: Mapping[str, Any]) -> OrbitElements:
-    """Return the elements of ``{"tle": [...]}`` or ``{"omm": {...}}``.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Orbit:
+    """Elements, and their tidy form as stored: ``{"tle": [...]}`` or ``{"omm": {...}}``."""
+
+    elements: OrbitElements
+    stored: dict[str, Any]
+
+
+def orbit_from(body: OrbitIn) -> Orbit:
+    """Return the orbit of one body.
 
     Raises
     ------
     InvalidElements
         With a pointer such as ``/tle/1`` or ``/omm/EPOCH``.
     """
-    if orbit.get("tle") is not None:
-        return parse_tle(orbit["tle"])
-    with inside("/omm"):
-        return elements_from_omm(orbit["omm"])
+    if body.tle is not None:
+        reading = read_tle(body.tle)
+        return Orbit(elements=reading.elements, stored={"tle": list(reading.lines)})
+    elements = elements_from_omm(body.omm or {})
+    return Orbit(elements=elements, stored={"omm": omm_from_elements(elements)})
 
 
 def satellite_from(body: SatelliteIn, satellite_id: str) -> Satellite:
     """Return the satellite of one body."""
-    elements = elements_from({"tle": body.tle, "omm": body.omm})
+    elements = orbit_from(body).elements
     with inside("/agility"):
         agility = Agility(**body.agility.model_dump())
     with inside("/sensor"):

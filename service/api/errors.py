@@ -84,17 +84,27 @@ def problem(
         title=kind.title,
         status=number,
         code=code,
-        detail=detail,
+        detail=_sendable(detail),
         instance=request.url.path,
         request_id=request.state.request_id,
         errors=[
-            FaultOut(pointer=f.pointer, code=f.code, row=f.row, detail=f.detail)
+            FaultOut(
+                pointer=None if f.pointer is None else _sendable(f.pointer),
+                code=f.code,
+                row=f.row,
+                detail=_sendable(f.detail),
+            )
             for f in faults[:MAX_FAULTS]
         ],
     )
     return JSONResponse(
         body.model_dump(), status_code=number, headers=dict(headers or {}), media_type=PROBLEM_JSON
     )
+
+
+def _sendable(text: str) -> str:
+    # JSON can spell half a surrogate pair, as a field's name for example; UTF-8 cannot.
+    return text.encode("utf-8", "replace").decode()
 
 
 def refuse(faults: Sequence[Fault], *, code: str | None = None) -> ServiceError:

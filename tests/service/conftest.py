@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import threading
 import time
 from collections.abc import Iterator
@@ -47,16 +48,24 @@ def serve(app: FastAPI) -> Iterator[str]:
         thread.join()
 
 
+@pytest.fixture(scope="session")
+def empty_database(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A database with the schema and nothing else, to be copied."""
+    path = tmp_path_factory.mktemp("database") / "empty.db"
+    upgrade(f"sqlite:///{path}")
+    return path
+
+
 @pytest.fixture
-def settings(tmp_path: Path) -> Settings:
-    """Settings of a service with a database in a temporary folder."""
+def settings(tmp_path: Path, empty_database: Path) -> Settings:
+    """Settings of a service with an empty database in a temporary folder."""
+    shutil.copyfile(empty_database, tmp_path / "service.db")
     return Settings(database_url=f"sqlite:///{tmp_path / 'service.db'}", max_body_mb=4.0)
 
 
 @pytest.fixture
 def service(settings: Settings) -> Iterator[Service]:
     """A service with an empty database."""
-    upgrade(settings.database_url)
     app = create_app(settings)
     with serve(app) as address, httpx.Client(base_url=address, timeout=60) as client:
         yield Service(

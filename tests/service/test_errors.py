@@ -8,25 +8,10 @@ import httpx
 import pytest
 
 from planner_core.errors import InvalidElements
-from service.db.migrate import upgrade
 from service.main import create_app
 from service.settings import Settings
 from tests.service.conftest import Service, serve
-
-KEYS = {"type", "title", "status", "code", "detail", "instance", "request_id", "errors"}
-
-
-def assert_problem(response: httpx.Response, status: int, code: str) -> dict[str, object]:
-    assert response.status_code == status, response.text
-    assert response.headers["content-type"] == "application/problem+json"
-    body: dict[str, object] = response.json()
-    assert set(body) == KEYS
-    assert body["status"] == status
-    assert body["code"] == code
-    assert body["type"] == "/problems/" + code.replace("_", "-")
-    assert body["instance"] == response.request.url.path
-    assert body["request_id"] == response.headers["x-request-id"]
-    return body
+from tests.service.problems import assert_problem
 
 
 def test_an_unknown_path_is_404(client: httpx.Client) -> None:
@@ -47,7 +32,6 @@ def test_a_mistyped_query_parameter_is_refused_rather_than_ignored(client: httpx
 @pytest.fixture
 def broken(settings: Settings) -> Iterator[httpx.Client]:
     """The real application with two routes that fail."""
-    upgrade(settings.database_url)
     app = create_app(settings)
 
     @app.get("/bug")

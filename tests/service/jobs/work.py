@@ -8,7 +8,7 @@ import signal
 import time
 from pathlib import Path
 
-from planner_core.errors import InvalidScenario
+from planner_core.errors import Cancelled, InvalidScenario
 from planner_core.solvers.base import Budget, Progress
 from service.jobs.plan_job import PlanAnswer, PlanRequest
 from service.jobs.runner import Work
@@ -29,6 +29,16 @@ def run(request: PlanRequest, budget: Budget) -> PlanAnswer:
         case "deaf":
             budget.report(Progress(phase="solve", fraction=0.5))
             time.sleep(300)
+        case "no_plan":
+            while not budget.is_spent():
+                budget.report(Progress(phase="access", fraction=0.1))
+                time.sleep(0.01)
+            raise Cancelled
+        case "slow_to_verify":
+            found = search(request, budget)
+            budget.report(Progress(phase="verify", fraction=0.0))
+            time.sleep(1.0)
+            return found
         case "hog":
             hoard = [bytearray(os.urandom(1 << 20)) * 16 for _ in range(10_000)]
             return answer(request, str(len(hoard)))

@@ -1,0 +1,80 @@
+"""What all imports share: the answer's shape, and when a file is refused as a whole."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from enum import StrEnum
+from typing import Annotated, Any, Generic, TypeVar
+
+from fastapi import Query
+from pydantic import BaseModel, Field
+
+from planner_core.errors import Fault
+from service.api.errors import refuse
+
+T = TypeVar("T")
+
+
+class OnError(StrEnum):
+    """What to do with the good records of a file that also has bad ones."""
+
+    SKIP = "skip"
+    REJECT_ALL = "reject_all"
+
+
+OnErrorQuery = Annotated[
+    OnError,
+    Query(description="`skip` stores the good records; `reject_all` stores nothing (422)."),
+]
+
+
+class RejectedRow(BaseModel):
+    """A record that was not stored, and why."""
+
+    row: int | None = Field(description="Line of the file, from 1; null in JSON and XML.")
+    code: str
+    detail: str
+
+
+class Imported(BaseModel, Generic[T]):
+    """What an import stored, and what it did not."""
+
+    accepted: int
+    rejected: int
+    items: list[T]
+    errors: list[RejectedRow]
+
+
+def refuse_if_asked(accepted: int, faults: Sequence[Fault], on_error: OnError) -> None:
+    """Raise 422 where nothing is acceptable, or something is wrong and all was asked for."""
+    if faults and (not accepted or on_error is OnError.REJECT_ALL):
+        raise refuse(faults)
+
+
+def imported(items: list[T], faults: Sequence[Fault]) -> Imported[T]:
+    """Return the answer to an import."""
+    return Imported(
+        accepted=len(items),
+        rejected=len(faults),
+        items=items,
+        errors=[RejectedRow(row=f.row, code=f.code, detail=_placed(f)) for f in faults],
+    )
+
+
+def _placed(fault: Fault) -> str:
+    return (
+        f"{fault.pointer}: {fault.detail}" if fault.row is None and fault.pointer else fault.detail
+    )
+
+
+def body_schemas(**examples: tuple[str, str]) -> dict[str, Any]:
+    """Return OpenAPI's ``requestBody`` for text bodies: media type to description."""
+    return {
+        "requestBody": {
+            "required": True,
+            "content": {
+                kind: {"schema": {"type": "string", "description": text}}
+                for kind, text in examples.values()
+            },
+        }
+    }

@@ -1,0 +1,249 @@
+"""Satellites: one, many at once, and their element sets."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from typing import Annotated, Any
+
+import sqlalchemy as sa
+from fastapi import APIRouter, Query, Request, Response
+from pydantic import BaseModel, Field
+from sqlalchemy.orm import Session
+
+from planner_core.errors import Fault
+from planner_core.orbits.ingest import read_elements
+from service import satellite_store as store
+from service.api.conditional import created, unless_known
+from service.api.deps import DatabaseDep, RawBodyDep, require_media_type
+from service.api.errors import problem_responses, refuse
+from service.api.imports import (
+    Imported,
+    OnError,
+    OnErrorQuery,
+    body_schemas,
+    imported,
+    refuse_if_asked,
+)
+from service.api.paging import Listed, PagingDep, newest_first
+from service.api.problems import ServiceError
+from service.api.shapes import Instant
+from service.db.rows import ElementSetRow, SatelliteRow
+from service.inputs import AgilityIn, OrbitIn, ResourcesField, SatelliteIn, SensorIn
+from service.translate import orbit_from, satellite_from
+
+router = APIRouter(prefix="/v1/satellites", tags=["satellites"])
+
+_IMPORT_TYPES = ("text/plain", "application/json", "text/csv", "application/xml", "text/xml")
+
+
+class ElementsOut(BaseModel):
+    """One element set of a satellite."""
+
+    id: str
+    epoch: Instant
+    tle: list[str] | None
+    omm: dict[str, Any] | None
+    created_at: Instant
+
+
+class SatelliteOut(BaseModel):
+    """A satellite with the element set in force, the one of the newest epoch."""
+
+    id: str
+    name: str
+    norad_cat_id: int
+    epoch: Instant
+    tle: list[str] | None
+    omm: dict[str, Any] | None
+    agility: AgilityIn
+    sensor: SensorIn
+    resources: ResourcesField
+    created_at: Instant
+    links: dict[str, str]
+
+
+class RecordWarning(BaseModel):
+    """What was put right while reading a record."""
+
+    row: int | None
+    code: str
+    detail: str
+
+
+class ImportedSatellite(BaseModel):
+    """The satellite that a record belongs to."""
+
+    id: str
+    name: str
+    norad_cat_id: int
+    epoch: Instant
+    row: int | None = Field(description="Line of the file where the record starts.")
+    status: store.Status = Field(
+        description="`elements_added`: the catalogue number was known, the epoch was not; "
+        "`unchanged`: both were."
+    )
+    warnings: list[RecordWarning]
+
+
+@router.post("", status_code=201)
+def create_satellite(body: SatelliteIn, database: DatabaseDep, response: Response) -> SatelliteOut:
+    """Store one satellite. A second one with the same catalogue number is another satellite."""
+    satellite_from(body, "new")
+    orbit = orbit_from(body)
+    with database.transaction() as session:
+        row = store.add_satellite(session, body, orbit)
+        shown = _shown(session, [row])[0]
+    return created(response, shown, f"/v1/satellites/{row.id}")
+
+
+@router.post(
+    "/import",
+    openapi_extra=body_schemas(
+        tle=("text/plain", "TLE, 2LE or 3LE; or OMM in its keyword form (KVN)."),
+        json=("application/json", "One OMM or a list of them, as CelesTrak serves it."),
+        csv=("text/csv", "OMM keywords in the header, one element set a line."),
+        xml=("application/xml", "An omm document, or an ndm with many."),
+    ),
+    responses=problem_responses(413, 415),
+)
+def import_satellites(
+    request: Request, data: RawBodyDep, database: DatabaseDep, on_error: OnErrorQuery = OnError.SKIP
+) -> Imported[ImportedSatellite]:
+    """Store the element sets of a file; satellites get the paper's agility, sensor and resources.
+
+    Importing the same file again changes nothing: a record whose catalogue number is stored
+    joins that satellite, as a further element set where its epoch is new. Two records of one
+    satellite and epoch in a file are one; the second is reported.
+    """
+    found = read_elements(data, require_media_type(request, *_IMPORT_TYPES))
+    refuse_if_asked(len(found.entries), found.faults, on_error)
+    with database.transaction() as session:
+        items = [_imported(one) for one in store.import_entries(session, found.entries)]
+    return imported(items, found.faults)
+
+
+@router.get("")
+def list_satellites(
+    database: DatabaseDep,
+    paging: PagingDep,
+    norad_cat_id: Annotated[int | None, Query(ge=0, description="Only this number.")] = None,
+) -> Listed[SatelliteOut]:
+    """List the satellites, newest first."""
+    query = store.alive()
+    if norad_cat_id is not None:
+        query = query.where(SatelliteRow.norad_cat_id == norad_cat_id)
+    with database.reading() as session:
+        page = newest_first(session, query, SatelliteRow.id, paging)
+        return Listed(items=_shown(session, page.rows), next=page.next)
+
+
+@router.get("/{satellite_id}", response_model=SatelliteOut, responses=problem_responses(404))
+def get_satellite(
+    satellite_id: str, database: DatabaseDep, request: Request, response: Response
+) -> SatelliteOut | Response:
+    """Return one satellite with the element set in force."""
+    with database.reading() as session:
+        shown = _shown(session, [_find(session, satellite_id)])[0]
+    return unless_known(request, response, shown)
+
+
+@router.delete("/{satellite_id}", status_code=204, responses=problem_responses(404))
+def delete_satellite(satellite_id: str, database: DatabaseDep) -> None:
+    """Delete a satellite. Scenarios that use it keep their copy."""
+    with database.transaction() as session:
+        _find(session, satellite_id).deleted_at = datetime.now(UTC)
+
+
+@router.put("/{satellite_id}/elements", responses=problem_responses(404))
+def put_elements(
+    satellite_id: str, body: OrbitIn, database: DatabaseDep, response: Response
+) -> SatelliteOut:
+    """Store a further element set of the satellite; that of the newest epoch is in force.
+
+    Older ones stay readable. Scenarios that exist do not change.
+    """
+    orbit = orbit_from(body)
+    with database.transaction() as session:
+        row = _find(session, satellite_id)
+        _require_same_object(row, orbit.elements.norad_cat_id, body)
+        store.add_elements(session, row.id, orbit.elements.epoch, orbit.stored)
+        shown = _shown(session, [row])[0]
+    return created(response, shown, f"/v1/satellites/{row.id}/elements")
+
+
+@router.get("/{satellite_id}/elements", responses=problem_responses(404))
+def list_elements(
+    satellite_id: str, database: DatabaseDep, paging: PagingDep
+) -> Listed[ElementsOut]:
+    """List all element sets of a satellite, the last stored first."""
+    query = sa.select(ElementSetRow).where(ElementSetRow.satellite_id == satellite_id)
+    with database.reading() as session:
+        _find(session, satellite_id)
+        page = newest_first(session, query, ElementSetRow.id, paging)
+    return Listed(items=[_shown_elements(row) for row in page.rows], next=page.next)
+
+
+def _find(session: Session, satellite_id: str) -> SatelliteRow:
+    row = session.get(SatelliteRow, satellite_id)
+    if row is None or row.deleted_at is not None:
+        raise ServiceError("not_found", f"There is no satellite {satellite_id!r}.")
+    return row
+
+
+def _require_same_object(row: SatelliteRow, norad_cat_id: int, body: OrbitIn) -> None:
+    if norad_cat_id == row.norad_cat_id:
+        return
+    raise refuse(
+        [
+            Fault(
+                code="different_satellite",
+                detail=f"The elements are of {norad_cat_id}, the satellite is {row.norad_cat_id}.",
+                pointer="/tle" if body.tle is not None else "/omm/NORAD_CAT_ID",
+            )
+        ]
+    )
+
+
+def _shown(session: Session, rows: Sequence[SatelliteRow]) -> list[SatelliteOut]:
+    elements = store.in_force(session, [row.id for row in rows])
+    return [
+        SatelliteOut(
+            id=row.id,
+            name=row.name,
+            norad_cat_id=row.norad_cat_id,
+            epoch=elements[row.id].epoch,
+            tle=elements[row.id].orbit.get("tle"),
+            omm=elements[row.id].orbit.get("omm"),
+            agility=AgilityIn(**row.agility),
+            sensor=SensorIn(**row.sensor),
+            resources=row.resources,
+            created_at=row.created_at,
+            links={"elements": f"/v1/satellites/{row.id}/elements"},
+        )
+        for row in rows
+    ]
+
+
+def _shown_elements(row: ElementSetRow) -> ElementsOut:
+    return ElementsOut(
+        id=row.id,
+        epoch=row.epoch,
+        tle=row.orbit.get("tle"),
+        omm=row.orbit.get("omm"),
+        created_at=row.created_at,
+    )
+
+
+def _imported(one: store.ImportedEntry) -> ImportedSatellite:
+    return ImportedSatellite(
+        id=one.satellite.id,
+        name=one.satellite.name,
+        norad_cat_id=one.satellite.norad_cat_id,
+        epoch=one.entry.elements.epoch,
+        row=one.entry.row,
+        status=one.status,
+        warnings=[
+            RecordWarning(row=w.row, code=w.code, detail=w.detail) for w in one.entry.warnings
+        ],
+    )

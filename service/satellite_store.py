@@ -1,0 +1,173 @@
+"""Satellites and their element sets in the database."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from typing import Any, Literal
+
+import sqlalchemy as sa
+from sqlalchemy.orm import Session, aliased
+
+from planner_core.orbits.ingest import Entry
+from service.db.rows import ElementSetRow, SatelliteRow
+from service.ids import new_id
+from service.inputs import AgilityIn, SatelliteIn, SensorIn
+from service.translate import Orbit
+
+_LONGEST_NAME = 200
+
+Status = Literal["created", "elements_added", "unchanged"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ImportedEntry:
+    """What became of one record of a file."""
+
+    satellite: SatelliteRow
+    status: Status
+    entry: Entry
+
+
+def alive() -> sa.Select[SatelliteRow]:
+    """Return the query of all satellites that have not been deleted."""
+    return sa.select(SatelliteRow).where(SatelliteRow.deleted_at.is_(None))
+
+
+def add_satellite(session: Session, body: SatelliteIn, orbit: Orbit) -> SatelliteRow:
+    """Store a new satellite with its first element set."""
+    dumped = body.model_dump(mode="json", include={"agility", "sensor", "resources"})
+    row = SatelliteRow(
+        id=new_id(),
+        name=body.name,
+        norad_cat_id=orbit.elements.norad_cat_id,
+        created_at=datetime.now(UTC),
+        **dumped,
+    )
+    session.add(row)
+    session.flush()
+    add_elements(session, row.id, orbit.elements.epoch, orbit.stored)
+    return row
+
+
+def add_elements(
+    session: Session, satellite_id: str, epoch: datetime, orbit: dict[str, Any]
+) -> ElementSetRow:
+    """Store an element set; one that is there already is returned as it is."""
+    same_epoch = sa.select(ElementSetRow).where(
+        ElementSetRow.satellite_id == satellite_id, ElementSetRow.epoch == epoch
+    )
+    for stored in session.scalars(same_epoch):
+        if stored.orbit == orbit:
+            return stored
+    row = _element_set(satellite_id, epoch, orbit)
+    session.add(row)
+    session.flush()
+    return row
+
+
+def in_force(session: Session, satellite_ids: Iterable[str]) -> dict[str, ElementSetRow]:
+    """Return each satellite's newest element set; of two with one epoch, the later stored."""
+    newest = (
+        sa.func.row_number()
+        .over(
+            partition_by=ElementSetRow.satellite_id,
+            order_by=(ElementSetRow.epoch.desc(), ElementSetRow.id.desc()),
+        )
+        .label("newest")
+    )
+    ranked = (
+        sa.select(ElementSetRow, newest)
+        .where(ElementSetRow.satellite_id.in_(list(satellite_ids)))
+        .subquery()
+    )
+    row = aliased(ElementSetRow, ranked)
+    rows = session.scalars(sa.select(row).where(ranked.c.newest == 1))
+    return {row.satellite_id: row for row in rows}
+
+
+def import_entries(session: Session, entries: Sequence[Entry]) -> list[ImportedEntry]:
+    """Store the records of a file; a satellite that is known is never made twice.
+
+    A catalogue number that is stored already gains the element set, unless it has one of
+    that epoch. Number 0 says nothing, so that there the name counts too.
+    """
+    batch = _Import(_known_satellites(session), _known_epochs(session))
+    results = [batch.take(entry) for entry in entries]
+    session.add_all(batch.new_satellites)
+    session.flush()  # the rows below refer to them
+    session.add_all(batch.new_elements)
+    return results
+
+
+class _Import:
+    """What a file adds to what is known."""
+
+    def __init__(
+        self, known: dict[tuple[int, str], SatelliteRow], epochs: set[tuple[str, int]]
+    ):
+        self._known = known
+        self._epochs = epochs
+        self.new_satellites: list[SatelliteRow] = []
+        self.new_elements: list[ElementSetRow] = []
+
+    def take(self, entry: Entry) -> ImportedEntry:
+        """Give a record to its satellite, known or new."""
+        elements = entry.elements
+        name = (elements.name or f"NORAD {elements.norad_cat_id}")[:_LONGEST_NAME]
+        key = _key(elements.norad_cat_id, name)
+        status: Status = "elements_added"
+        if key not in self._known:
+            self._known[key] = _new_satellite(name, elements.norad_cat_id)
+            self.new_satellites.append(self._known[key])
+            status = "created"
+        satellite = self._known[key]
+        if (satellite.id, _tick(elements.epoch)) in self._epochs:
+            status = "unchanged"
+        else:
+            self._epochs.add((satellite.id, _tick(elements.epoch)))
+            self.new_elements.append(_element_set(satellite.id, elements.epoch, entry.orbit))
+        return ImportedEntry(satellite=satellite, status=status, entry=entry)
+
+
+def _element_set(satellite_id: str, epoch: datetime, orbit: dict[str, Any]) -> ElementSetRow:
+    return ElementSetRow(
+        id=new_id(),
+        satellite_id=satellite_id,
+        epoch=epoch,
+        orbit=orbit,
+        created_at=datetime.now(UTC),
+    )
+
+
+def _new_satellite(name: str, norad_cat_id: int) -> SatelliteRow:
+    return SatelliteRow(
+        id=new_id(),
+        name=name,
+        norad_cat_id=norad_cat_id,
+        agility=AgilityIn().model_dump(mode="json"),
+        sensor=SensorIn().model_dump(mode="json"),
+        resources="paper",
+        created_at=datetime.now(UTC),
+    )
+
+
+def _known_satellites(session: Session) -> dict[tuple[int, str], SatelliteRow]:
+    # Oldest first, so that of several with one number the newest stays in the table.
+    rows = session.scalars(alive().order_by(SatelliteRow.id))
+    return {_key(row.norad_cat_id, row.name): row for row in rows}
+
+
+def _known_epochs(session: Session) -> set[tuple[str, int]]:
+    pairs = session.execute(sa.select(ElementSetRow.satellite_id, ElementSetRow.epoch))
+    return {(satellite_id, _tick(epoch)) for satellite_id, epoch in pairs}
+
+
+def _tick(epoch: datetime) -> int:
+    # A TLE has its epoch to 864 microseconds, an OMM made from it may be off by one.
+    return round((epoch - datetime(2000, 1, 1, tzinfo=UTC)) / timedelta(microseconds=864))
+
+
+def _key(norad_cat_id: int, name: str) -> tuple[int, str]:
+    return norad_cat_id, name if norad_cat_id == 0 else ""
