@@ -1,0 +1,211 @@
+"""The program ``slewline``: one command for each way to run the service.
+
+Whatever takes long to import is imported by the command that needs it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import planner_core
+from planner_core.errors import PlannerError
+
+if TYPE_CHECKING:
+    from service.settings import Settings
+
+OK = 0
+FAILED = 1
+WRONG_INPUT = 2
+
+Command = Callable[[argparse.Namespace], int]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit status: 0 well, 1 failed, 2 wrong input."""
+    options = _parser().parse_args(arguments)
+    command: Command = options.command
+    try:
+        return command(options)
+    except _WrongInput as error:
+        return _complain(str(error), WRONG_INPUT)
+    except KeyboardInterrupt:
+        return _complain("interrupted", FAILED)
+
+
+class _WrongInput(Exception):
+    """Something on the command line, in the environment or in a file; the message names it."""
+
+
+def _complain(message: str, status: int) -> int:
+    print(f"slewline: {message}", file=sys.stderr)
+    return status
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="slewline",
+        description="Operations planning for agile Earth-observation satellites.",
+        epilog="Each setting is also an environment variable: SLEWLINE_PORT and so on.",
+    )
+    parser.add_argument("--version", action="version", version=planner_core.__version__)
+    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+
+    serve = _command(commands, "serve", _serve, "run the API and local workers")
+    _add_address(serve)
+    serve.add_argument("--workers", type=int, help="worker processes (2)")
+    _add_database(serve)
+
+    api = _command(commands, "api", _api, "run the API alone")
+    _add_address(api)
+    _add_database(api)
+
+    worker = _command(commands, "worker", _worker, "run one worker")
+    _add_database(worker)
+
+    migrate = _command(commands, "migrate", _migrate, "create or update the database")
+    _add_database(migrate)
+
+    demo = _command(commands, "demo", _demo, "plan a real-size mission and print what came out")
+    demo.add_argument("--serve", action="store_true", help="keep serving afterwards")
+    demo.add_argument("--out", type=Path, default=Path("demo-output"), help="folder for timelines")
+
+    _add_solve(_command(commands, "solve", _solve, "plan a scenario file, without a service"))
+
+    _command(commands, "openapi", _openapi, "print the description of the HTTP API")
+    return parser
+
+
+def _command(commands: Any, name: str, run: Command, help: str) -> argparse.ArgumentParser:  # noqa: A002
+    parser: argparse.ArgumentParser = commands.add_parser(name, help=help, description=help)
+    parser.set_defaults(command=run)
+    return parser
+
+
+def _add_address(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--host", help="address to listen on (127.0.0.1)")
+    parser.add_argument("--port", type=int, help="port to listen on, 0 for a free one (8000)")
+
+
+def _add_database(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--database-url", help="SQLAlchemy URL (a SQLite file of the user)")
+
+
+def _add_solve(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("scenario", type=Path, metavar="SCENARIO.json")
+    parser.add_argument("--solver", required=True, metavar="NAME")
+    parser.add_argument(
+        "--param", action="append", default=[], type=_parameter, metavar="KEY=VALUE",
+        help="a parameter of the solver, as JSON or as a word; may be repeated",
+    )  # fmt: skip
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--time-s", type=float, default=None, help="stop the search after this")
+    parser.add_argument("--out", type=Path, metavar="FILE", help="write the timeline here")
+
+
+def _parameter(text: str) -> tuple[str, Any]:
+    """Return name and value of ``KEY=VALUE``.
+
+    >>> _parameter("depth=3"), _parameter("feasibility=penalty")
+    (('depth', 3), ('feasibility', 'penalty'))
+    """
+    name, equals, value = text.partition("=")
+    if not equals or not name:
+        raise argparse.ArgumentTypeError(f"{text!r} is not KEY=VALUE")
+    try:
+        return name, json.loads(value)
+    except json.JSONDecodeError:
+        return name, value
+
+
+def _settings(options: argparse.Namespace) -> Settings:
+    """Return the settings of the environment, with the options given on top."""
+    from pydantic import ValidationError
+
+    from service.settings import Settings
+
+    given = {name: value for name, value in vars(options).items() if name in Settings.model_fields}
+    try:
+        return Settings(**{name: value for name, value in given.items() if value is not None})
+    except ValidationError as error:
+        first = error.errors()[0]
+        name = str(first["loc"][0])
+        option = f"--{name.replace('_', '-')}" if name in given else f"SLEWLINE_{name.upper()}"
+        raise _WrongInput(f"{option}: {first['msg']}, not {first['input']!r}") from error
+
+
+def _serve(options: argparse.Namespace) -> int:
+    return _run_server(_settings(options), with_workers=True)
+
+
+def _api(options: argparse.Namespace) -> int:
+    return _run_server(_settings(options), with_workers=False)
+
+
+def _run_server(settings: Settings, *, with_workers: bool) -> int:
+    from service.logs import configure_logging
+    from service.server import CannotServe, serve
+
+    configure_logging()
+    try:
+        return serve(settings, with_workers=with_workers)
+    except CannotServe as error:
+        return _complain(str(error), FAILED)
+
+
+def _worker(options: argparse.Namespace) -> int:
+    from service.jobs.__main__ import run_worker
+    from service.jobs.runner import Work
+
+    run_worker(_settings(options), Work())
+    return OK
+
+
+def _migrate(options: argparse.Namespace) -> int:
+    from service.server import prepare_database
+
+    prepare_database(_settings(options))
+    print("The database is up to date.")
+    return OK
+
+
+def _demo(options: argparse.Namespace) -> int:
+    from service.demo import DemoFailed, run_demo
+
+    try:
+        return run_demo(_settings(options), folder=options.out, keep_serving=options.serve)
+    except DemoFailed as error:
+        return _complain(str(error), FAILED)
+
+
+def _solve(options: argparse.Namespace) -> int:
+    from service.solve import solve_file
+
+    try:
+        return solve_file(
+            options.scenario,
+            solver=options.solver,
+            params=dict(options.param),
+            seed=options.seed,
+            time_s=options.time_s,
+            out=options.out,
+        )
+    except PlannerError as error:
+        where = f" {error.fault.pointer}:" if error.fault.pointer else ""
+        raise _WrongInput(f"{where} {error.detail}".strip()) from error
+    except OSError as error:
+        raise _WrongInput(f"{error.filename}: {error.strerror}") from error
+
+
+def _openapi(options: argparse.Namespace) -> int:
+    from service.main import create_app
+
+    # The application opens its database at the first request: this one never.
+    settings = _settings(options).model_copy(update={"database_url": "sqlite:///unused.db"})
+    app = create_app(settings)
+    print(json.dumps(app.openapi(), indent=2))
+    return OK

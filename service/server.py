@@ -1,0 +1,141 @@
+"""Run the service on this machine: the API in this process, workers beside it."""
+
+from __future__ import annotations
+
+import ipaddress
+import signal
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from typing import Final
+
+import httpx
+import uvicorn
+
+from service.db.migrate import upgrade
+from service.jobs.queue import DbosQueue, migrate_queue
+from service.jobs.supervisor import Supervisor
+from service.main import create_app
+from service.settings import Settings
+
+_READY_WITHIN_S: Final = 300.0  # a first start may have kernels to compile
+_LOOK_EVERY_S: Final = 0.1
+_LAST_ANSWERS_WITHIN_S: Final = 3
+
+
+class CannotServe(Exception):
+    """The service cannot run as configured; the message says what to change."""
+
+
+def prepare_database(settings: Settings) -> None:
+    """Create or update the tables of the service and of its queue."""
+    upgrade(settings.database_url)
+    migrate_queue(settings)
+
+
+def listen(host: str, port: int) -> socket.socket:
+    """Return a socket bound to the address; port 0 takes a free one.
+
+    Raises
+    ------
+    CannotServe
+        Where the host is not this machine's loopback, or the port is taken.
+    """
+    if not _is_loopback(host):
+        raise CannotServe(
+            f"Will not listen on {host}: whoever reaches the service may use it. "
+            "Give --host 127.0.0.1, and put a proxy that asks for credentials before it."
+        )
+    try:
+        family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        return socket.create_server(address[:2], family=family, backlog=2048)
+    except OSError as error:
+        raise CannotServe(
+            f"Cannot listen on {host} port {port}: {error.strerror}. "
+            "Give another --port; 0 takes a free one."
+        ) from error
+
+
+def address_of(listener: socket.socket) -> str:
+    """Return the URL under which a listening socket is reached."""
+    host, port = listener.getsockname()[:2]
+    return f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"
+
+
+def serve(settings: Settings, *, with_workers: bool) -> int:
+    """Serve until SIGTERM or SIGINT, then end all that was started. Return the exit status."""
+    stop = threading.Event()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: stop.set())
+    with ExitStack() as stack:
+        listener = stack.enter_context(listen(settings.host, settings.port))
+        prepare_database(settings)
+        api = stack.enter_context(_running_api(settings, listener))
+        health = "live"
+        if with_workers and settings.workers:
+            stack.enter_context(_running_workers(settings))
+            health = "ready"
+        url = address_of(listener)
+        if _wait_for(f"{url}/health/{health}", lambda: stop.is_set() or not api.is_alive()):
+            print(f"Slewline is ready at {url}", flush=True)
+        while api.is_alive() and not stop.wait(_LOOK_EVERY_S):
+            pass
+    return 0 if stop.is_set() else 1
+
+
+@contextmanager
+def _running_api(settings: Settings, listener: socket.socket) -> Iterator[threading.Thread]:
+    queue = DbosQueue(settings.database_url)
+    config = uvicorn.Config(
+        create_app(settings, queue),
+        log_config=None,
+        access_log=False,
+        timeout_graceful_shutdown=_LAST_ANSWERS_WITHIN_S,
+    )
+    server = uvicorn.Server(config)
+    # In a thread, uvicorn leaves the signals to the one who also has workers to stop.
+    thread = threading.Thread(target=server.run, args=([listener],), name="api", daemon=True)
+    thread.start()
+    try:
+        yield thread
+    finally:
+        server.should_exit = True
+        thread.join()
+        queue.close()
+
+
+@contextmanager
+def _running_workers(settings: Settings) -> Iterator[None]:
+    supervisor = Supervisor(settings)
+    supervisor.start()
+    try:
+        yield
+    finally:
+        supervisor.stop()
+
+
+def _wait_for(url: str, is_over: Callable[[], bool]) -> bool:
+    """Return whether the URL answered 200 before it was over."""
+    deadline_s = time.monotonic() + _READY_WITHIN_S
+    with httpx.Client(trust_env=False) as client:
+        while not is_over():
+            if time.monotonic() > deadline_s:
+                raise CannotServe(f"No worker became ready within {_READY_WITHIN_S:.0f} s.")
+            try:
+                if client.get(url).is_success:
+                    return True
+            except httpx.HTTPError:
+                pass  # not listening yet
+            time.sleep(_LOOK_EVERY_S)
+    return False
+
+
+def _is_loopback(host: str) -> bool:
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False

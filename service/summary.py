@@ -1,0 +1,52 @@
+"""Timelines as a few lines of text for people at a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+HEADER = (
+    "solver", "reward", "bound", "gap", "collects", "contacts", "downlinked",
+    "capacities", "battery", "recorder", "search", "total", "validity",
+)  # fmt: skip
+LEGEND = (
+    "downlinked: targets whose image is on the ground, and what went down in recorder "
+    "capacities;\nbattery: lowest; recorder: highest; search and total: seconds."
+)
+
+
+def summary_row(timeline: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the cells of one timeline document, in the order of ``HEADER``."""
+    totals, runtime_s = timeline["totals"], timeline["runtime_s"]
+    return (
+        timeline["solver"]["name"],
+        f"{totals['reward']:g}",
+        _cell(totals["bound"], "g"),
+        _cell(totals["gap"], ".2%"),
+        str(totals["collects"]),
+        str(totals["contacts"]),
+        str(totals["targets"]["downlinked"]),
+        _cell(totals["downlinked_fraction"], ".2f"),
+        _cell(totals["battery_min_fraction"], ".1%"),
+        _cell(totals["recorder_max_fraction"], ".1%"),
+        f"{runtime_s['solve']:.3f}",
+        f"{sum(runtime_s.values()):.2f}",
+        timeline["validity"],
+    )
+
+
+def table(rows: Sequence[Sequence[str]]) -> str:
+    """Return rows as lines with aligned columns, the first one under the left edge.
+
+    >>> print(table([("solver", "reward"), ("rule", "7")]))
+    solver  reward
+    rule         7
+    """
+    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+    return "\n".join(
+        "  ".join([row[0].ljust(widths[0]), *map(str.rjust, row[1:], widths[1:])]) for row in rows
+    )
+
+
+def _cell(value: float | None, layout: str) -> str:
+    return "-" if value is None else format(value, layout)

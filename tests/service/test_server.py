@@ -1,0 +1,101 @@
+"""``slewline serve`` as a process: ready means ready, and a signal ends all of it."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import httpx
+import psutil
+import pytest
+
+WITHIN_S = 60.0
+
+
+@contextmanager
+def _serving(
+    tmp_path: Path, command: str, *options: str
+) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """Run the program on a fresh database; yield the process and its first line."""
+    database = f"sqlite:///{tmp_path / 'slewline.db'}"
+    process = subprocess.Popen(
+        [
+            sys.executable,
+            "-m",
+            "service",
+            command,
+            "--port",
+            "0",
+            "--database-url",
+            database,
+            *options,
+        ],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    )
+    assert process.stdout is not None
+    try:
+        yield process, process.stdout.readline()
+    finally:
+        process.kill()
+        process.wait()
+        process.stdout.close()
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_serve_says_once_when_it_is_ready_and_ends_cleanly(
+    tmp_path: Path, number: signal.Signals
+) -> None:
+    with _serving(tmp_path, "serve", "--workers", "1") as (process, line):
+        url = line.split()[-1]
+        assert line.startswith("Slewline is ready at http://127.0.0.1:")
+        assert httpx.get(f"{url}/health/ready").json()["workers"] == 1
+        children = psutil.Process(process.pid).children(recursive=True)
+        process.send_signal(number)
+        rest, _ = process.communicate(timeout=WITHIN_S)
+        assert (process.returncode, rest) == (0, "")
+        assert len(children) >= 1
+        _, alive = psutil.wait_procs(children, timeout=WITHIN_S)
+        assert alive == []
+
+
+def test_api_alone_runs_no_worker(tmp_path: Path) -> None:
+    with _serving(tmp_path, "api") as (process, line):
+        url = line.split()[-1]
+        assert httpx.get(f"{url}/health/live").status_code == 200
+        assert httpx.get(f"{url}/health/ready").status_code == 503
+        assert psutil.Process(process.pid).children() == []
+        process.terminate()
+        assert process.wait(WITHIN_S) == 0
+
+
+def test_a_worker_process_serves_the_jobs_of_an_api_process(tmp_path: Path) -> None:
+    with _serving(tmp_path, "api") as (_, line):
+        url = line.split()[-1]
+        database = f"sqlite:///{tmp_path / 'slewline.db'}"
+        worker = subprocess.Popen(
+            [sys.executable, "-m", "service", "worker", "--database-url", database],
+            stderr=subprocess.DEVNULL,
+        )
+        try:
+            assert _becomes_ready(url)
+            worker.terminate()
+            assert worker.wait(WITHIN_S) == 0
+        finally:
+            worker.kill()
+            worker.wait()
+
+
+def _becomes_ready(url: str) -> bool:
+    deadline = time.monotonic() + WITHIN_S
+    while time.monotonic() < deadline:
+        if httpx.get(f"{url}/health/ready").status_code == 200:
+            return True
+        time.sleep(0.1)
+    return False
