@@ -136,13 +136,13 @@ class Ground:
 
 def angle_deg(a: Floats, b: Floats) -> Floats:
     cross = np.linalg.norm(np.cross(a, b), axis=-1)
-    return np.degrees(np.arctan2(cross, (a * b).sum(axis=-1)))
+    return np.asarray(np.degrees(np.arctan2(cross, (a * b).sum(axis=-1))))
 
 
 def vertical_at(position_m: Floats, nadir: str) -> Floats:
     """Return the vertical at a satellite: Skyfield's geodetic one, or the geocentric."""
     if nadir == "geocentric":
-        return position_m / np.linalg.norm(position_m, axis=-1, keepdims=True)
+        return np.asarray(position_m / np.linalg.norm(position_m, axis=-1, keepdims=True))
     x, y, z = position_m.T
     # Bowring's closed form, not the planner's iteration.
     a, b = 6_378_137.0, 6_356_752.314245179
@@ -150,14 +150,10 @@ def vertical_at(position_m: Floats, nadir: str) -> Floats:
     across = np.hypot(x, y)
     beta = np.arctan2(z * a, across * b)
     for _ in range(3):
-        lat = np.arctan2(
-            z + e2_second * b * np.sin(beta) ** 3, across - e2 * a * np.cos(beta) ** 3
-        )
+        lat = np.arctan2(z + e2_second * b * np.sin(beta) ** 3, across - e2 * a * np.cos(beta) ** 3)
         beta = np.arctan2(b * np.sin(lat), a * np.cos(lat))
     lon = np.arctan2(y, x)
-    return np.stack(
-        [np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)], axis=-1
-    )
+    return np.stack([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)], axis=-1)
 
 
 def elevation_deg(position_m: Floats, ground: Ground) -> Floats:

@@ -19,9 +19,7 @@ from planner_core.orbits.ephemeris import propagate
 from planner_core.orbits.places import Places
 from tests.geometry import orbit_from_omm, satellite
 
-DAY = Horizon(
-    start=datetime(2022, 8, 16, tzinfo=UTC), end=datetime(2022, 8, 17, tzinfo=UTC)
-)
+DAY = Horizon(start=datetime(2022, 8, 16, tzinfo=UTC), end=datetime(2022, 8, 17, tzinfo=UTC))
 Windows = dict[tuple[str, str], list[tuple[float, float]]]
 
 

@@ -34,9 +34,9 @@ def test_gmst_grows_by_one_sidereal_day_without_jumps() -> None:
     assert np.allclose(turned, 2.0 * np.pi * 1.00273790935, rtol=0, atol=1e-9)
 
 
-@given(st.datetimes(datetime(1957, 1, 1), datetime(2056, 1, 1)))
-def test_julian_date_counts_days_from_midnight(naive: datetime) -> None:
-    instant = naive.replace(tzinfo=UTC)
+@given(st.integers(-(43 * 366 * 86400), 56 * 366 * 86400), st.integers(0, 999_999))
+def test_julian_date_counts_days_from_midnight(seconds: int, microseconds: int) -> None:
+    instant = datetime(2000, 1, 1, tzinfo=UTC) + timedelta(0, seconds, microseconds)
     jd, fraction = frames.julian_date(instant)
     assert jd % 1.0 == 0.5
     assert 0.0 <= fraction < 1.0
@@ -45,9 +45,7 @@ def test_julian_date_counts_days_from_midnight(naive: datetime) -> None:
     assert abs((back - instant).total_seconds()) < 1e-4
 
 
-@given(
-    st.floats(-180.0, 180.0), st.floats(-90.0, 90.0), st.floats(-500.0, 4e7)
-)
+@given(st.floats(-180.0, 180.0), st.floats(-90.0, 90.0), st.floats(-500.0, 4e7))
 def test_geodetic_coordinates_come_back(lon: float, lat: float, alt: float) -> None:
     position = frames.geodetic_to_itrf(np.array([lon]), np.array([lat]), np.array([alt]))
     found = frames.itrf_to_geodetic(position)
