@@ -15,8 +15,8 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from planner_core.jit import kernel
-from planner_core.problem import COLLECT, Bytes, Floats, Ints, Longs, Problem
+from planner_core.chains import longest_chain
+from planner_core.problem import COLLECT, Floats, Ints, Problem
 
 _PAIRS_TO_SPEND = 40_000_000
 _ROUNDING = 1e-6  # relative; far above the rounding of the sums, far below one reward
@@ -35,50 +35,6 @@ class Bound:
     value: float
     proof: Literal["lagrangian"]
     prices: Floats
-
-
-@kernel
-def longest_chain(
-    weight: Floats, near_from: Ints, far_from: Ints, offset: Longs, bits: Bytes, before: Ints
-) -> tuple[float, int]:
-    """Return the greatest weight of a chain of tasks that may follow each other, and its end.
-
-    Parameters
-    ----------
-    weight
-        Worth of each task, not negative; tasks worth 0 are passed over. Shape ``(m,)``.
-    before
-        Filled with the task before each on its best chain, or -1. Shape ``(m,)``.
-    """
-    m = len(weight)
-    value = np.zeros(m)
-    # Beyond the longest slew everything may follow: only the best so far counts there.
-    far_value = np.zeros(m + 1)
-    far_task = np.full(m + 1, -1, dtype=np.int32)
-    best_far, best_far_task = 0.0, -1
-    best, best_task = 0.0, -1
-    for a in range(m):
-        if far_value[a] > best_far:
-            best_far, best_far_task = far_value[a], far_task[a]
-        if weight[a] <= 0.0:
-            continue
-        if best_far > value[a]:
-            value[a] = best_far
-            before[a] = best_far_task
-        elif value[a] == 0.0:
-            before[a] = -1
-        value[a] += weight[a]
-        if value[a] > best:
-            best, best_task = value[a], a
-        for b in range(near_from[a], far_from[a]):
-            bit = offset[a] + b - near_from[a]
-            if (bits[bit >> 3] >> (bit & 7)) & 1 and value[a] > value[b]:
-                value[b] = value[a]
-                before[b] = a
-        if value[a] > far_value[far_from[a]]:
-            far_value[far_from[a]] = value[a]
-            far_task[far_from[a]] = a
-    return best, best_task
 
 
 def lagrangian_value(problem: Problem, prices: Floats) -> tuple[float, Ints]:

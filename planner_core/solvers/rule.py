@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import ClassVar
 
+import numpy as np
+
 from planner_core.jit import kernel
 from planner_core.model import NO_TASK, Track, is_safe, next_action, take
-from planner_core.problem import Bytes, Problem
+from planner_core.problem import Bytes, Ints, Problem
 from planner_core.solvers.base import Budget, Constraint, Feasibility, Solution
 from planner_core.solvers.sequential import Turn, plan_in_turn
 
@@ -49,6 +51,36 @@ def naive_select_action(
     return row
 
 
+@kernel
+def rule_plan(
+    track: Track, collected: Bytes, is_hard: bool, unimaged_only: bool, contact_above: float
+) -> Ints:
+    """Return the rows that RULEBASEDPLANNER takes from the start to the end of the horizon.
+
+    Marks the targets it takes in ``collected``.
+    """
+    m = len(track.start_s)
+    rows = np.empty(m, dtype=np.int32)
+    count = 0
+    last = NO_TASK
+    battery, recorder = track.battery_start, track.recorder_start
+    row = naive_select_action(
+        track, collected, is_hard, unimaged_only, contact_above, last, last, battery, recorder
+    )
+    while row < m:
+        if track.use_resources:
+            battery, recorder, _ = take(track, last, row, battery, recorder)
+        if not track.is_contact[row]:
+            collected[track.place[row]] = 1
+        rows[count] = row
+        count += 1
+        last = row
+        row = naive_select_action(
+            track, collected, is_hard, unimaged_only, contact_above, row, last, battery, recorder
+        )
+    return rows[:count]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rule:
     """Take the next feasible task in time; sun-point through those that resources forbid."""
@@ -66,12 +98,12 @@ class Rule:
         },
     )
     contact_above_fraction: float = field(
-        default=0.0,
+        default=0.45,
         metadata={
             "minimum": 0,
             "maximum": 1,
-            "description": "Take a contact only when the recorder is at least this full "
-            "(0: always, the paper's rule).",
+            "description": "Take a contact only when the recorder is at least this full. "
+            "The paper's rule is 0, every contact, which costs images.",
         },
     )
     feasibility: Feasibility = field(
@@ -86,27 +118,15 @@ class Rule:
         """Return the plan; the same one whatever the seed."""
 
         def plan_turn(turn: Turn) -> list[int]:
-            track, collected = turn.track, turn.collected
-            last = cursor = NO_TASK
-            battery, recorder = track.battery_start, track.recorder_start
-            taken: list[int] = []
-            reward = 0.0
-            while not budget.is_spent():
-                row = naive_select_action(
-                    track, collected, self.feasibility == "hard", self.unimaged_only,
-                    self.contact_above_fraction, cursor, last, battery, recorder,
-                )  # fmt: skip
-                if row == len(track.start_s):
-                    break
-                if track.use_resources:
-                    battery, recorder, _ = take(track, last, row, battery, recorder)
-                cursor = last = row
-                taken.append(row)
-                place = track.place[row]
-                if not track.is_contact[row] and not collected[place]:
-                    collected[place] = 1
-                    reward += float(problem.target_reward[place])
-                turn.report((row + 1) / len(track.start_s), reward)
-            return taken
+            before = turn.collected.copy()
+            rows = rule_plan(
+                turn.track,
+                turn.collected,
+                self.feasibility == "hard",
+                self.unimaged_only,
+                self.contact_above_fraction,
+            )
+            turn.report(1.0, float(problem.target_reward[turn.collected > before].sum()))
+            return [int(row) for row in rows]
 
         return plan_in_turn(problem, budget, plan_turn)

@@ -13,7 +13,7 @@ from planner_core.domain import Dynamics
 from planner_core.model import NO_TASK, WAIT, Model, compile_track, take
 from planner_core.plan import Plan
 from planner_core.problem import Problem
-from planner_core.solvers import SOLVERS, ForwardSearch, Rule
+from planner_core.solvers import SOLVERS, ForwardSearch, Graph, Rule
 from planner_core.solvers.base import Budget, Solver, Termination
 from planner_core.solvers.forward_search import NOTHING, select_action
 from planner_core.timeline import plan_sha256, replay
@@ -26,7 +26,8 @@ VARIANTS: list[Solver] = [
     *(cls() for cls in SOLVERS.values()),
     ForwardSearch(unimaged_only=False),
     ForwardSearch(depth=5, breadth=2, gamma=0.999),
-    Rule(contact_above_fraction=0.3),
+    Rule(contact_above_fraction=0.0),
+    Graph(path="longest"),
     Rule(unimaged_only=False),
 ]
 
