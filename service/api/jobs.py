@@ -204,7 +204,10 @@ def _describe(response: Response, job: JobRow) -> None:
 
 
 def _scenario_id(session: Session, body: JobIn) -> str:
-    if body.scenario_id is not None and store.has_scenario(session, body.scenario_id):
+    if body.scenario_id is None:
+        detail = "The job needs a scenario."
+        raise refuse([Fault(code="missing_field", detail=detail, pointer="/scenario_id")])
+    if store.has_scenario(session, body.scenario_id):
         return body.scenario_id
     detail = f"There is no scenario {body.scenario_id!r}."
     raise refuse([Fault(code="unknown_scenario", detail=detail, pointer="/scenario_id")])
