@@ -33,3 +33,6 @@ class Settings(BaseSettings):
     default_time_s: float = Field(300.0, gt=0)
     max_time_s: float = Field(3600.0, gt=0)
     default_memory_mb: int = Field(2048, ge=64)
+    queue_poll_s: float = Field(0.1, gt=0)
+    max_queued: int = Field(10_000, ge=1)
+    max_running_per_tenant: int = Field(64, ge=1)

@@ -102,11 +102,17 @@ def renew(
 
 
 def finish(session: Session, lease: Lease, outcome: Outcome) -> bool:
-    """Write how the job ended, result included; return False where the lease is lost."""
+    """Write how the job ended, result included; return False where the lease is lost.
+
+    Who cancelled a job is told that it was cancelled, even where its plan came first.
+    """
+    state: Any = outcome.state
+    if state == "succeeded":
+        state = sa.case((JobRow.state == "cancelling", "cancelled"), else_="succeeded")
     changed = _update(
         session,
         _held(lease),
-        state=outcome.state,
+        state=state,
         termination=outcome.termination,
         error=sa.null() if outcome.error is None else dict(outcome.error),
         **_ended(),

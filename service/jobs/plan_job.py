@@ -63,7 +63,7 @@ class PlanAnswer:
     opportunity_block: bytes | None = None
 
 
-def run_plan_job(request: PlanRequest, budget: Budget) -> PlanAnswer:
+def run_plan_job(request: PlanRequest, budget: Budget) -> PlanAnswer:  # noqa: ARG001
     """Return the judged answer to one request.
 
     Raises

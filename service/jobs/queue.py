@@ -6,6 +6,7 @@ dispatch is named ``"{job_id}:{dispatch}"`` and is never used twice.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -15,6 +16,8 @@ import sqlalchemy as sa
 from dbos import DBOS, DBOSClient, DBOSConfig, EnqueueOptions
 from sqlalchemy.orm import Session
 
+from service.settings import Settings
+
 APPLICATION: Final = "slewline"
 QUEUE: Final = "plan"
 WORKFLOW: Final = "run_job"
@@ -22,6 +25,9 @@ WORKFLOW: Final = "run_job"
 VERSION: Final = "1"
 # Of a job; the queue itself counts the other way round.
 MOST_URGENT: Final = 9
+
+# At its start it says at length what it is.
+logging.getLogger("dbos").setLevel(logging.WARNING)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,12 +91,12 @@ def _mark_disconnect(context: sa.engine.ExceptionContext) -> None:
         context.is_disconnect = True
 
 
-def migrate_queue(database_url: str, *, tenant_limit: int, poll_s: float = 0.1) -> None:
+def migrate_queue(settings: Settings) -> None:
     """Create or update the queue's own tables, and the queue in them."""
-    DBOS.migrate(database_url)
-    queue = DbosQueue(database_url)
+    DBOS.migrate(settings.database_url)
+    queue = DbosQueue(settings.database_url)
     try:
-        queue.configure(tenant_limit=tenant_limit, poll_s=poll_s)
+        queue.configure(tenant_limit=settings.max_running_per_tenant, poll_s=settings.queue_poll_s)
     finally:
         queue.close()
 
@@ -195,7 +201,10 @@ class DbosConsumer:
             log_level="WARNING",
         )
         DBOS(config=config)
-        DBOS.workflow(name=WORKFLOW)(handle)
+
+        @DBOS.workflow(name=WORKFLOW)
+        def run_job(job_id: str, dispatch: int) -> None:
+            handle(job_id, dispatch)
 
     def start(self) -> None:
         """Begin to claim dispatches."""

@@ -19,8 +19,6 @@ from service.jobs.queue import Claim, JobQueue
 
 log = logging.getLogger(__name__)
 
-_PAGE = 200
-
 
 class Reconciler:
     """Repairs the jobs of one database.
@@ -31,13 +29,24 @@ class Reconciler:
         How long a claim may go without a sign of life.
     max_attempts
         A job whose worker died so often is failed: it is probably the cause.
+    page
+        How many waiting jobs are compared with the queue at a time.
     """
 
-    def __init__(self, database: Database, queue: JobQueue, *, lease_s: float, max_attempts: int):
+    def __init__(
+        self,
+        database: Database,
+        queue: JobQueue,
+        *,
+        lease_s: float,
+        max_attempts: int,
+        page: int = 200,
+    ):
         self._database = database
         self._queue = queue
         self._lease_s = lease_s
         self._max_attempts = max_attempts
+        self._page = page
         self._checked_up_to = ""
 
     def run(self) -> None:
@@ -112,11 +121,11 @@ class Reconciler:
                 JobRow.id > self._checked_up_to,
             )
             .order_by(JobRow.id)
-            .limit(_PAGE)
+            .limit(self._page)
         )
         with self._database.reading() as session:
             found = [(row.id, row.dispatch) for row in session.execute(page)]
-        self._checked_up_to = found[-1][0] if len(found) == _PAGE else ""
+        self._checked_up_to = found[-1][0] if len(found) == self._page else ""
         return found
 
     def _return(self, job_id: str, dispatch: int) -> None:

@@ -147,6 +147,7 @@ class _Run:
         self._verifying = False
         self._next_tick_s = 0.0
         self._expire_at_s = math.inf
+        self._started = False
         self._cancelled = False
         self._kill_at_s = time.monotonic() + START_S
 
@@ -166,6 +167,7 @@ class _Run:
         if isinstance(message, Answered | Refused | Stopped):
             return self._settled(message)
         if isinstance(message, Started):
+            self._started = True
             self._expire_at_s = time.monotonic() + self._limits.time_s
             self._kill_at_s = self._expire_at_s + TIME_GRACE_S
         elif isinstance(message, Progress):
@@ -176,8 +178,7 @@ class _Run:
         self._progress = progress
         if progress.phase == "verify" and not self._verifying:
             self._verifying = True
-            if self._kill_at_s < math.inf:
-                self._kill_at_s += VERIFY_GRACE_S
+            self._kill_at_s += VERIFY_GRACE_S
 
     def _settled(self, ending: Ending) -> Ending:
         if isinstance(ending, Stopped) and not self._cancelled:
@@ -213,6 +214,8 @@ class _Run:
             return 0.0
 
     def _out_of_time(self) -> Refused:
+        if not self._started:
+            return Refused("solver_crashed", "The solver's process did not start.")
         detail = f"No plan within the limit of {self._limits.time_s:g} s."
         return Refused("time_limit", detail)
 

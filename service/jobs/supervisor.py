@@ -85,7 +85,9 @@ class _Slot:
         if self._process is None and now_s >= self._started_s + self._pause_s:
             self._started_s = now_s
             # In a session of its own, so that Ctrl-C reaches the supervisor alone.
-            self._process = subprocess.Popen(command, env=environment, start_new_session=True)
+            self._process = subprocess.Popen(  # noqa: S603 - our own command
+                command, env=environment, start_new_session=True
+            )
 
     def terminate(self) -> None:
         if self._process is not None:

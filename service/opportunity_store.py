@@ -1,0 +1,30 @@
+"""Opportunities of scenarios, computed once and stored."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import sqlalchemy as sa
+from sqlalchemy.orm import Session
+
+import planner_core
+from service.db.clock import utc_now
+from service.db.rows import OpportunitySetRow
+
+VERSION: Final = f"{planner_core.__version__}/1"
+
+
+def load(session: Session, sha256: str) -> bytes | None:
+    """Return the stored block of a scenario, or None."""
+    row = session.get(OpportunitySetRow, sha256)
+    return None if row is None or row.version != VERSION else row.block
+
+
+def save(session: Session, sha256: str, block: bytes) -> None:
+    """Store the block of a scenario."""
+    session.execute(sa.delete(OpportunitySetRow).where(OpportunitySetRow.scenario_sha256 == sha256))
+    session.execute(
+        sa.insert(OpportunitySetRow).values(
+            scenario_sha256=sha256, version=VERSION, block=block, created_at=utc_now()
+        )
+    )

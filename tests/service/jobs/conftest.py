@@ -1,0 +1,167 @@
+"""A database with the queue in it, jobs to put there, and real worker processes."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+import sqlalchemy as sa
+
+from service.db.clock import utc_now
+from service.db.migrate import upgrade
+from service.db.rows import JobResultRow, JobRow, ScenarioRow, WorkerRow
+from service.db.session import Database
+from service.ids import new_id
+from service.jobs.queue import DbosQueue, migrate_queue
+from service.jobs.supervisor import environment_of
+from service.settings import Settings
+from tests.service.jobs.work import WORK
+
+PATIENCE_S = 60.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Jobs:
+    """One database of jobs."""
+
+    settings: Settings
+    database: Database
+    queue: DbosQueue
+    scenario_id: str
+    folder: Path
+
+    def submit(self, solver: str, **changes: Any) -> str:
+        """Queue a job and return its id."""
+        job_id = new_id()
+        values: dict[str, Any] = {
+            "params": {"log": str(self.folder / "starts.log")},
+            "limits": {"time_s": 60.0, "memory_mb": 2048},
+            "priority": 5,
+        } | changes
+        with self.database.transaction() as session:
+            session.execute(
+                sa.insert(JobRow).values(
+                    id=job_id,
+                    scenario_id=self.scenario_id,
+                    tenant="local",
+                    state="queued",
+                    solver=solver,
+                    seed=0,
+                    dispatched_at=utc_now(),
+                    created_at=utc_now(),
+                    **values,
+                )
+            )
+            self.queue.enqueue(session, job_id, 1, priority=values["priority"], tenant="local")
+        return job_id
+
+    def job(self, job_id: str) -> JobRow:
+        """Return the job as it stands."""
+        with self.database.reading() as session:
+            return session.get_one(JobRow, job_id)
+
+    def result(self, job_id: str) -> tuple[str, str] | None:
+        """Return timeline and targets of a job."""
+        wanted = sa.select(JobResultRow.timeline, JobResultRow.targets)
+        with self.database.reading() as session:
+            row = session.execute(wanted.where(JobResultRow.job_id == job_id)).one_or_none()
+            return None if row is None else (row.timeline, row.targets)
+
+    def starts(self) -> list[str]:
+        """Return a line for each time a solver began: job, solver, process."""
+        log = self.folder / "starts.log"
+        return log.read_text().splitlines() if log.exists() else []
+
+    def workers(self) -> list[str]:
+        """Return the workers that have enrolled."""
+        with self.database.reading() as session:
+            return list(session.scalars(sa.select(WorkerRow.id)))
+
+    def until(self, condition: Callable[[], bool]) -> None:
+        """Wait for a condition, generously."""
+        deadline_s = time.monotonic() + PATIENCE_S
+        while not condition():
+            assert time.monotonic() < deadline_s, "it never happened"
+            time.sleep(0.02)
+
+    def until_state(self, job_id: str, *states: str) -> JobRow:
+        """Wait until a job is in one of these states."""
+        self.until(lambda: self.job(job_id).state in states)
+        return self.job(job_id)
+
+
+@dataclass(slots=True)
+class Workers:
+    """Worker processes of one test."""
+
+    jobs: Jobs
+    processes: list[subprocess.Popen[bytes]] = field(default_factory=list)
+
+    def start(self) -> subprocess.Popen[bytes]:
+        """Start a worker and return when it is ready to claim jobs."""
+        before = len(self.jobs.workers())
+        command = [sys.executable, "-m", "service.jobs"]
+        command += ["--work", WORK.function, "--preload", WORK.preload]
+        environment = os.environ | environment_of(self.jobs.settings)
+        process = subprocess.Popen(command, env=environment)
+        self.processes.append(process)
+        self.jobs.until(lambda: process.poll() is not None or len(self.jobs.workers()) > before)
+        assert process.returncode is None, "the worker ended at once"
+        return process
+
+
+@pytest.fixture(scope="session")
+def empty_database(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A migrated database, to be copied."""
+    path = tmp_path_factory.mktemp("template") / "jobs.db"
+    upgrade(f"sqlite:///{path}")
+    migrate_queue(Settings(database_url=f"sqlite:///{path}"))
+    return path
+
+
+@pytest.fixture
+def jobs(empty_database: Path, tmp_path: Path) -> Iterator[Jobs]:
+    """A database of its own, with one scenario and short leases."""
+    shutil.copy(empty_database, tmp_path / "jobs.db")
+    settings = Settings(
+        database_url=f"sqlite:///{tmp_path / 'jobs.db'}",
+        lease_s=2.0,
+        heartbeat_s=0.2,
+        reconcile_s=0.2,
+        workers=1,
+    )
+    database, queue = Database(settings.database_url), DbosQueue(settings.database_url)
+    scenario_id = new_id()
+    with database.transaction() as session:
+        session.execute(
+            sa.insert(ScenarioRow).values(
+                id=scenario_id, sha256="0" * 64, summary={}, content="{}", created_at=utc_now()
+            )
+        )
+    yield Jobs(
+        settings=settings,
+        database=database,
+        queue=queue,
+        scenario_id=scenario_id,
+        folder=tmp_path,
+    )
+    queue.close()
+    database.close()
+
+
+@pytest.fixture
+def workers(jobs: Jobs) -> Iterator[Workers]:
+    """Starts workers; whatever still runs at the end is killed."""
+    started = Workers(jobs)
+    yield started
+    for process in started.processes:
+        process.kill()
+        process.wait()

@@ -1,0 +1,116 @@
+"""Real workers: what survives kills, stops and cancels."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+
+import psutil
+import sqlalchemy as sa
+
+from service.db.rows import OpportunitySetRow
+from service.jobs import lease
+from service.jobs.supervisor import Supervisor
+from tests.service.jobs.conftest import Jobs, Workers
+from tests.service.jobs.work import WORK
+
+
+def solver_pid(jobs: Jobs, job_id: str) -> int:
+    """Wait until a job's solver has begun and return its process id."""
+    jobs.until(lambda: any(line.startswith(job_id) for line in jobs.starts()))
+    return int(next(line for line in jobs.starts() if line.startswith(job_id)).split()[-1])
+
+
+def cancel(jobs: Jobs, job_id: str) -> None:
+    with jobs.database.transaction() as session:
+        assert lease.request_cancel(session, job_id)
+
+
+def test_a_job_survives_its_worker_and_finishes_once(jobs: Jobs, workers: Workers) -> None:
+    """SIGKILL in the middle of a job: another worker does it again, and one result is left."""
+    first = workers.start()
+    job_id = jobs.submit("search", limits={"time_s": 3.0, "memory_mb": 2048})
+    orphan = solver_pid(jobs, job_id)
+    workers.start()
+    first.send_signal(signal.SIGKILL)
+    job = jobs.until_state(job_id, "succeeded", "failed", "cancelled")
+    assert (job.state, job.dispatch, job.run, job.lost_runs) == ("succeeded", 2, 2, 1)
+    assert jobs.result(job_id) is not None
+    assert len(jobs.starts()) == 2
+    jobs.until(lambda: not psutil.pid_exists(orphan))
+    jobs.until(lambda: jobs.queue.claims() == [])
+
+
+def test_one_worker_serves_cancels_and_failures_by_priority(jobs: Jobs, workers: Workers) -> None:
+    jobs_in_order = [jobs.submit("answer", priority=priority) for priority in (0, 5, 9, 5)]
+    low, middle, high, later = jobs_in_order
+    worker = workers.start()
+    for job_id in jobs_in_order:
+        jobs.until_state(job_id, "succeeded")
+    began = [line.split()[0] for line in jobs.starts()]
+    assert began[0] == high
+    assert set(began[1:3]) == {middle, later}
+    assert began[3] == low
+    with jobs.database.reading() as session:
+        assert session.scalars(sa.select(OpportunitySetRow.block)).all() == [b"block"]
+
+    searching = jobs.submit("search")
+    jobs.until(lambda: (jobs.job(searching).progress or {}).get("phase") == "solve")
+    cancel(jobs, searching)
+    job = jobs.until_state(searching, "cancelled")
+    assert job.termination == "cancelled"
+    result = jobs.result(searching)
+    assert result is not None
+    assert json.loads(result[0])["validity"] == "valid"
+
+    deaf = jobs.submit("deaf")
+    solver_pid(jobs, deaf)
+    cancel(jobs, deaf)
+    assert jobs.until_state(deaf, "cancelled").termination is None
+    assert jobs.result(deaf) is None
+
+    refused = jobs.until_state(jobs.submit("refuse"), "failed")
+    assert refused.error == {"code": "no_such_orbit", "detail": "The orbit is not one."}
+
+    # The queue offers a finished job once more: nothing happens.
+    with jobs.database.transaction() as session:
+        jobs.queue.enqueue(session, low, 7, priority=9, tenant="local")
+    after = jobs.submit("answer")
+    jobs.until_state(after, "succeeded")
+    assert jobs.job(low).run == 1
+
+    worker.terminate()
+    assert worker.wait(30) == 0
+    assert jobs.workers() == []
+
+
+def test_a_worker_told_to_stop_hands_its_job_back(jobs: Jobs, workers: Workers) -> None:
+    first = workers.start()
+    job_id = jobs.submit("search", limits={"time_s": 1.0, "memory_mb": 2048})
+    solver = solver_pid(jobs, job_id)
+    first.terminate()
+    assert first.wait(30) == 0
+    job = jobs.job(job_id)
+    assert (job.state, job.dispatch, job.lost_runs) == ("queued", 2, 0)
+    assert not psutil.pid_exists(solver)
+    workers.start()
+    assert jobs.until_state(job_id, "succeeded", "failed").state == "succeeded"
+
+
+def test_the_supervisor_replaces_dead_workers_and_ends_them_all(jobs: Jobs) -> None:
+    supervisor = Supervisor(jobs.settings, work=WORK)
+    supervisor.start()
+    try:
+        jobs.until(lambda: len(jobs.workers()) == 1)
+        (first,) = supervisor.pids()
+        job_id = jobs.submit("search", limits={"time_s": 2.0, "memory_mb": 2048})
+        solver_pid(jobs, job_id)
+        os.kill(first, signal.SIGKILL)
+        assert jobs.until_state(job_id, "succeeded", "failed").state == "succeeded"
+        (second,) = supervisor.pids()
+        assert second != first
+    finally:
+        supervisor.stop()
+    assert supervisor.pids() == []
+    assert not psutil.pid_exists(second)

@@ -1,0 +1,74 @@
+"""Things for solver processes to do in tests: the request's ``solver`` names one."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import time
+from pathlib import Path
+
+from planner_core.errors import Cancelled, InvalidScenario
+from planner_core.solvers.base import Budget, Progress
+from service.jobs.plan_job import PlanAnswer, PlanRequest
+from service.jobs.runner import Work
+
+WORK = Work(function="tests.service.jobs.work:run", preload="tests.service.jobs.work")
+
+
+def run(request: PlanRequest, budget: Budget) -> PlanAnswer:
+    """Do what the solver's name says; leave a line for each start where params ask for it."""
+    if "log" in request.params:
+        with Path(request.params["log"]).open("a") as log:
+            log.write(f"{request.job_id} {request.solver} {os.getpid()}\n")
+    match request.solver:
+        case "answer":
+            return answer(request, "horizon_complete")
+        case "search":
+            return search(request, budget)
+        case "deaf":
+            budget.report(Progress(phase="solve", fraction=0.5))
+            time.sleep(300)
+        case "no_plan":
+            while not budget.is_spent():
+                budget.report(Progress(phase="access", fraction=0.1))
+                time.sleep(0.01)
+            raise Cancelled
+        case "slow_to_verify":
+            found = search(request, budget)
+            budget.report(Progress(phase="verify", fraction=0.0))
+            time.sleep(1.0)
+            return found
+        case "hog":
+            hoard = [bytearray(os.urandom(1 << 20)) * 16 for _ in range(10_000)]
+            return answer(request, str(len(hoard)))
+        case "crash":
+            os.kill(os.getpid(), signal.SIGSEGV)
+        case "refuse":
+            raise InvalidScenario("no_such_orbit", "The orbit is not one.", pointer="/satellites")
+        case "bug":
+            raise KeyError("a fault of ours, with inner details")
+    raise AssertionError(request.solver)
+
+
+def search(request: PlanRequest, budget: Budget) -> PlanAnswer:
+    """Get better and better until the budget is spent."""
+    steps = 0
+    while not budget.is_spent():
+        steps += 1
+        budget.report(Progress(phase="solve", fraction=0.5, reward=float(steps)))
+        time.sleep(0.01)
+    return answer(request, budget.termination().value)
+
+
+def answer(request: PlanRequest, termination: str) -> PlanAnswer:
+    """Return a small answer that names its job."""
+    timeline = {"job": request.job_id, "termination": termination, "validity": "valid"}
+    targets = [{"target_id": "t0", "outcome": "collected", "reason": None}]
+    return PlanAnswer(
+        timeline=json.dumps(timeline),
+        targets=json.dumps(targets),
+        termination=termination,
+        reward=1.0,
+        opportunity_block=None if request.opportunity_block else b"block",
+    )
