@@ -18,7 +18,7 @@ from datetime import UTC, datetime, timedelta
 
 from planner_core.domain import OrbitElements
 from planner_core.errors import InvalidElements
-from planner_core.orbits.limits import (
+from planner_core.orbits.element_ranges import (
     LARGEST_NORAD_CAT_ID,
     LONGEST_TEXT,
     is_plain_text,

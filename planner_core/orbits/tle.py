@@ -22,7 +22,7 @@ from datetime import UTC, datetime, timedelta
 
 from planner_core.domain import OrbitElements
 from planner_core.errors import Fault, InvalidElements
-from planner_core.orbits.limits import require_in_range
+from planner_core.orbits.element_ranges import require_in_range
 
 _WIDTH = 69
 _ALPHA5 = "ABCDEFGHJKLMNPQRSTUVWXYZ"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from planner_core.errors import Fault, InvalidElements
-from planner_core.orbits.limits import LONGEST_TEXT, is_plain_text
+from planner_core.orbits.element_ranges import LONGEST_TEXT, is_plain_text
 from planner_core.orbits.tle import TleReading, read_tle
 
 _LONGEST_NAME = 24  # columns of a name line; a line this short is never an element line

@@ -1,0 +1,244 @@
+"""From a scenario to a problem: the only place where orbits and problem meet."""
+
+from __future__ import annotations
+
+import io
+import json
+from dataclasses import dataclass, fields
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from planner_core import opportunities as tasks
+from planner_core.access import Accesses, Limits, find_accesses
+from planner_core.domain import Horizon, Satellite, Scenario
+from planner_core.errors import Cancelled
+from planner_core.orbits import ephemeris as orbits
+from planner_core.orbits.eclipse import always_sunlit, sunlight
+from planner_core.orbits.ephemeris import Ephemeris, propagate
+from planner_core.orbits.places import Places
+from planner_core.problem import (
+    ACCESS_FOUND,
+    ACCESS_TOO_SHORT,
+    COLLECT,
+    CONTACT,
+    NEVER_VISIBLE,
+    OUTSIDE_LIMITS,
+    Opportunities,
+    Problem,
+    Sunlight,
+    build_satellite_problem,
+)
+from planner_core.solvers.base import Budget, Progress
+
+Longs = npt.NDArray[np.int64]
+Codes = npt.NDArray[np.int8]
+Placed = tuple[Longs, Longs, Longs]
+
+LEO_PERIOD_S = 128 * 60.0
+OLD_ELEMENTS_DAYS = 3.0
+
+_REASONS = np.array(
+    [NEVER_VISIBLE, OUTSIDE_LIMITS, ACCESS_TOO_SHORT, ACCESS_FOUND], dtype=np.int8
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ScenarioOpportunities:
+    """All that geometry has to say about a scenario; computed once, stored, used by any solver.
+
+    Attributes
+    ----------
+    opportunities
+        The table that every solver plans with.
+    target_access
+        Why a target has no collect, or ``ACCESS_FOUND``. Shape ``(num_targets,)``.
+    sunlight
+        One per satellite.
+    warnings
+        Sentences for people.
+    """
+
+    opportunities: Opportunities
+    target_access: Codes
+    sunlight: tuple[Sunlight, ...]
+    warnings: tuple[str, ...]
+
+    def to_bytes(self) -> bytes:
+        """Return a compressed form that ``from_bytes`` reads back bit for bit."""
+        columns = {
+            field.name: getattr(self.opportunities, field.name) for field in fields(Opportunities)
+        }
+        lit = self.sunlight
+        buffer = io.BytesIO()
+        np.savez_compressed(
+            buffer,
+            **columns,
+            target_access=self.target_access,
+            lit_counts=np.array([len(s.enter_s) for s in lit], dtype=np.int64),
+            lit_enter_s=np.concatenate([np.empty(0), *(s.enter_s for s in lit)]),
+            lit_exit_s=np.concatenate([np.empty(0), *(s.exit_s for s in lit)]),
+            warnings=np.frombuffer(json.dumps(self.warnings).encode(), dtype=np.uint8),
+        )
+        return buffer.getvalue()
+
+    @classmethod
+    def from_bytes(cls, stored: bytes) -> ScenarioOpportunities:
+        """Return what ``to_bytes`` stored."""
+        with np.load(io.BytesIO(stored), allow_pickle=False) as columns:
+            cuts = np.cumsum(columns["lit_counts"])[:-1]
+            enter_s = np.split(columns["lit_enter_s"], cuts)
+            exit_s = np.split(columns["lit_exit_s"], cuts)
+            return cls(
+                opportunities=Opportunities(
+                    **{field.name: columns[field.name] for field in fields(Opportunities)}
+                ),
+                target_access=columns["target_access"],
+                sunlight=tuple(
+                    Sunlight(enter_s=enter, exit_s=leave)
+                    for enter, leave in zip(enter_s, exit_s, strict=True)
+                ),
+                warnings=tuple(json.loads(columns["warnings"].tobytes())),
+            )
+
+
+def compute_opportunities(scenario: Scenario, budget: Budget) -> ScenarioOpportunities:
+    """Return every opportunity of a scenario, worked out satellite by satellite.
+
+    Raises
+    ------
+    PropagationFailed
+        SGP4 stops before the end of the horizon.
+    Cancelled
+        The budget was spent first; there is no partial answer.
+    """
+    targets, stations = Places.of(scenario.targets), Places.of(scenario.ground_stations)
+    closeness = np.zeros(len(targets), dtype=np.int64)
+    parts: list[Opportunities] = []
+    lit: list[Sunlight] = []
+    num_accesses = 0
+    for index, satellite in enumerate(scenario.satellites):
+        _go_on(budget, index / len(scenario.satellites))
+        path = propagate(satellite, scenario.horizon)
+        nadir = satellite.sensor.nadir
+        for kind, places in ((COLLECT, targets), (CONTACT, stations)):
+            if kind == CONTACT and not scenario.use_resources:
+                continue
+            found = find_accesses(path, places, _limits(scenario, satellite, kind), budget.stop)
+            placed = _placed(scenario, kind, found)
+            if kind == COLLECT:
+                _note(closeness, path, targets, found, placed[0])
+            parts.append(
+                tasks.describe(index, kind, path, places, nadir, found, num_accesses, placed)
+            )
+            num_accesses += len(found)
+        aware = scenario.use_resources and satellite.resources.eclipse_aware
+        lit.append(sunlight(path) if aware else always_sunlit(scenario.horizon.duration_s))
+    _go_on(budget, 1.0)
+    return ScenarioOpportunities(
+        opportunities=tasks.merge(
+            parts, [t.id for t in scenario.targets], [s.id for s in scenario.ground_stations]
+        ),
+        target_access=_REASONS[closeness],
+        sunlight=tuple(lit),
+        warnings=orbit_warnings(scenario),
+    )
+
+
+def _go_on(budget: Budget, fraction: float, phase: Literal["access", "compile"] = "access") -> None:
+    if budget.is_spent():
+        raise Cancelled
+    budget.report(Progress(phase=phase, fraction=fraction))
+
+
+def _limits(scenario: Scenario, satellite: Satellite, kind: int) -> Limits:
+    if kind == COLLECT:
+        return Limits.of_targets(satellite.sensor, scenario.targets)
+    return Limits.of_stations(scenario.ground_stations)
+
+
+def _placed(scenario: Scenario, kind: int, found: Accesses) -> Placed:
+    if kind == COLLECT:
+        return tasks.place_collects(found, scenario.targets, scenario.collect_spacing_s)
+    return tasks.place_contacts(found, scenario.ground_stations)
+
+
+def _note(closeness: Longs, path: Ephemeris, targets: Places, found: Accesses, used: Longs) -> None:
+    """Raise each target's closeness (an index of ``_REASONS``) to what this satellite offers."""
+    np.maximum.at(closeness, found.place, 2)
+    np.maximum.at(closeness, found.place[used], 3)
+    unseen = np.flatnonzero(closeness == 0)
+    seen = find_accesses(path, targets.at(unseen), Limits.above_horizon(len(unseen)))
+    closeness[unseen[seen.place]] = 1
+
+
+def build_problem(scenario: Scenario, computed: ScenarioOpportunities, budget: Budget) -> Problem:
+    """Return the frozen problem that solvers and the referee see.
+
+    Raises
+    ------
+    Cancelled
+        The budget was spent first.
+    """
+    satellites = []
+    for index, satellite in enumerate(scenario.satellites):
+        _go_on(budget, index / len(scenario.satellites), "compile")
+        satellites.append(
+            build_satellite_problem(
+                index,
+                computed.opportunities,
+                id=satellite.id,
+                name=satellite.name,
+                agility=satellite.agility,
+                resources=satellite.resources,
+                sunlight=computed.sunlight[index],
+            )
+        )
+    _go_on(budget, 1.0, "compile")
+    stations = scenario.ground_stations
+    return Problem(
+        horizon_s=scenario.horizon.duration_s,
+        use_resources=scenario.use_resources,
+        dynamics=scenario.dynamics,
+        continuous_starts=scenario.continuous_starts,
+        target_ids=tuple(target.id for target in scenario.targets),
+        target_reward=np.array([t.reward for t in scenario.targets], dtype=np.float64),
+        target_access=computed.target_access,
+        station_ids=tuple(station.id for station in stations),
+        station_antennas=np.array([s.antennas for s in stations], dtype=np.int32),
+        opportunities=computed.opportunities,
+        satellites=tuple(satellites),
+    )
+
+
+def check_propagation(scenario: Scenario) -> None:
+    """Raise ``PropagationFailed`` for the first satellite that SGP4 cannot carry through."""
+    for satellite in scenario.satellites:
+        orbits.check_propagation(satellite, scenario.horizon)
+
+
+def orbit_warnings(scenario: Scenario) -> tuple[str, ...]:
+    """Return what a reader should know about the age of the element sets."""
+    return tuple(
+        warning
+        for satellite in scenario.satellites
+        if (warning := _age_warning(satellite, scenario.horizon)) is not None
+    )
+
+
+def _age_warning(satellite: Satellite, horizon: Horizon) -> str | None:
+    orbit = satellite.orbit
+    before_s = horizon.offset_s(orbit.epoch)
+    oldest_days = max(-before_s, horizon.duration_s - before_s, before_s) / 86400.0
+    if before_s > horizon.duration_s:
+        return (
+            f"Satellite {satellite.name!r}: the element set's epoch lies after the horizon's end "
+            f"({orbit.epoch:%Y-%m-%d})."
+        )
+    if orbit.period_s < LEO_PERIOD_S and oldest_days > OLD_ELEMENTS_DAYS:
+        return (
+            f"Satellite {satellite.name!r}: the element set is up to {oldest_days:.1f} days from "
+            f"its epoch; expect errors of about a kilometre per day."
+        )
+    return None

@@ -1,0 +1,138 @@
+"""Places on the ground, and how a satellite is seen from them (and they from it)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from planner_core.domain import Nadir
+from planner_core.orbits import frames
+from planner_core.orbits.ephemeris import Ephemeris
+from planner_core.orbits.sun import is_in_shadow
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int32]
+Bools = npt.NDArray[np.bool_]
+
+
+class _Point(Protocol):
+    @property
+    def lon_deg(self) -> float: ...
+    @property
+    def lat_deg(self) -> float: ...
+    @property
+    def alt_m(self) -> float: ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Places:
+    """Points on the ground with their geodetic horizon, Earth-fixed. Shape ``(n, 3)`` each."""
+
+    position_m: Floats
+    up: Floats
+    east: Floats
+    north: Floats
+    lon_deg: Floats
+
+    @classmethod
+    def of(cls, points: Sequence[_Point]) -> Places:
+        """Return the places of targets or stations, in their order."""
+        lon, lat, alt = (
+            np.array([getattr(point, name) for point in points], dtype=np.float64)
+            for name in ("lon_deg", "lat_deg", "alt_m")
+        )
+        up, east, north = frames.up_east_north(lon, lat)
+        position = frames.geodetic_to_itrf(lon, lat, alt)
+        return cls(position_m=position, up=up, east=east, north=north, lon_deg=lon)
+
+    def __len__(self) -> int:
+        return len(self.position_m)
+
+    def at(self, rows: npt.NDArray[np.integer]) -> Places:
+        """Return the places in these rows (repeats allowed)."""
+        return Places(
+            position_m=self.position_m[rows],
+            up=self.up[rows],
+            east=self.east[rows],
+            north=self.north[rows],
+            lon_deg=self.lon_deg[rows],
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class View:
+    """What holds between one satellite and one place at one instant, one row each.
+
+    Attributes
+    ----------
+    off_nadir_deg, elevation_deg, azimuth_deg, range_m
+        At the satellite; at the ground; from north over east; between both.
+    sun_elevation_deg, in_eclipse
+        Of the sun at the place; whether the satellite is in the Earth's shadow.
+    """
+
+    off_nadir_deg: Floats
+    elevation_deg: Floats
+    azimuth_deg: Floats
+    range_m: Floats
+    sun_elevation_deg: Floats
+    in_eclipse: Bools
+
+
+def view(ephemeris: Ephemeris, places: Places, t_s: Floats, nadir: Nadir) -> View:
+    """Return the geometry of row ``i``'s place at ``t_s[i]``. Shape ``(n,)``."""
+    position, _ = ephemeris.state_itrf(t_s)
+    up_here = frames.geodetic_normal(position) if nadir == "geodetic" else _unit(position)
+    sight = position - places.position_m
+    range_m = np.linalg.norm(sight, axis=1)
+    azimuth, elevation = azimuth_elevation_deg(ephemeris, places, t_s)
+    sun = _sun_itrf(ephemeris, t_s)
+    return View(
+        off_nadir_deg=_angle_deg(_row_dot(up_here, sight) / range_m),
+        elevation_deg=elevation,
+        azimuth_deg=azimuth,
+        range_m=range_m,
+        sun_elevation_deg=90.0 - _angle_deg(_row_dot(places.up, sun)),
+        in_eclipse=is_in_shadow(position, sun),
+    )
+
+
+def azimuth_elevation_deg(
+    ephemeris: Ephemeris, places: Places, t_s: Floats
+) -> tuple[Floats, Floats]:
+    """Return where the satellite stands above each place: azimuth [0, 360) and elevation."""
+    position, _ = ephemeris.state_itrf(t_s)
+    sight = position - places.position_m
+    east, north, up = (_row_dot(sight, v) for v in (places.east, places.north, places.up))
+    azimuth = np.degrees(np.arctan2(east, north)) % 360.0
+    return azimuth, np.degrees(np.arctan2(up, np.hypot(east, north)))
+
+
+def line_of_sight_teme(ephemeris: Ephemeris, places: Places, t_s: Floats) -> Floats:
+    """Return unit vectors from the satellite to row ``i``'s place, inertial. ``(n, 3)``."""
+    position, _ = ephemeris.state_itrf(t_s)
+    return ephemeris.to_teme(_unit(places.position_m - position), t_s)
+
+
+def _sun_itrf(ephemeris: Ephemeris, t_s: Floats) -> Floats:
+    node_s = ephemeris.node_s
+    inertial = np.stack(
+        [np.interp(t_s, node_s, ephemeris.sun_teme[:, axis]) for axis in range(3)], axis=1
+    )
+    return ephemeris.to_itrf(inertial, t_s)
+
+
+def _unit(vector: Floats) -> Floats:
+    return np.asarray(vector / np.linalg.norm(vector, axis=1)[:, None])
+
+
+def _row_dot(a: Floats, b: Floats) -> Floats:
+    return np.asarray(np.einsum("ij,ij->i", a, b))
+
+
+def _angle_deg(cosine: Floats) -> Floats:
+    return np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
