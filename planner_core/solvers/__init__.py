@@ -6,11 +6,14 @@ from planner_core.errors import UnknownSolver
 from planner_core.solvers.base import Solver
 from planner_core.solvers.forward_search import ForwardSearch
 from planner_core.solvers.graph import Graph
+from planner_core.solvers.mcts import Mcts
 from planner_core.solvers.rule import Rule
 
-__all__ = ["SOLVERS", "ForwardSearch", "Graph", "Rule", "solver_class"]
+__all__ = ["SOLVERS", "ForwardSearch", "Graph", "Mcts", "Rule", "solver_class"]
 
-SOLVERS: dict[str, type[Solver]] = {solver.name: solver for solver in (Rule, Graph, ForwardSearch)}
+SOLVERS: dict[str, type[Solver]] = {
+    solver.name: solver for solver in (Rule, Graph, ForwardSearch, Mcts)
+}
 """Every solver by its name in the API."""
 
 
