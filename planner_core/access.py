@@ -2,7 +2,7 @@
 
 The search takes the satellite's cubics minute by minute. A cap on the ground, rigorously
 large enough, leaves the few places that a minute can matter for; for those, every limit is a
-smooth function whose sign changes are found by value and rate at both ends (``orbits.limits``)
+smooth function whose sign changes are found by value and rate at both ends (``orbits.crossings``)
 and swept together (``orbits.search``). Windows are rounded inward to the millisecond here,
 once, and nowhere else.
 """
@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from planner_core.domain import GroundStation, LookSide, Nadir, Sensor, Target
-from planner_core.orbits import limits as codes
+from planner_core.orbits import crossings as codes
 from planner_core.orbits.ephemeris import Ephemeris
 from planner_core.orbits.frames import EARTH_POLAR_RADIUS_M
 from planner_core.orbits.mask import Mask, windows_above_mask
@@ -227,7 +227,7 @@ def _cap(ephemeris: Ephemeris, reach_rad: Floats, turn_rad_s: Floats, size: int)
     first = np.arange(0, num_intervals, size, dtype=np.int64)
     last = np.minimum(first + size, num_intervals)
     nodes = np.minimum(first[:, None] + np.arange(size + 1), last[:, None])
-    middle_s: Floats = (first + last) * (0.5 * ephemeris.step_s)
+    middle_s = np.asarray((first + last) * (0.5 * ephemeris.step_s), dtype=np.float64)
     middle, _ = ephemeris.state_itrf(middle_s)
     half_s = (last - first) * (0.5 * ephemeris.step_s)
     # Along its path the satellite gets no farther from the middle than it can turn in half.

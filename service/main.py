@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from fastapi import Depends, FastAPI
 
 import planner_core
-from service.api import meta, openapi, satellites
+from service.api import ground_stations, jobs, meta, openapi, satellites, target_catalogs
 from service.api.deps import check_request
 from service.api.errors import install_error_handlers
 from service.api.middleware import BodyLimit, RequestContext
@@ -25,7 +25,14 @@ DESCRIPTION = (
     "errors are problem documents (RFC 9457)."
 )
 
-ROUTERS = (satellites.router, meta.router, openapi.router)
+ROUTERS = (
+    satellites.router,
+    ground_stations.router,
+    target_catalogs.router,
+    jobs.router,
+    meta.router,
+    openapi.router,
+)
 
 
 def create_app(settings: Settings, queue: JobQueue | None = None) -> FastAPI:

@@ -104,9 +104,7 @@ def import_entries(session: Session, entries: Sequence[Entry]) -> list[ImportedE
 class _Import:
     """What a file adds to what is known."""
 
-    def __init__(
-        self, known: dict[tuple[int, str], SatelliteRow], epochs: set[tuple[str, int]]
-    ):
+    def __init__(self, known: dict[tuple[int, str], SatelliteRow], epochs: set[tuple[str, int]]):
         self._known = known
         self._epochs = epochs
         self.new_satellites: list[SatelliteRow] = []

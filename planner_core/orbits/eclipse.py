@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from planner_core.orbits.crossings import SUNLIT
 from planner_core.orbits.ephemeris import Ephemeris
-from planner_core.orbits.limits import SUNLIT
 from planner_core.orbits.search import GROUP, find_windows
 from planner_core.problem import Sunlight
 

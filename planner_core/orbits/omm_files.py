@@ -11,6 +11,7 @@ import csv
 import io
 import json
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -140,7 +141,7 @@ def _read_records(reader: Any, messages: list[Message]) -> list[Fault]:
 
 
 def _header_fault(header: list[str], row: int) -> Fault | None:
-    twice = [name for name in header if name and header.count(name) > 1]
+    twice = [name for name, count in Counter(header).items() if name and count > 1]
     if twice:
         return Fault("omm_duplicate_key", f"The header names {_shown(twice[0])} twice", row=row)
     missing = [key for key in REQUIRED_KEYS if key not in header]

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from planner_core.jit import kernel
-from planner_core.orbits.limits import crossings, limit_value
+from planner_core.orbits.crossings import crossings, limit_value
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int32]

@@ -148,7 +148,7 @@ class ForwardSearch:
         },
     )
     gamma: float = field(
-        default=0.995,
+        default=0.9995,
         metadata={
             "exclusiveMinimum": 0,
             "maximum": 1,
@@ -170,8 +170,12 @@ class ForwardSearch:
         },
     )
     contact_reward_per_s: float = field(
-        default=0.1,
-        metadata={"minimum": 0, "description": "Guidance per second of contact (Table 2)."},
+        default=1e-3,
+        metadata={
+            "minimum": 0,
+            "description": "Guidance per second of contact. Table 2 has 0.1, which makes every "
+            "contact worth tens of images and costs a tenth of the plan.",
+        },
     )
     sunpoint_reward_per_s: float = field(
         default=1e-4,

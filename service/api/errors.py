@@ -129,12 +129,8 @@ def faults_of(errors: Iterable[Any], body: object) -> list[Fault]:
 
 def faults_of_validation(error: ValidationError, body: object) -> list[Fault]:
     """Return the faults of a document that was validated outside FastAPI."""
-    return [
-        Fault(
-            code=_code(e["type"]), detail=_sentence(e), pointer=_pointer(("body", *e["loc"]), body)
-        )
-        for e in error.errors(include_url=False)
-    ]
+    found = ({**e, "loc": ("body", *e["loc"])} for e in error.errors(include_url=False))
+    return faults_of(found, body)
 
 
 _CODES = {

@@ -8,10 +8,18 @@ from typing import Any
 from fastapi import APIRouter, FastAPI, Request
 from fastapi.openapi.utils import get_openapi
 from fastapi.responses import HTMLResponse
+from pydantic import BaseModel
 
 from service.api.errors import ProblemOut, problem_responses
+from service.api.target_catalogs import TargetCatalogIn
 
 router = APIRouter(include_in_schema=False)
+
+# Schemas that no route's signature mentions.
+_FURTHER_SCHEMAS: dict[str, type[BaseModel]] = {
+    "Problem": ProblemOut,
+    "TargetCatalogIn": TargetCatalogIn,
+}
 
 _ALWAYS = (422, 500)
 _WITH_BODY = (413, 415)
@@ -45,9 +53,10 @@ def _with_problems(document: dict[str, Any]) -> dict[str, Any]:
     schemas = document.setdefault("components", {}).setdefault("schemas", {})
     for name in ("HTTPValidationError", "ValidationError"):
         schemas.pop(name, None)
-    problem_schema = ProblemOut.model_json_schema(ref_template="#/components/schemas/{model}")
-    schemas |= problem_schema.pop("$defs")
-    schemas["Problem"] = problem_schema | {"title": "Problem"}
+    for name, model in _FURTHER_SCHEMAS.items():
+        schema = model.model_json_schema(ref_template="#/components/schemas/{model}")
+        schemas |= schema.pop("$defs", {})
+        schemas[name] = schema | {"title": name}
     for operations in document["paths"].values():
         for operation in operations.values():
             statuses = _ALWAYS + (_WITH_BODY if "requestBody" in operation else ())

@@ -34,11 +34,15 @@ class Lease:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """How a run ended. ``timeline`` and ``targets`` are documents as JSON text, or None."""
+    """How a run ended. ``timeline`` and ``targets`` are documents as JSON text, or None.
+
+    ``progress`` is the last report; None leaves the one that the job has.
+    """
 
     state: JobState
     termination: str | None = None
     error: Mapping[str, str] | None = None
+    progress: Mapping[str, Any] | None = None
     timeline: str | None = None
     targets: str | None = None
 
@@ -115,6 +119,7 @@ def finish(session: Session, lease: Lease, outcome: Outcome) -> bool:
         state=state,
         termination=outcome.termination,
         error=sa.null() if outcome.error is None else dict(outcome.error),
+        progress=JobRow.progress if outcome.progress is None else dict(outcome.progress),
         **_ended(),
     )
     if changed and outcome.timeline is not None and outcome.targets is not None:

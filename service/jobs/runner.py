@@ -89,11 +89,15 @@ class Runner:
         self._context = get_context("forkserver")
         self._context.set_forkserver_preload([work.preload])
 
-    def warm_up(self) -> None:
-        """Start the fork server and return when it is ready to fork."""
+    def warm_up(self, is_wanted: Callable[[], bool] = lambda: True) -> bool:
+        """Start the fork server; return whether it was ready before ``is_wanted`` said no."""
         process = self._context.Process(target=_nothing, daemon=True)
         process.start()
-        process.join()
+        while process.is_alive() and is_wanted():
+            process.join(POLL_S)
+        is_ready = not process.is_alive()
+        _end(process)
+        return is_ready
 
     def run(
         self,

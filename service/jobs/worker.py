@@ -70,7 +70,8 @@ class Worker:
 
     def run(self, is_wanted: Callable[[], bool] = lambda: True) -> None:
         """Work until ``stop`` is called or ``is_wanted`` says no."""
-        self._runner.warm_up()
+        if not self._runner.warm_up(lambda: is_wanted() and not self._stopping.is_set()):
+            return
         consumer = DbosConsumer(self._settings.database_url, self.id, self.handle)
         self._enrol()
         consumer.start()
@@ -206,6 +207,9 @@ def outcome_of(ending: Ending) -> Outcome:
     return Outcome(
         state="cancelled" if answer.termination == "cancelled" else "succeeded",
         termination=answer.termination,
+        progress=dataclasses.asdict(
+            Progress(phase="verify", fraction=1.0, reward=answer.reward, bound=answer.bound)
+        ),
         timeline=answer.timeline,
         targets=answer.targets,
     )

@@ -63,14 +63,24 @@ def settings(tmp_path: Path, empty_database: Path) -> Settings:
     return Settings(database_url=f"sqlite:///{tmp_path / 'service.db'}", max_body_mb=4.0)
 
 
+@pytest.fixture(scope="session")
+def running_app(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[FastAPI, str]]:
+    """The application on a port of its own, for all tests; each gives it its own database."""
+    unused = f"sqlite:///{tmp_path_factory.mktemp('unused') / 'unused.db'}"
+    app = create_app(Settings(database_url=unused, max_body_mb=4.0))
+    with serve(app) as address:
+        yield app, address
+
+
 @pytest.fixture
-def service(settings: Settings) -> Iterator[Service]:
+def service(settings: Settings, running_app: tuple[FastAPI, str]) -> Iterator[Service]:
     """A service with an empty database."""
-    app = create_app(settings)
-    with serve(app) as address, httpx.Client(base_url=address, timeout=60) as client:
-        yield Service(
-            app=app, client=client, database=app.state.database, settings=app.state.settings
-        )
+    app, address = running_app
+    app.state.settings = settings
+    app.state.database = Database(settings.database_url)
+    with httpx.Client(base_url=address, timeout=60) as client:
+        yield Service(app=app, client=client, database=app.state.database, settings=settings)
+    app.state.database.close()
 
 
 @pytest.fixture

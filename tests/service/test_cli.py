@@ -38,9 +38,7 @@ def test_wrong_usage_ends_with_status_2(arguments: list[str]) -> None:
 
 def test_help_loads_neither_the_web_framework_nor_the_compiler() -> None:
     script = "import sys, service.cli; print(*sys.modules)"
-    ran = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, check=True
-    )
+    ran = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     loaded = set(ran.stdout.split())
     assert "service.cli" in loaded
     assert loaded.isdisjoint({"fastapi", "numba", "numpy", "sqlalchemy", "dbos", "uvicorn"})

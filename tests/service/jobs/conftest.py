@@ -26,6 +26,8 @@ from service.settings import Settings
 from tests.service.jobs.work import WORK
 
 PATIENCE_S = 60.0
+SERVER_URL = os.environ.get("SLEWLINE_TEST_SERVER_URL")
+"""A PostgreSQL server that these tests may fill with databases; without it they use SQLite."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -119,20 +121,38 @@ class Workers:
 
 
 @pytest.fixture(scope="session")
-def empty_database(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A migrated database, to be copied."""
-    path = tmp_path_factory.mktemp("template") / "jobs.db"
-    upgrade(f"sqlite:///{path}")
-    migrate_queue(Settings(database_url=f"sqlite:///{path}"))
-    return path
+def template_url(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """A migrated database, to be copied: a SQLite file, or on the server that is named."""
+    folder = tmp_path_factory.mktemp("template")
+    url = f"sqlite:///{folder / 'jobs.db'}"
+    if SERVER_URL is not None:
+        url = _create_database(SERVER_URL, "template1")
+    upgrade(url)
+    migrate_queue(Settings(database_url=url))
+    return url
+
+
+def _copy(template_url: str, folder: Path) -> str:
+    if SERVER_URL is not None:
+        return _create_database(SERVER_URL, str(sa.make_url(template_url).database))
+    shutil.copy(str(sa.make_url(template_url).database), folder / "jobs.db")
+    return f"sqlite:///{folder / 'jobs.db'}"
+
+
+def _create_database(server_url: str, template: str) -> str:
+    name = f"slewline_{new_id().replace('-', '')}"
+    engine = sa.create_engine(server_url, isolation_level="AUTOCOMMIT")
+    with engine.connect() as connection:
+        connection.execute(sa.text(f"CREATE DATABASE {name} TEMPLATE {template}"))
+    engine.dispose()
+    return sa.make_url(server_url).set(database=name).render_as_string(hide_password=False)
 
 
 @pytest.fixture
-def jobs(empty_database: Path, tmp_path: Path) -> Iterator[Jobs]:
+def jobs(template_url: str, tmp_path: Path) -> Iterator[Jobs]:
     """A database of its own, with one scenario and short leases."""
-    shutil.copy(empty_database, tmp_path / "jobs.db")
     settings = Settings(
-        database_url=f"sqlite:///{tmp_path / 'jobs.db'}",
+        database_url=_copy(template_url, tmp_path),
         lease_s=2.0,
         heartbeat_s=0.2,
         reconcile_s=0.2,

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import time
+
 import sqlalchemy as sa
 
+from service.db.clock import utc_now
+from service.db.rows import JobRow
 from service.jobs import lease
 from service.jobs.queue import dispatch_name
 from service.jobs.reconcile import Reconciler
@@ -29,13 +33,18 @@ def claim(jobs: Jobs, job_id: str, *, age_s: float = 60.0) -> tuple[str, int]:
 
 
 def set_queue_status(jobs: Jobs, job_id: str, dispatch: int, status: str, age_s: float) -> None:
+    schema = "dbos." if jobs.database.engine.dialect.name == "postgresql" else ""
     with jobs.database.transaction() as session:
         changed = session.execute(
             sa.text(
-                "UPDATE workflow_status SET status = :status, executor_id = 'dead-worker',"
-                " started_at_epoch_ms = (unixepoch() - :age_s) * 1000 WHERE workflow_uuid = :name"
+                f"UPDATE {schema}workflow_status SET status = :status, executor_id = 'dead-worker',"
+                " started_at_epoch_ms = :since WHERE workflow_uuid = :name"
             ),
-            {"status": status, "age_s": age_s, "name": dispatch_name(job_id, dispatch)},
+            {
+                "status": status,
+                "since": int((time.time() - age_s) * 1000),
+                "name": dispatch_name(job_id, dispatch),
+            },
         )
         assert changed.rowcount == 1  # type: ignore[attr-defined]
 
@@ -44,8 +53,7 @@ def age(jobs: Jobs, job_id: str) -> None:
     """Make a job look as if it had been queued long ago."""
     with jobs.database.transaction() as session:
         session.execute(
-            sa.text("UPDATE job SET dispatched_at = '2020-01-01 00:00:00.000000' WHERE id = :id"),
-            {"id": job_id},
+            sa.update(JobRow).where(JobRow.id == job_id).values(dispatched_at=utc_now(-3600.0))
         )
 
 

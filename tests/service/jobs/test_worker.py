@@ -27,19 +27,56 @@ def cancel(jobs: Jobs, job_id: str) -> None:
         assert lease.request_cancel(session, job_id)
 
 
-def test_a_job_survives_its_worker_and_finishes_once(jobs: Jobs, workers: Workers) -> None:
-    """SIGKILL in the middle of a job: another worker does it again, and one result is left."""
-    first = workers.start()
-    job_id = jobs.submit("search", limits={"time_s": 3.0, "memory_mb": 2048})
-    orphan = solver_pid(jobs, job_id)
-    workers.start()
-    first.send_signal(signal.SIGKILL)
-    job = jobs.until_state(job_id, "succeeded", "failed", "cancelled")
-    assert (job.state, job.dispatch, job.run, job.lost_runs) == ("succeeded", 2, 2, 1)
-    assert jobs.result(job_id) is not None
-    assert len(jobs.starts()) == 2
-    jobs.until(lambda: not psutil.pid_exists(orphan))
-    jobs.until(lambda: jobs.queue.claims() == [])
+def test_a_job_survives_its_worker_and_finishes_once(jobs: Jobs) -> None:
+    """SIGKILL in the middle of a job: the supervisor's next worker does it, and all end well."""
+    supervisor = Supervisor(jobs.settings, work=WORK)
+    supervisor.start()
+    try:
+        job_id = jobs.submit("search", limits={"time_s": 1.0, "memory_mb": 2048})
+        orphan = solver_pid(jobs, job_id)
+        (first,) = supervisor.pids()
+        os.kill(first, signal.SIGKILL)
+        job = jobs.until_state(job_id, "succeeded", "failed", "cancelled")
+        assert (job.state, job.dispatch, job.run, job.lost_runs) == ("succeeded", 2, 2, 1)
+        assert jobs.result(job_id) is not None
+        assert len(jobs.starts()) == 2
+        assert not psutil.pid_exists(orphan)
+        jobs.until(lambda: jobs.queue.claims() == [])
+        (second,) = supervisor.pids()
+        assert second != first
+    finally:
+        supervisor.stop()
+    assert supervisor.pids() == []
+    assert not psutil.pid_exists(second)
+
+
+def test_workers_take_over_from_a_frozen_and_from_a_stopped_one(
+    jobs: Jobs, workers: Workers
+) -> None:
+    """SIGSTOP past the lease: the new owner's result stands, and the old worker lives on.
+
+    SIGTERM: the job is handed back at once, and lost nothing.
+    """
+    frozen = workers.start()
+    job_id = jobs.submit("search", limits={"time_s": 1.0, "memory_mb": 2048})
+    solver_pid(jobs, job_id)
+    frozen.send_signal(signal.SIGSTOP)
+    owner = workers.start()
+    job = jobs.until_state(job_id, "succeeded", "failed")
+    assert (job.state, job.dispatch, job.run) == ("succeeded", 2, 2)
+
+    handed_back = jobs.submit("search", limits={"time_s": 3.0, "memory_mb": 2048})
+    solver = solver_pid(jobs, handed_back)
+    owner.terminate()
+    assert owner.wait(30) == 0
+    assert not psutil.pid_exists(solver)
+    waiting = jobs.job(handed_back)
+    assert (waiting.state, waiting.dispatch, waiting.lost_runs) == ("queued", 2, 0)
+
+    frozen.send_signal(signal.SIGCONT)
+    assert jobs.until_state(handed_back, "succeeded", "failed").state == "succeeded"
+    unchanged = jobs.job(job_id)
+    assert (unchanged.version, unchanged.run) == (job.version, 2)
 
 
 def test_one_worker_serves_cancels_and_failures_by_priority(jobs: Jobs, workers: Workers) -> None:
@@ -83,34 +120,3 @@ def test_one_worker_serves_cancels_and_failures_by_priority(jobs: Jobs, workers:
     worker.terminate()
     assert worker.wait(30) == 0
     assert jobs.workers() == []
-
-
-def test_a_worker_told_to_stop_hands_its_job_back(jobs: Jobs, workers: Workers) -> None:
-    first = workers.start()
-    job_id = jobs.submit("search", limits={"time_s": 1.0, "memory_mb": 2048})
-    solver = solver_pid(jobs, job_id)
-    first.terminate()
-    assert first.wait(30) == 0
-    job = jobs.job(job_id)
-    assert (job.state, job.dispatch, job.lost_runs) == ("queued", 2, 0)
-    assert not psutil.pid_exists(solver)
-    workers.start()
-    assert jobs.until_state(job_id, "succeeded", "failed").state == "succeeded"
-
-
-def test_the_supervisor_replaces_dead_workers_and_ends_them_all(jobs: Jobs) -> None:
-    supervisor = Supervisor(jobs.settings, work=WORK)
-    supervisor.start()
-    try:
-        jobs.until(lambda: len(jobs.workers()) == 1)
-        (first,) = supervisor.pids()
-        job_id = jobs.submit("search", limits={"time_s": 2.0, "memory_mb": 2048})
-        solver_pid(jobs, job_id)
-        os.kill(first, signal.SIGKILL)
-        assert jobs.until_state(job_id, "succeeded", "failed").state == "succeeded"
-        (second,) = supervisor.pids()
-        assert second != first
-    finally:
-        supervisor.stop()
-    assert supervisor.pids() == []
-    assert not psutil.pid_exists(second)

@@ -22,9 +22,9 @@ def run(request: PlanRequest, budget: Budget) -> PlanAnswer:
         with Path(request.params["log"]).open("a") as log:
             log.write(f"{request.job_id} {request.solver} {os.getpid()}\n")
     match request.solver:
-        case "answer":
+        case "answer" | "rule":
             return answer(request, "horizon_complete")
-        case "search":
+        case "search" | "forward_search":
             return search(request, budget)
         case "deaf":
             budget.report(Progress(phase="solve", fraction=0.5))

@@ -1,0 +1,161 @@
+"""Ground stations: one, and many at once from GeoJSON or CSV."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from typing import Literal
+
+import sqlalchemy as sa
+from fastapi import APIRouter, Request, Response
+from pydantic import BaseModel, Field
+from sqlalchemy.orm import Session
+
+from service.api.conditional import created, unless_known
+from service.api.deps import DatabaseDep, RawBodyDep, require_media_type
+from service.api.errors import problem_responses
+from service.api.imports import (
+    Imported,
+    OnError,
+    OnErrorQuery,
+    body_schemas,
+    imported,
+    refuse_if_asked,
+)
+from service.api.paging import Listed, PagingDep, newest_first
+from service.api.problems import ServiceError
+from service.api.shapes import Instant
+from service.db.rows import GroundStationRow
+from service.ids import new_id
+from service.inputs import GroundStationIn
+from service.records import Checked, check, read_csv, read_geojson
+from service.translate import ground_station_from
+
+router = APIRouter(prefix="/v1/ground-stations", tags=["ground stations"])
+
+_CSV_COLUMNS = tuple(n for n in GroundStationIn.model_fields if n != "elevation_mask")
+_REQUIRED = ("name", "lat_deg", "lon_deg")
+_IMPORT_TYPES = ("application/geo+json", "application/json", "text/csv")
+
+
+class GroundStationOut(GroundStationIn):
+    """A ground station."""
+
+    id: str
+    created_at: Instant
+
+
+class ImportedStation(BaseModel):
+    """The station that a record belongs to."""
+
+    id: str
+    name: str
+    row: int | None = Field(description="Line of the file, for CSV.")
+    status: Literal["created", "unchanged"] = Field(
+        description="`unchanged`: the same station is stored already."
+    )
+
+
+@router.post("", status_code=201)
+def create_ground_station(
+    body: GroundStationIn, database: DatabaseDep, response: Response
+) -> GroundStationOut:
+    """Store one ground station."""
+    ground_station_from(body, "new")
+    with database.transaction() as session:
+        row = _add(session, body)
+    return created(response, _shown(row), f"/v1/ground-stations/{row.id}")
+
+
+@router.post(
+    "/import",
+    openapi_extra=body_schemas(
+        geojson=("application/geo+json", "A FeatureCollection of points, each with a `name`."),
+        csv=("text/csv", f"A header with some of {', '.join(_CSV_COLUMNS)}."),
+    ),
+    responses=problem_responses(413, 415),
+)
+def import_ground_stations(
+    request: Request, data: RawBodyDep, database: DatabaseDep, on_error: OnErrorQuery = OnError.SKIP
+) -> Imported[ImportedStation]:
+    """Store the stations of a file. A station that is stored already is not stored again.
+
+    CSV: `lat`, `latitude`, `lon`, `lng` and `longitude` are taken as well. GeoJSON: the
+    properties that are fields of a station count, others are ignored.
+    """
+    kind = require_media_type(request, *_IMPORT_TYPES)
+    found = (
+        read_csv(data, _CSV_COLUMNS, _REQUIRED)
+        if kind == "text/csv"
+        else read_geojson(data, GroundStationIn.model_fields)
+    )
+    good, faults = check(
+        found.records, GroundStationIn, lambda body: ground_station_from(body, "new")
+    )
+    faults = [*found.faults, *faults]
+    refuse_if_asked(len(good), faults, on_error)
+    with database.transaction() as session:
+        return imported(_store(session, good), faults)
+
+
+@router.get("")
+def list_ground_stations(database: DatabaseDep, paging: PagingDep) -> Listed[GroundStationOut]:
+    """List the ground stations, newest first."""
+    query = sa.select(GroundStationRow).where(GroundStationRow.deleted_at.is_(None))
+    with database.reading() as session:
+        page = newest_first(session, query, GroundStationRow.id, paging)
+    return Listed(items=[_shown(row) for row in page.rows], next=page.next)
+
+
+@router.get("/{station_id}", response_model=GroundStationOut, responses=problem_responses(404))
+def get_ground_station(
+    station_id: str, database: DatabaseDep, request: Request, response: Response
+) -> GroundStationOut | Response:
+    """Return one ground station."""
+    with database.reading() as session:
+        shown = _shown(_find(session, station_id))
+    return unless_known(request, response, shown)
+
+
+@router.delete("/{station_id}", status_code=204, responses=problem_responses(404))
+def delete_ground_station(station_id: str, database: DatabaseDep) -> None:
+    """Delete a ground station. Scenarios that use it keep their copy."""
+    with database.transaction() as session:
+        _find(session, station_id).deleted_at = datetime.now(UTC)
+
+
+def _find(session: Session, station_id: str) -> GroundStationRow:
+    row = session.get(GroundStationRow, station_id)
+    if row is None or row.deleted_at is not None:
+        raise ServiceError("not_found", f"There is no ground station {station_id!r}.")
+    return row
+
+
+def _add(session: Session, body: GroundStationIn) -> GroundStationRow:
+    row = GroundStationRow(
+        id=new_id(),
+        name=body.name,
+        body=body.model_dump(mode="json"),
+        created_at=datetime.now(UTC),
+    )
+    session.add(row)
+    return row
+
+
+def _store(session: Session, good: list[Checked[GroundStationIn]]) -> list[ImportedStation]:
+    query = sa.select(GroundStationRow).where(GroundStationRow.deleted_at.is_(None))
+    known = {_body(row): row for row in session.scalars(query)}
+    items = []
+    for one in good:
+        key = one.body.model_dump_json()
+        status: Literal["created", "unchanged"] = "unchanged" if key in known else "created"
+        row = known[key] = known.get(key) or _add(session, one.body)
+        items.append(ImportedStation(id=row.id, name=row.name, row=one.record.row, status=status))
+    return items
+
+
+def _body(row: GroundStationRow) -> str:
+    return GroundStationIn(**row.body).model_dump_json()
+
+
+def _shown(row: GroundStationRow) -> GroundStationOut:
+    return GroundStationOut(id=row.id, created_at=row.created_at, **row.body)

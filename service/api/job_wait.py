@@ -1,0 +1,66 @@
+"""Waiting for a job to change, without a thread that waits."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from typing import Final
+
+from starlette.concurrency import run_in_threadpool
+
+from service import job_store as store
+from service.api.job_shapes import etag_of_job
+from service.api.problems import ServiceError
+from service.api.shapes import matches
+from service.db.rows import JobRow
+from service.db.session import Database
+from service.jobs import lease
+
+LOOK_EVERY_S: Final = 0.1
+
+
+async def wait_for_change(
+    database: Database,
+    job_id: str,
+    known: str | None,
+    wait_s: float,
+    is_disconnected: Callable[[], Awaitable[bool]],
+) -> tuple[JobRow, str]:
+    """Return a job and its scenario's hash, at the latest after ``wait_s``.
+
+    Parameters
+    ----------
+    known
+        The client's ``If-None-Match``: what it has seen; None for what is there now.
+
+    Raises
+    ------
+    ServiceError
+        Where there is no such job.
+    """
+    job, sha256 = await run_in_threadpool(_read, database, job_id)
+    seen = etag_of_job(job) if known is None else known
+    clock = asyncio.get_running_loop()
+    until_s = clock.time() + wait_s
+    while job.state in lease.ACTIVE and matches(seen, etag_of_job(job)):
+        left_s = until_s - clock.time()
+        if left_s <= 0 or await is_disconnected():
+            break
+        await asyncio.sleep(min(LOOK_EVERY_S, left_s))
+        # Only a number is read until it moves: many may wait at once.
+        if await run_in_threadpool(_version, database, job_id) != job.version:
+            job, sha256 = await run_in_threadpool(_read, database, job_id)
+    return job, sha256
+
+
+def _read(database: Database, job_id: str) -> tuple[JobRow, str]:
+    with database.reading() as session:
+        job = store.find(session, job_id)
+        if job is None:
+            raise ServiceError("not_found", f"There is no job {job_id!r}.")
+        return job, store.scenario_hashes(session, [job])[job.scenario_id]
+
+
+def _version(database: Database, job_id: str) -> int | None:
+    with database.reading() as session:
+        return store.version_of(session, job_id)

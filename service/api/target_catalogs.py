@@ -1,0 +1,225 @@
+"""Target catalogues: from JSON, GeoJSON or CSV, stored whole or not at all."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from typing import Annotated, Any
+
+import sqlalchemy as sa
+from fastapi import APIRouter, Query, Request, Response
+from pydantic import BaseModel, Field, ValidationError
+from sqlalchemy.orm import Session
+
+from planner_core.errors import Fault
+from service.api.conditional import created, unless_known
+from service.api.deps import DatabaseDep, RawBodyDep, require_media_type
+from service.api.errors import faults_of_validation, problem_responses, refuse
+from service.api.paging import Listed, PagingDep, newest_first
+from service.api.problems import ServiceError
+from service.api.shapes import Body, Instant, Name
+from service.db.rows import TargetCatalogRow, TargetRow
+from service.ids import new_id
+from service.inputs import TargetIn
+from service.records import Record, Records, check, first_of_each, read_csv, read_geojson
+from service.translate import target_from
+
+router = APIRouter(prefix="/v1/target-catalogs", tags=["target catalogues"])
+
+MAX_TARGETS = 100_000
+_TYPES = ("application/json", "application/geo+json", "text/csv")
+_REQUIRED = ("id", "lat_deg", "lon_deg")
+_COLUMNS = tuple(TargetIn.model_fields)
+_UNNAMED = "Targets"
+
+
+class TargetCatalogIn(Body):
+    """A catalogue of targets."""
+
+    name: Name
+    targets: list[TargetIn] = Field(min_length=1, max_length=MAX_TARGETS)
+
+
+class TargetCatalogOut(BaseModel):
+    """A catalogue; its targets have their own address."""
+
+    id: str
+    name: str
+    num_targets: int
+    created_at: Instant
+    links: dict[str, str]
+
+
+class CreatedCatalog(TargetCatalogOut):
+    """A new catalogue."""
+
+    ignored_columns: list[str] = Field(description="Columns of a CSV file that mean nothing here.")
+
+
+_REQUEST_BODY: dict[str, Any] = {
+    "requestBody": {
+        "required": True,
+        "content": {
+            "application/json": {"schema": {"$ref": "#/components/schemas/TargetCatalogIn"}},
+            "application/geo+json": {
+                "schema": {
+                    "type": "object",
+                    "description": "A FeatureCollection of points (RFC 7946). The id is the "
+                    "feature's or a property; other fields of a target are properties.",
+                }
+            },
+            "text/csv": {
+                "schema": {
+                    "type": "string",
+                    "description": f"A header with id, lat_deg, lon_deg and any of "
+                    f"{', '.join(_COLUMNS[3:])}; lat, latitude, lon, lng and longitude are "
+                    "taken as well. An empty cell means the default.",
+                }
+            },
+        },
+    }
+}
+
+
+@router.post(
+    "",
+    status_code=201,
+    openapi_extra=_REQUEST_BODY,
+    responses=problem_responses(413, 415),
+)
+def create_target_catalog(
+    request: Request,
+    response: Response,
+    data: RawBodyDep,
+    database: DatabaseDep,
+    name: Annotated[
+        Name | None, Query(description="Name of a catalogue whose file has none.")
+    ] = None,
+) -> CreatedCatalog:
+    """Store a catalogue. One bad row refuses the whole of it; every bad row is named."""
+    kind = require_media_type(request, *_TYPES)
+    found = _read(kind, data)
+    targets = _checked(found)
+    with database.transaction() as session:
+        row = _add(session, found.name or name or _UNNAMED, targets)
+    shown = created(response, _shown(row), f"/v1/target-catalogs/{row.id}")
+    return CreatedCatalog(**shown.model_dump(), ignored_columns=list(found.ignored))
+
+
+def _read(kind: str, data: bytes) -> Records:
+    match kind:
+        case "text/csv":
+            return read_csv(data, _COLUMNS, _REQUIRED)
+        case "application/geo+json":
+            return read_geojson(data, _COLUMNS)
+    return _read_json(data)
+
+
+def _read_json(data: bytes) -> Records:
+    try:
+        document = json.loads(data.decode("utf-8-sig"))
+    except (ValueError, RecursionError) as error:
+        raise refuse([Fault(code="malformed_json", detail=f"No JSON: {error}"[:200])]) from None
+    try:
+        body = TargetCatalogIn.model_validate(document)
+    except ValidationError as error:
+        raise refuse(faults_of_validation(error, document)) from None
+    records = tuple(
+        Record(
+            fields=target.model_dump(),
+            pointers={column: f"/targets/{position}/{column}" for column in _COLUMNS},
+        )
+        for position, target in enumerate(body.targets)
+    )
+    return Records(records=records, name=body.name)
+
+
+def _checked(found: Records) -> list[TargetIn]:
+    if len(found.records) > MAX_TARGETS:
+        raise ServiceError("too_many_rows", f"A catalogue holds at most {MAX_TARGETS} targets.")
+    good, faults = check(found.records, TargetIn, target_from)
+    faults += found.faults
+    faults += first_of_each(good, lambda target: target.id, "duplicate_target_id", "id")
+    if faults:
+        raise refuse(sorted(faults, key=lambda fault: fault.row or 0))
+    return [one.body for one in good]
+
+
+def _add(session: Session, name: str, targets: Sequence[TargetIn]) -> TargetCatalogRow:
+    row = TargetCatalogRow(
+        id=new_id(), name=name, num_targets=len(targets), created_at=datetime.now(UTC)
+    )
+    session.add(row)
+    session.flush()
+    session.execute(
+        sa.insert(TargetRow),
+        [
+            {
+                "catalog_id": row.id,
+                "position": position,
+                "target_id": target.id,
+                "body": target.model_dump(mode="json"),
+            }
+            for position, target in enumerate(targets)
+        ],
+    )
+    return row
+
+
+@router.get("")
+def list_target_catalogs(database: DatabaseDep, paging: PagingDep) -> Listed[TargetCatalogOut]:
+    """List the catalogues, newest first."""
+    query = sa.select(TargetCatalogRow).where(TargetCatalogRow.deleted_at.is_(None))
+    with database.reading() as session:
+        page = newest_first(session, query, TargetCatalogRow.id, paging)
+    return Listed(items=[_shown(row) for row in page.rows], next=page.next)
+
+
+@router.get("/{catalog_id}", response_model=TargetCatalogOut, responses=problem_responses(404))
+def get_target_catalog(
+    catalog_id: str, database: DatabaseDep, request: Request, response: Response
+) -> TargetCatalogOut | Response:
+    """Return one catalogue, without its targets."""
+    with database.reading() as session:
+        shown = _shown(_find(session, catalog_id))
+    return unless_known(request, response, shown)
+
+
+@router.get("/{catalog_id}/targets", responses=problem_responses(404))
+def list_targets(catalog_id: str, database: DatabaseDep, paging: PagingDep) -> Listed[TargetIn]:
+    """List the targets of a catalogue, in the order of its file."""
+    query = (
+        sa.select(TargetRow)
+        .where(TargetRow.catalog_id == catalog_id, TargetRow.position > paging.after_number())
+        .order_by(TargetRow.position)
+        .limit(paging.limit + 1)
+    )
+    with database.reading() as session:
+        _find(session, catalog_id)
+        page = paging.answer(session.scalars(query).all(), lambda row: row.position)
+    return Listed(items=[TargetIn(**row.body) for row in page.rows], next=page.next)
+
+
+@router.delete("/{catalog_id}", status_code=204, responses=problem_responses(404))
+def delete_target_catalog(catalog_id: str, database: DatabaseDep) -> None:
+    """Delete a catalogue. Scenarios that use it keep their copy."""
+    with database.transaction() as session:
+        _find(session, catalog_id).deleted_at = datetime.now(UTC)
+
+
+def _find(session: Session, catalog_id: str) -> TargetCatalogRow:
+    row = session.get(TargetCatalogRow, catalog_id)
+    if row is None or row.deleted_at is not None:
+        raise ServiceError("not_found", f"There is no target catalogue {catalog_id!r}.")
+    return row
+
+
+def _shown(row: TargetCatalogRow) -> TargetCatalogOut:
+    return TargetCatalogOut(
+        id=row.id,
+        name=row.name,
+        num_targets=row.num_targets,
+        created_at=row.created_at,
+        links={"targets": f"/v1/target-catalogs/{row.id}/targets"},
+    )

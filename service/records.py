@@ -1,0 +1,286 @@
+"""Files of points, CSV and GeoJSON: from bytes to checked bodies, every fault with its place."""
+
+from __future__ import annotations
+
+import csv
+import difflib
+import io
+import json
+import re
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Generic, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from planner_core.errors import Fault, PlannerError
+from service.api.errors import faults_of_validation
+
+B = TypeVar("B", bound=BaseModel)
+
+_NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_WHOLE = re.compile(r"[+-]?\d{1,18}", re.ASCII)
+_TEXT_COLUMNS = frozenset({"id", "name"})
+_ALIASES = {
+    "lat": "lat_deg",
+    "latitude": "lat_deg",
+    "lon": "lon_deg",
+    "lng": "lon_deg",
+    "long": "lon_deg",
+    "longitude": "lon_deg",
+}
+_MISSPELT = 0.75
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Record:
+    """One record of a file, not yet checked.
+
+    Attributes
+    ----------
+    row
+        Line of the file where it starts, for CSV.
+    pointers
+        Where each field stands, for JSON; ``""`` is the record itself.
+    """
+
+    fields: Mapping[str, object]
+    row: int | None = None
+    pointers: Mapping[str, str] = field(default_factory=dict)
+
+    def place(self, fault: Fault) -> Fault:
+        """Return a fault of one field with its place in the file."""
+        name = (fault.pointer or "").removeprefix("/").partition("/")[0]
+        if self.row is None:
+            own = self.pointers.get(name) or f"{self.pointers.get('', '')}/properties/{name}"
+            return replace(fault, pointer=own)
+        detail = f"{name}: {fault.detail}" if name else fault.detail
+        return replace(fault, row=self.row, pointer=None, detail=detail)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Records:
+    """What a file holds; ``ignored`` are columns that are none of ours."""
+
+    records: tuple[Record, ...] = ()
+    faults: tuple[Fault, ...] = ()
+    ignored: tuple[str, ...] = ()
+    name: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Checked(Generic[B]):
+    """A record that fits its schema."""
+
+    record: Record
+    body: B
+
+
+def check(
+    records: Sequence[Record], schema: type[B], build: Callable[[B], object]
+) -> tuple[list[Checked[B]], list[Fault]]:
+    """Return the bodies that fit, and what is wrong with the others.
+
+    Parameters
+    ----------
+    build
+        Makes the domain's type of a body, which has the last word on its values.
+    """
+    good: list[Checked[B]] = []
+    faults: list[Fault] = []
+    for record in records:
+        try:
+            body = schema.model_validate(record.fields)
+            build(body)
+        except ValidationError as error:
+            found = faults_of_validation(error, record.fields)
+            faults += [record.place(_with_hint(fault, record.fields)) for fault in found]
+        except PlannerError as error:
+            faults.append(record.place(error.fault))
+        else:
+            good.append(Checked(record, body))
+    return good, faults
+
+
+def _with_hint(fault: Fault, fields: Mapping[str, object]) -> Fault:
+    lat, lon = fields.get("lat_deg"), fields.get("lon_deg")
+    if fault.pointer != "/lat_deg" or not isinstance(lat, float) or not isinstance(lon, float):
+        return fault
+    if 90.0 < abs(lat) <= 360.0 and abs(lon) <= 90.0:
+        hint = f"{fault.detail} It is {lat}: are latitude and longitude swapped?"
+        return replace(fault, detail=hint)
+    return fault
+
+
+def first_of_each(
+    checked: Sequence[Checked[B]], key: Callable[[B], str], code: str, name: str
+) -> list[Fault]:
+    """Return a fault for each record whose key an earlier one has."""
+    seen: dict[str, Record] = {}
+    faults = []
+    for one in checked:
+        value = key(one.body)
+        first = seen.setdefault(value, one.record)
+        if first is not one.record:
+            where = f", as in line {first.row}" if first.row else ""
+            fault = Fault(code=code, detail=f"{value!r} appears twice{where}.", pointer=f"/{name}")
+            faults.append(one.record.place(fault))
+    return faults
+
+
+def read_csv(data: bytes, known: Collection[str], required: Collection[str]) -> Records:
+    """Return the records of a CSV file with a header.
+
+    Columns may stand in any order; ``lat``, ``latitude``, ``lon``, ``lng``, ``long`` and
+    ``longitude`` are taken too. Other columns are ignored, unless they look like a misspelt
+    one. An empty cell means the default.
+    """
+    text = _decoded(data)
+    if isinstance(text, Fault):
+        return Records(faults=(text,))
+    rows = _csv_rows(text)
+    first = next(rows, None)
+    if first is None:
+        return Records(faults=(Fault(code="empty_file", detail="The file is empty."),))
+    if isinstance(first, Fault):
+        return Records(faults=(first,))
+    columns = [_ALIASES.get(c.strip().lower(), c.strip().lower()) for c in first[1]]
+    faults = _faults_of_header(first[0], columns, known, required)
+    if faults:
+        return Records(faults=tuple(faults))
+    records: list[Record] = []
+    for row in rows:
+        if isinstance(row, Fault):
+            faults.append(row)
+        elif len(row[1]) != len(columns):
+            detail = f"The line has {len(row[1])} cells, the header {len(columns)}."
+            faults.append(Fault(code="malformed_csv", detail=detail, row=row[0]))
+        else:
+            cells = zip(columns, (cell.strip() for cell in row[1]), strict=True)
+            fields = {name: _value(name, cell) for name, cell in cells if cell and name in known}
+            records.append(Record(fields=fields, row=row[0]))
+    if not records and not faults:
+        faults.append(Fault(code="empty_file", detail="The file has a header and no records."))
+    ignored = tuple(column for column in columns if column not in known)
+    return Records(records=tuple(records), faults=tuple(faults), ignored=ignored)
+
+
+def _decoded(data: bytes) -> str | Fault:
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        return Fault(code="not_utf8", detail=f"Byte {error.start} is no UTF-8.")
+
+
+def _csv_rows(text: str) -> Iterator[tuple[int, list[str]] | Fault]:
+    """Yield the line where each record starts, and its cells; blank lines are left out."""
+    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+    while True:
+        start = reader.line_num + 1
+        try:
+            cells = next(reader)
+        except StopIteration:
+            return
+        except csv.Error as error:
+            yield Fault(code="malformed_csv", detail=f"{str(error).capitalize()}.", row=start)
+            continue
+        if any(cell.strip() for cell in cells):
+            yield start, cells
+
+
+def _faults_of_header(
+    row: int, columns: Sequence[str], known: Collection[str], required: Collection[str]
+) -> list[Fault]:
+    faults = []
+    for position, column in enumerate(columns):
+        missing = [name for name in known if name not in columns]
+        meant = difflib.get_close_matches(column, missing, 1, _MISSPELT)
+        if column in columns[:position]:
+            faults.append(
+                Fault(code="malformed_csv", detail=f"Column {column!r} is given twice.", row=row)
+            )
+        elif column not in known and meant:
+            detail = f"There is no column {column!r}; {meant[0]!r} is meant?"
+            faults.append(Fault(code="unknown_field", detail=detail, row=row))
+    lacking = [name for name in required if name not in columns]
+    if lacking:
+        detail = f"The header lacks {', '.join(lacking)}; it has {', '.join(columns)[:200]}."
+        faults.append(Fault(code="missing_field", detail=detail, row=row))
+    return faults
+
+
+def _value(column: str, cell: str) -> object:
+    if column in _TEXT_COLUMNS:
+        return cell
+    if column == "antennas" and _WHOLE.fullmatch(cell):
+        return int(cell)
+    # What is no number stays text, which the schema refuses by name.
+    return float(cell) if _NUMBER.fullmatch(cell) else cell
+
+
+def read_geojson(data: bytes, known: Collection[str]) -> Records:
+    """Return the points of a GeoJSON FeatureCollection (RFC 7946: longitude, latitude, altitude).
+
+    Of a feature's properties those that are fields of ours count; others are ignored.
+    """
+    text = _decoded(data)
+    if isinstance(text, Fault):
+        return Records(faults=(text,))
+    try:
+        document = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        return Records(faults=(Fault(code="malformed_json", detail=f"No JSON: {error}"[:200]),))
+    if not isinstance(document, dict) or document.get("type") != "FeatureCollection":
+        return _no_collection("The body must be a FeatureCollection.", "")
+    features = document.get("features")
+    if not isinstance(features, list):
+        return _no_collection("A FeatureCollection has a list of features.", "/features")
+    if not features:
+        return Records(faults=(Fault(code="empty_file", detail="The collection is empty."),))
+    found = [_feature(feature, f"/features/{i}", known) for i, feature in enumerate(features)]
+    name = document.get("name")
+    return Records(
+        records=tuple(one for one in found if isinstance(one, Record)),
+        faults=tuple(one for one in found if isinstance(one, Fault)),
+        name=name[:200] if isinstance(name, str) and name.isprintable() and name else None,
+    )
+
+
+def _no_collection(detail: str, pointer: str) -> Records:
+    return Records(faults=(Fault(code="malformed_geojson", detail=detail, pointer=pointer),))
+
+
+def _feature(feature: object, pointer: str, known: Collection[str]) -> Record | Fault:
+    if not isinstance(feature, dict) or feature.get("type") != "Feature":
+        return Fault(code="malformed_geojson", detail="This is no Feature.", pointer=pointer)
+    geometry = feature.get("geometry")
+    if not isinstance(geometry, dict) or geometry.get("type") != "Point":
+        detail = "The geometry must be a Point."
+        return Fault(code="malformed_geojson", detail=detail, pointer=f"{pointer}/geometry")
+    at = f"{pointer}/geometry/coordinates"
+    position = geometry.get("coordinates")
+    if not isinstance(position, list) or len(position) not in (2, 3):
+        detail = "A position is [longitude, latitude] or [longitude, latitude, altitude]."
+        return Fault(code="malformed_geojson", detail=detail, pointer=at)
+    properties = feature.get("properties")
+    fields: dict[str, Any] = dict(properties) if isinstance(properties, dict) else {}
+    fields |= dict(zip(("lon_deg", "lat_deg", "alt_m"), map(_as_float, position), strict=False))
+    if "id" in feature:
+        fields["id"] = feature["id"]
+    if isinstance(fields.get("id"), int):
+        fields["id"] = str(fields["id"])
+    pointers = {"": pointer, "lon_deg": f"{at}/0", "lat_deg": f"{at}/1"}
+    if len(position) == 3:
+        pointers["alt_m"] = f"{at}/2"
+    if "id" in feature or "id" not in fields:
+        pointers["id"] = f"{pointer}/id"
+    kept = {name: value for name, value in fields.items() if name in known and value is not None}
+    return Record(fields=kept, pointers=pointers)
+
+
+def _as_float(value: object) -> object:
+    is_number = isinstance(value, int) and not isinstance(value, bool)
+    try:
+        return float(value) if is_number else value  # type: ignore[arg-type]
+    except OverflowError:
+        return float("inf")

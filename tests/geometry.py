@@ -1,0 +1,184 @@
+"""Orbits, points and a second, plain way to see from one to the other.
+
+Everything below the factories is independent of the planner's own geometry: positions come
+from Skyfield, and limits are judged from vectors one instant at a time.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+
+import numpy as np
+import numpy.typing as npt
+from sgp4.api import WGS72, Satrec
+from sgp4.conveniences import sat_epoch_datetime
+from skyfield.api import EarthSatellite, load, wgs84
+from skyfield.framelib import itrs
+
+from planner_core.domain import Horizon, OrbitElements, Resources, Satellite, Sensor
+from planner_core.orbits.sgp4_record import satrec
+
+Floats = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+
+YEAR_2019 = datetime(2019, 1, 1, tzinfo=UTC)
+
+
+def hours(count: float, start: datetime = YEAR_2019) -> Horizon:
+    return Horizon(start=start, end=start + timedelta(hours=count))
+
+
+def orbit(
+    *,
+    epoch: datetime = YEAR_2019,
+    mean_motion_rev_day: float = 15.24162312,
+    eccentricity: float = 0.001,
+    inclination_deg: float = 90.0,
+    raan_deg: float = 0.0,
+    arg_perigee_deg: float = 0.0,
+    mean_anomaly_deg: float = 0.0,
+    bstar: float = 0.0,
+) -> OrbitElements:
+    """Return the paper's own orbit unless told otherwise."""
+    return OrbitElements(
+        name="paper",
+        norad_cat_id=1,
+        object_id="",
+        epoch=epoch,
+        mean_motion_rev_day=mean_motion_rev_day,
+        eccentricity=eccentricity,
+        inclination_deg=inclination_deg,
+        raan_deg=raan_deg,
+        arg_perigee_deg=arg_perigee_deg,
+        mean_anomaly_deg=mean_anomaly_deg,
+        bstar=bstar,
+    )
+
+
+def orbit_from_tle(line1: str, line2: str) -> OrbitElements:
+    record = Satrec.twoline2rv(line1, line2, WGS72)
+    return orbit(
+        epoch=sat_epoch_datetime(record).astimezone(UTC),
+        mean_motion_rev_day=record.no_kozai * 1440.0 / (2.0 * math.pi),
+        eccentricity=record.ecco,
+        inclination_deg=math.degrees(record.inclo),
+        raan_deg=math.degrees(record.nodeo),
+        arg_perigee_deg=math.degrees(record.argpo),
+        mean_anomaly_deg=math.degrees(record.mo),
+        bstar=record.bstar,
+    )
+
+
+def orbit_from_omm(record: dict[str, str | float]) -> OrbitElements:
+    return orbit(
+        epoch=datetime.fromisoformat(str(record["EPOCH"])).replace(tzinfo=UTC),
+        mean_motion_rev_day=float(record["MEAN_MOTION"]),
+        eccentricity=float(record["ECCENTRICITY"]),
+        inclination_deg=float(record["INCLINATION"]),
+        raan_deg=float(record["RA_OF_ASC_NODE"]),
+        arg_perigee_deg=float(record["ARG_OF_PERICENTER"]),
+        mean_anomaly_deg=float(record["MEAN_ANOMALY"]),
+        bstar=float(record["BSTAR"]),
+    )
+
+
+def satellite(
+    elements: OrbitElements | None = None, *, name: str = "paper", sensor: Sensor | None = None
+) -> Satellite:
+    elements = elements or orbit()
+    return Satellite(
+        id=name,
+        name=name,
+        orbit=elements,
+        sensor=sensor or Sensor(),
+        resources=Resources.paper(elements.period_s),
+    )
+
+
+class SkyfieldPath:
+    """A satellite's Earth-fixed states by Skyfield."""
+
+    def __init__(self, elements: OrbitElements, horizon: Horizon):
+        self._scale = load.timescale(builtin=True)
+        self._satellite = EarthSatellite.from_satrec(satrec(elements), self._scale)
+        self._start = horizon.start
+
+    def position_m(self, t_s: Floats) -> Floats:
+        """Return positions in the ITRS. Shape ``(n, 3)``."""
+        start = self._start
+        times = self._scale.utc(
+            start.year, start.month, start.day, start.hour, start.minute, start.second + t_s
+        )
+        found = self._satellite.at(times).frame_xyz(itrs).m
+        return np.ascontiguousarray(np.asarray(found, dtype=np.float64).T)
+
+    def velocity_m_s(self, t_s: Floats) -> Floats:
+        """Return velocities relative to the turning Earth, by difference."""
+        return self.position_m(t_s + 0.5) - self.position_m(t_s - 0.5)
+
+
+@dataclass(frozen=True)
+class Ground:
+    """A point on the ground by Skyfield's ellipsoid: position and geodetic vertical."""
+
+    position_m: Floats
+    up: Floats
+
+    @classmethod
+    def at(cls, lat_deg: float, lon_deg: float, alt_m: float = 0.0) -> Ground:
+        here = wgs84.latlon(lat_deg, lon_deg, elevation_m=alt_m).itrs_xyz.m
+        above = wgs84.latlon(lat_deg, lon_deg, elevation_m=alt_m + 1000.0).itrs_xyz.m
+        return cls(position_m=here, up=(above - here) / 1000.0)
+
+
+def angle_deg(a: Floats, b: Floats) -> Floats:
+    cross = np.linalg.norm(np.cross(a, b), axis=-1)
+    return np.asarray(np.degrees(np.arctan2(cross, (a * b).sum(axis=-1))))
+
+
+def vertical_at(position_m: Floats, nadir: str) -> Floats:
+    """Return the vertical at a satellite: Skyfield's geodetic one, or the geocentric."""
+    if nadir == "geocentric":
+        return np.asarray(position_m / np.linalg.norm(position_m, axis=-1, keepdims=True))
+    x, y, z = position_m.T
+    # Bowring's closed form, not the planner's iteration.
+    a, b = 6_378_137.0, 6_356_752.314245179
+    e2, e2_second = 1 - (b / a) ** 2, (a / b) ** 2 - 1
+    across = np.hypot(x, y)
+    beta = np.arctan2(z * a, across * b)
+    for _ in range(3):
+        lat = np.arctan2(z + e2_second * b * np.sin(beta) ** 3, across - e2 * a * np.cos(beta) ** 3)
+        beta = np.arctan2(b * np.sin(lat), a * np.cos(lat))
+    lon = np.arctan2(y, x)
+    return np.stack([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)], axis=-1)
+
+
+def elevation_deg(position_m: Floats, ground: Ground) -> Floats:
+    return 90.0 - angle_deg(position_m - ground.position_m, ground.up)
+
+
+def off_nadir_deg(position_m: Floats, ground: Ground, nadir: str) -> Floats:
+    return angle_deg(vertical_at(position_m, nadir), position_m - ground.position_m)
+
+
+def windows_by_scan(
+    holds: Callable[[Floats], Bools], duration_s: float, step_s: float = 1.0
+) -> list[tuple[float, float]]:
+    """Return the windows in which ``holds`` is true: a dense scan, edges bisected."""
+    t = np.append(np.arange(0.0, duration_s, step_s), duration_s)
+    inside = holds(t)
+    change = np.flatnonzero(inside[:-1] != inside[1:])
+    a, b = t[change], t[change + 1]
+    for _ in range(30):
+        middle = 0.5 * (a + b)
+        same = holds(middle) == inside[change]
+        a, b = np.where(same, middle, a), np.where(same, b, middle)
+    edges: Sequence[float] = [
+        *([0.0] if inside[0] else []),
+        *(0.5 * (a + b)).tolist(),
+        *([duration_s] if inside[-1] else []),
+    ]
+    return list(zip(edges[::2], edges[1::2], strict=True))

@@ -1,0 +1,328 @@
+"""The jobs part of the HTTP API, on the real application."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import httpx
+import pytest
+
+from planner_core.solvers import SOLVERS
+from service.jobs import lease
+from service.jobs.lease import Lease, Outcome
+from service.main import create_app
+from service.solver_params import params_of
+from tests.service.conftest import serve
+from tests.service.jobs.conftest import Jobs, Workers
+from tests.service.problems import assert_problem
+
+KEYS = {
+    "id", "state", "scenario", "solver", "params", "seed", "limits", "attempt", "priority",
+    "label", "progress", "created_at", "started_at", "finished_at", "termination", "error",
+    "links",
+}  # fmt: skip
+
+TARGETS = [
+    {
+        "target_id": f"t{number}",
+        "target_catalog_id": None,
+        "outcome": "collected" if number % 2 else "unscheduled",
+        "action_id": f"a{number}" if number % 2 else None,
+        "satellite_id": "s1" if number % 2 else None,
+        "reason": None if number % 2 else {"code": "no_access", "certainty": "proven"},
+    }
+    for number in range(7)
+]
+
+
+@pytest.fixture
+def client(jobs: Jobs) -> Iterator[httpx.Client]:
+    """A client of a server that sends jobs to the queue, with nobody to run them."""
+    app = create_app(jobs.settings, jobs.queue)
+    with serve(app) as address, httpx.Client(base_url=address, timeout=60) as client:
+        yield client
+
+
+def post(client: httpx.Client, jobs: Jobs, **fields: Any) -> httpx.Response:
+    return client.post(
+        "/v1/jobs", json={"scenario_id": jobs.scenario_id, "solver": "rule"} | fields
+    )
+
+
+def posted(client: httpx.Client, jobs: Jobs, **fields: Any) -> str:
+    response = post(client, jobs, **fields)
+    assert response.status_code == 202, response.text
+    return str(response.json()["id"])
+
+
+def start(jobs: Jobs, job_id: str) -> Lease:
+    with jobs.database.transaction() as session:
+        held = lease.start(session, job_id, 1, lease_s=60.0)
+    assert held is not None
+    return held
+
+
+def finish(jobs: Jobs, job_id: str, outcome: Outcome | None = None) -> None:
+    answered = Outcome(
+        state="succeeded",
+        termination="optimal",
+        timeline='{"validity": "valid"}',
+        targets=json.dumps(TARGETS),
+    )
+    held = start(jobs, job_id)
+    with jobs.database.transaction() as session:
+        assert lease.finish(session, held, outcome or answered)
+
+
+def report(jobs: Jobs, held: Lease, reward: float) -> None:
+    progress = {"phase": "solve", "fraction": 0.5, "reward": reward, "bound": None, "message": ""}
+    with jobs.database.transaction() as session:
+        lease.renew(session, held, lease_s=60.0, progress=progress)
+
+
+def test_a_job_is_taken_and_shown_whole(client: httpx.Client, jobs: Jobs) -> None:
+    response = post(client, jobs, label="first", seed=7, limits={"time_s": 5})
+    assert response.status_code == 202
+    job = response.json()
+    assert set(job) == KEYS
+    address = f"/v1/jobs/{job['id']}"
+    assert response.headers["location"] == address
+    assert response.headers["retry-after"] == "1"
+    assert response.headers["etag"] == '"1"'
+    assert job["state"] == "queued"
+    assert job["scenario"] == {"id": jobs.scenario_id, "sha256": "0" * 64}
+    assert job["params"] == params_of(SOLVERS["rule"]())
+    assert job["limits"] == {"time_s": 5.0, "memory_mb": jobs.settings.default_memory_mb}
+    assert (job["seed"], job["attempt"], job["priority"], job["label"]) == (7, 1, 5, "first")
+    assert job["created_at"].endswith("Z")
+    for name in ("progress", "started_at", "finished_at", "termination", "error"):
+        assert job[name] is None
+    assert job["links"]["timeline"] == address + "/timeline"
+    assert client.get(address).json() == job
+
+
+@pytest.mark.parametrize(
+    ("fields", "code", "pointer"),
+    [
+        ({"solver": "magic"}, "unknown_solver", "/solver"),
+        ({"params": {"dept": 3}}, "unknown_parameter_of_solver", "/params/dept"),
+        ({"params": {"unimaged_only": "yes"}}, "invalid_value", "/params/unimaged_only"),
+        ({"params": [1]}, "invalid_value", "/params"),
+        ({"scenario_id": "no-such"}, "unknown_scenario", "/scenario_id"),
+        ({"scenario_id": None}, "missing_field", "/scenario_id"),
+        ({"limits": {"time_s": 0}}, "value_out_of_range", "/limits/time_s"),
+        ({"limits": {"time_s": 1e9}}, "value_out_of_range", "/limits/time_s"),
+        ({"limits": {"cpu": 1}}, "unknown_field", "/limits/cpu"),
+        ({"priority": 10}, "value_out_of_range", "/priority"),
+        ({"seed": -1}, "value_out_of_range", "/seed"),
+        ({"seed": 2**63}, "value_out_of_range", "/seed"),
+        ({"label": "x" * 201}, "value_out_of_range", "/label"),
+        ({"colour": "red"}, "unknown_field", "/colour"),
+    ],
+)
+def test_a_wrong_job_is_refused_by_name_and_not_stored(
+    client: httpx.Client, jobs: Jobs, fields: dict[str, Any], code: str, pointer: str
+) -> None:
+    assert_problem(post(client, jobs, **fields), 422, code, pointer)
+    assert client.get("/v1/jobs").json() == {"items": [], "next": None}
+
+
+def test_a_full_queue_takes_no_more(jobs: Jobs) -> None:
+    settings = jobs.settings.model_copy(update={"max_queued": 2})
+    app = create_app(settings, jobs.queue)
+    with serve(app) as address, httpx.Client(base_url=address, timeout=60) as client:
+        first = posted(client, jobs)
+        posted(client, jobs)
+        refused = post(client, jobs)
+        assert_problem(refused, 503, "queue_full")
+        assert int(refused.headers["retry-after"]) > 0
+        client.post(f"/v1/jobs/{first}/cancel")
+        posted(client, jobs)
+
+
+def test_jobs_are_listed_newest_first_by_pages_and_filters(
+    client: httpx.Client, jobs: Jobs
+) -> None:
+    ids = [posted(client, jobs, label=f"l{number % 2}") for number in range(5)]
+    finish(jobs, ids[0])
+
+    def listed(**query: str | int) -> list[str]:
+        response = client.get("/v1/jobs", params=query)
+        return [job["id"] for job in response.json()["items"]]
+
+    assert listed() == ids[::-1]
+    assert listed(label="l1") == [ids[3], ids[1]]
+    assert listed(label="l") == []
+    assert listed(state="succeeded") == [ids[0]]
+    assert listed(solver="forward_search") == []
+    assert listed(solver="rule", scenario_id=jobs.scenario_id, state="queued") == ids[:0:-1]
+    assert_problem(client.get("/v1/jobs", params={"state": "sleeping"}), 422, "unknown_value")
+    first = client.get("/v1/jobs", params={"limit": 2, "label": "l0"}).json()
+    second = client.get("/v1/jobs", params={"limit": 2, "label": "l0", "cursor": first["next"]})
+    assert [job["id"] for job in first["items"] + second.json()["items"]] == ids[::-2]
+    assert second.json()["next"] is None
+
+
+def test_what_does_not_exist_is_not_found(client: httpx.Client) -> None:
+    for path in ("", "/timeline", "/timeline.csv", "/targets"):
+        assert_problem(client.get(f"/v1/jobs/none{path}"), 404, "not_found")
+    assert_problem(client.post("/v1/jobs/none/cancel"), 404, "not_found")
+
+
+def test_a_job_that_has_not_changed_is_not_sent_again(client: httpx.Client, jobs: Jobs) -> None:
+    job_id = posted(client, jobs)
+    first = client.get(f"/v1/jobs/{job_id}")
+    known = {"If-None-Match": first.headers["etag"]}
+    again = client.get(f"/v1/jobs/{job_id}", headers=known)
+    assert (again.status_code, again.content) == (304, b"")
+    finish(jobs, job_id)
+    changed = client.get(f"/v1/jobs/{job_id}", headers=known)
+    assert changed.status_code == 200
+    assert changed.headers["etag"] != first.headers["etag"]
+    assert "retry-after" not in changed.headers
+
+
+def test_wait_holds_until_the_job_changes(client: httpx.Client, jobs: Jobs) -> None:
+    job_id = posted(client, jobs)
+    held = start(jobs, job_id)
+    etag = client.get(f"/v1/jobs/{job_id}").headers["etag"]
+    with ThreadPoolExecutor(1) as pool:
+        waiting = pool.submit(
+            client.get,
+            f"/v1/jobs/{job_id}",
+            params={"wait": 30},
+            headers={"If-None-Match": etag},
+        )
+        report(jobs, held, 12.5)
+        answer = waiting.result()
+    assert answer.status_code == 200
+    assert answer.json()["progress"]["reward"] == 12.5
+
+
+def test_wait_ends_without_a_change_and_says_so(client: httpx.Client, jobs: Jobs) -> None:
+    job_id = posted(client, jobs)
+    unchanged = client.get(f"/v1/jobs/{job_id}", params={"wait": 0.2})
+    assert unchanged.json()["state"] == "queued"
+    known = {"If-None-Match": unchanged.headers["etag"]}
+    again = client.get(f"/v1/jobs/{job_id}", params={"wait": 0.2}, headers=known)
+    assert again.status_code == 304
+    assert_problem(client.get(f"/v1/jobs/{job_id}", params={"wait": 31}), 422, "value_out_of_range")
+
+
+def test_many_can_wait_while_the_server_serves_others(client: httpx.Client, jobs: Jobs) -> None:
+    """Eighty held requests are more than the server has threads."""
+    job_id = posted(client, jobs)
+    limits = httpx.Limits(max_connections=100)
+    with (
+        httpx.Client(base_url=client.base_url, timeout=60, limits=limits) as waiters,
+        ThreadPoolExecutor(80) as pool,
+    ):
+        waiting = [
+            pool.submit(waiters.get, f"/v1/jobs/{job_id}", params={"wait": 30}) for _ in range(80)
+        ]
+        for _ in range(5):
+            assert client.get("/health/live").status_code == 200
+            assert not any(one.done() for one in waiting)
+        client.post(f"/v1/jobs/{job_id}/cancel")
+        assert {one.result().json()["state"] for one in waiting} == {"cancelled"}
+
+
+def test_a_waiting_job_is_cancelled_at_once_and_only_once(client: httpx.Client, jobs: Jobs) -> None:
+    job_id = posted(client, jobs)
+    cancelled = client.post(f"/v1/jobs/{job_id}/cancel")
+    assert cancelled.status_code == 202
+    assert cancelled.json()["state"] == "cancelled"
+    assert cancelled.json()["finished_at"] is not None
+    assert jobs.queue.lost([(job_id, 1)]) == {(job_id, 1)}
+    again = assert_problem(client.post(f"/v1/jobs/{job_id}/cancel"), 409, "invalid_transition")
+    assert "no transition is allowed" in again["detail"]
+
+
+def test_a_running_job_is_cancelling_first(client: httpx.Client, jobs: Jobs) -> None:
+    job_id = posted(client, jobs)
+    start(jobs, job_id)
+    for _ in range(2):
+        answer = client.post(f"/v1/jobs/{job_id}/cancel")
+        assert (answer.status_code, answer.json()["state"]) == (202, "cancelling")
+
+
+def test_the_timeline_is_not_ready_before_the_job_has_ended(
+    client: httpx.Client, jobs: Jobs
+) -> None:
+    job_id = posted(client, jobs)
+    for path in ("timeline", "timeline.json", "targets"):
+        early = client.get(f"/v1/jobs/{job_id}/{path}")
+        assert_problem(early, 409, "not_ready")
+        assert early.headers["retry-after"] == "1"
+    finish(jobs, job_id, Outcome.failed("time_limit", "No plan within the limit of 1 s."))
+    late = client.get(f"/v1/jobs/{job_id}/timeline")
+    assert "time_limit" in assert_problem(late, 409, "not_ready")["detail"]
+    assert "retry-after" not in late.headers
+    failed = client.get(f"/v1/jobs/{job_id}").json()
+    assert failed["error"] == {"code": "time_limit", "detail": "No plan within the limit of 1 s."}
+
+
+def test_the_timeline_comes_as_json_and_in_no_other_form_yet(
+    client: httpx.Client, jobs: Jobs
+) -> None:
+    job_id = posted(client, jobs)
+    finish(jobs, job_id)
+    path = f"/v1/jobs/{job_id}/timeline"
+    answer = client.get(path)
+    assert answer.headers["content-type"] == "application/json"
+    assert answer.json() == {"validity": "valid"}
+    known = {"If-None-Match": answer.headers["etag"]}
+    assert client.get(path, headers=known).status_code == 304
+    for accept in ("application/json", "text/csv, */*;q=0.1", "application/*"):
+        assert client.get(path, headers={"Accept": accept}).status_code == 200
+    assert client.get(path + ".json", headers={"Accept": "text/csv"}).status_code == 200
+    assert_problem(client.get(path, headers={"Accept": "text/csv"}), 406, "not_acceptable")
+    for suffix in ("csv", "geojson", "czml", "ics"):
+        assert_problem(client.get(f"{path}.{suffix}"), 406, "not_acceptable")
+
+
+def test_targets_are_listed_once_each_by_pages_and_filters(
+    client: httpx.Client, jobs: Jobs
+) -> None:
+    job_id = posted(client, jobs)
+    finish(jobs, job_id)
+
+    def listed(**query: str | int) -> list[str]:
+        found: list[str] = []
+        path: str | None = f"/v1/jobs/{job_id}/targets"
+        while path is not None:
+            response = client.get(path, params=query)
+            found += [target["target_id"] for target in response.json()["items"]]
+            cursor = response.json()["next"]
+            assert (cursor is None) == ("link" not in response.headers)
+            query["cursor"] = cursor or ""
+            path = path if cursor else None
+        return found
+
+    assert client.get(f"/v1/jobs/{job_id}/targets").json()["items"] == TARGETS
+    assert listed(limit=3) == [f"t{number}" for number in range(7)]
+    assert listed(limit=2, outcome="unscheduled") == ["t0", "t2", "t4", "t6"]
+    assert listed(reason="no_access") == ["t0", "t2", "t4", "t6"]
+    assert listed(outcome="collected", reason="no_access") == []
+    wrong = client.get(f"/v1/jobs/{job_id}/targets", params={"outcome": "lost"})
+    assert_problem(wrong, 422, "unknown_value")
+
+
+def test_a_job_goes_from_post_to_timeline_by_a_real_worker(
+    client: httpx.Client, jobs: Jobs, workers: Workers
+) -> None:
+    workers.start()
+    searching = posted(client, jobs, solver="forward_search")
+    path = f"/v1/jobs/{searching}"
+    jobs.until(lambda: client.get(path, params={"wait": 5}).json()["progress"] is not None)
+    assert client.post(path + "/cancel").json()["state"] == "cancelling"
+    jobs.until(lambda: client.get(path, params={"wait": 5}).json()["state"] == "cancelled")
+    assert client.get(path).json()["termination"] == "cancelled"
+    assert client.get(path + "/timeline").json()["job"] == searching
+    simple = posted(client, jobs)
+    path = f"/v1/jobs/{simple}"
+    jobs.until(lambda: client.get(path, params={"wait": 5}).json()["state"] == "succeeded")
+    assert client.get(path + "/targets").json()["items"][0]["target_id"] == "t0"
