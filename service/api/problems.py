@@ -132,6 +132,9 @@ KINDS: dict[str, ProblemKind] = {
     "duplicate_satellite_id": ProblemKind(
         422, "Duplicate satellite id", "A scenario names each satellite once."
     ),
+    "duplicate_target_catalog_id": ProblemKind(
+        422, "Duplicate target catalogue id", "A scenario names each catalogue once."
+    ),
     "duplicate_ground_station_id": ProblemKind(
         422, "Duplicate ground station id", "A scenario names each ground station once."
     ),
