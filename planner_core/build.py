@@ -11,9 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from planner_core import opportunities as tasks
-from planner_core.access import Accesses, Limits, find_accesses
+from planner_core.access import Accesses, find_accesses
 from planner_core.domain import Horizon, Satellite, Scenario
 from planner_core.errors import Cancelled
+from planner_core.limits import Limits
 from planner_core.orbits import ephemeris as orbits
 from planner_core.orbits.eclipse import always_sunlit, sunlight
 from planner_core.orbits.ephemeris import Ephemeris, propagate
