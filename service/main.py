@@ -15,6 +15,7 @@ from service.api import (
     openapi,
     satellites,
     scenarios,
+    solvers,
     target_catalogs,
 )
 from service.api.deps import check_request
@@ -38,6 +39,7 @@ ROUTERS = (
     ground_stations.router,
     target_catalogs.router,
     scenarios.router,
+    solvers.router,
     meta.router,
     openapi.router,
 )
