@@ -16,6 +16,7 @@ from service.api import (
     openapi,
     satellites,
     scenarios,
+    solvers,
     target_catalogs,
 )
 from service.api.deps import check_request
@@ -40,6 +41,7 @@ ROUTERS = (
     target_catalogs.router,
     scenarios.router,
     jobs.router,
+    solvers.router,
     meta.router,
     openapi.router,
 )
