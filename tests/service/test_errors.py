@@ -125,3 +125,20 @@ def test_openapi_declares_every_error_as_a_problem(client: httpx.Client) -> None
             assert {"422", "500"} <= set(errors)
             for response in errors.values():
                 assert list(response["content"]) == ["application/problem+json"]
+
+
+def references(node: object) -> Iterator[str]:
+    if isinstance(node, dict):
+        yield from (value for key, value in node.items() if key == "$ref")
+        for value in node.values():
+            yield from references(value)
+    elif isinstance(node, list):
+        for value in node:
+            yield from references(value)
+
+
+def test_every_reference_in_openapi_leads_somewhere(client: httpx.Client) -> None:
+    document = client.get("/openapi.json").json()
+    found = {reference.removeprefix("#/components/schemas/") for reference in references(document)}
+    assert {"Problem", "TargetCatalogIn", "SatelliteOut"} <= found
+    assert found <= set(document["components"]["schemas"])
