@@ -40,8 +40,8 @@ ROUTERS = (
     ground_stations.router,
     target_catalogs.router,
     scenarios.router,
-    solvers.router,
     jobs.router,
+    solvers.router,
     meta.router,
     openapi.router,
 )
