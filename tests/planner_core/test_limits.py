@@ -144,7 +144,7 @@ def test_any_mixture_of_limits_cuts_the_windows_that_a_scan_finds(
         id="t",
         lat_deg=lat,
         lon_deg=lon,
-        sun_elevation_max_deg=sun[0] + sun[1],
+        sun_elevation_max_deg=min(90.0, sun[0] + sun[1]),
         local_time_from_h=float(own[0]),
         local_time_to_h=float(own[1]),
         look_side=side,  # type: ignore[arg-type]
