@@ -11,10 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 from planner_core import opportunities as tasks
-from planner_core.access import Accesses, Limits, find_accesses
+from planner_core.access import Accesses, find_accesses
 from planner_core.domain import Horizon, Satellite, Scenario
 from planner_core.errors import Cancelled
+from planner_core.limits import Limits
 from planner_core.orbits import ephemeris as orbits
+from planner_core.orbits.earth_orientation import shipped
 from planner_core.orbits.eclipse import always_sunlit, sunlight
 from planner_core.orbits.ephemeris import Ephemeris, propagate
 from planner_core.orbits.places import Places
@@ -219,12 +221,15 @@ def check_propagation(scenario: Scenario) -> None:
 
 
 def orbit_warnings(scenario: Scenario) -> tuple[str, ...]:
-    """Return what a reader should know about the age of the element sets."""
-    return tuple(
-        warning
-        for satellite in scenario.satellites
-        if (warning := _age_warning(satellite, scenario.horizon)) is not None
-    )
+    """Return what a reader should know about element sets and the Earth's orientation."""
+    ages = (_age_warning(satellite, scenario.horizon) for satellite in scenario.satellites)
+    warnings = [warning for warning in ages if warning is not None]
+    if not shipped().covers(scenario.horizon):
+        warnings.append(
+            "The horizon reaches outside the table of the Earth's orientation: its end values "
+            "are held, and access times may be off by up to a second."
+        )
+    return tuple(warnings)
 
 
 def _age_warning(satellite: Satellite, horizon: Horizon) -> str | None:

@@ -178,6 +178,14 @@ class Question(Body):
     )
 
 
+class ScenarioIn(Question):
+    """A planning question over what is stored."""
+
+    satellite_ids: list[Id] = Field(min_length=1, max_length=10_000)
+    target_catalog_ids: list[Id] = Field(min_length=1, max_length=1000)
+    ground_station_ids: list[Id] = Field([], max_length=10_000)
+
+
 class FileSatellite(SatelliteIn):
     """A satellite of a scenario file."""
 

@@ -18,6 +18,7 @@ from sgp4.api import SGP4_ERRORS
 from planner_core.domain import Horizon, Nadir, Satellite
 from planner_core.errors import PropagationFailed
 from planner_core.orbits import frames
+from planner_core.orbits.earth_orientation import EarthOrientation, shipped
 from planner_core.orbits.sgp4_record import satrec
 from planner_core.orbits.sun import sun_direction_teme
 
@@ -111,27 +112,14 @@ class Ephemeris:
         vertical at the satellite, and the direction to the sun, three columns each.
         Shape ``(num_nodes - 1, 4, 9)``.
         """
-        up, up_rate = self._vertical(nadir)
+        vertical = (
+            frames.geodetic_normal(self.position_itrf_m)
+            if nadir == "geodetic"
+            else frames.unit(self.position_itrf_m)
+        )
         sun = frames.rotate_to_itrf(self.sun_teme, self.gmst_rad, self.xp_rad, self.yp_rad)
-        sun_rate = frames.EARTH_ROTATION_RAD_S * np.stack(
-            [sun[:, 1], -sun[:, 0], np.zeros(len(sun))], axis=1
-        )
-        return _hermite(
-            np.hstack([self.position_itrf_m, up, sun]),
-            np.hstack([self.velocity_itrf_m_s, up_rate, sun_rate]),
-            self.step_s,
-        )
-
-    def _vertical(self, nadir: Nadir) -> tuple[Floats, Floats]:
-        half_s = 0.5  # a central difference over one second is good to 1e-10 rad/s
-
-        def normal(offset_s: float) -> Floats:
-            at = self.position_itrf_m + offset_s * self.velocity_itrf_m_s
-            if nadir == "geodetic":
-                return frames.geodetic_normal(at)
-            return np.asarray(at / np.linalg.norm(at, axis=1)[:, None])
-
-        return normal(0.0), (normal(half_s) - normal(-half_s)) / (2.0 * half_s)
+        columns = np.hstack([self.position_itrf_m, vertical, sun])
+        return _hermite(columns, _rate_at_nodes(columns, self.step_s), self.step_s)
 
 
 def _hermite(value: Floats, rate: Floats, step_s: float) -> Floats:
@@ -141,8 +129,15 @@ def _hermite(value: Floats, rate: Floats, step_s: float) -> Floats:
     return np.ascontiguousarray(np.stack([v0, r0, c2, c3], axis=1))
 
 
-def propagate(satellite: Satellite, horizon: Horizon) -> Ephemeris:
+def propagate(
+    satellite: Satellite, horizon: Horizon, orientation: EarthOrientation | None = None
+) -> Ephemeris:
     """Return a satellite's states over the horizon.
+
+    Parameters
+    ----------
+    orientation
+        UT1 and the pole; the table shipped with the package unless given.
 
     Raises
     ------
@@ -152,8 +147,8 @@ def propagate(satellite: Satellite, horizon: Horizon) -> Ephemeris:
     position, jd, fraction = _sgp4_nodes(satellite, horizon)
     step_s = horizon.duration_s / (len(fraction) - 1)
     velocity = _rate_at_nodes(position, step_s)
-    gmst = frames.gmst82_rad(jd, fraction)
-    xp = yp = np.zeros_like(gmst)
+    dut1_s, xp, yp = (orientation or shipped()).at(jd, fraction)
+    gmst = frames.gmst82_rad(jd, fraction + dut1_s / 86400.0)
     position_itrf, velocity_itrf = frames.teme_to_itrf(position, velocity, gmst, xp, yp)
     return Ephemeris(
         satellite=satellite.name,
@@ -198,7 +193,7 @@ def _sgp4_nodes(satellite: Satellite, horizon: Horizon) -> tuple[Floats, float, 
 
 
 def _rate_at_nodes(value: Floats, step_s: float) -> Floats:
-    """Return the rate of an evenly sampled function at its samples. Shape ``(n, 3)``."""
+    """Return the rate of evenly sampled functions at their samples. Shape ``(n, k)``."""
     nodes = np.arange(_STENCIL, dtype=np.float64)
     powers = np.arange(_STENCIL)[:, None]
     first_power = (powers[:, 0] == 1).astype(np.float64)

@@ -101,6 +101,11 @@ def _polar(vector: Floats, xp_rad: Floats, yp_rad: Floats) -> Floats:
     )  # fmt: skip
 
 
+def unit(vector: Floats) -> Floats:
+    """Return the directions of vectors. Shape ``(n, 3)``."""
+    return np.asarray(vector / np.linalg.norm(vector, axis=1)[:, None])
+
+
 def geodetic_to_itrf(lon_deg: Floats, lat_deg: Floats, alt_m: Floats) -> Floats:
     """Return positions of points on or above the WGS84 ellipsoid. Shape ``(n, 3)``."""
     lon, lat = np.radians(lon_deg), np.radians(lat_deg)

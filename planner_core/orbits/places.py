@@ -86,7 +86,7 @@ class View:
 def view(ephemeris: Ephemeris, places: Places, t_s: Floats, nadir: Nadir) -> View:
     """Return the geometry of row ``i``'s place at ``t_s[i]``. Shape ``(n,)``."""
     position, _ = ephemeris.state_itrf(t_s)
-    up_here = frames.geodetic_normal(position) if nadir == "geodetic" else _unit(position)
+    up_here = frames.geodetic_normal(position) if nadir == "geodetic" else frames.unit(position)
     sight = position - places.position_m
     range_m = np.linalg.norm(sight, axis=1)
     azimuth, elevation = azimuth_elevation_deg(ephemeris, places, t_s)
@@ -115,7 +115,7 @@ def azimuth_elevation_deg(
 def line_of_sight_teme(ephemeris: Ephemeris, places: Places, t_s: Floats) -> Floats:
     """Return unit vectors from the satellite to row ``i``'s place, inertial. ``(n, 3)``."""
     position, _ = ephemeris.state_itrf(t_s)
-    return ephemeris.to_teme(_unit(places.position_m - position), t_s)
+    return ephemeris.to_teme(frames.unit(places.position_m - position), t_s)
 
 
 def _sun_itrf(ephemeris: Ephemeris, t_s: Floats) -> Floats:
@@ -124,10 +124,6 @@ def _sun_itrf(ephemeris: Ephemeris, t_s: Floats) -> Floats:
         [np.interp(t_s, node_s, ephemeris.sun_teme[:, axis]) for axis in range(3)], axis=1
     )
     return ephemeris.to_itrf(inertial, t_s)
-
-
-def _unit(vector: Floats) -> Floats:
-    return np.asarray(vector / np.linalg.norm(vector, axis=1)[:, None])
 
 
 def _row_dot(a: Floats, b: Floats) -> Floats:

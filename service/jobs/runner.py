@@ -162,12 +162,19 @@ class _Run:
                 return ending
 
     def _listen(self) -> Ending | None:
-        if not wait([self._pipe], POLL_S):
-            return None
-        try:
-            message = self._pipe.recv()
-        except (EOFError, OSError):
-            return self._crashed()
+        """Wait a moment for messages and read all there are: an answer may be among them."""
+        timeout_s = POLL_S
+        while wait([self._pipe], timeout_s):
+            try:
+                ending = self._hear(self._pipe.recv())
+            except (EOFError, OSError):
+                ending = self._crashed()
+            if ending is not None:
+                return ending
+            timeout_s = 0.0
+        return None
+
+    def _hear(self, message: object) -> Ending | None:
         if isinstance(message, Answered | Refused | Stopped):
             return self._settled(message)
         if isinstance(message, Started):

@@ -291,3 +291,13 @@ def test_old_element_sets_are_warned_of() -> None:
     assert "3.1 days" in warnings(2.1)[0]
     assert "after the horizon" in warnings(-5.0)[0]
     assert warnings(10.0, mean_motion=1.0027) == ()
+
+
+def test_a_horizon_outside_the_table_of_ut1_is_warned_of() -> None:
+    start = YEAR_2019 + timedelta(days=30 * 365)
+    asked = replace(
+        scenario(satellites=(satellite(orbit(epoch=start)),)),
+        horizon=Horizon(start=start, end=start + timedelta(days=1)),
+    )
+    assert "Earth's orientation" in orbit_warnings(asked)[0]
+    assert orbit_warnings(scenario()) == ()
