@@ -158,10 +158,8 @@ def _api(options: argparse.Namespace) -> int:
 
 
 def _run_server(settings: Settings, *, with_workers: bool) -> int:
-    from service.logs import configure_logging
     from service.server import CannotServe, serve
 
-    configure_logging()
     try:
         return serve(settings, with_workers=with_workers)
     except CannotServe as error:
