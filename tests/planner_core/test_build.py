@@ -16,9 +16,11 @@ from planner_core.build import (
     check_propagation,
     compute_opportunities,
     orbit_warnings,
+    view_at,
 )
 from planner_core.domain import GroundStation, Horizon, Satellite, Scenario, Sensor, Target
 from planner_core.errors import Cancelled, PropagationFailed
+from planner_core.orbits.places import View
 from planner_core.problem import (
     ACCESS_FOUND,
     ACCESS_TOO_SHORT,
@@ -179,6 +181,21 @@ def test_angles_agree_with_skyfield(computed: ScenarioOpportunities) -> None:
         )
 
 
+def test_the_view_at_any_instant_can_be_asked_for(computed: ScenarioOpportunities) -> None:
+    """At its middle it is the table's own; a contact begins and ends at the lowest elevation."""
+    asked = scenario(satellites=two_satellites(), spacing_s=20.0)
+    table = computed.opportunities
+    rows = np.arange(0, len(table), 7)
+    middle = view_at(asked, table, rows, 0.5 * (table.start_s[rows] + table.end_s[rows]))
+    for field in fields(View):
+        in_table = getattr(table, field.name)[rows]
+        assert np.allclose(getattr(middle, field.name), in_table, rtol=1e-12, atol=1e-9)
+    contacts = np.flatnonzero(table.kind == CONTACT)
+    for instants in (table.start_s, table.end_s):
+        edge = view_at(asked, table, contacts, instants[contacts])
+        assert edge.elevation_deg == pytest.approx(np.full(len(contacts), 5.0), abs=1e-3)
+
+
 def test_lines_of_sight_are_inertial_unit_vectors(computed: ScenarioOpportunities) -> None:
     """Over a contact they turn as far as the pass does; tracking keeps them on the station."""
     table = computed.opportunities
@@ -262,7 +279,7 @@ def test_progress_rises_and_a_cancelled_search_stops() -> None:
     budget = Budget(report=seen.append)
     asked = scenario(satellites=two_satellites())
     build_problem(asked, compute_opportunities(asked, budget), budget)
-    assert [p.fraction for p in seen if p.phase == "access"] == [0.0, 0.5, 1.0]
+    assert [p.fraction for p in seen if p.phase == "access"] == [0.0, 0.25, 0.5, 0.75, 1.0]
     assert [p.fraction for p in seen if p.phase == "compile"] == [0.0, 0.5, 1.0]
     budget.cancel()
     with pytest.raises(Cancelled):
