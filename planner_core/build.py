@@ -14,7 +14,7 @@ import numpy.typing as npt
 from planner_core import opportunities as tasks
 from planner_core.access import Accesses, find_accesses
 from planner_core.domain import Horizon, Satellite, Scenario
-from planner_core.errors import Cancelled
+from planner_core.errors import Cancelled, InvalidScenario
 from planner_core.limits import Limits
 from planner_core.orbits import ephemeris as orbits
 from planner_core.orbits.earth_orientation import shipped
@@ -41,6 +41,7 @@ Floats = npt.NDArray[np.float64]
 
 LEO_PERIOD_S = 128 * 60.0
 OLD_ELEMENTS_DAYS = 3.0
+REFUSED_ELEMENTS_DAYS = 30.0
 
 _REASONS = np.array(
     [NEVER_VISIBLE, OUTSIDE_LIMITS, ACCESS_TOO_SHORT, ACCESS_FOUND], dtype=np.int8
@@ -264,6 +265,28 @@ def check_propagation(scenario: Scenario) -> None:
         orbits.check_propagation(satellite, scenario.horizon)
 
 
+def check_element_age(scenario: Scenario) -> None:
+    """Refuse element sets too old to plan with, unless the scenario allows them.
+
+    Raises
+    ------
+    InvalidScenario
+        A satellite in low orbit is more than 30 days from its epoch at some time of the
+        horizon: its place along the orbit is then a matter of minutes, not of seconds.
+    """
+    if scenario.allow_old_elements:
+        return
+    for index, satellite in enumerate(scenario.satellites):
+        age_days = _greatest_age_days(satellite, scenario.horizon)
+        if satellite.orbit.period_s < LEO_PERIOD_S and age_days > REFUSED_ELEMENTS_DAYS:
+            raise InvalidScenario(
+                "elements_too_old",
+                f"Satellite {satellite.name!r}: the element set is up to {age_days:.0f} days from "
+                f"its epoch, more than {REFUSED_ELEMENTS_DAYS:.0f}.",
+                pointer=f"/satellites/{index}",
+            )
+
+
 def orbit_warnings(scenario: Scenario) -> tuple[str, ...]:
     """Return what a reader should know about element sets and the Earth's orientation."""
     ages = (_age_warning(satellite, scenario.horizon) for satellite in scenario.satellites)
@@ -278,16 +301,21 @@ def orbit_warnings(scenario: Scenario) -> tuple[str, ...]:
 
 def _age_warning(satellite: Satellite, horizon: Horizon) -> str | None:
     orbit = satellite.orbit
-    before_s = horizon.offset_s(orbit.epoch)
-    oldest_days = max(-before_s, horizon.duration_s - before_s, before_s) / 86400.0
-    if before_s > horizon.duration_s:
+    age_days = _greatest_age_days(satellite, horizon)
+    if orbit.epoch > horizon.end:
         return (
             f"Satellite {satellite.name!r}: the element set's epoch lies after the horizon's end "
             f"({orbit.epoch:%Y-%m-%d})."
         )
-    if orbit.period_s < LEO_PERIOD_S and oldest_days > OLD_ELEMENTS_DAYS:
+    if orbit.period_s < LEO_PERIOD_S and age_days > OLD_ELEMENTS_DAYS:
         return (
-            f"Satellite {satellite.name!r}: the element set is up to {oldest_days:.1f} days from "
+            f"Satellite {satellite.name!r}: the element set is up to {age_days:.1f} days from "
             f"its epoch; expect errors of about a kilometre per day."
         )
     return None
+
+
+def _greatest_age_days(satellite: Satellite, horizon: Horizon) -> float:
+    """Return how far from its epoch an element set is used at most, before or after."""
+    epoch_s = horizon.offset_s(satellite.orbit.epoch)
+    return max(epoch_s, horizon.duration_s - epoch_s) / 86400.0

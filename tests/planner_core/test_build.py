@@ -13,13 +13,14 @@ import pytest
 from planner_core.build import (
     ScenarioOpportunities,
     build_problem,
+    check_element_age,
     check_propagation,
     compute_opportunities,
     orbit_warnings,
     view_at,
 )
 from planner_core.domain import GroundStation, Horizon, Satellite, Scenario, Sensor, Target
-from planner_core.errors import Cancelled, PropagationFailed
+from planner_core.errors import Cancelled, InvalidScenario, PropagationFailed
 from planner_core.orbits.places import View
 from planner_core.problem import (
     ACCESS_FOUND,
@@ -319,3 +320,22 @@ def test_a_horizon_outside_the_table_of_ut1_is_warned_of() -> None:
     )
     assert "Earth's orientation" in orbit_warnings(asked)[0]
     assert orbit_warnings(scenario()) == ()
+
+
+def test_very_old_element_sets_are_refused_unless_allowed() -> None:
+    def aged(days: float, mean_motion: float = 15.2) -> Scenario:
+        start = YEAR_2019 + timedelta(days=days)
+        one = satellite(orbit(mean_motion_rev_day=mean_motion), name="OLD")
+        return replace(
+            scenario(satellites=(one,)),
+            horizon=Horizon(start=start, end=start + timedelta(days=1)),
+        )
+
+    check_element_age(aged(28.9))
+    check_element_age(aged(40.0, mean_motion=2.0))
+    check_element_age(replace(aged(40.0), allow_old_elements=True))
+    for days in (29.1, -31.0):
+        with pytest.raises(InvalidScenario, match="OLD") as caught:
+            check_element_age(aged(days))
+        assert caught.value.code == "elements_too_old"
+        assert caught.value.fault.pointer == "/satellites/0"
