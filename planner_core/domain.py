@@ -369,7 +369,10 @@ class GroundStation:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scenario:
-    """The frozen question: who may image what, when, and under which rules."""
+    """The frozen question: who may image what, when, and under which rules.
+
+    ``allow_old_elements`` plans with element sets of any age (see ``build.check_element_age``).
+    """
 
     horizon: Horizon
     satellites: tuple[Satellite, ...]
@@ -379,6 +382,7 @@ class Scenario:
     dynamics: Dynamics = "physical"
     collect_spacing_s: float | None = None
     continuous_starts: bool = False
+    allow_old_elements: bool = False
     warnings: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:

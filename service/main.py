@@ -11,6 +11,7 @@ from fastapi import Depends, FastAPI
 import planner_core
 from service.api import (
     ground_stations,
+    job_events,
     jobs,
     meta,
     openapi,
@@ -41,6 +42,7 @@ ROUTERS = (
     target_catalogs.router,
     scenarios.router,
     jobs.router,
+    job_events.router,
     solvers.router,
     meta.router,
     openapi.router,

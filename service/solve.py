@@ -91,7 +91,7 @@ def _read_json(path: Path) -> dict[str, Any]:
     try:
         content = json.loads(path.read_text(encoding="utf-8-sig"))
     except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise InvalidScenario("invalid_json", f"{path} is not JSON: {error}.") from error
+        raise InvalidScenario("malformed_json", f"{path} is not JSON: {error}.") from error
     if not isinstance(content, dict):
-        raise InvalidScenario("invalid_json", f"{path} must hold one JSON object.")
+        raise InvalidScenario("malformed_json", f"{path} must hold one JSON object.")
     return content

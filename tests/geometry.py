@@ -177,14 +177,13 @@ def vertical_at(position_m: Floats, nadir: str) -> Floats:
     if nadir == "geocentric":
         return np.asarray(position_m / np.linalg.norm(position_m, axis=-1, keepdims=True))
     x, y, z = position_m.T
-    # Bowring's closed form, not the planner's iteration.
-    a, b = 6_378_137.0, 6_356_752.314245179
-    e2, e2_second = 1 - (b / a) ** 2, (a / b) ** 2 - 1
+    # The plain fixed point, not the planner's closed form.
+    e2 = 6.69437999014e-3
     across = np.hypot(x, y)
-    beta = np.arctan2(z * a, across * b)
-    for _ in range(2):
-        lat = np.arctan2(z + e2_second * b * np.sin(beta) ** 3, across - e2 * a * np.cos(beta) ** 3)
-        beta = np.arctan2(b * np.sin(lat), a * np.cos(lat))
+    lat = np.arctan2(z, across)
+    for _ in range(8):
+        normal_m = 6_378_137.0 / np.sqrt(1.0 - e2 * np.sin(lat) ** 2)
+        lat = np.arctan2(z + e2 * normal_m * np.sin(lat), across)
     lon = np.arctan2(y, x)
     return np.stack([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)], axis=-1)
 

@@ -145,6 +145,7 @@ def shown(job: JobRow, scenario_sha256: str) -> JobOut:
             "self": address,
             "timeline": f"{address}/timeline",
             "targets": f"{address}/targets",
+            "events": f"{address}/events",
             "scenario": f"/v1/scenarios/{job.scenario_id}",
         },
     )

@@ -146,7 +146,6 @@ class _Run:
         self._limits = limits
         self._tick_s = tick_s
         self._tick = tick
-        self._memory = psutil.Process(process.pid)
         self._progress: Progress | None = None
         self._verifying = False
         self._next_tick_s = 0.0
@@ -220,9 +219,9 @@ class _Run:
 
     def _held_mb(self) -> float:
         try:
-            return float(self._memory.memory_info().rss) / 1e6
+            return float(psutil.Process(self._process.pid).memory_info().rss) / 1e6
         except psutil.NoSuchProcess:
-            return 0.0
+            return 0.0  # it has ended; its last words are still to be read
 
     def _out_of_time(self) -> Refused:
         if not self._started:

@@ -28,9 +28,7 @@ def plainly_within(path: Ephemeris, limits: Sensor | Target, target: Target, t: 
     """Judge the limits of light, time, side and direction instant by instant."""
     place = Places.of([target])
     position, velocity = path.state_itrf(t)
-    sun = path.to_itrf(
-        np.stack([np.interp(t, path.node_s, path.sun_teme[:, i]) for i in range(3)], axis=1), t
-    )
+    sun = path.sun_itrf(t)
     height_deg = np.degrees(np.arcsin(sun @ place.up[0]))
     holds = np.ones(len(t), dtype=np.bool_)
     if limits.sun_elevation_min_deg is not None:
