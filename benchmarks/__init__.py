@@ -1,0 +1,1 @@
+"""Timings and plan quality; run by hand, never asserted in tests."""
