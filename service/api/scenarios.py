@@ -59,6 +59,7 @@ class ScenarioOut(BaseModel):
     dynamics: Dynamics
     collect_spacing_s: float | None
     continuous_starts: bool
+    allow_old_elements: bool
     counts: Counts
     warnings: list[str] = Field(description="About the age of orbits, for people.")
     created_at: Instant

@@ -224,6 +224,40 @@ def test_old_elements_are_a_warning(client: httpx.Client) -> None:
     assert post(client, PATH, question(client))["warnings"] == []
 
 
+def test_elements_of_more_than_thirty_days_are_refused_unless_allowed(client: httpx.Client) -> None:
+    asked = question(client)
+    stale = satellite(name="STALE", tle=tle(epoch=EPOCH - timedelta(days=40)))
+    asked["satellite_ids"].append(post(client, "/v1/satellites", stale)["id"])
+    refused = client.post(PATH, json=asked)
+    problem = assert_problem(refused, 422, "elements_too_old", "/satellite_ids/1")
+    assert "STALE" in problem["detail"]
+    allowed = post(client, PATH, asked | {"allow_old_elements": True})
+    assert allowed["allow_old_elements"] is True
+    assert any("STALE" in warning for warning in allowed["warnings"])
+
+
+def test_limits_of_sensor_and_target_narrow_the_opportunities(client: httpx.Client) -> None:
+    free = question(client)
+    sunny = satellite(sensor={"sun_elevation_min_deg": 10.0})
+    lit = free | {"satellite_ids": [post(client, "/v1/satellites", sunny)["id"]]}
+    own = [t | {"look_side": "left", "orbit_direction": "descending"} for t in grid()]
+    narrow = free | {"target_catalog_ids": [catalog(client, *own)]}
+    found = {}
+    for name, asked in (("free", free), ("lit", lit), ("narrow", narrow)):
+        path = post(client, PATH, asked)["links"]["opportunities"]
+        found[name] = get(client, path, kind="collect", limit="500").json()["items"]
+    assert 0 < len(found["lit"]) < len(found["free"])
+    assert 0 < len(found["narrow"]) < len(found["free"])
+    assert min(item["sun_elevation_deg"] for item in found["lit"]) > 9.9
+    for item in found["narrow"]:
+        assert any(
+            wide["target_id"] == item["target_id"]
+            and wide["access_start"] <= item["access_start"]
+            and wide["access_end"] >= item["access_end"]
+            for wide in found["free"]
+        )
+
+
 def test_opportunities_are_those_of_the_core_and_computed_once(service: Service) -> None:
     body = post(service.client, PATH, question(service.client))
     path = body["links"]["opportunities"] + "?limit=50"
