@@ -9,14 +9,12 @@ once, and nowhere else.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from planner_core.domain import GroundStation, LookSide, Nadir, Sensor, Target
-from planner_core.orbits import crossings as codes
+from planner_core.limits import Limits
 from planner_core.orbits.ephemeris import Ephemeris
 from planner_core.orbits.frames import EARTH_POLAR_RADIUS_M
 from planner_core.orbits.mask import Mask, windows_above_mask
@@ -33,91 +31,6 @@ _DEFLECTION_DEG = 0.2  # between the geodetic and the geocentric vertical, at mo
 _CAP_MARGIN_RAD = 1e-4
 _TURN_MARGIN = 1.05  # the satellite may turn a little faster between nodes than at them
 _ROUNDING_MS = 1e-5
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Limits:
-    """What a place must meet to be seen, one row per place; ``nadir`` and side for all.
-
-    Attributes
-    ----------
-    off_nadir_min_deg, off_nadir_max_deg
-        Bounds of the angle at the satellite. Shape ``(n,)``.
-    min_elevation_deg
-        Bound at the ground, 0 or more. Shape ``(n,)``.
-    masks
-        Azimuth-elevation masks, one per place (empty for none), or no masks at all.
-    """
-
-    nadir: Nadir
-    look_side: LookSide
-    off_nadir_min_deg: Floats
-    off_nadir_max_deg: Floats
-    min_elevation_deg: Floats
-    masks: tuple[Mask, ...] = ()
-
-    @classmethod
-    def of_targets(cls, sensor: Sensor, targets: Sequence[Target]) -> Limits:
-        """Return a sensor's limits, narrowed by each target's own."""
-        lowest, highest = sensor.off_nadir_min_deg, sensor.off_nadir_max_deg
-        return cls(
-            nadir=sensor.nadir,
-            look_side=sensor.look_side,
-            off_nadir_min_deg=np.array(
-                [max(lowest, t.off_nadir_min_deg or 0.0) for t in targets], dtype=np.float64
-            ),
-            off_nadir_max_deg=np.array(
-                [
-                    highest if t.off_nadir_max_deg is None else min(highest, t.off_nadir_max_deg)
-                    for t in targets
-                ],
-                dtype=np.float64,
-            ),
-            min_elevation_deg=np.full(len(targets), max(0.0, sensor.min_elevation_deg)),
-        )
-
-    @classmethod
-    def of_stations(cls, stations: Sequence[GroundStation]) -> Limits:
-        """Return the limits of contacts."""
-        lowest_deg = [
-            max(0.0, s.min_elevation_deg, min((e for _, e in s.elevation_mask), default=0.0))
-            for s in stations
-        ]
-        return cls(
-            nadir="geocentric",
-            look_side="any",
-            off_nadir_min_deg=np.zeros(len(stations)),
-            off_nadir_max_deg=np.full(len(stations), 90.0),
-            min_elevation_deg=np.array(lowest_deg, dtype=np.float64),
-            masks=tuple(s.elevation_mask for s in stations),
-        )
-
-    @classmethod
-    def above_horizon(cls, num_places: int) -> Limits:
-        """Return the limits of bare visibility."""
-        return cls(
-            nadir="geocentric",
-            look_side="any",
-            off_nadir_min_deg=np.zeros(num_places),
-            off_nadir_max_deg=np.full(num_places, 90.0),
-            min_elevation_deg=np.zeros(num_places),
-        )
-
-    def table(self) -> tuple[Ints, Floats, Floats]:
-        """Return codes ``(m,)``, signs ``(m,)`` and thresholds ``(n, m)`` of those in force."""
-        rows = [(codes.ELEVATION, 1.0, 90.0 - self.min_elevation_deg)]
-        if np.any(self.off_nadir_max_deg < 90.0):
-            rows.append((codes.OFF_NADIR, 1.0, self.off_nadir_max_deg))
-        if np.any(self.off_nadir_min_deg > 0.0):
-            rows.append((codes.OFF_NADIR, -1.0, self.off_nadir_min_deg))
-        if self.look_side != "any":
-            side = 1.0 if self.look_side == "left" else -1.0
-            rows.append((codes.LOOK_SIDE, side, np.full(len(self.min_elevation_deg), 90.0)))
-        return (
-            np.array([code for code, _, _ in rows], dtype=np.int32),
-            np.array([sign for _, sign, _ in rows]),
-            np.stack([sign * np.cos(np.radians(bound)) for _, sign, bound in rows], axis=1),
-        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -152,17 +65,16 @@ def find_accesses(
     Complete for windows and gaps that a millisecond can show. When ``stop[0]`` becomes
     non-zero the search ends early with the accesses found so far.
     """
-    code, sign, threshold = limits.table()
     coarse, fine = _caps(ephemeris, limits)
     place, windows = find_windows(
         ephemeris.track(limits.nadir),
         ephemeris.step_s,
         coarse,
         fine,
-        _place_vectors(places),
-        code,
-        sign,
-        threshold,
+        _place_vectors(places, limits),
+        limits.codes,
+        limits.signs,
+        limits.thresholds,
         np.zeros(1, dtype=np.uint8) if stop is None else stop,
     )
     windows = np.clip(windows, 0.0, ephemeris.duration_s)
@@ -171,8 +83,9 @@ def find_accesses(
     return _rounded_inward(place, windows, ephemeris.duration_s)
 
 
-def _place_vectors(places: Places) -> Floats:
-    return np.ascontiguousarray(np.stack([places.position_m, places.up, places.east], axis=1))
+def _place_vectors(places: Places, limits: Limits) -> Floats:
+    own = np.stack([places.position_m, places.up], axis=1)
+    return np.ascontiguousarray(np.concatenate([own, limits.meridians], axis=1))
 
 
 def _rounded_inward(place: Ints, windows: Floats, duration_s: float) -> Accesses:
@@ -239,13 +152,11 @@ def _cap(ephemeris: Ephemeris, reach_rad: Floats, turn_rad_s: Floats, size: int)
 
 def _reach_rad(radius_m: Floats, limits: Limits) -> Floats:
     """Return the Earth-central angle beyond which no place meets the limits. Shape ``(n,)``."""
-    if len(limits.min_elevation_deg) == 0:
-        return np.zeros_like(radius_m)
     ratio = np.maximum(radius_m / _LOWEST_GROUND_M, 1.0)
-    lowest = np.radians(limits.min_elevation_deg.min() - _DEFLECTION_DEG)
+    lowest = np.radians(limits.lowest_elevation_deg - _DEFLECTION_DEG)
     reach = np.arccos(np.cos(lowest) / ratio) - lowest
     tilt_deg = _DEFLECTION_DEG if limits.nadir == "geodetic" else 0.0
-    widest = np.radians(min(limits.off_nadir_max_deg.max() + tilt_deg, 90.0))
+    widest = np.radians(min(limits.widest_off_nadir_deg + tilt_deg, 90.0))
     sine = ratio * np.sin(widest)
     with_off_nadir = np.where(sine < 1.0, np.arcsin(np.minimum(sine, 1.0)) - widest, np.inf)
     return np.asarray(np.minimum(reach, with_off_nadir))

@@ -35,6 +35,7 @@ from planner_core.errors import InvalidScenario
 Dynamics = Literal["physical", "paper"]
 Nadir = Literal["geodetic", "geocentric"]
 LookSide = Literal["left", "right", "any"]
+OrbitDirection = Literal["ascending", "descending", "any"]
 
 
 def _require(condition: bool, where: str, message: str) -> None:
@@ -47,6 +48,26 @@ def _require_finite(owner: object, *names: str) -> None:
         value = getattr(owner, name)
         if value is not None:
             _require(math.isfinite(value), name, "must be a finite number")
+
+
+def _check_light(limits: Sensor | Target) -> None:
+    """Check the limits of sun and local time that sensors and targets share."""
+    lowest, highest = limits.sun_elevation_min_deg, limits.sun_elevation_max_deg
+    for name, value in (("sun_elevation_min_deg", lowest), ("sun_elevation_max_deg", highest)):
+        _require(value is None or -90 <= value <= 90, name, "must be between -90 and 90")
+    _require(
+        lowest is None or highest is None or lowest <= highest,
+        "sun_elevation_max_deg",
+        "must not be below sun_elevation_min_deg",
+    )
+    begin, end = limits.local_time_from_h, limits.local_time_to_h
+    for name, hour in (("local_time_from_h", begin), ("local_time_to_h", end)):
+        _require(hour is None or 0 <= hour <= 24, name, "must be between 0 and 24")
+    _require(
+        (begin is None) == (end is None) and (begin is None or begin != end),
+        "local_time_to_h",
+        "needs a local_time_from_h that differs from it, and the other way round",
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -140,13 +161,37 @@ class Agility:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sensor:
-    """The pointing limits of the imager. Visibility (elevation >= 0) is always required."""
+    """The limits of imaging. Visibility (elevation >= 0) is always required.
+
+    Attributes
+    ----------
+    off_nadir_min_deg, off_nadir_max_deg
+        Of the line of sight, from the vertical that ``nadir`` names.
+    nadir
+        Vertical of the ellipsoid (geodetic) or towards the Earth's centre (geocentric).
+    look_side
+        Side of the target as seen along the satellite's velocity over the ground.
+    min_elevation_deg
+        Of the satellite, as the target sees it.
+    sun_elevation_min_deg, sun_elevation_max_deg
+        Of the sun, as the target sees it, without refraction. None for no limit.
+    local_time_from_h, local_time_to_h
+        Local apparent solar time at the target, in hours from midnight; a span from 22 to 2
+        runs over midnight. None for no limit.
+    orbit_direction
+        Ascending while the satellite moves north.
+    """
 
     off_nadir_min_deg: float = 5.0
     off_nadir_max_deg: float = 55.0
     nadir: Nadir = "geodetic"
     look_side: LookSide = "any"
     min_elevation_deg: float = 0.0
+    sun_elevation_min_deg: float | None = None
+    sun_elevation_max_deg: float | None = None
+    local_time_from_h: float | None = None
+    local_time_to_h: float | None = None
+    orbit_direction: OrbitDirection = "any"
 
     def __post_init__(self) -> None:
         _require_finite(self, "off_nadir_min_deg", "off_nadir_max_deg", "min_elevation_deg")
@@ -159,6 +204,7 @@ class Sensor:
         _require(
             0 <= self.min_elevation_deg < 90, "min_elevation_deg", "must be from 0 to below 90"
         )
+        _check_light(self)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -258,7 +304,8 @@ class Satellite:
 class Target:
     """A point on the ground to be imaged once, by any satellite.
 
-    ``off_nadir_min_deg`` and ``off_nadir_max_deg`` narrow the sensor's limits.
+    The limits from ``off_nadir_min_deg`` on are named and meant as those of ``Sensor``, and
+    narrow them: a collect meets both.
     """
 
     id: str
@@ -269,6 +316,13 @@ class Target:
     collect_s: float = 30.0
     off_nadir_min_deg: float | None = None
     off_nadir_max_deg: float | None = None
+    min_elevation_deg: float | None = None
+    sun_elevation_min_deg: float | None = None
+    sun_elevation_max_deg: float | None = None
+    local_time_from_h: float | None = None
+    local_time_to_h: float | None = None
+    look_side: LookSide = "any"
+    orbit_direction: OrbitDirection = "any"
     catalog_id: str | None = None
 
     def __post_init__(self) -> None:
@@ -278,6 +332,10 @@ class Target:
         _require(-500 <= self.alt_m <= 10000, "alt_m", "must be between -500 and 10000")
         _require(self.reward >= 0, "reward", "must be 0 or more")
         _require(self.collect_s > 0, "collect_s", "must be greater than 0")
+        for name in ("off_nadir_min_deg", "off_nadir_max_deg", "min_elevation_deg"):
+            value = getattr(self, name)
+            _require(value is None or 0 <= value <= 90, name, "must be between 0 and 90")
+        _check_light(self)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -311,7 +369,10 @@ class GroundStation:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scenario:
-    """The frozen question: who may image what, when, and under which rules."""
+    """The frozen question: who may image what, when, and under which rules.
+
+    ``allow_old_elements`` plans with element sets of any age (see ``build.check_element_age``).
+    """
 
     horizon: Horizon
     satellites: tuple[Satellite, ...]
@@ -321,6 +382,7 @@ class Scenario:
     dynamics: Dynamics = "physical"
     collect_spacing_s: float | None = None
     continuous_starts: bool = False
+    allow_old_elements: bool = False
     warnings: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:

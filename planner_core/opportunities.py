@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import fields
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -16,19 +16,32 @@ import numpy.typing as npt
 from planner_core.access import Accesses
 from planner_core.domain import GroundStation, Nadir, Target
 from planner_core.orbits.ephemeris import Ephemeris
-from planner_core.orbits.places import Places, line_of_sight_teme, view
-from planner_core.problem import COLLECT, CONTACT, Opportunities
+from planner_core.orbits.places import Places, View, line_of_sight_teme, view
+from planner_core.problem import COLLECT, Opportunities
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int32]
 Longs = npt.NDArray[np.int64]
 
+Placed = tuple[Longs, Longs, Longs]
+Columns = dict[str, npt.NDArray[Any]]
+
 _MS_PER_S: Final = 1000
+_CHUNK: Final = 16_384  # rows whose intermediate results fit the processor's cache
+_SEEN: Final = (
+    "los_start",
+    "los_end",
+    "off_nadir_deg",
+    "elevation_deg",
+    "azimuth_deg",
+    "range_m",
+    "sun_elevation_deg",
+)
 
 
 def place_collects(
     accesses: Accesses, targets: Sequence[Target], spacing_s: float | None
-) -> tuple[Longs, Longs, Longs]:
+) -> Placed:
     """Return the collects that accesses offer.
 
     Without a spacing, one in the middle of each access; with one, starts ``spacing_s`` apart
@@ -62,9 +75,7 @@ def _spaced(row: Longs, start_ms: Longs, room_ms: Longs, step_ms: float) -> tupl
     return row[of], start_ms[of] + into_ms
 
 
-def place_contacts(
-    accesses: Accesses, stations: Sequence[GroundStation]
-) -> tuple[Longs, Longs, Longs]:
+def place_contacts(accesses: Accesses, stations: Sequence[GroundStation]) -> Placed:
     """Return the contacts: whole accesses of at least the station's ``min_contact_s``."""
     shortest_ms = np.array(
         [math.ceil(station.min_contact_s * _MS_PER_S - 1e-6) for station in stations],
@@ -79,17 +90,10 @@ def _ms(instant_s: Floats) -> Longs:
     return np.rint(instant_s * _MS_PER_S).astype(np.int64)
 
 
-def describe(
-    satellite: int,
-    kind: int,
-    ephemeris: Ephemeris,
-    places: Places,
-    nadir: Nadir,
-    accesses: Accesses,
-    first_access: int,
-    placed: tuple[Longs, Longs, Longs],
-) -> Opportunities:
-    """Return the placed tasks of one satellite as rows of the opportunity table.
+def rows_of(
+    satellite: int, kind: int, accesses: Accesses, first_access: int, placed: Placed
+) -> Columns:
+    """Return the placed tasks of one satellite as rows of the opportunity table, unseen yet.
 
     Parameters
     ----------
@@ -97,52 +101,74 @@ def describe(
         Index of the satellite; ``COLLECT`` or ``CONTACT``.
     first_access
         Number of the first access; the others follow.
-    placed
-        Row of the access, start and end in milliseconds.
     """
-    row, begin_ms, finish_ms = placed
-    start_s, end_s = begin_ms / _MS_PER_S, finish_ms / _MS_PER_S
-    place = accesses.place[row]
-    there = places.at(place)
-    seen = view(ephemeris, there, 0.5 * (start_s + end_s), nadir)
-    return Opportunities(
-        satellite=np.full(len(row), satellite, dtype=np.int32),
-        kind=np.full(len(row), kind, dtype=np.int8),
-        place=place,
-        access=(first_access + row).astype(np.int32),
-        start_s=start_s,
-        end_s=end_s,
-        access_start_s=accesses.start_s[row],
-        access_end_s=accesses.end_s[row],
-        los_start=line_of_sight_teme(ephemeris, there, start_s),
-        los_end=line_of_sight_teme(ephemeris, there, end_s),
-        off_nadir_deg=seen.off_nadir_deg,
-        elevation_deg=seen.elevation_deg,
-        azimuth_deg=seen.azimuth_deg,
-        range_m=seen.range_m,
-        sun_elevation_deg=seen.sun_elevation_deg,
-        in_eclipse=seen.in_eclipse,
-    )
-
-
-def merge(
-    parts: Sequence[Opportunities], target_ids: Sequence[str], station_ids: Sequence[str]
-) -> Opportunities:
-    """Return all parts as one table in the order (start, end, satellite, kind, place's id)."""
-    whole = {
-        field.name: np.concatenate([getattr(part, field.name) for part in parts])
-        for field in fields(Opportunities)
+    row, start_ms, end_ms = placed
+    return {
+        "satellite": np.full(len(row), satellite, dtype=np.int32),
+        "kind": np.full(len(row), kind, dtype=np.int8),
+        "place": accesses.place[row],
+        "access": (first_access + row).astype(np.int32),
+        "start_s": start_ms / _MS_PER_S,
+        "end_s": end_ms / _MS_PER_S,
+        "access_start_s": accesses.start_s[row],
+        "access_end_s": accesses.end_s[row],
     }
+
+
+def in_order(
+    parts: Sequence[Columns], target_ids: Sequence[str], station_ids: Sequence[str]
+) -> Columns:
+    """Return all rows by (start, end, satellite, kind, place's id as text)."""
+    whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    is_collect = whole["kind"] == COLLECT
     rank = np.where(
-        whole["kind"] == COLLECT,
-        _rank_of(target_ids, whole["place"], whole["kind"] == COLLECT),
-        _rank_of(station_ids, whole["place"], whole["kind"] == CONTACT),
+        is_collect,
+        _rank_of(target_ids, whole["place"], is_collect),
+        _rank_of(station_ids, whole["place"], ~is_collect),
     )
     order = np.lexsort((rank, whole["kind"], whole["satellite"], whole["end_s"], whole["start_s"]))
-    return Opportunities(**{name: values[order] for name, values in whole.items()})
+    return {name: values[order] for name, values in whole.items()}
 
 
 def _rank_of(ids: Sequence[str], place: Ints, wanted: npt.NDArray[np.bool_]) -> Longs:
     rank = np.zeros(max(len(ids), 1), dtype=np.int64)
     rank[sorted(range(len(ids)), key=ids.__getitem__)] = np.arange(len(ids))
     return np.where(wanted, rank[np.where(wanted, place, 0)], 0)
+
+
+class Described:
+    """The opportunity table while what the satellites see is filled in, one after another.
+
+    The geometry is two thirds of the table. Filling it in place keeps one copy of it, which
+    counts where a week of a constellation has millions of rows.
+    """
+
+    def __init__(self, rows: Columns):
+        count = len(rows["start_s"])
+        self._rows = rows
+        self._seen: Columns = {
+            name: np.empty((count, 3) if name.startswith("los") else count, dtype=np.float64)
+            for name in _SEEN
+        }
+        self._seen["in_eclipse"] = np.zeros(count, dtype=np.bool_)
+
+    def fill(
+        self, satellite: int, kind: int, ephemeris: Ephemeris, places: Places, nadir: Nadir
+    ) -> None:
+        """Fill in the rows of one satellite and kind."""
+        all_rows = np.flatnonzero(
+            (self._rows["satellite"] == satellite) & (self._rows["kind"] == kind)
+        )
+        for first in range(0, len(all_rows), _CHUNK):
+            rows = all_rows[first : first + _CHUNK]
+            there = places.at(self._rows["place"][rows])
+            start_s, end_s = self._rows["start_s"][rows], self._rows["end_s"][rows]
+            self._seen["los_start"][rows] = line_of_sight_teme(ephemeris, there, start_s)
+            self._seen["los_end"][rows] = line_of_sight_teme(ephemeris, there, end_s)
+            seen = view(ephemeris, there, 0.5 * (start_s + end_s), nadir)
+            for field in fields(View):
+                self._seen[field.name][rows] = getattr(seen, field.name)
+
+    def table(self) -> Opportunities:
+        """Return the finished table."""
+        return Opportunities(**self._rows, **self._seen)

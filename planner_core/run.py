@@ -68,6 +68,7 @@ def plan_scenario(
     clock.append(time.perf_counter())
     problem = build_problem(scenario, opportunities, budget)
     clock.append(time.perf_counter())
+    budget.report(Progress(phase="solve", fraction=0.0))
     solution = solver.solve(problem, budget, seed)
     clock.append(time.perf_counter())
     budget.report(Progress(phase="verify", fraction=0.0))

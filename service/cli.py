@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import planner_core
-from planner_core.errors import PlannerError
+from planner_core.errors import Cancelled, PlannerError
 
 if TYPE_CHECKING:
     from service.settings import Settings
@@ -103,7 +104,7 @@ def _add_solve(parser: argparse.ArgumentParser) -> None:
         help="a parameter of the solver, as JSON or as a word; may be repeated",
     )  # fmt: skip
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--time-s", type=float, default=None, help="stop the search after this")
+    parser.add_argument("--time-s", type=_positive, help="seconds after which the search stops")
     parser.add_argument("--out", type=Path, metavar="FILE", help="write the timeline here")
 
 
@@ -120,6 +121,16 @@ def _parameter(text: str) -> tuple[str, Any]:
         return name, json.loads(value)
     except json.JSONDecodeError:
         return name, value
+
+
+def _positive(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0.0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number above 0")
+    return value
 
 
 def _settings(options: argparse.Namespace) -> Settings:
@@ -147,10 +158,8 @@ def _api(options: argparse.Namespace) -> int:
 
 
 def _run_server(settings: Settings, *, with_workers: bool) -> int:
-    from service.logs import configure_logging
     from service.server import CannotServe, serve
 
-    configure_logging()
     try:
         return serve(settings, with_workers=with_workers)
     except CannotServe as error:
@@ -195,10 +204,25 @@ def _solve(options: argparse.Namespace) -> int:
             out=options.out,
         )
     except PlannerError as error:
-        where = f" {error.fault.pointer}:" if error.fault.pointer else ""
-        raise _WrongInput(f"{where} {error.detail}".strip()) from error
+        place = _place(error.fault.pointer or "", options.scenario)
+        raise _WrongInput(f"{place}: {error.detail}") from error
+    except Cancelled:
+        return _complain("stopped before there was a plan", FAILED)
     except OSError as error:
         raise _WrongInput(f"{error.filename}: {error.strerror}") from error
+
+
+def _place(pointer: str, scenario: Path) -> str:
+    """Return where on the command line or in the file a fault lies.
+
+    >>> _place("/params/depth", Path("day.json")), _place("/horizon/end", Path("day.json"))
+    ('--param depth', 'day.json /horizon/end')
+    """
+    if pointer == "/solver":
+        return "--solver"
+    if pointer.startswith("/params/"):
+        return f"--param {pointer.removeprefix('/params/')}"
+    return f"{scenario} {pointer}".strip()
 
 
 def _openapi(options: argparse.Namespace) -> int:

@@ -60,7 +60,7 @@ def run_demo(settings: Settings, *, folder: Path, keep_serving: bool = False) ->
         with httpx.Client(base_url=url, trust_env=False, timeout=60.0) as client:
             status = _plan_mission(client, folder)
         if keep_serving:
-            print(f"\nStill serving at {url} (documentation: {url}/docs). Ctrl-C ends it.")
+            print(f"\nStill serving at {url} (its calls: {url}/docs). Ctrl-C ends it.", flush=True)
             _wait_for_interrupt()
     return status
 

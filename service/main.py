@@ -9,11 +9,22 @@ from typing import TYPE_CHECKING
 from fastapi import Depends, FastAPI
 
 import planner_core
-from service.api import ground_stations, jobs, meta, openapi, satellites, target_catalogs
+from service.api import (
+    ground_stations,
+    job_events,
+    jobs,
+    meta,
+    openapi,
+    satellites,
+    scenarios,
+    solvers,
+    target_catalogs,
+)
 from service.api.deps import check_request
 from service.api.errors import install_error_handlers
 from service.api.middleware import BodyLimit, RequestContext
 from service.db.session import Database
+from service.opportunities import OpportunityReader
 from service.settings import Settings
 
 if TYPE_CHECKING:
@@ -29,7 +40,10 @@ ROUTERS = (
     satellites.router,
     ground_stations.router,
     target_catalogs.router,
+    scenarios.router,
     jobs.router,
+    job_events.router,
+    solvers.router,
     meta.router,
     openapi.router,
 )
@@ -51,12 +65,13 @@ def create_app(settings: Settings, queue: JobQueue | None = None) -> FastAPI:
         description=DESCRIPTION,
         docs_url=None,  # FastAPI's own pages load scripts from the internet
         redoc_url=None,
-        lifespan=_close_database,
+        lifespan=_lifespan,
         dependencies=[Depends(check_request)],
         redirect_slashes=False,
     )
     app.state.settings = settings
     app.state.database = Database(settings.database_url)
+    app.state.opportunities = OpportunityReader()
     app.state.queue = queue
     for router in ROUTERS:
         app.include_router(router)
@@ -69,6 +84,7 @@ def create_app(settings: Settings, queue: JobQueue | None = None) -> FastAPI:
 
 
 @asynccontextmanager
-async def _close_database(app: FastAPI) -> AsyncIterator[None]:
+async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     yield
+    app.state.opportunities.close()
     app.state.database.close()

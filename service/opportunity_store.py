@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 from typing import Final
 
 import sqlalchemy as sa
+from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
 import planner_core
@@ -21,10 +23,11 @@ def load(session: Session, sha256: str) -> bytes | None:
 
 
 def save(session: Session, sha256: str, block: bytes) -> None:
-    """Store the block of a scenario."""
-    session.execute(sa.delete(OpportunitySetRow).where(OpportunitySetRow.scenario_sha256 == sha256))
-    session.execute(
-        sa.insert(OpportunitySetRow).values(
-            scenario_sha256=sha256, version=VERSION, block=block, created_at=utc_now()
-        )
+    """Store the block of a scenario; where another one was quicker, that one stays."""
+    stale = sa.delete(OpportunitySetRow).where(
+        OpportunitySetRow.scenario_sha256 == sha256, OpportunitySetRow.version != VERSION
     )
+    session.execute(stale)
+    row = {"scenario_sha256": sha256, "version": VERSION, "block": block, "created_at": utc_now()}
+    with contextlib.suppress(IntegrityError), session.begin_nested():
+        session.execute(sa.insert(OpportunitySetRow).values(**row))

@@ -17,6 +17,7 @@ import uvicorn
 from service.db.migrate import upgrade
 from service.jobs.queue import DbosQueue, migrate_queue
 from service.jobs.supervisor import Supervisor
+from service.logs import configure_logging
 from service.main import create_app
 from service.settings import Settings
 
@@ -71,6 +72,7 @@ def serve(settings: Settings, *, with_workers: bool) -> int:
         signal.signal(number, lambda *_: stop.set())
     with ExitStack() as stack:
         listener = stack.enter_context(listen(settings.host, settings.port))
+        configure_logging()
         prepare_database(settings)
         api = stack.enter_context(_running_api(settings, listener))
         health = "live"

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import signal
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor, wait
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from planner_core.errors import InvalidScenario
 from planner_core.solvers import solver_class
 from planner_core.solvers.base import Budget
-from service.jobs.plan_job import PlanRequest, run_plan_job
+from service.jobs.plan_job import PlanAnswer, PlanRequest, run_plan_job
 from service.solver_params import params_of, parse_params
 from service.summary import HEADER, LEGEND, summary_row, table
 from service.translate import canonical, sha256_of
+
+_LOOK_EVERY_S: Final = 0.05
 
 
 def solve_file(
@@ -43,13 +47,16 @@ def solve_file(
     ------
     PlannerError
         Where the file, the solver's name or its parameters are wrong.
+    Cancelled
+        Where the time or the patience ended before there was a plan.
     OSError
         Where a file cannot be read or written.
     """
+    if out is not None and not out.parent.is_dir():
+        # Better said before the search than after it.
+        raise FileNotFoundError(errno.ENOENT, "No such folder", str(out.parent))
     chosen = parse_params(solver_class(solver), params)
     content = canonical(_read_json(path))
-    budget = Budget(time_s)
-    signal.signal(signal.SIGINT, lambda *_: budget.cancel())
     request = PlanRequest(
         job_id="local",
         scenario_sha256=sha256_of(content),
@@ -59,7 +66,7 @@ def solve_file(
         seed=seed,
         limits={"time_s": time_s},
     )
-    timeline = json.loads(run_plan_job(request, budget).timeline)
+    timeline = json.loads(_answer(request, Budget(time_s)).timeline)
     if out is not None:
         out.write_text(json.dumps(timeline, indent=1) + "\n", encoding="utf-8")
     print(table([HEADER, summary_row(timeline)]))
@@ -68,11 +75,23 @@ def solve_file(
     return 0 if timeline["validity"] == "valid" else 1
 
 
+def _answer(request: PlanRequest, budget: Budget) -> PlanAnswer:
+    """Run the job in a thread: inside a kernel the main one could not take a signal."""
+    signal.signal(signal.SIGINT, lambda *_: budget.cancel())
+    with ThreadPoolExecutor(max_workers=1) as pool:
+        job = pool.submit(run_plan_job, request, budget)
+        while not job.done():
+            wait([job], timeout=_LOOK_EVERY_S)
+            if budget.is_spent() and not budget.is_cancelled:
+                budget.expire()
+        return job.result()
+
+
 def _read_json(path: Path) -> dict[str, Any]:
     try:
         content = json.loads(path.read_text(encoding="utf-8-sig"))
     except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise InvalidScenario("invalid_json", f"{path} is not JSON: {error}.") from error
+        raise InvalidScenario("malformed_json", f"{path} is not JSON: {error}.") from error
     if not isinstance(content, dict):
-        raise InvalidScenario("invalid_json", f"{path} must hold one JSON object.")
+        raise InvalidScenario("malformed_json", f"{path} must hold one JSON object.")
     return content

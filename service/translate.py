@@ -64,8 +64,8 @@ def canonical(content: Mapping[str, Any]) -> str:
 
     Raises
     ------
-    InvalidScenario
-        Where the file is not of its schema.
+    InvalidScenario, InvalidElements
+        Where the file is not of its schema, or an orbit cannot be read.
     """
     return canonical_of_file(read_file(content))
 
@@ -76,7 +76,13 @@ def sha256_of(canonical_text: str) -> str:
 
 
 def read_file(content: Mapping[str, Any]) -> ScenarioFile:
-    """Return a scenario file that fits the schema, every id filled in."""
+    """Return a scenario file that fits the schema: every id filled in, every orbit tidy.
+
+    Raises
+    ------
+    InvalidScenario, InvalidElements
+        With a JSON pointer to the first thing that is wrong.
+    """
     try:
         file = ScenarioFile.model_validate(content)
     except ValidationError as error:
@@ -84,10 +90,17 @@ def read_file(content: Mapping[str, Any]) -> ScenarioFile:
         raise InvalidScenario(first.code, first.detail, pointer=first.pointer) from None
     return file.model_copy(
         update={
-            "satellites": _with_ids(file.satellites),
+            "satellites": _with_ids(list(_with_tidy_orbits(file.satellites))),
             "ground_stations": _with_ids(file.ground_stations),
         }
     )
+
+
+def _with_tidy_orbits(items: Sequence[FileSatellite]) -> Iterator[FileSatellite]:
+    for position, item in enumerate(items):
+        with inside(f"/satellites/{position}"):
+            stored = orbit_from(item).stored
+        yield item.model_copy(update=stored)
 
 
 def _with_ids(items: Sequence[FileSatellite | FileGroundStation]) -> list[object]:
@@ -127,6 +140,7 @@ def scenario_from_file(file: ScenarioFile) -> Scenario:
         dynamics=file.dynamics,
         collect_spacing_s=file.collect_spacing_s,
         continuous_starts=file.continuous_starts,
+        allow_old_elements=file.allow_old_elements,
     )
 
 

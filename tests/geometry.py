@@ -19,6 +19,7 @@ from skyfield.api import EarthSatellite, load, wgs84
 from skyfield.framelib import itrs
 
 from planner_core.domain import Horizon, OrbitElements, Resources, Satellite, Sensor
+from planner_core.orbits.earth_orientation import shipped
 from planner_core.orbits.sgp4_record import satrec
 
 Floats = npt.NDArray[np.float64]
@@ -99,10 +100,17 @@ def satellite(
 
 
 class SkyfieldPath:
-    """A satellite's Earth-fixed states by Skyfield."""
+    """A satellite's Earth-fixed states by Skyfield, with its own UT1 and our table's pole."""
 
     def __init__(self, elements: OrbitElements, horizon: Horizon):
         self._scale = load.timescale(builtin=True)
+        pole = shipped()
+        terrestrial = pole.mjd + 2_400_000.5 + (pole.tai_utc_s + 32.184) / 86400.0
+        self._scale.polar_motion_table = (
+            terrestrial,
+            np.degrees(pole.xp_rad) * 3600.0,
+            np.degrees(pole.yp_rad) * 3600.0,
+        )
         self._satellite = EarthSatellite.from_satrec(satrec(elements), self._scale)
         self._start = horizon.start
 
@@ -115,9 +123,34 @@ class SkyfieldPath:
         found = self._satellite.at(times).frame_xyz(itrs).m
         return np.ascontiguousarray(np.asarray(found, dtype=np.float64).T)
 
-    def velocity_m_s(self, t_s: Floats) -> Floats:
-        """Return velocities relative to the turning Earth, by difference."""
-        return self.position_m(t_s + 0.5) - self.position_m(t_s - 0.5)
+
+class SkyfieldTable:
+    """Skyfield's positions every ten seconds, and cubics between them, good to a centimetre.
+
+    The cubics pass through four positions; they know no velocity.
+    """
+
+    step_s = 10.0
+
+    def __init__(self, elements: OrbitElements, horizon: Horizon):
+        self.duration_s = horizon.duration_s
+        around = np.arange(-1.0, np.ceil(self.duration_s / self.step_s) + 2.0) * self.step_s
+        self._position_m = SkyfieldPath(elements, horizon).position_m(around)
+        self.seconds = np.arange(0.0, self.duration_s + 0.5)
+        self.at_seconds_m = self.position_m(self.seconds)
+
+    def position_m(self, t_s: Floats) -> Floats:
+        """Return positions in the ITRS. Shape ``(n, 3)``."""
+        steps = t_s / self.step_s
+        k = np.minimum(np.floor(steps).astype(np.int64), len(self._position_m) - 4)
+        u = (steps - k)[:, None]
+        before, here, after, beyond = (self._position_m[k + i] for i in range(4))
+        return np.asarray(
+            -u * (u - 1) * (u - 2) / 6 * before
+            + (u + 1) * (u - 1) * (u - 2) / 2 * here
+            - (u + 1) * u * (u - 2) / 2 * after
+            + (u + 1) * u * (u - 1) / 6 * beyond
+        )
 
 
 @dataclass(frozen=True)
@@ -144,14 +177,13 @@ def vertical_at(position_m: Floats, nadir: str) -> Floats:
     if nadir == "geocentric":
         return np.asarray(position_m / np.linalg.norm(position_m, axis=-1, keepdims=True))
     x, y, z = position_m.T
-    # Bowring's closed form, not the planner's iteration.
-    a, b = 6_378_137.0, 6_356_752.314245179
-    e2, e2_second = 1 - (b / a) ** 2, (a / b) ** 2 - 1
+    # The plain fixed point, not the planner's closed form.
+    e2 = 6.69437999014e-3
     across = np.hypot(x, y)
-    beta = np.arctan2(z * a, across * b)
-    for _ in range(3):
-        lat = np.arctan2(z + e2_second * b * np.sin(beta) ** 3, across - e2 * a * np.cos(beta) ** 3)
-        beta = np.arctan2(b * np.sin(lat), a * np.cos(lat))
+    lat = np.arctan2(z, across)
+    for _ in range(8):
+        normal_m = 6_378_137.0 / np.sqrt(1.0 - e2 * np.sin(lat) ** 2)
+        lat = np.arctan2(z + e2 * normal_m * np.sin(lat), across)
     lon = np.arctan2(y, x)
     return np.stack([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)], axis=-1)
 

@@ -31,9 +31,10 @@ OFF_NADIR: Final = 0
 ELEVATION: Final = 1
 SUN_ELEVATION: Final = 2
 LOCAL_TIME: Final = 3
-LOOK_SIDE: Final = 4
-PASS_DIRECTION: Final = 5
-SUNLIT: Final = 6
+OWN_LOCAL_TIME: Final = 4
+LOOK_SIDE: Final = 5
+HEADING: Final = 6
+SUNLIT: Final = 7
 
 _POSITION: Final = 0
 _VERTICAL: Final = 3
@@ -97,7 +98,8 @@ def limit_value(limit: Limit, cubic: Floats, place: Floats, t: float) -> Value:
     cubic
         One interval of a track. Shape ``(4, 9)``.
     place
-        Position (m), local vertical, and reference meridian of the place. Shape ``(3, 3)``.
+        Position (m) and vertical of the place, and the middle meridians of the two limits of
+        local time. Shape ``(4, 3)``.
     """
     code, sign, threshold = limit
     x, dx = (place[1, 0], place[1, 1], place[1, 2]), (0.0, 0.0, 0.0)
@@ -108,22 +110,25 @@ def limit_value(limit: Limit, cubic: Floats, place: Floats, t: float) -> Value:
             x, dx = _at(cubic, _VERTICAL, t), _rate(cubic, _VERTICAL, t)
     elif code == SUN_ELEVATION:
         y, dy = _at(cubic, _SUN, t), _rate(cubic, _SUN, t)
-    elif code == LOCAL_TIME:
+    elif code in (LOCAL_TIME, OWN_LOCAL_TIME):
         sun, sun_rate = _at(cubic, _SUN, t), _rate(cubic, _SUN, t)
-        x = (place[2, 0], place[2, 1], place[2, 2])
+        row = 2 + code - LOCAL_TIME
+        x = (place[row, 0], place[row, 1], place[row, 2])
         y, dy = (sun[0], sun[1], 0.0), (sun_rate[0], sun_rate[1], 0.0)
     elif code == LOOK_SIDE:
         x = (place[0, 0], place[0, 1], place[0, 2])
         y, dy = _cross(y, dy), _cross(y, _rate_of_rate(cubic, _POSITION, t))
-    elif code == PASS_DIRECTION:
+    elif code == HEADING:
         x = (0.0, 0.0, 1.0)
         y, dy = dy, _rate_of_rate(cubic, _POSITION, t)
     else:
         x, dx = _at(cubic, _SUN, t), _rate(cubic, _SUN, t)
     xx, yy = _dot(x, x), _dot(y, y)
-    scale = 1.0 / math.sqrt(xx * yy)
+    scale2 = 1.0 / (xx * yy)
+    scale = math.sqrt(scale2)
     cosine = _dot(x, y) * scale
-    rate = (_dot(dx, y) + _dot(x, dy)) * scale - cosine * (_dot(x, dx) / xx + _dot(y, dy) / yy)
+    stretch = (_dot(x, dx) * yy + _dot(y, dy) * xx) * scale2
+    rate = (_dot(dx, y) + _dot(x, dy)) * scale - cosine * stretch
     g, g_rate = sign * cosine - threshold, sign * rate
     if code == SUNLIT:
         # In the light while the sun is above the Earth's limb as the satellite sees it; the

@@ -19,7 +19,7 @@ def sunlight(ephemeris: Ephemeris) -> Sunlight:
         ephemeris.step_s,
         np.tile(everywhere, (-(-len(track) // GROUP), 1)),
         np.tile(everywhere, (len(track), 1)),
-        np.ones((1, 3, 3)),
+        np.ones((1, 4, 3)),
         np.array([SUNLIT], dtype=np.int32),
         np.ones(1),
         np.zeros((1, 1)),

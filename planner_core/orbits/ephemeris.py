@@ -17,7 +17,9 @@ from sgp4.api import SGP4_ERRORS
 
 from planner_core.domain import Horizon, Nadir, Satellite
 from planner_core.errors import PropagationFailed
+from planner_core.jit import kernel
 from planner_core.orbits import frames
+from planner_core.orbits.earth_orientation import EarthOrientation, shipped
 from planner_core.orbits.sgp4_record import satrec
 from planner_core.orbits.sun import sun_direction_teme
 
@@ -68,11 +70,11 @@ class Ephemeris:
 
     def state_teme(self, t_s: Floats) -> tuple[Floats, Floats]:
         """Return inertial position and velocity at instants in the horizon, ``(n, 3)`` each."""
-        return self._state(t_s, self.position_teme_m, self.velocity_teme_m_s)
+        return _between(self.position_teme_m, self.velocity_teme_m_s, self.step_s, t_s)
 
     def state_itrf(self, t_s: Floats) -> tuple[Floats, Floats]:
         """Return Earth-fixed position and velocity at instants in the horizon."""
-        return self._state(t_s, self.position_itrf_m, self.velocity_itrf_m_s)
+        return _between(self.position_itrf_m, self.velocity_itrf_m_s, self.step_s, t_s)
 
     def to_teme(self, vector: Floats, t_s: Floats) -> Floats:
         """Return Earth-fixed vectors in inertial axes at each instant. Shape ``(n, 3)``."""
@@ -82,6 +84,11 @@ class Ephemeris:
         """Return inertial vectors in Earth-fixed axes at each instant. Shape ``(n, 3)``."""
         return frames.rotate_to_itrf(vector, *self._orientation(t_s))
 
+    def sun_itrf(self, t_s: Floats) -> Floats:
+        """Return the Earth-fixed direction to the sun at each instant. Shape ``(n, 3)``."""
+        inertial = [np.interp(t_s, self.node_s, self.sun_teme[:, axis]) for axis in range(3)]
+        return self.to_itrf(np.stack(inertial, axis=1), t_s)
+
     def _orientation(self, t_s: Floats) -> tuple[Floats, Floats, Floats]:
         node_s = self.node_s
         return (
@@ -89,18 +96,6 @@ class Ephemeris:
             np.interp(t_s, node_s, self.xp_rad),
             np.interp(t_s, node_s, self.yp_rad),
         )
-
-    def _state(self, t_s: Floats, position: Floats, velocity: Floats) -> tuple[Floats, Floats]:
-        last = len(position) - 2
-        k = np.clip((t_s / self.step_s).astype(np.int64), 0, last)
-        u = ((t_s - k * self.step_s) / self.step_s)[:, None]
-        p0, p1 = position[k], position[k + 1]
-        m0, m1 = velocity[k] * self.step_s, velocity[k + 1] * self.step_s
-        c2 = 3.0 * (p1 - p0) - 2.0 * m0 - m1
-        c3 = 2.0 * (p0 - p1) + m0 + m1
-        at = p0 + u * (m0 + u * (c2 + u * c3))
-        rate = (m0 + u * (2.0 * c2 + u * 3.0 * c3)) / self.step_s
-        return at, rate
 
     def track(self, nadir: Nadir) -> Floats:
         """Return the polynomials that the access search evaluates.
@@ -111,27 +106,31 @@ class Ephemeris:
         vertical at the satellite, and the direction to the sun, three columns each.
         Shape ``(num_nodes - 1, 4, 9)``.
         """
-        up, up_rate = self._vertical(nadir)
+        vertical = (
+            frames.geodetic_normal(self.position_itrf_m)
+            if nadir == "geodetic"
+            else frames.unit(self.position_itrf_m)
+        )
         sun = frames.rotate_to_itrf(self.sun_teme, self.gmst_rad, self.xp_rad, self.yp_rad)
-        sun_rate = frames.EARTH_ROTATION_RAD_S * np.stack(
-            [sun[:, 1], -sun[:, 0], np.zeros(len(sun))], axis=1
-        )
-        return _hermite(
-            np.hstack([self.position_itrf_m, up, sun]),
-            np.hstack([self.velocity_itrf_m_s, up_rate, sun_rate]),
-            self.step_s,
-        )
+        columns = np.hstack([self.position_itrf_m, vertical, sun])
+        return _hermite(columns, _rate_at_nodes(columns, self.step_s), self.step_s)
 
-    def _vertical(self, nadir: Nadir) -> tuple[Floats, Floats]:
-        half_s = 0.5  # a central difference over one second is good to 1e-10 rad/s
 
-        def normal(offset_s: float) -> Floats:
-            at = self.position_itrf_m + offset_s * self.velocity_itrf_m_s
-            if nadir == "geodetic":
-                return frames.geodetic_normal(at)
-            return np.asarray(at / np.linalg.norm(at, axis=1)[:, None])
-
-        return normal(0.0), (normal(half_s) - normal(-half_s)) / (2.0 * half_s)
+@kernel
+def _between(value: Floats, rate: Floats, step_s: float, t_s: Floats) -> tuple[Floats, Floats]:
+    """Return value and rate between nodes: the same cubics as ``_hermite``, at many instants."""
+    at, rate_at = np.empty((len(t_s), 3)), np.empty((len(t_s), 3))
+    for row in range(len(t_s)):
+        k = min(max(int(t_s[row] / step_s), 0), len(value) - 2)
+        u = t_s[row] / step_s - k
+        for axis in range(3):
+            v0, v1 = value[k, axis], value[k + 1, axis]
+            m0, m1 = rate[k, axis] * step_s, rate[k + 1, axis] * step_s
+            c2 = 3.0 * (v1 - v0) - 2.0 * m0 - m1
+            c3 = 2.0 * (v0 - v1) + m0 + m1
+            at[row, axis] = v0 + u * (m0 + u * (c2 + u * c3))
+            rate_at[row, axis] = (m0 + u * (2.0 * c2 + u * 3.0 * c3)) / step_s
+    return at, rate_at
 
 
 def _hermite(value: Floats, rate: Floats, step_s: float) -> Floats:
@@ -141,8 +140,15 @@ def _hermite(value: Floats, rate: Floats, step_s: float) -> Floats:
     return np.ascontiguousarray(np.stack([v0, r0, c2, c3], axis=1))
 
 
-def propagate(satellite: Satellite, horizon: Horizon) -> Ephemeris:
+def propagate(
+    satellite: Satellite, horizon: Horizon, orientation: EarthOrientation | None = None
+) -> Ephemeris:
     """Return a satellite's states over the horizon.
+
+    Parameters
+    ----------
+    orientation
+        UT1 and the pole; the table shipped with the package unless given.
 
     Raises
     ------
@@ -152,8 +158,8 @@ def propagate(satellite: Satellite, horizon: Horizon) -> Ephemeris:
     position, jd, fraction = _sgp4_nodes(satellite, horizon)
     step_s = horizon.duration_s / (len(fraction) - 1)
     velocity = _rate_at_nodes(position, step_s)
-    gmst = frames.gmst82_rad(jd, fraction)
-    xp = yp = np.zeros_like(gmst)
+    dut1_s, xp, yp = (orientation or shipped()).at(jd, fraction)
+    gmst = frames.gmst82_rad(jd, fraction + dut1_s / 86400.0)
     position_itrf, velocity_itrf = frames.teme_to_itrf(position, velocity, gmst, xp, yp)
     return Ephemeris(
         satellite=satellite.name,
@@ -198,7 +204,7 @@ def _sgp4_nodes(satellite: Satellite, horizon: Horizon) -> tuple[Floats, float, 
 
 
 def _rate_at_nodes(value: Floats, step_s: float) -> Floats:
-    """Return the rate of an evenly sampled function at its samples. Shape ``(n, 3)``."""
+    """Return the rate of evenly sampled functions at their samples. Shape ``(n, k)``."""
     nodes = np.arange(_STENCIL, dtype=np.float64)
     powers = np.arange(_STENCIL)[:, None]
     first_power = (powers[:, 0] == 1).astype(np.float64)

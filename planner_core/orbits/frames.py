@@ -101,6 +101,11 @@ def _polar(vector: Floats, xp_rad: Floats, yp_rad: Floats) -> Floats:
     )  # fmt: skip
 
 
+def unit(vector: Floats) -> Floats:
+    """Return the directions of vectors. Shape ``(n, 3)``."""
+    return np.asarray(vector / np.linalg.norm(vector, axis=1)[:, None])
+
+
 def geodetic_to_itrf(lon_deg: Floats, lat_deg: Floats, alt_m: Floats) -> Floats:
     """Return positions of points on or above the WGS84 ellipsoid. Shape ``(n, 3)``."""
     lon, lat = np.radians(lon_deg), np.radians(lat_deg)
@@ -114,14 +119,40 @@ def itrf_to_geodetic(position: Floats) -> tuple[Floats, Floats, Floats]:
     """Return longitude (deg), latitude (deg) and altitude (m) above WGS84. Shape ``(n,)``."""
     x, y, z = position[:, 0], position[:, 1], position[:, 2]
     across = np.hypot(x, y)
-    lat = np.arctan2(z, across * (1.0 - _E2))
-    for _ in range(6):  # the error shrinks by e^2 = 1/150 a turn
-        curvature_m = EARTH_RADIUS_M / np.sqrt(1.0 - _E2 * np.sin(lat) ** 2)
-        lat = np.arctan2(z + _E2 * curvature_m * np.sin(lat), across)
-    curvature_m = EARTH_RADIUS_M / np.sqrt(1.0 - _E2 * np.sin(lat) ** 2)
+    sine, cosine = _latitude(across, z)
     # This form of the altitude is as good at the poles as at the equator.
-    alt_m = across * np.cos(lat) + z * np.sin(lat) - EARTH_RADIUS_M**2 / curvature_m
-    return np.degrees(np.arctan2(y, x)), np.degrees(lat), alt_m
+    alt_m = across * cosine + z * sine - EARTH_RADIUS_M * np.sqrt(1.0 - _E2 * sine**2)
+    return np.degrees(np.arctan2(y, x)), np.degrees(np.arctan2(sine, cosine)), alt_m
+
+
+def geodetic_normal(position: Floats) -> Floats:
+    """Return the ellipsoid's outward normal below (or at) each position. Shape ``(n, 3)``."""
+    x, y, z = position[:, 0], position[:, 1], position[:, 2]
+    across = np.hypot(x, y)
+    sine, cosine = _latitude(across, z)
+    ratio = cosine / np.maximum(across, 1e-6)
+    return np.stack([ratio * x, ratio * y, sine], axis=1)
+
+
+def _latitude(across: Floats, z: Floats) -> tuple[Floats, Floats]:
+    """Return sine and cosine of the geodetic latitude, by Bowring's method.
+
+    Two turns are exact to 1e-12 rad from the ground to the geostationary belt.
+    """
+    ratio = EARTH_POLAR_RADIUS_M / EARTH_RADIUS_M
+    reduced = latitude = _normalised(z, across * ratio)
+    for _ in range(2):
+        sine, cosine = reduced
+        latitude = _normalised(
+            z + _E2 / ratio * EARTH_RADIUS_M * sine**3, across - _E2 * EARTH_RADIUS_M * cosine**3
+        )
+        reduced = _normalised(ratio * latitude[0], latitude[1])
+    return latitude
+
+
+def _normalised(sine: Floats, cosine: Floats) -> tuple[Floats, Floats]:
+    length = np.hypot(sine, cosine)
+    return np.asarray(sine / length), np.asarray(cosine / length)
 
 
 def up_east_north(lon_deg: Floats, lat_deg: Floats) -> tuple[Floats, Floats, Floats]:
@@ -132,9 +163,3 @@ def up_east_north(lon_deg: Floats, lat_deg: Floats) -> tuple[Floats, Floats, Flo
     east = np.stack([-np.sin(lon), np.cos(lon), zero], axis=1)
     north = np.stack([-np.sin(lat) * np.cos(lon), -np.sin(lat) * np.sin(lon), np.cos(lat)], axis=1)
     return up, east, north
-
-
-def geodetic_normal(position: Floats) -> Floats:
-    """Return the ellipsoid's outward normal below (or at) each position. Shape ``(n, 3)``."""
-    lon_deg, lat_deg, _ = itrf_to_geodetic(position)
-    return up_east_north(lon_deg, lat_deg)[0]

@@ -86,13 +86,13 @@ class View:
 def view(ephemeris: Ephemeris, places: Places, t_s: Floats, nadir: Nadir) -> View:
     """Return the geometry of row ``i``'s place at ``t_s[i]``. Shape ``(n,)``."""
     position, _ = ephemeris.state_itrf(t_s)
-    up_here = frames.geodetic_normal(position) if nadir == "geodetic" else _unit(position)
+    vertical = frames.geodetic_normal(position) if nadir == "geodetic" else frames.unit(position)
     sight = position - places.position_m
-    range_m = np.linalg.norm(sight, axis=1)
-    azimuth, elevation = azimuth_elevation_deg(ephemeris, places, t_s)
-    sun = _sun_itrf(ephemeris, t_s)
+    range_m = np.sqrt(_row_dot(sight, sight))
+    azimuth, elevation = _azimuth_elevation_deg(sight, places)
+    sun = ephemeris.sun_itrf(t_s)
     return View(
-        off_nadir_deg=_angle_deg(_row_dot(up_here, sight) / range_m),
+        off_nadir_deg=_angle_deg(_row_dot(vertical, sight) / range_m),
         elevation_deg=elevation,
         azimuth_deg=azimuth,
         range_m=range_m,
@@ -106,7 +106,10 @@ def azimuth_elevation_deg(
 ) -> tuple[Floats, Floats]:
     """Return where the satellite stands above each place: azimuth [0, 360) and elevation."""
     position, _ = ephemeris.state_itrf(t_s)
-    sight = position - places.position_m
+    return _azimuth_elevation_deg(position - places.position_m, places)
+
+
+def _azimuth_elevation_deg(sight: Floats, places: Places) -> tuple[Floats, Floats]:
     east, north, up = (_row_dot(sight, v) for v in (places.east, places.north, places.up))
     azimuth = np.degrees(np.arctan2(east, north)) % 360.0
     return azimuth, np.degrees(np.arctan2(up, np.hypot(east, north)))
@@ -115,19 +118,7 @@ def azimuth_elevation_deg(
 def line_of_sight_teme(ephemeris: Ephemeris, places: Places, t_s: Floats) -> Floats:
     """Return unit vectors from the satellite to row ``i``'s place, inertial. ``(n, 3)``."""
     position, _ = ephemeris.state_itrf(t_s)
-    return ephemeris.to_teme(_unit(places.position_m - position), t_s)
-
-
-def _sun_itrf(ephemeris: Ephemeris, t_s: Floats) -> Floats:
-    node_s = ephemeris.node_s
-    inertial = np.stack(
-        [np.interp(t_s, node_s, ephemeris.sun_teme[:, axis]) for axis in range(3)], axis=1
-    )
-    return ephemeris.to_itrf(inertial, t_s)
-
-
-def _unit(vector: Floats) -> Floats:
-    return np.asarray(vector / np.linalg.norm(vector, axis=1)[:, None])
+    return ephemeris.to_teme(frames.unit(places.position_m - position), t_s)
 
 
 def _row_dot(a: Floats, b: Floats) -> Floats:

@@ -44,7 +44,7 @@ def find_windows(
         Caps: unit vector, and cosine of the radius outside which no place can meet the
         limits, for each ``GROUP`` of intervals and for each interval. Shape ``(k, 4)``.
     places
-        Position, vertical, reference meridian. Shape ``(n, 3, 3)``.
+        Position, vertical and two meridians (see ``limit_value``). Shape ``(n, 4, 3)``.
     codes, signs, thresholds
         The limits: shapes ``(m,)``, ``(m,)`` and ``(n, m)``.
     stop
@@ -87,7 +87,7 @@ def _windows_of_place(
     out: Floats,
 ) -> int:
     num_limits = len(codes)
-    value = np.empty((num_limits, 2))
+    value = np.empty((num_limits + 1, 2))
     value_node = np.full(num_limits, -1)
     events = np.empty((2 * num_limits, 2))
     x, y, z = place[0]
@@ -145,7 +145,7 @@ def _events_of_interval(
     not looked at: then the count is -1.
     """
     holding, num_events = 0, 0
-    instants = np.empty(2)
+    instants = value[-1]
     for m in range(len(codes)):
         limit = (codes[m], signs[m], thresholds[m])
         if value_node[m] == k:

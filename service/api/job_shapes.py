@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, cast
+from typing import Annotated, Any, Literal, cast
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
 
 from service.api.shapes import Body, Instant, Name
 from service.db.rows import JobRow
+from service.inputs import ScenarioFile, ScenarioIn
 from service.jobs.lease import JobState
 
 Outcome = Literal["downlinked", "collected", "unscheduled", "excluded"]
@@ -24,10 +25,28 @@ class LimitsIn(Body):
     )
 
 
+def _form(scenario: object) -> str:
+    is_file = isinstance(scenario, ScenarioFile) or (
+        isinstance(scenario, dict) and not {"satellites", "targets"}.isdisjoint(scenario)
+    )
+    return "file" if is_file else "stored"
+
+
+InlineScenario = Annotated[
+    Annotated[ScenarioIn, Tag("stored")] | Annotated[ScenarioFile, Tag("file")],
+    Discriminator(_form),
+]
+
+
 class JobIn(Body):
     """A scenario, the solver that is to plan it, and how."""
 
     scenario_id: str | None = Field(None, description="A stored scenario.")
+    scenario: InlineScenario | None = Field(
+        None,
+        description="Instead of `scenario_id`: the body of `POST /v1/scenarios`, or a whole "
+        "scenario file; it is stored with the job.",
+    )
     solver: str = Field(description="A name of `GET /v1/solvers`.")
     params: dict[str, Any] = Field({}, description="The solver's own; the others are defaults.")
     seed: int = Field(0, ge=0, lt=2**63, description="Same seed, same plan.")
@@ -126,6 +145,7 @@ def shown(job: JobRow, scenario_sha256: str) -> JobOut:
             "self": address,
             "timeline": f"{address}/timeline",
             "targets": f"{address}/targets",
+            "events": f"{address}/events",
             "scenario": f"/v1/scenarios/{job.scenario_id}",
         },
     )

@@ -13,6 +13,7 @@ from sqlalchemy.orm import Session
 from planner_core.errors import Fault
 from planner_core.solvers import solver_class
 from service import job_store as store
+from service import scenario_store
 from service.api.deps import DatabaseDep, SettingsDep
 from service.api.errors import problem_responses, refuse
 from service.api.job_shapes import JobIn, JobOut, Outcome, TargetItem, etag_of_job, shown
@@ -21,11 +22,14 @@ from service.api.paging import Listed, PagingDep, newest_first
 from service.api.problems import ServiceError
 from service.api.shapes import matches
 from service.db.rows import JobRow
+from service.db.session import Database
+from service.inputs import ScenarioFile, ScenarioIn
 from service.jobs import lease
 from service.jobs.lease import JobState
 from service.jobs.queue import JobQueue
 from service.settings import Settings
 from service.solver_params import params_of, parse_params
+from service.translate import inside, read_file
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
 log = logging.getLogger(__name__)
@@ -52,6 +56,7 @@ def create_job(
     queue = _queue(request)
     solver = solver_class(body.solver)
     params = params_of(parse_params(solver, body.params))
+    frozen = _frozen(database, settings, body)
     with database.transaction() as session:
         if store.num_waiting(session) >= settings.max_queued:
             raise ServiceError(
@@ -59,7 +64,7 @@ def create_job(
                 f"{settings.max_queued} jobs are waiting.",
                 headers={"Retry-After": str(_QUEUE_FULL_S)},
             )
-        spec = _spec(body, settings, _scenario_id(session, body), params)
+        spec = _spec(body, settings, _scenario_id(session, body, frozen), params)
         job = store.submit(session, queue, spec)
         answer = _shown(session, job)
     response.headers["Location"] = f"/v1/jobs/{job.id}"
@@ -203,10 +208,31 @@ def _describe(response: Response, job: JobRow) -> None:
         response.headers["Retry-After"] = str(_ASK_AGAIN_S)
 
 
-def _scenario_id(session: Session, body: JobIn) -> str:
-    if body.scenario_id is None:
-        detail = "The job needs a scenario."
-        raise refuse([Fault(code="missing_field", detail=detail, pointer="/scenario_id")])
+def _frozen(
+    database: Database, settings: Settings, body: JobIn
+) -> scenario_store.FrozenScenario | None:
+    """Return the inline scenario of a job, ready to be stored."""
+    scenario, days = body.scenario, settings.max_horizon_days
+    if (scenario is None) == (body.scenario_id is None):
+        detail = "Give either scenario_id or scenario."
+        if scenario is None:
+            raise refuse([Fault(code="missing_field", detail=detail, pointer="/scenario_id")])
+        raise refuse([Fault(code="invalid_value", detail=detail, pointer="/scenario")])
+    with inside("/scenario"):
+        if isinstance(scenario, ScenarioIn):
+            return scenario_store.freeze(database, scenario, max_horizon_days=days)
+        if isinstance(scenario, ScenarioFile):
+            file = read_file(scenario.model_dump(mode="json"))
+            return scenario_store.freeze_file(file, max_horizon_days=days)
+    return None
+
+
+def _scenario_id(
+    session: Session, body: JobIn, frozen: scenario_store.FrozenScenario | None
+) -> str:
+    if frozen is not None:
+        return scenario_store.save(session, frozen)[0].id
+    assert body.scenario_id is not None
     if store.has_scenario(session, body.scenario_id):
         return body.scenario_id
     detail = f"There is no scenario {body.scenario_id!r}."

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from planner_core.errors import Fault
+from service.api.element_problems import ELEMENT_PROBLEMS
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,9 +79,6 @@ KINDS: dict[str, ProblemKind] = {
     ),
     "not_utf8": ProblemKind(422, "Not UTF-8", "Text must be UTF-8, with or without a BOM."),
     "empty_file": ProblemKind(422, "Empty file", "The file holds no records."),
-    "nothing_accepted": ProblemKind(
-        422, "Nothing accepted", "No record of the file could be used; nothing was stored."
-    ),
     "missing_field": ProblemKind(422, "Missing field", "A required field or column is absent."),
     "unknown_field": ProblemKind(
         422, "Unknown field", "The field or column does not exist; check its spelling."
@@ -129,8 +127,14 @@ KINDS: dict[str, ProblemKind] = {
         "Duplicate target id",
         "Target ids are unique within a catalogue and over the catalogues of a scenario.",
     ),
+    "different_satellite": ProblemKind(
+        422, "Another satellite", "The elements have another catalogue number than the satellite."
+    ),
     "duplicate_satellite_id": ProblemKind(
         422, "Duplicate satellite id", "A scenario names each satellite once."
+    ),
+    "duplicate_target_catalog_id": ProblemKind(
+        422, "Duplicate target catalogue id", "A scenario names each catalogue once."
     ),
     "duplicate_ground_station_id": ProblemKind(
         422, "Duplicate ground station id", "A scenario names each ground station once."
@@ -140,6 +144,12 @@ KINDS: dict[str, ProblemKind] = {
         "Propagation failed",
         "SGP4 cannot carry this orbit through the horizon: the satellite has decayed by then, "
         "or its elements are too old or wrong. The detail has SGP4's code.",
+    ),
+    "elements_too_old": ProblemKind(
+        422,
+        "Elements too old",
+        "At some time of the horizon a satellite in low orbit is more than 30 days from the epoch "
+        "of its element set. Give newer elements, or allow_old_elements.",
     ),
     "idempotency_key_reused": ProblemKind(
         422, "Idempotency key reused", "The key was used with another body; choose a new one."
@@ -156,15 +166,18 @@ KINDS: dict[str, ProblemKind] = {
     "still_computing": ProblemKind(
         503, "Still computing", "The answer is being prepared; ask again after Retry-After."
     ),
+} | {
+    code: ProblemKind(422, title, explanation)
+    for code, (title, explanation) in ELEMENT_PROBLEMS.items()
 }
-"""Problems that are not in this table are about data (status 422) and titled by their code."""
+"""All codes. `kind_of` also serves one that is missing here: as data that is wrong, 422."""
 
 
 def kind_of(code: str) -> ProblemKind:
-    """Return the kind of a code; every error of the planner is a 422.
+    """Return the kind of a code.
 
     >>> kind_of("tle_checksum").title
-    'Tle checksum'
+    'TLE checksum mismatch'
     """
     known = KINDS.get(code)
     if known is not None:

@@ -127,7 +127,9 @@ def import_satellites(
 def list_satellites(
     database: DatabaseDep,
     paging: PagingDep,
-    norad_cat_id: Annotated[int | None, Query(ge=0, description="Only this number.")] = None,
+    norad_cat_id: Annotated[
+        int | None, Query(ge=0, le=999_999_999, description="Only this number.")
+    ] = None,
 ) -> Listed[SatelliteOut]:
     """List the satellites, newest first."""
     query = store.alive()

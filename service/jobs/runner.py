@@ -146,7 +146,6 @@ class _Run:
         self._limits = limits
         self._tick_s = tick_s
         self._tick = tick
-        self._memory = psutil.Process(process.pid)
         self._progress: Progress | None = None
         self._verifying = False
         self._next_tick_s = 0.0
@@ -162,12 +161,19 @@ class _Run:
                 return ending
 
     def _listen(self) -> Ending | None:
-        if not wait([self._pipe], POLL_S):
-            return None
-        try:
-            message = self._pipe.recv()
-        except (EOFError, OSError):
-            return self._crashed()
+        """Wait a moment for messages and read all there are: an answer may be among them."""
+        timeout_s = POLL_S
+        while wait([self._pipe], timeout_s):
+            try:
+                ending = self._hear(self._pipe.recv())
+            except (EOFError, OSError):
+                ending = self._crashed()
+            if ending is not None:
+                return ending
+            timeout_s = 0.0
+        return None
+
+    def _hear(self, message: object) -> Ending | None:
         if isinstance(message, Answered | Refused | Stopped):
             return self._settled(message)
         if isinstance(message, Started):
@@ -213,9 +219,9 @@ class _Run:
 
     def _held_mb(self) -> float:
         try:
-            return float(self._memory.memory_info().rss) / 1e6
+            return float(psutil.Process(self._process.pid).memory_info().rss) / 1e6
         except psutil.NoSuchProcess:
-            return 0.0
+            return 0.0  # it has ended; its last words are still to be read
 
     def _out_of_time(self) -> Refused:
         if not self._started:

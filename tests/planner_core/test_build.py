@@ -13,12 +13,15 @@ import pytest
 from planner_core.build import (
     ScenarioOpportunities,
     build_problem,
+    check_element_age,
     check_propagation,
     compute_opportunities,
     orbit_warnings,
+    view_at,
 )
 from planner_core.domain import GroundStation, Horizon, Satellite, Scenario, Sensor, Target
-from planner_core.errors import Cancelled, PropagationFailed
+from planner_core.errors import Cancelled, InvalidScenario, PropagationFailed
+from planner_core.orbits.places import View
 from planner_core.problem import (
     ACCESS_FOUND,
     ACCESS_TOO_SHORT,
@@ -179,6 +182,22 @@ def test_angles_agree_with_skyfield(computed: ScenarioOpportunities) -> None:
         )
 
 
+def test_the_view_at_any_instant_can_be_asked_for(computed: ScenarioOpportunities) -> None:
+    """At its middle it is the table's own; a contact begins and ends at the lowest elevation."""
+    asked = scenario(satellites=two_satellites(), spacing_s=20.0)
+    table = computed.opportunities
+    rows = np.arange(0, len(table), 7)
+    middle = view_at(asked, table, rows, 0.5 * (table.start_s[rows] + table.end_s[rows]))
+    for field in fields(View):
+        in_table = getattr(table, field.name)[rows]
+        assert np.allclose(getattr(middle, field.name), in_table, rtol=1e-12, atol=1e-9)
+    whole = (table.access_start_s > 0.0) & (table.access_end_s < 86400.0)
+    contacts = np.flatnonzero((table.kind == CONTACT) & whole)
+    for instants in (table.start_s, table.end_s):
+        edge = view_at(asked, table, contacts, instants[contacts])
+        assert edge.elevation_deg == pytest.approx(np.full(len(contacts), 5.0), abs=1e-3)
+
+
 def test_lines_of_sight_are_inertial_unit_vectors(computed: ScenarioOpportunities) -> None:
     """Over a contact they turn as far as the pass does; tracking keeps them on the station."""
     table = computed.opportunities
@@ -262,7 +281,7 @@ def test_progress_rises_and_a_cancelled_search_stops() -> None:
     budget = Budget(report=seen.append)
     asked = scenario(satellites=two_satellites())
     build_problem(asked, compute_opportunities(asked, budget), budget)
-    assert [p.fraction for p in seen if p.phase == "access"] == [0.0, 0.5, 1.0]
+    assert [p.fraction for p in seen if p.phase == "access"] == [0.0, 0.25, 0.5, 0.75, 1.0]
     assert [p.fraction for p in seen if p.phase == "compile"] == [0.0, 0.5, 1.0]
     budget.cancel()
     with pytest.raises(Cancelled):
@@ -291,3 +310,32 @@ def test_old_element_sets_are_warned_of() -> None:
     assert "3.1 days" in warnings(2.1)[0]
     assert "after the horizon" in warnings(-5.0)[0]
     assert warnings(10.0, mean_motion=1.0027) == ()
+
+
+def test_a_horizon_outside_the_table_of_ut1_is_warned_of() -> None:
+    start = YEAR_2019 + timedelta(days=30 * 365)
+    asked = replace(
+        scenario(satellites=(satellite(orbit(epoch=start)),)),
+        horizon=Horizon(start=start, end=start + timedelta(days=1)),
+    )
+    assert "Earth's orientation" in orbit_warnings(asked)[0]
+    assert orbit_warnings(scenario()) == ()
+
+
+def test_very_old_element_sets_are_refused_unless_allowed() -> None:
+    def aged(days: float, mean_motion: float = 15.2) -> Scenario:
+        start = YEAR_2019 + timedelta(days=days)
+        one = satellite(orbit(mean_motion_rev_day=mean_motion), name="OLD")
+        return replace(
+            scenario(satellites=(one,)),
+            horizon=Horizon(start=start, end=start + timedelta(days=1)),
+        )
+
+    check_element_age(aged(28.9))
+    check_element_age(aged(40.0, mean_motion=2.0))
+    check_element_age(replace(aged(40.0), allow_old_elements=True))
+    for days in (29.1, -31.0):
+        with pytest.raises(InvalidScenario, match="OLD") as caught:
+            check_element_age(aged(days))
+        assert caught.value.code == "elements_too_old"
+        assert caught.value.fault.pointer == "/satellites/0"

@@ -74,7 +74,7 @@ def test_spaced_collects_lie_inside_and_no_gap_exceeds_the_spacing(
     assert (np.diff(start) > 0).all()
     assert np.diff(start).max(initial=0) <= spacing_s * 1000.0 + 1.0
     assert (end - start == end[0] - start[0]).all()
-    assert 0.0 <= (end[0] - start[0]) - collect_s * 1000.0 < 1.0 + 1e-6
+    assert -1e-6 <= (end[0] - start[0]) - collect_s * 1000.0 < 1.0 + 1e-6
 
 
 def test_each_target_has_its_own_collect_length() -> None:

@@ -18,6 +18,7 @@ from fastapi import FastAPI
 from service.db.migrate import upgrade
 from service.db.session import Database
 from service.main import create_app
+from service.opportunities import OpportunityReader
 from service.settings import Settings
 
 
@@ -78,8 +79,10 @@ def service(settings: Settings, running_app: tuple[FastAPI, str]) -> Iterator[Se
     app, address = running_app
     app.state.settings = settings
     app.state.database = Database(settings.database_url)
+    app.state.opportunities = OpportunityReader()
     with httpx.Client(base_url=address, timeout=60) as client:
         yield Service(app=app, client=client, database=app.state.database, settings=settings)
+    app.state.opportunities.close()
     app.state.database.close()
 
 

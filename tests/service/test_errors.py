@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
 
 import httpx
 import pytest
 
 from planner_core.errors import InvalidElements
+from service.db.rows import WorkerRow
+from service.db.session import Database
 from service.main import create_app
 from service.settings import Settings
 from tests.service.conftest import Service, serve
@@ -87,6 +91,23 @@ def test_health_is_not_ready_without_a_worker(service: Service) -> None:
     assert_problem(service.client.get("/health/ready"), 503, "not_live")
 
 
+def test_health_is_ready_while_a_worker_is_heard_of(service: Service) -> None:
+    now = datetime.now(UTC)
+    with service.database.transaction() as session:
+        session.add(WorkerRow(id="old", started_at=now, seen_at=now - timedelta(hours=1)))
+        session.add(WorkerRow(id="new", started_at=now, seen_at=now))
+    body = service.client.get("/health/ready").json()
+    assert (body["status"], body["workers"]) == ("ready", 1)
+
+
+def test_health_is_not_ready_without_its_database(service: Service, tmp_path: Path) -> None:
+    (tmp_path / "broken.db").write_bytes(b"this is no database" * 100)
+    service.app.state.database = Database(f"sqlite:///{tmp_path / 'broken.db'}")
+    problem = assert_problem(service.client.get("/health/ready"), 503, "not_live")
+    assert "database" in problem["detail"]
+    assert service.client.get("/health/live").status_code == 200
+
+
 def test_docs_render_without_the_internet(client: httpx.Client) -> None:
     page = client.get("/docs")
     assert page.status_code == 200
@@ -104,3 +125,20 @@ def test_openapi_declares_every_error_as_a_problem(client: httpx.Client) -> None
             assert {"422", "500"} <= set(errors)
             for response in errors.values():
                 assert list(response["content"]) == ["application/problem+json"]
+
+
+def references(node: object) -> Iterator[str]:
+    if isinstance(node, dict):
+        yield from (value for key, value in node.items() if key == "$ref")
+        for value in node.values():
+            yield from references(value)
+    elif isinstance(node, list):
+        for value in node:
+            yield from references(value)
+
+
+def test_every_reference_in_openapi_leads_somewhere(client: httpx.Client) -> None:
+    document = client.get("/openapi.json").json()
+    found = {reference.removeprefix("#/components/schemas/") for reference in references(document)}
+    assert {"Problem", "TargetCatalogIn", "SatelliteOut"} <= found
+    assert found <= set(document["components"]["schemas"])

@@ -199,3 +199,19 @@ def test_the_same_question_gives_the_same_plan_over_http_and_from_a_file(
     offline = httpx.Response(200, content=out.read_bytes()).json()
     assert offline["plan_sha256"] == online["plan_sha256"]
     assert offline["scenario_sha256"] == online["scenario_sha256"] == scenario["sha256"]
+
+
+def test_a_job_may_bring_its_scenario_along(service: Service) -> None:
+    mission = paper_mission(drawn_targets(40, seed=4))
+    body = {"scenario": mission, "solver": "rule", "label": "inline"}
+    job = service.until(service.post("/v1/jobs", body)["id"], *FINAL)
+    assert job["state"] == "succeeded", job
+    file = service.get(f"/v1/scenarios/{job['scenario']['id']}?expand=true")
+    assert [t["id"] for t in file["targets"]] == [t["id"] for t in mission["targets"]]
+    by_id = {"scenario_id": job["scenario"]["id"]} | {"scenario": mission, "solver": "rule"}
+    refused = service.http.post("/v1/jobs", json=by_id)
+    assert refused.status_code == 422
+    mission["satellites"][0]["omm"] = {**PAPER_ORBIT, "ECCENTRICITY": 1.5}
+    refused = service.http.post("/v1/jobs", json=body)
+    assert refused.status_code == 422
+    assert refused.json()["errors"][0]["pointer"] == "/scenario/satellites/0/omm/ECCENTRICITY"

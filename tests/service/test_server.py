@@ -6,53 +6,22 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import httpx
 import psutil
 import pytest
 
+from tests.service.serving import serving
+
 WITHIN_S = 60.0
-
-
-@contextmanager
-def _serving(
-    tmp_path: Path, command: str, *options: str
-) -> Iterator[tuple[subprocess.Popen[str], str]]:
-    """Run the program on a fresh database; yield the process and its first line."""
-    database = f"sqlite:///{tmp_path / 'slewline.db'}"
-    process = subprocess.Popen(
-        [
-            sys.executable,
-            "-m",
-            "service",
-            command,
-            "--port",
-            "0",
-            "--database-url",
-            database,
-            *options,
-        ],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        text=True,
-    )
-    assert process.stdout is not None
-    try:
-        yield process, process.stdout.readline()
-    finally:
-        process.kill()
-        process.wait()
-        process.stdout.close()
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_serve_says_once_when_it_is_ready_and_ends_cleanly(
     tmp_path: Path, number: signal.Signals
 ) -> None:
-    with _serving(tmp_path, "serve", "--workers", "1") as (process, line):
+    with serving(tmp_path, "serve", "--workers", "1") as (process, line):
         url = line.split()[-1]
         assert line.startswith("Slewline is ready at http://127.0.0.1:")
         assert httpx.get(f"{url}/health/ready").json()["workers"] == 1
@@ -66,7 +35,7 @@ def test_serve_says_once_when_it_is_ready_and_ends_cleanly(
 
 
 def test_api_alone_runs_no_worker(tmp_path: Path) -> None:
-    with _serving(tmp_path, "api") as (process, line):
+    with serving(tmp_path, "api") as (process, line):
         url = line.split()[-1]
         assert httpx.get(f"{url}/health/live").status_code == 200
         assert httpx.get(f"{url}/health/ready").status_code == 503
@@ -76,7 +45,7 @@ def test_api_alone_runs_no_worker(tmp_path: Path) -> None:
 
 
 def test_a_worker_process_serves_the_jobs_of_an_api_process(tmp_path: Path) -> None:
-    with _serving(tmp_path, "api") as (_, line):
+    with serving(tmp_path, "api") as (_, line):
         url = line.split()[-1]
         database = f"sqlite:///{tmp_path / 'slewline.db'}"
         worker = subprocess.Popen(

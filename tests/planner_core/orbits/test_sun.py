@@ -80,10 +80,10 @@ def test_sunlight_and_shadow_agree_at_every_instant() -> None:
     path = propagate(satellite(orbit(raan_deg=100.0)), hours(24))
     lit = sunlight(path)
     t = np.arange(0.5, 86400.0, 10.0)
-    sun = np.stack([np.interp(t, path.node_s, path.sun_teme[:, i]) for i in range(3)], axis=1)
+    sun = path.sun_itrf(t)
     row = np.searchsorted(lit.enter_s, t, side="right") - 1
     inside = (row >= 0) & (t < lit.exit_s[row])
-    assert (inside != is_in_shadow(path.state_teme(t)[0], sun)).all()
+    assert (inside != is_in_shadow(path.state_itrf(t)[0], sun)).all()
     assert 0.5 < inside.mean() < 0.8
 
 

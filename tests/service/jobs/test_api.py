@@ -100,7 +100,13 @@ def test_a_job_is_taken_and_shown_whole(client: httpx.Client, jobs: Jobs) -> Non
     assert job["created_at"].endswith("Z")
     for name in ("progress", "started_at", "finished_at", "termination", "error"):
         assert job[name] is None
-    assert job["links"]["timeline"] == address + "/timeline"
+    assert job["links"] == {
+        "self": address,
+        "timeline": address + "/timeline",
+        "targets": address + "/targets",
+        "events": address + "/events",
+        "scenario": f"/v1/scenarios/{jobs.scenario_id}",
+    }
     assert client.get(address).json() == job
 
 
@@ -309,6 +315,26 @@ def test_targets_are_listed_once_each_by_pages_and_filters(
     assert listed(outcome="collected", reason="no_access") == []
     wrong = client.get(f"/v1/jobs/{job_id}/targets", params={"outcome": "lost"})
     assert_problem(wrong, 422, "unknown_value")
+
+
+def test_events_tell_each_change_until_the_job_is_final(client: httpx.Client, jobs: Jobs) -> None:
+    job_id = posted(client, jobs)
+    path = client.get(f"/v1/jobs/{job_id}").json()["links"]["events"]
+    with client.stream("GET", path) as stream:
+        assert stream.headers["content-type"].startswith("text/event-stream")
+        lines = (line for line in stream.iter_lines() if line)
+        first = [next(lines) for _ in range(3)]
+        finish(jobs, job_id)
+        rest = list(lines)
+    assert first[:2] == ["id: 1", "event: job"]
+    assert json.loads(first[2].removeprefix("data: "))["state"] == "queued"
+    last = json.loads(rest[-1].removeprefix("data: "))
+    assert last == client.get(f"/v1/jobs/{job_id}").json()
+    assert last["state"] == "succeeded"
+    number = rest[-3].removeprefix("id: ")
+    assert client.get(path, headers={"Last-Event-ID": number}).text == ""
+    assert client.get(path, headers={"Last-Event-ID": "1"}).text.startswith(f"id: {number}\n")
+    assert_problem(client.get("/v1/jobs/none/events"), 404, "not_found")
 
 
 def test_a_job_goes_from_post_to_timeline_by_a_real_worker(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -162,3 +163,20 @@ def test_a_bug_is_an_internal_error_that_tells_nothing_of_the_inside(
     assert isinstance(ending, Refused)
     assert ending.code == "internal_error"
     assert "inner details" not in ending.detail
+
+
+def test_an_answer_counts_even_when_its_process_is_gone_before_it_is_heard(
+    runner: Runner, log: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A worker may be held up; limits are judged after the last words have been read."""
+
+    class HeldUp(Watcher):
+        def tick(self, progress: Progress | None) -> Order:
+            if not self.seen:
+                time.sleep(0.5)
+            return super().tick(progress)
+
+    monkeypatch.setattr(runner_module, "TIME_GRACE_S", 0.0)
+    ending = run(runner, log, "search", HeldUp(), time_s=0.2)
+    assert isinstance(ending, Answered)
+    assert ending.answer.termination == "time_limit"

@@ -1,0 +1,66 @@
+"""A job's changes as server-sent events."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from typing import Annotated, Final
+
+from fastapi import APIRouter, Header
+from fastapi.responses import StreamingResponse
+
+from service.api.deps import DatabaseDep
+from service.api.errors import problem_responses
+from service.api.job_shapes import etag_of_job, shown
+from service.api.job_wait import wait_for_change
+from service.db.session import Database
+from service.jobs import lease
+
+router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
+
+SIGN_OF_LIFE_S: Final = 10.0
+_NOTHING_SEEN: Final = "0"
+
+
+@router.get(
+    "/{job_id}/events",
+    response_class=StreamingResponse,
+    responses={
+        200: {"content": {"text/event-stream": {}}, "description": "One `job` event a change."},
+        **problem_responses(404),
+    },
+)
+async def job_events(
+    job_id: str,
+    database: DatabaseDep,
+    last_event_id: Annotated[str, Header(description="The last event that was seen.")] = "",
+) -> StreamingResponse:
+    """Send the job as it is, then at each change, until it is final.
+
+    Each event's data is what `GET /v1/jobs/{id}` answers. With `Last-Event-ID` the first
+    event comes when the job is no longer what that event told.
+    """
+    await wait_for_change(database, job_id, None, 0.0, _never)
+    seen = last_event_id or _NOTHING_SEEN
+    return StreamingResponse(
+        _events(database, job_id, f'"{seen}"'),
+        media_type="text/event-stream",
+        headers={"Cache-Control": "no-store"},
+    )
+
+
+async def _events(database: Database, job_id: str, seen: str) -> AsyncIterator[str]:
+    while True:
+        job, sha256 = await wait_for_change(database, job_id, seen, SIGN_OF_LIFE_S, _never)
+        if etag_of_job(job) != seen:
+            seen = etag_of_job(job)
+            data = shown(job, sha256).model_dump_json()
+            yield f"id: {job.version}\nevent: job\ndata: {data}\n\n"
+        elif job.state in lease.ACTIVE:
+            yield ": nothing new\n\n"
+        if job.state in lease.FINAL:
+            return
+
+
+async def _never() -> bool:
+    # The framework ends the stream of a client that has gone.
+    return False

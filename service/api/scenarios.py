@@ -1,0 +1,231 @@
+"""Scenarios: frozen questions, and the opportunities they offer."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated, Any, Literal, cast
+
+import numpy as np
+import sqlalchemy as sa
+from fastapi import APIRouter, Query, Request, Response
+from pydantic import BaseModel, Field
+from sqlalchemy.orm import Session
+
+from planner_core.domain import Dynamics
+from planner_core.problem import COLLECT, CONTACT
+from service import scenario_store as store
+from service.api.conditional import created, unless_known
+from service.api.deps import DatabaseDep, SettingsDep
+from service.api.errors import problem_responses
+from service.api.paging import Listed, PagingDep, newest_first
+from service.api.problems import ServiceError
+from service.api.shapes import Instant, etag_of, matches
+from service.db.rows import ScenarioRow
+from service.inputs import ScenarioFile, ScenarioIn
+from service.opportunities import Described, OpportunityReader
+
+router = APIRouter(prefix="/v1/scenarios", tags=["scenarios"])
+
+Kind = Literal["collect", "contact"]
+_KINDS: dict[str, int] = {"collect": COLLECT, "contact": CONTACT}
+
+
+class HorizonOut(BaseModel):
+    """The span to plan."""
+
+    start: Instant
+    end: Instant
+
+
+class Counts(BaseModel):
+    """How much the scenario holds."""
+
+    satellites: int
+    targets: int
+    ground_stations: int
+
+
+class ScenarioOut(BaseModel):
+    """A frozen question. Later edits of what it names change nothing in it."""
+
+    id: str
+    sha256: str = Field(description="Of the canonical content, the name left out.")
+    name: str | None
+    horizon: HorizonOut
+    satellite_ids: list[str]
+    target_catalog_ids: list[str]
+    ground_station_ids: list[str]
+    use_resources: bool
+    dynamics: Dynamics
+    collect_spacing_s: float | None
+    continuous_starts: bool
+    allow_old_elements: bool
+    counts: Counts
+    warnings: list[str] = Field(description="About the age of orbits, for people.")
+    created_at: Instant
+    links: dict[str, str]
+
+
+class OpportunityOut(BaseModel):
+    """A collect or a contact that a plan may take. Angles hold at its middle."""
+
+    id: str
+    satellite_id: str
+    kind: Kind
+    target_id: str | None = Field(description="Of a collect.")
+    station_id: str | None = Field(description="Of a contact.")
+    start: Instant
+    end: Instant
+    access_start: Instant = Field(description="The opportunity lies within its access.")
+    access_end: Instant
+    off_nadir_deg: float = Field(description="At the satellite.")
+    elevation_deg: float = Field(description="At the target or station.")
+    azimuth_deg: float = Field(description="Of the satellite, from north over east.")
+    sun_elevation_deg: float = Field(description="At the target or station.")
+    eclipse: bool = Field(description="The satellite is in the Earth's shadow.")
+
+
+@router.post(
+    "",
+    status_code=201,
+    responses={200: {"model": ScenarioOut, "description": "The same question is stored already."}},
+)
+def create_scenario(
+    body: ScenarioIn, database: DatabaseDep, settings: SettingsDep, response: Response
+) -> ScenarioOut:
+    """Freeze a question: everything it names is copied into it.
+
+    The same content again, under whatever name, answers 200 with the scenario that is there.
+    """
+    frozen = store.freeze(database, body, max_horizon_days=settings.max_horizon_days)
+    with database.transaction() as session:
+        row, is_new = store.save(session, frozen)
+    response.status_code = 201 if is_new else 200
+    return created(response, _shown(row), f"/v1/scenarios/{row.id}")
+
+
+@router.get("")
+def list_scenarios(database: DatabaseDep, paging: PagingDep) -> Listed[ScenarioOut]:
+    """List the scenarios, newest first."""
+    with database.reading() as session:
+        page = newest_first(session, sa.select(ScenarioRow), ScenarioRow.id, paging)
+    return Listed(items=[_shown(row) for row in page.rows], next=page.next)
+
+
+@router.get(
+    "/{scenario_id}",
+    response_model=ScenarioOut | ScenarioFile,
+    responses=problem_responses(404),
+)
+def get_scenario(
+    scenario_id: str,
+    database: DatabaseDep,
+    request: Request,
+    response: Response,
+    expand: Annotated[
+        bool, Query(description="Answer the self-contained scenario file instead.")
+    ] = False,
+) -> ScenarioOut | Response:
+    """Return one scenario; with `expand`, as the file that `slewline solve` takes."""
+    with database.reading() as session:
+        row = _find(session, scenario_id)
+        if expand:
+            return _file(request, row)
+    return unless_known(request, response, _shown(row))
+
+
+def _file(request: Request, row: ScenarioRow) -> Response:
+    # The canonical content is JSON already; the name, which is not part of it, goes in front.
+    name = "" if row.name is None else f'"name":{json.dumps(row.name)},'
+    text = f"{{{name}{row.content[1:]}"
+    etag = etag_of(text)
+    if matches(request.headers.get("if-none-match"), etag):
+        return Response(status_code=304, headers={"ETag": etag})
+    return Response(text, media_type="application/json", headers={"ETag": etag})
+
+
+@router.get("/{scenario_id}/opportunities", responses=problem_responses(404, 503))
+def list_opportunities(
+    scenario_id: str,
+    database: DatabaseDep,
+    request: Request,
+    paging: PagingDep,
+    target_id: Annotated[str | None, Query(description="Only collects of this target.")] = None,
+    satellite_id: Annotated[str | None, Query(description="Only of this satellite.")] = None,
+    kind: Annotated[Kind | None, Query(description="Only collects or only contacts.")] = None,
+) -> Listed[OpportunityOut]:
+    """List what could be done before any planning, in order of start.
+
+    The first call computes the opportunities, which may take a while: 503 with `Retry-After`
+    asks to come back.
+    """
+    with database.reading() as session:
+        sha256 = _find(session, scenario_id).sha256
+    reader = cast(OpportunityReader, request.app.state.opportunities)
+    described = reader.get(database, scenario_id, sha256)
+    rows = _matching(described, target_id, satellite_id, kind)
+    first = int(np.searchsorted(rows, paging.after_number(), side="right"))
+    page = paging.answer(rows[first : first + paging.limit + 1].tolist(), lambda row: row)
+    return Listed(items=[_opportunity(described, row) for row in page.rows], next=page.next)
+
+
+def _matching(
+    described: Described, target_id: str | None, satellite_id: str | None, kind: Kind | None
+) -> np.ndarray[Any, np.dtype[np.int64]]:
+    scenario, table = described.scenario, described.computed.opportunities
+    wanted = np.ones(len(table), dtype=np.bool_)
+    if kind is not None:
+        wanted &= table.kind == _KINDS[kind]
+    if satellite_id is not None:
+        known = [i for i, s in enumerate(scenario.satellites) if s.id == satellite_id]
+        wanted &= np.isin(table.satellite, known)
+    if target_id is not None:
+        places = [i for i, t in enumerate(scenario.targets) if t.id == target_id]
+        wanted &= (table.kind == COLLECT) & np.isin(table.place, places)
+    return np.flatnonzero(wanted)
+
+
+def _opportunity(described: Described, row: int) -> OpportunityOut:
+    scenario, table = described.scenario, described.computed.opportunities
+    is_collect = int(table.kind[row]) == COLLECT
+    place = int(table.place[row])
+    at = scenario.horizon.instant
+    return OpportunityOut(
+        id=f"o{row}",
+        satellite_id=scenario.satellites[int(table.satellite[row])].id,
+        kind="collect" if is_collect else "contact",
+        target_id=scenario.targets[place].id if is_collect else None,
+        station_id=None if is_collect else scenario.ground_stations[place].id,
+        start=at(float(table.start_s[row])),
+        end=at(float(table.end_s[row])),
+        access_start=at(float(table.access_start_s[row])),
+        access_end=at(float(table.access_end_s[row])),
+        off_nadir_deg=_rounded(table.off_nadir_deg[row]),
+        elevation_deg=_rounded(table.elevation_deg[row]),
+        azimuth_deg=_rounded(table.azimuth_deg[row]),
+        sun_elevation_deg=_rounded(table.sun_elevation_deg[row]),
+        eclipse=bool(table.in_eclipse[row]),
+    )
+
+
+def _rounded(angle_deg: float) -> float:
+    return round(float(angle_deg), 6)
+
+
+def _find(session: Session, scenario_id: str) -> ScenarioRow:
+    row = session.get(ScenarioRow, scenario_id)
+    if row is None:
+        raise ServiceError("not_found", f"There is no scenario {scenario_id!r}.")
+    return row
+
+
+def _shown(row: ScenarioRow) -> ScenarioOut:
+    where = f"/v1/scenarios/{row.id}"
+    return ScenarioOut(
+        id=row.id,
+        sha256=row.sha256,
+        name=row.name,
+        created_at=row.created_at,
+        links={"opportunities": f"{where}/opportunities", "file": f"{where}?expand=true"},
+        **row.summary,
+    )

@@ -1,0 +1,182 @@
+"""Scenario files: the same question has one canonical form; what is wrong has a pointer."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from datetime import UTC, datetime
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from planner_core.domain import Resources
+from planner_core.errors import PlannerError
+from service.translate import canonical, scenario_from_content, sha256_of
+from tests.service.factories import ground_station, satellite, target, tle
+
+
+def file(**fields: Any) -> dict[str, Any]:
+    return {
+        "horizon": {"start": "2026-03-01T00:00:00Z", "end": "2026-03-02T00:00:00Z"},
+        "satellites": [satellite()],
+        "targets": [target()],
+    } | fields
+
+
+def test_names_become_ids_that_are_unique() -> None:
+    made = scenario_from_content(
+        file(
+            satellites=[satellite(), satellite(), satellite(name="B", id="EYE-1-2")],
+            ground_stations=[ground_station(id="North"), ground_station()],
+        )
+    )
+    assert [s.id for s in made.satellites] == ["EYE-1", "EYE-1-3", "EYE-1-2"]
+    assert [g.id for g in made.ground_stations] == ["North", "North-2"]
+
+
+def test_own_figures_become_fractions_per_second() -> None:
+    own = {
+        "battery_capacity_wh": 100.0,
+        "sunpoint_power_w": 36.0,
+        "collect_power_w": 72.0,
+        "contact_power_w": 18.0,
+        "recorder_capacity_mbit": 4000.0,
+        "collect_rate_mbit_s": 400.0,
+        "downlink_rate_mbit_s": 200.0,
+        "telemetry_rate_mbit_s": 0.004,
+    }
+    made = scenario_from_content(file(satellites=[satellite(resources=own)]))
+    resources = made.satellites[0].resources
+    assert resources.sunpoint_charge_per_s == pytest.approx(36.0 / 360_000.0)
+    assert resources.collect_drain_per_s == pytest.approx(72.0 / 360_000.0)
+    assert resources.contact_drain_per_s == pytest.approx(18.0 / 360_000.0)
+    assert resources.collect_fill_per_s == pytest.approx(0.1)
+    assert resources.downlink_per_s == pytest.approx(0.05)
+    assert resources.telemetry_per_s == pytest.approx(1e-6)
+    assert resources.recorder_capacity_mbit == 4000.0
+    assert (resources.battery_min_fraction, resources.recorder_max_fraction) == (0.3, 0.75)
+
+
+@pytest.mark.parametrize("preset", ["paper", "paper_code"])
+def test_presets_follow_the_orbits_period(preset: str) -> None:
+    made = scenario_from_content(file(satellites=[satellite(resources=preset)]))
+    expected = {"paper": Resources.paper, "paper_code": Resources.paper_code}[preset]
+    assert made.satellites[0].resources == expected(86400.0 / 15.0)
+
+
+def test_the_canonical_form_is_its_own_canonical_form() -> None:
+    text = canonical(file(ground_stations=[ground_station()], name="x"))
+    assert canonical(json.loads(text)) == text
+    assert '"name":"x"' not in text
+
+
+@pytest.mark.parametrize(
+    "same",
+    [
+        {"name": "Another name"},
+        {"use_resources": True},
+        {"horizon": {"start": "2026-03-01T01:00:00+01:00", "end": "2026-03-02 00:00:00.0004Z"}},
+        {"satellites": [satellite(agility={"slew_rate_deg_s": 1}, id="EYE-1")]},
+        {"satellites": [satellite(tle=[line + "  " for line in tle()])]},
+        {"targets": [target(reward=1, collect_s=30)]},
+        {"ground_stations": []},
+    ],
+)
+def test_the_same_question_has_the_same_hash(same: dict[str, Any]) -> None:
+    assert sha256_of(canonical(file(**same))) == sha256_of(canonical(file()))
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        {"use_resources": False},
+        {"dynamics": "paper"},
+        {"satellites": [satellite(id="7")]},
+        {"satellites": [satellite(tle=tle(raan_deg=11.0))]},
+        {"targets": [target(), target(id="t2")]},
+        {"targets": [target(catalog_id="c")]},
+        {"ground_stations": [ground_station()]},
+    ],
+)
+def test_another_question_has_another_hash(other: dict[str, Any]) -> None:
+    assert sha256_of(canonical(file(**other))) != sha256_of(canonical(file()))
+
+
+@pytest.mark.parametrize(
+    ("change", "code", "pointer"),
+    [
+        ({"satellite_ids": []}, "unknown_field", "/satellite_ids"),
+        ({"satellites": []}, "value_out_of_range", "/satellites"),
+        ({"satellites": [satellite(tle=[*tle()[:1], "2"])]}, None, "/satellites/0/tle/1"),
+        ({"satellites": [satellite(colour=1)]}, "unknown_field", "/satellites/0/colour"),
+        (
+            {"satellites": [satellite(), satellite(tle=None, omm={})]},
+            "omm_missing_key",
+            "/satellites/1/omm/EPOCH",
+        ),
+        ({"targets": [target(), target()]}, "duplicate_target_id", "/targets/1/id"),
+        (
+            {"targets": [target(off_nadir_min_deg=9, off_nadir_max_deg=8)]},
+            "value_out_of_range",
+            "/targets/0/off_nadir_max_deg",
+        ),
+        (
+            {"satellites": [satellite(id="a"), satellite(id="a")]},
+            "duplicate_satellite_id",
+            "/satellites/1/id",
+        ),
+        (
+            {"ground_stations": [ground_station(elevation_mask=[[9, 1], [8, 1]])]},
+            "value_out_of_range",
+            "/ground_stations/0/elevation_mask/1",
+        ),
+        (
+            {"horizon": {"start": "2026-03-01T00:00:00Z", "end": "2026-03-01T00:00:00Z"}},
+            "horizon_inverted",
+            "/horizon/end",
+        ),
+    ],
+)
+def test_what_is_wrong_in_a_file_has_a_pointer(
+    change: dict[str, Any], code: str | None, pointer: str
+) -> None:
+    with pytest.raises(PlannerError) as caught:
+        scenario_from_content(file(**change))
+    assert caught.value.fault.pointer == pointer
+    assert code is None or caught.value.code == code
+
+
+instants = st.datetimes(
+    min_value=datetime(1960, 1, 2),  # noqa: DTZ001 - hypothesis adds the zone
+    max_value=datetime(2100, 1, 1),  # noqa: DTZ001
+    timezones=st.just(UTC),
+)
+
+
+@given(start=instants, lat=st.floats(-90, 90), reward=st.floats(0, 1e12))
+def test_a_file_survives_its_canonical_form(start: datetime, lat: float, reward: float) -> None:
+    content = file(
+        horizon={"start": start.isoformat(), "end": "2101-01-01T00:00:00Z"},
+        targets=[target(lat_deg=lat, reward=reward)],
+    )
+    made = scenario_from_content(json.loads(canonical(content)))
+    assert abs((made.horizon.start - start).total_seconds()) <= 0.0005 + 1e-9
+    assert (made.targets[0].lat_deg, made.targets[0].reward) == (lat, reward)
+
+
+json_values = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(), inner, max_size=3),
+    max_leaves=8,
+)
+
+
+@given(
+    where=st.sampled_from(["horizon", "satellites", "targets", "ground_stations", "dynamics"]),
+    value=json_values,
+)
+def test_any_json_is_read_or_refused_never_worse(where: str, value: object) -> None:
+    with contextlib.suppress(PlannerError):
+        scenario_from_content(file(**{where: value}))
