@@ -73,7 +73,7 @@ class Rules(NamedTuple):
 
 @kernel
 def _new_node(tree: Tree, cursor: int, last: int, battery: float, recorder: float) -> int:
-    node = tree.used[0]
+    node = int(tree.used[0])
     tree.used[0] += 1
     tree.cursor[node] = cursor
     tree.last[node] = last
@@ -121,7 +121,7 @@ def _new_edge(tree: Tree, node: int, action: int) -> None:
 @kernel
 def _choose(tree: Tree, node: int, exploration: float) -> int:
     """Line 11: the edge of greatest upper confidence; one that was never tried comes first."""
-    first = tree.first_edge[node]
+    first = int(tree.first_edge[node])
     total = 0
     for edge in range(first, first + tree.num_edges[node]):
         if tree.visits[edge] == 0:
@@ -434,7 +434,7 @@ class Mcts:
     )
     contact_reward_per_s: float = field(
         default=1e-3,
-        metadata=_described("Guidance per second of contact; Table 2: 0.1.", minimum=0),
+        metadata=_described("Guidance per second of contact (Table 2: 0.1).", minimum=0),
     )
     sunpoint_reward_per_s: float = field(
         default=1e-4,
