@@ -285,6 +285,20 @@ def test_opportunities_are_those_of_the_core_and_computed_once(service: Service)
     assert count(service, OpportunitySetRow) == 1
 
 
+def test_opportunities_tell_what_holds_at_their_edges(client: httpx.Client) -> None:
+    path = post(client, PATH, question(client))["links"]["opportunities"]
+    plain = get(client, path, kind="contact", limit="5").json()["items"]
+    edged = get(client, path, kind="contact", limit="5", edges="true").json()["items"]
+    assert [item["at_start"] for item in plain] == [None] * len(plain)
+    for item in edged:
+        # A contact begins and ends at the mask, and is higher and nearer in between.
+        for edge in (item["at_start"], item["at_end"]):
+            assert edge["elevation_deg"] == pytest.approx(5.0, abs=0.01)
+            assert edge["range_km"] > item["range_km"]
+        assert item["elevation_deg"] > 5.0
+        assert item["nadir"] == "geodetic"
+
+
 def test_opportunities_can_be_filtered(client: httpx.Client) -> None:
     body = post(client, PATH, question(client))
     path = body["links"]["opportunities"]
