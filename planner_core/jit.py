@@ -13,3 +13,12 @@ F = TypeVar("F", bound=Callable[..., object])
 def kernel(function: F) -> F:
     """Compile a loop over plain arrays; type checkers keep seeing the Python function."""
     return cast(F, numba.njit(cache=True, nogil=True)(function))
+
+
+def inlined(function: F) -> F:
+    """Compile a small step of a hot loop into its callers.
+
+    A call that hands over a ``Track`` counts references to its thirty arrays, which costs more
+    than the step itself.
+    """
+    return cast(F, numba.njit(cache=True, nogil=True, inline="always")(function))

@@ -30,7 +30,7 @@ from typing import Final, NamedTuple, TypedDict
 
 import numpy as np
 
-from planner_core.jit import kernel
+from planner_core.jit import inlined, kernel
 from planner_core.problem import (
     CONTACT,
     Bytes,
@@ -178,7 +178,7 @@ def _resource_columns(
     }
 
 
-@kernel
+@inlined
 def take(
     track: Track, last: int, row: int, battery: float, recorder: float
 ) -> tuple[float, float, bool]:
@@ -291,7 +291,7 @@ def _fill_fallbacks(track: Track) -> None:
                     num_labels += 1
 
 
-@kernel
+@inlined
 def next_action(
     track: Track,
     last: int,
@@ -307,7 +307,9 @@ def next_action(
     This is A(s) of eq. 4, in time order. With ``is_hard`` an action must also keep the limits,
     now and (see ``is_safe``) to the end of the horizon.
     """
-    for row in range(from_row, len(track.start_s)):
+    # Rows that start before the last task ends need no look.
+    first = from_row if last < 0 else max(from_row, track.near_from[last])
+    for row in range(first, len(track.start_s)):
         if track.blocked[row] or not may_follow(
             last, row, track.near_from, track.far_from, track.offset, track.bits
         ):
@@ -324,7 +326,7 @@ def next_action(
     return len(track.start_s)
 
 
-@kernel
+@inlined
 def may_wait(
     track: Track, last: int, cursor: int, battery: float, recorder: float, is_hard: bool
 ) -> bool:
@@ -346,23 +348,23 @@ class Guidance(NamedTuple):
     penalty: float
 
 
-@kernel
+@inlined
 def task_reward(
     track: Track,
     guidance: Guidance,
     target_reward: Floats,
     collected: Bytes,
-    now_s: float,
+    discount: float,
     row: int,
     battery_after: float,
     recorder_after: float,
 ) -> float:
-    """Return R(s, a) of Table 2 for a collect or a contact taken at ``now_s``."""
+    """Return R(s, a) of Table 2 for a collect or a contact; ``discount`` is gamma^(t_s - t)."""
     reward = 0.0
     if track.is_contact[row]:
         reward += guidance.contact_reward_per_s * (track.end_s[row] - track.start_s[row])
     elif not collected[track.place[row]]:
-        reward += guidance.gamma ** (track.start_s[row] - now_s) * target_reward[track.place[row]]
+        reward += discount * target_reward[track.place[row]]
     if track.use_resources:
         if battery_after <= track.battery_min:
             reward -= guidance.penalty
@@ -454,7 +456,7 @@ class Model:
         battery, recorder, _ = take(self.track, state.last, row, state.battery, state.recorder)
         reward = task_reward(
             self.track, self.guidance, self.target_reward, self._mask(state),
-            now_s, row, battery, recorder,
+            self.guidance.gamma**sojourn_s, row, battery, recorder,
         )  # fmt: skip
         images = state.collected
         if not self.track.is_contact[row]:

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from planner_core.domain import Agility, Dynamics, Resources
-from planner_core.jit import kernel
+from planner_core.jit import inlined, kernel
 from planner_core.slew import INSTANT, TIME_TOLERANCE_S, angle_between_deg, slew_s
 
 Floats = npt.NDArray[np.float64]
@@ -285,7 +285,7 @@ def _fill_near_bits(
                 bits[bit >> 3] |= np.uint8(1 << (bit & 7))
 
 
-@kernel
+@inlined
 def may_follow(a: int, b: int, near_from: Ints, far_from: Ints, offset: Longs, bits: Bytes) -> bool:
     """Return whether local row ``b`` may follow ``a``; ``a`` of -1 is "no task yet"."""
     if a < 0 or b >= far_from[a]:

@@ -86,8 +86,9 @@ def _select_action(
         battery_after, recorder_after = battery, recorder
         if track.use_resources:
             battery_after, recorder_after, _ = take(track, last, row, battery, recorder)
+        discount = guidance.gamma ** (track.start_s[row] - now_s)
         v = task_reward(
-            track, guidance, target_reward, collected, now_s, row, battery_after, recorder_after
+            track, guidance, target_reward, collected, discount, row, battery_after, recorder_after
         )
         if depth > 1:
             place = track.place[row]
@@ -101,7 +102,7 @@ def _select_action(
             if is_new:
                 collected[place] = 0
             if v_next > -np.inf:
-                v += guidance.gamma ** (track.start_s[row] - now_s) * v_next
+                v += discount * v_next
         if v > v_best:
             best, v_best = row, v
     if first == m or not track.use_resources:

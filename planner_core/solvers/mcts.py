@@ -57,6 +57,17 @@ class Tree(NamedTuple):
     used: Ints
 
 
+class Path(NamedTuple):
+    """Room for one simulation; shape ``(depth,)``, ``options`` of ``(breadth + 1,)``."""
+
+    edge: Ints
+    action: Ints
+    image: Ints
+    reward: Floats
+    discount: Floats
+    options: Ints
+
+
 class Rules(NamedTuple):
     """The parameters of the search, as kernels take them."""
 
@@ -128,10 +139,11 @@ def _choose(tree: Tree, node: int, exploration: float) -> int:
             return edge
         total += tree.visits[edge]
     best, best_value = first, -np.inf
+    log_total = np.log(total)
     for edge in range(first, first + tree.num_edges[node]):
-        bonus = exploration * np.sqrt(np.log(total) / tree.visits[edge])
-        if tree.value[edge] + bonus > best_value:
-            best, best_value = edge, tree.value[edge] + bonus
+        bound = tree.value[edge] + exploration * np.sqrt(log_total / tree.visits[edge])
+        if bound > best_value:
+            best, best_value = edge, bound
     return best
 
 
@@ -144,11 +156,6 @@ def _random(state: Uint64s) -> float:
     z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
     z = z ^ (z >> np.uint64(31))
     return float(z >> np.uint64(11)) / 9007199254740992.0
-
-
-@kernel
-def _discount(rules: Rules, guidance: Guidance, sojourn_s: float) -> float:
-    return guidance.gamma if rules.is_per_decision else guidance.gamma**sojourn_s
 
 
 @kernel
@@ -198,6 +205,7 @@ def _simulate(
     target_reward: Floats,
     collected: Bytes,
     random: Uint64s,
+    path: Path,
     root: int,
     best: Floats,
     best_actions: Ints,
@@ -205,12 +213,6 @@ def _simulate(
     """SIMULATE and ROLLOUT from ``root``; keeps the sequence of greatest return in ``best``."""
     m = len(track.start_s)
     depth = rules.depth
-    edges = np.empty(depth, dtype=np.int32)
-    actions = np.empty(depth, dtype=np.int32)
-    rewards = np.empty(depth)
-    discounts = np.empty(depth)
-    images = np.empty(depth, dtype=np.int32)
-    options = np.empty(rules.breadth + 1, dtype=np.int32)
     node = root
     cursor, last = tree.cursor[root], tree.last[root]
     battery, recorder = tree.battery[root], tree.recorder[root]
@@ -224,7 +226,7 @@ def _simulate(
             is_rollout = node != root
         if is_rollout:
             action, first = _rollout_action(
-                track, rules, collected, random, options, cursor, last, battery, recorder
+                track, rules, collected, random, path.options, cursor, last, battery, recorder
             )
             if action == m:
                 break
@@ -233,42 +235,43 @@ def _simulate(
                 break
             edge = _choose(tree, node, rules.exploration)
             action, first = tree.action[edge], tree.action[tree.first_edge[node]]
-            edges[d] = edge
+            path.edge[d] = edge
             in_tree = d + 1
         now_s = track.start_s[cursor] if cursor >= 0 else 0.0
-        images[d] = -1
+        path.image[d] = -1
         row = first if action == WAIT else action
         sojourn_s = track.start_s[row] - now_s
+        discount = guidance.gamma**sojourn_s
         if action == WAIT:
-            rewards[d] = guidance.sunpoint_reward_per_s * sojourn_s
+            path.reward[d] = guidance.sunpoint_reward_per_s * sojourn_s
         else:
             if track.use_resources:
                 battery, recorder, _ = take(track, last, row, battery, recorder)
-            rewards[d] = task_reward(
-                track, guidance, target_reward, collected, now_s, row, battery, recorder
+            path.reward[d] = task_reward(
+                track, guidance, target_reward, collected, discount, row, battery, recorder
             )
             last = row
             place = track.place[row]
             if not track.is_contact[row] and not collected[place]:
                 collected[place] = 1
-                images[d] = place
-        actions[d] = action
-        discounts[d] = _discount(rules, guidance, sojourn_s)
+                path.image[d] = place
+        path.action[d] = action
+        path.discount[d] = guidance.gamma if rules.is_per_decision else discount
         cursor = row
         if not is_rollout:
-            if tree.child[edges[d]] == _UNSEEN:
-                tree.child[edges[d]] = _new_node(tree, cursor, last, battery, recorder)
-            node = tree.child[edges[d]]
+            if tree.child[path.edge[d]] == _UNSEEN:
+                tree.child[path.edge[d]] = _new_node(tree, cursor, last, battery, recorder)
+            node = tree.child[path.edge[d]]
         d += 1
     returned = 0.0
     for i in range(d - 1, -1, -1):
-        if images[i] >= 0:
-            collected[images[i]] = 0
-        q = discounts[i] * returned
+        if path.image[i] >= 0:
+            collected[path.image[i]] = 0
+        q = path.discount[i] * returned
         if i >= in_tree or not rules.is_literal:
-            q += rewards[i]
+            q += path.reward[i]
         if i < in_tree:
-            edge = edges[i]
+            edge = path.edge[i]
             tree.visits[edge] += 1
             if rules.is_max_backup:
                 if tree.visits[edge] == 1 or q > tree.value[edge]:
@@ -279,7 +282,7 @@ def _simulate(
     if d > 0 and returned > best[0]:
         best[0] = returned
         best_actions[:] = m
-        best_actions[:d] = actions[:d]
+        best_actions[:d] = path.action[:d]
 
 
 @kernel
@@ -291,6 +294,7 @@ def _search(
     target_reward: Floats,
     collected: Bytes,
     random: Uint64s,
+    path: Path,
     num_simulations: int,
     stop: Bytes,
     best: Floats,
@@ -301,7 +305,17 @@ def _search(
         if stop[0]:
             break
         _simulate(
-            tree, track, rules, guidance, target_reward, collected, random, 0, best, best_actions
+            tree,
+            track,
+            rules,
+            guidance,
+            target_reward,
+            collected,
+            random,
+            path,
+            0,
+            best,
+            best_actions,
         )
     chosen = _UNSEEN
     if tree.first_edge[0] == _UNSEEN:
@@ -478,13 +492,21 @@ class Mcts:
         tree, spare = trees
         _new_node(tree, NO_TASK, NO_TASK, track.battery_start, track.recorder_start)
         random = np.array([seed & 0xFFFF_FFFF_FFFF_FFFF], dtype=np.uint64)
+        path = Path(
+            edge=np.empty(self.depth, dtype=np.int32),
+            action=np.empty(self.depth, dtype=np.int32),
+            image=np.empty(self.depth, dtype=np.int32),
+            reward=np.empty(self.depth),
+            discount=np.empty(self.depth),
+            options=np.empty(self.breadth + 1, dtype=np.int32),
+        )
         best, best_actions = np.full(1, -np.inf), np.full(self.depth, NO_TASK, dtype=np.int32)
         taken: list[int] = []
         reward = 0.0
         while not budget.is_spent():
             edge = _search(
                 tree, track, rules, guidance, target_reward, collected, random,
-                self.num_simulations, budget.stop, best, best_actions,
+                path, self.num_simulations, budget.stop, best, best_actions,
             )  # fmt: skip
             if edge == _UNSEEN or budget.is_spent():
                 break
