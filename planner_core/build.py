@@ -15,7 +15,7 @@ from planner_core import opportunities as tasks
 from planner_core.access import Accesses, find_accesses
 from planner_core.domain import Horizon, Satellite, Scenario
 from planner_core.errors import Cancelled, InvalidScenario
-from planner_core.limits import Limits
+from planner_core.limits import Limits, TargetLimits
 from planner_core.orbits import ephemeris as orbits
 from planner_core.orbits.earth_orientation import shipped
 from planner_core.orbits.eclipse import always_sunlit, sunlight
@@ -122,6 +122,8 @@ def compute_opportunities(scenario: Scenario, budget: Budget) -> ScenarioOpportu
     """
     places = _places(scenario)
     kinds = (COLLECT, CONTACT) if scenario.use_resources else (COLLECT,)
+    own = TargetLimits.of(scenario.targets)
+    contact = Limits.of_stations(scenario.ground_stations)
     closeness = np.zeros(len(scenario.targets), dtype=np.int64)
     parts: list[tasks.Columns] = []
     lit: list[Sunlight] = []
@@ -131,7 +133,7 @@ def compute_opportunities(scenario: Scenario, budget: Budget) -> ScenarioOpportu
         _go_on(budget, index / num_steps)
         path = propagate(satellite, scenario.horizon)
         for kind in kinds:
-            limits = _limits(scenario, satellite, kind)
+            limits = contact if kind == CONTACT else Limits.of_targets(satellite.sensor, own)
             found = find_accesses(path, places[kind], limits, budget.stop)
             placed = _placed(scenario, kind, found)
             if kind == COLLECT:
@@ -197,12 +199,6 @@ def _go_on(budget: Budget, fraction: float, phase: Literal["access", "compile"] 
     if budget.is_spent():
         raise Cancelled
     budget.report(Progress(phase=phase, fraction=fraction))
-
-
-def _limits(scenario: Scenario, satellite: Satellite, kind: int) -> Limits:
-    if kind == COLLECT:
-        return Limits.of_targets(satellite.sensor, scenario.targets)
-    return Limits.of_stations(scenario.ground_stations)
 
 
 def _placed(scenario: Scenario, kind: int, found: Accesses) -> tasks.Placed:

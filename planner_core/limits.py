@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypedDict
 
@@ -19,6 +19,51 @@ Row = tuple[int, float, Floats]
 
 _NO_LIMIT = -2.0  # a threshold below every cosine
 _DEG_PER_HOUR = 15.0
+_BOUNDS = (
+    "off_nadir_min_deg",
+    "off_nadir_max_deg",
+    "min_elevation_deg",
+    "sun_elevation_min_deg",
+    "sun_elevation_max_deg",
+    "local_time_from_h",
+    "local_time_to_h",
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TargetLimits:
+    """The targets' own limits as columns, made once for many satellites.
+
+    Attributes
+    ----------
+    lon_deg
+        Shape ``(n,)``.
+    bounds
+        The targets' numbers by field name, NaN for none. Shape ``(n,)`` each.
+    choices
+        The targets' wishes by field name, "any" for none. Shape ``(n,)`` each.
+    """
+
+    lon_deg: Floats
+    bounds: Mapping[str, Floats]
+    choices: Mapping[str, npt.NDArray[np.str_]]
+
+    @classmethod
+    def of(cls, targets: Sequence[Target]) -> TargetLimits:
+        """Return the limits of targets, in their order."""
+        return cls(
+            lon_deg=np.array([target.lon_deg for target in targets], dtype=np.float64),
+            bounds={
+                name: np.array(
+                    [_number(getattr(target, name)) for target in targets], dtype=np.float64
+                )
+                for name in _BOUNDS
+            },
+            choices={
+                name: np.array([getattr(target, name) for target in targets], dtype=np.str_)
+                for name in ("look_side", "orbit_direction")
+            },
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -53,25 +98,30 @@ class Limits:
     masks: tuple[Mask, ...] = ()
 
     @classmethod
-    def of_targets(cls, sensor: Sensor, targets: Sequence[Target]) -> Limits:
+    def of_targets(cls, sensor: Sensor, targets: Sequence[Target] | TargetLimits) -> Limits:
         """Return a sensor's limits, narrowed by each target's own."""
+        own = targets if isinstance(targets, TargetLimits) else TargetLimits.of(targets)
 
         def highest(name: str) -> Floats:
-            return np.fmax(_number(getattr(sensor, name)), _column(targets, name))
+            return np.fmax(_number(getattr(sensor, name)), own.bounds[name])
 
         def lowest(name: str) -> Floats:
-            return np.fmin(_number(getattr(sensor, name)), _column(targets, name))
+            return np.fmin(_number(getattr(sensor, name)), own.bounds[name])
+
+        def wanted(name: str, choice: str) -> Floats:
+            everyone = getattr(sensor, name) == choice
+            return np.where(everyone | (own.choices[name] == choice), 90.0, np.nan)
 
         widest = lowest("off_nadir_max_deg")
         narrowest = highest("off_nadir_min_deg")
         elevation = highest("min_elevation_deg")
         half_deg, meridian = _local_time(
-            np.full(len(targets), _number(sensor.local_time_from_h)),
-            np.full(len(targets), _number(sensor.local_time_to_h)),
-            targets,
+            np.full_like(own.lon_deg, _number(sensor.local_time_from_h)),
+            np.full_like(own.lon_deg, _number(sensor.local_time_to_h)),
+            own.lon_deg,
         )
         own_half_deg, own_meridian = _local_time(
-            _column(targets, "local_time_from_h"), _column(targets, "local_time_to_h"), targets
+            own.bounds["local_time_from_h"], own.bounds["local_time_to_h"], own.lon_deg
         )
         rows = [
             # The search leaves an interval at the first limit that never holds in it.
@@ -82,10 +132,10 @@ class Limits:
             _at_least(codes.SUN_ELEVATION, 90.0 - lowest("sun_elevation_max_deg")),
             _at_most(codes.LOCAL_TIME, half_deg),
             _at_most(codes.OWN_LOCAL_TIME, own_half_deg),
-            _at_most(codes.LOOK_SIDE, _wanted(sensor, targets, "look_side", "left")),
-            _at_least(codes.LOOK_SIDE, _wanted(sensor, targets, "look_side", "right")),
-            _at_most(codes.HEADING, _wanted(sensor, targets, "orbit_direction", "ascending")),
-            _at_least(codes.HEADING, _wanted(sensor, targets, "orbit_direction", "descending")),
+            _at_most(codes.LOOK_SIDE, wanted("look_side", "left")),
+            _at_least(codes.LOOK_SIDE, wanted("look_side", "right")),
+            _at_most(codes.HEADING, wanted("orbit_direction", "ascending")),
+            _at_least(codes.HEADING, wanted("orbit_direction", "descending")),
         ]
         return cls(
             nadir=sensor.nadir,
@@ -128,10 +178,6 @@ def _number(value: float | None) -> float:
     return np.nan if value is None else value
 
 
-def _column(targets: Sequence[Target], name: str) -> Floats:
-    return np.array([_number(getattr(target, name)) for target in targets], dtype=np.float64)
-
-
 def _at_most(code: int, bound_deg: Floats) -> Row:
     return code, 1.0, bound_deg
 
@@ -140,14 +186,7 @@ def _at_least(code: int, bound_deg: Floats) -> Row:
     return code, -1.0, bound_deg
 
 
-def _wanted(sensor: Sensor, targets: Sequence[Target], name: str, choice: str) -> Floats:
-    """Return 90 where sensor or target asks for ``choice``, NaN elsewhere."""
-    everyone = getattr(sensor, name) == choice
-    wanted = [everyone or getattr(target, name) == choice for target in targets]
-    return np.where(np.array(wanted, dtype=np.bool_), 90.0, np.nan)
-
-
-def _local_time(from_h: Floats, to_h: Floats, targets: Sequence[Target]) -> tuple[Floats, Floats]:
+def _local_time(from_h: Floats, to_h: Floats, lon_deg: Floats) -> tuple[Floats, Floats]:
     """Return the greatest angle between the sun's meridian and a middle one, and that middle.
 
     Local time is 12 h when the sun stands over the target's own meridian, and moves with the
@@ -156,7 +195,7 @@ def _local_time(from_h: Floats, to_h: Floats, targets: Sequence[Target]) -> tupl
     span_h = (to_h - from_h) % 24.0
     half_deg = np.where(span_h > 0.0, span_h * _DEG_PER_HOUR / 2.0, np.nan)
     middle_h = np.nan_to_num(from_h + span_h / 2.0)
-    sun = np.radians(_column(targets, "lon_deg") - (middle_h - 12.0) * _DEG_PER_HOUR)
+    sun = np.radians(lon_deg - (middle_h - 12.0) * _DEG_PER_HOUR)
     return half_deg, np.stack([np.cos(sun), np.sin(sun), np.zeros_like(sun)], axis=1)
 
 

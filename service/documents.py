@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 from planner_core import __version__
+from planner_core.orbits.sgp4_record import GRAVITY
 from planner_core.reasons import TargetOutcome
 from planner_core.run import Judged
 from planner_core.timeline import JudgedAction, Resourceline, Violation, plan_sha256
@@ -95,6 +96,12 @@ class Documents:
             "violations": [self._violation(v) for v in judged.timeline.violations],
             "totals": self._totals(),
             "warnings": list(judged.opportunities.warnings),
+            "models": {
+                "propagation": "SGP4",
+                "gravity": GRAVITY,
+                "earth_orientation": "IERS daily dUT1 and polar motion",
+                "nadir": {s.id: s.sensor.nadir for s in judged.scenario.satellites},
+            },
             "satellites": satellites,
         }
 

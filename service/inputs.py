@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, Discriminator, Field, StringConstraints, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
-from planner_core.domain import Dynamics, LookSide, Nadir
+from planner_core.domain import Dynamics, LookSide, Nadir, OrbitDirection
 from service.api.shapes import Body, Instant, Name
 
 Id = Annotated[str, StringConstraints(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")]
@@ -23,6 +23,8 @@ Latitude = Annotated[float, Field(ge=-90, le=90, description="Geodetic (WGS84), 
 Longitude = Annotated[
     float, Field(ge=-180, le=360, description="East positive; both 190 and -170 are taken.")
 ]
+SunElevation = Annotated[float | None, Field(ge=-90, le=90)]
+LocalTime = Annotated[float | None, Field(ge=0, le=24)]
 Altitude = Annotated[float, Field(ge=-500, le=10000, description="Above the WGS84 ellipsoid.")]
 
 
@@ -36,15 +38,31 @@ class AgilityIn(Body):
     settle_s: NonNegative = Field(0.0, description="Wait after each slew.")
 
 
-class SensorIn(Body):
-    """The pointing limits of the imager."""
+class LightIn(Body):
+    """When and from where an image may be taken: limits that sensor and target both have."""
+
+    look_side: LookSide = Field("any", description="Of the direction of flight.")
+    sun_elevation_min_deg: SunElevation = Field(None, description="Of the sun at the target.")
+    sun_elevation_max_deg: SunElevation = Field(None, description="Of the sun at the target.")
+    local_time_from_h: LocalTime = Field(
+        None,
+        description="Local apparent solar time at the target, in hours from midnight; with "
+        "local_time_to_h. A span from 22 to 2 runs over midnight.",
+    )
+    local_time_to_h: LocalTime = None
+    orbit_direction: OrbitDirection = Field(
+        "any", description="Ascending while the satellite moves north."
+    )
+
+
+class SensorIn(LightIn):
+    """The limits of the imager."""
 
     off_nadir_min_deg: float = Field(5.0, ge=0, le=90)
     off_nadir_max_deg: float = Field(55.0, ge=0, le=90)
     nadir: Nadir = Field(
         "geodetic", description="Perpendicular to the ellipsoid, or towards the Earth's centre."
     )
-    look_side: LookSide = Field("any", description="Relative to the direction of flight.")
     min_elevation_deg: float = Field(0.0, ge=0, lt=90, description="At the target.")
 
 
@@ -137,8 +155,11 @@ class GroundStationIn(Body):
     antennas: int = Field(1, ge=1, le=100, description="Satellites served at a time.")
 
 
-class TargetIn(Body):
-    """A point on the ground to be imaged once, by any satellite."""
+class TargetIn(LightIn):
+    """A point on the ground to be imaged once, by any satellite.
+
+    Its limits narrow those of the sensor: a collect meets both.
+    """
 
     id: Id = Field(description="Your own; unique in the catalogue.")
     lat_deg: Latitude
@@ -151,6 +172,9 @@ class TargetIn(Body):
     )
     off_nadir_max_deg: float | None = Field(
         None, ge=0, le=90, description="Narrows the sensor's limit."
+    )
+    min_elevation_deg: float | None = Field(
+        None, ge=0, lt=90, description="Narrows the sensor's limit."
     )
 
 
@@ -175,6 +199,11 @@ class Question(Body):
     )
     continuous_starts: bool = Field(
         False, description="A solver may place a collect anywhere inside its access."
+    )
+    allow_old_elements: bool = Field(
+        False,
+        description="Plan with element sets that are more than 30 days from their epoch "
+        "(low orbits), which is refused otherwise.",
     )
 
 

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from typing import Any, TypeVar
 
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
 
-from planner_core.build import check_propagation, orbit_warnings
-from planner_core.errors import InvalidScenario
+from planner_core.build import check_element_age, check_propagation, orbit_warnings
+from planner_core.errors import InvalidScenario, PlannerError
 from service import satellite_store
 from service.db.rows import GroundStationRow, SatelliteRow, ScenarioRow, TargetCatalogRow, TargetRow
 from service.db.session import Database
@@ -63,7 +65,8 @@ def freeze(database: Database, body: ScenarioIn, *, max_horizon_days: float) -> 
     _check_horizon(body, max_horizon_days)
     with database.reading() as session:
         file = _expanded(session, body)
-    return freeze_file(file, max_horizon_days=max_horizon_days)
+    with _named_by_ids():
+        return freeze_file(file, max_horizon_days=max_horizon_days)
 
 
 def freeze_file(file: ScenarioFile, *, max_horizon_days: float) -> FrozenScenario:
@@ -71,6 +74,7 @@ def freeze_file(file: ScenarioFile, *, max_horizon_days: float) -> FrozenScenari
     _check_horizon(file, max_horizon_days)
     scenario = scenario_from_file(file)
     check_propagation(scenario)
+    check_element_age(scenario)
     content = canonical_of_file(file)
     return FrozenScenario(
         name=file.name,
@@ -97,6 +101,17 @@ def save(session: Session, frozen: FrozenScenario) -> tuple[ScenarioRow, bool]:
     session.add(row)
     session.flush()
     return row, True
+
+
+@contextmanager
+def _named_by_ids() -> Iterator[None]:
+    """Let errors point into lists of ids, where the file would hold the things themselves."""
+    try:
+        yield
+    except PlannerError as error:
+        pointer = re.sub(r"^/satellites/(\d+).*", r"/satellite_ids/\1", error.fault.pointer or "")
+        error.fault = replace(error.fault, pointer=pointer)
+        raise
 
 
 def _check_horizon(body: Question, max_horizon_days: float) -> None:

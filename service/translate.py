@@ -140,6 +140,7 @@ def scenario_from_file(file: ScenarioFile) -> Scenario:
         dynamics=file.dynamics,
         collect_spacing_s=file.collect_spacing_s,
         continuous_starts=file.continuous_starts,
+        allow_old_elements=file.allow_old_elements,
     )
 
 

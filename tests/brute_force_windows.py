@@ -18,7 +18,7 @@ from tests.geometry import Ground, SkyfieldTable, vertical_at
 Floats = npt.NDArray[np.float64]
 Windows = list[tuple[float, float]]
 
-_NEAR_DEG = 0.3
+_NEAR_DEG = 1.5  # the fastest angle turns by about as much in a second
 _FINE_S = 0.01
 
 

@@ -145,6 +145,12 @@ KINDS: dict[str, ProblemKind] = {
         "SGP4 cannot carry this orbit through the horizon: the satellite has decayed by then, "
         "or its elements are too old or wrong. The detail has SGP4's code.",
     ),
+    "elements_too_old": ProblemKind(
+        422,
+        "Elements too old",
+        "At some time of the horizon a satellite in low orbit is more than 30 days from the epoch "
+        "of its element set. Give newer elements, or allow_old_elements.",
+    ),
     "idempotency_key_reused": ProblemKind(
         422, "Idempotency key reused", "The key was used with another body; choose a new one."
     ),

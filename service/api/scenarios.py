@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from typing import Annotated, Any, Literal, cast
 
 import numpy as np
@@ -11,7 +12,9 @@ from fastapi import APIRouter, Query, Request, Response
 from pydantic import BaseModel, Field
 from sqlalchemy.orm import Session
 
-from planner_core.domain import Dynamics
+from planner_core.build import view_at
+from planner_core.domain import Dynamics, Nadir
+from planner_core.orbits.places import View
 from planner_core.problem import COLLECT, CONTACT
 from service import scenario_store as store
 from service.api.conditional import created, unless_known
@@ -59,14 +62,26 @@ class ScenarioOut(BaseModel):
     dynamics: Dynamics
     collect_spacing_s: float | None
     continuous_starts: bool
+    allow_old_elements: bool
     counts: Counts
     warnings: list[str] = Field(description="About the age of orbits, for people.")
     created_at: Instant
     links: dict[str, str]
 
 
+class ViewOut(BaseModel):
+    """What satellite and place see of each other at one instant."""
+
+    off_nadir_deg: float
+    elevation_deg: float
+    azimuth_deg: float
+    range_km: float
+    sun_elevation_deg: float
+    eclipse: bool
+
+
 class OpportunityOut(BaseModel):
-    """A collect or a contact that a plan may take. Angles hold at its middle."""
+    """A collect or a contact that a plan may take. Angles and range hold at its middle."""
 
     id: str
     satellite_id: str
@@ -77,11 +92,15 @@ class OpportunityOut(BaseModel):
     end: Instant
     access_start: Instant = Field(description="The opportunity lies within its access.")
     access_end: Instant
-    off_nadir_deg: float = Field(description="At the satellite.")
+    off_nadir_deg: float = Field(description="At the satellite, from the nadir named below.")
     elevation_deg: float = Field(description="At the target or station.")
     azimuth_deg: float = Field(description="Of the satellite, from north over east.")
     sun_elevation_deg: float = Field(description="At the target or station.")
+    range_km: float = Field(description="From the satellite to the target or station.")
     eclipse: bool = Field(description="The satellite is in the Earth's shadow.")
+    nadir: Nadir = Field(description="What off-nadir angles are measured from.")
+    at_start: ViewOut | None = Field(None, description="With `edges=true`.")
+    at_end: ViewOut | None = Field(None, description="With `edges=true`.")
 
 
 @router.post(
@@ -152,6 +171,7 @@ def list_opportunities(
     target_id: Annotated[str | None, Query(description="Only collects of this target.")] = None,
     satellite_id: Annotated[str | None, Query(description="Only of this satellite.")] = None,
     kind: Annotated[Kind | None, Query(description="Only collects or only contacts.")] = None,
+    edges: Annotated[bool, Query(description="Say what holds at start and end, too.")] = False,
 ) -> Listed[OpportunityOut]:
     """List what could be done before any planning, in order of start.
 
@@ -165,7 +185,30 @@ def list_opportunities(
     rows = _matching(described, target_id, satellite_id, kind)
     first = int(np.searchsorted(rows, paging.after_number(), side="right"))
     page = paging.answer(rows[first : first + paging.limit + 1].tolist(), lambda row: row)
-    return Listed(items=[_opportunity(described, row) for row in page.rows], next=page.next)
+    items = [_opportunity(described, row) for row in page.rows]
+    if edges:
+        _add_edges(described, page.rows, items)
+    return Listed(items=items, next=page.next)
+
+
+def _add_edges(described: Described, rows: Sequence[int], items: Sequence[OpportunityOut]) -> None:
+    scenario, table = described.scenario, described.computed.opportunities
+    chosen = np.array(rows, dtype=np.int64)
+    first = view_at(scenario, table, chosen, table.start_s[chosen])
+    last = view_at(scenario, table, chosen, table.end_s[chosen])
+    for position, item in enumerate(items):
+        item.at_start, item.at_end = _view(first, position), _view(last, position)
+
+
+def _view(seen: View, position: int) -> ViewOut:
+    return ViewOut(
+        off_nadir_deg=_rounded(seen.off_nadir_deg[position]),
+        elevation_deg=_rounded(seen.elevation_deg[position]),
+        azimuth_deg=_rounded(seen.azimuth_deg[position]),
+        range_km=_rounded(seen.range_m[position] / 1000.0),
+        sun_elevation_deg=_rounded(seen.sun_elevation_deg[position]),
+        eclipse=bool(seen.in_eclipse[position]),
+    )
 
 
 def _matching(
@@ -203,12 +246,14 @@ def _opportunity(described: Described, row: int) -> OpportunityOut:
         elevation_deg=_rounded(table.elevation_deg[row]),
         azimuth_deg=_rounded(table.azimuth_deg[row]),
         sun_elevation_deg=_rounded(table.sun_elevation_deg[row]),
+        range_km=_rounded(table.range_m[row] / 1000.0),
         eclipse=bool(table.in_eclipse[row]),
+        nadir=scenario.satellites[int(table.satellite[row])].sensor.nadir,
     )
 
 
-def _rounded(angle_deg: float) -> float:
-    return round(float(angle_deg), 6)
+def _rounded(value: float) -> float:
+    return round(float(value), 6)
 
 
 def _find(session: Session, scenario_id: str) -> ScenarioRow:

@@ -224,6 +224,40 @@ def test_old_elements_are_a_warning(client: httpx.Client) -> None:
     assert post(client, PATH, question(client))["warnings"] == []
 
 
+def test_elements_of_more_than_thirty_days_are_refused_unless_allowed(client: httpx.Client) -> None:
+    asked = question(client)
+    stale = satellite(name="STALE", tle=tle(epoch=EPOCH - timedelta(days=40)))
+    asked["satellite_ids"].append(post(client, "/v1/satellites", stale)["id"])
+    refused = client.post(PATH, json=asked)
+    problem = assert_problem(refused, 422, "elements_too_old", "/satellite_ids/1")
+    assert "STALE" in problem["detail"]
+    allowed = post(client, PATH, asked | {"allow_old_elements": True})
+    assert allowed["allow_old_elements"] is True
+    assert any("STALE" in warning for warning in allowed["warnings"])
+
+
+def test_limits_of_sensor_and_target_narrow_the_opportunities(client: httpx.Client) -> None:
+    free = question(client)
+    sunny = satellite(sensor={"sun_elevation_min_deg": 10.0})
+    lit = free | {"satellite_ids": [post(client, "/v1/satellites", sunny)["id"]]}
+    own = [t | {"look_side": "left", "orbit_direction": "descending"} for t in grid()]
+    narrow = free | {"target_catalog_ids": [catalog(client, *own)]}
+    found = {}
+    for name, asked in (("free", free), ("lit", lit), ("narrow", narrow)):
+        path = post(client, PATH, asked)["links"]["opportunities"]
+        found[name] = get(client, path, kind="collect", limit="500").json()["items"]
+    assert 0 < len(found["lit"]) < len(found["free"])
+    assert 0 < len(found["narrow"]) < len(found["free"])
+    assert min(item["sun_elevation_deg"] for item in found["lit"]) > 9.9
+    for item in found["narrow"]:
+        assert any(
+            wide["target_id"] == item["target_id"]
+            and wide["access_start"] <= item["access_start"]
+            and wide["access_end"] >= item["access_end"]
+            for wide in found["free"]
+        )
+
+
 def test_opportunities_are_those_of_the_core_and_computed_once(service: Service) -> None:
     body = post(service.client, PATH, question(service.client))
     path = body["links"]["opportunities"] + "?limit=50"
@@ -249,6 +283,20 @@ def test_opportunities_are_those_of_the_core_and_computed_once(service: Service)
         assert item["access_start"] <= item["start"] < item["end"] <= item["access_end"]
     assert {item["kind"] for item in items} == {"collect", "contact"}
     assert count(service, OpportunitySetRow) == 1
+
+
+def test_opportunities_tell_what_holds_at_their_edges(client: httpx.Client) -> None:
+    path = post(client, PATH, question(client))["links"]["opportunities"]
+    plain = get(client, path, kind="contact", limit="5").json()["items"]
+    edged = get(client, path, kind="contact", limit="5", edges="true").json()["items"]
+    assert [item["at_start"] for item in plain] == [None] * len(plain)
+    for item in edged:
+        # A contact begins and ends at the mask, and is higher and nearer in between.
+        for edge in (item["at_start"], item["at_end"]):
+            assert edge["elevation_deg"] == pytest.approx(5.0, abs=0.01)
+            assert edge["range_km"] > item["range_km"]
+        assert item["elevation_deg"] > 5.0
+        assert item["nadir"] == "geodetic"
 
 
 def test_opportunities_can_be_filtered(client: httpx.Client) -> None:

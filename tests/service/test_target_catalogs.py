@@ -56,6 +56,13 @@ def test_a_json_catalogue_fills_in_defaults(client: httpx.Client) -> None:
         "collect_s": 30.0,
         "off_nadir_min_deg": None,
         "off_nadir_max_deg": None,
+        "min_elevation_deg": None,
+        "look_side": "any",
+        "sun_elevation_min_deg": None,
+        "sun_elevation_max_deg": None,
+        "local_time_from_h": None,
+        "local_time_to_h": None,
+        "orbit_direction": "any",
     }
 
 
