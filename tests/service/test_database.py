@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import threading
+from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -24,10 +25,12 @@ def worker_row(name: str = "w") -> WorkerRow:
 
 
 @pytest.fixture
-def database(tmp_path: Path) -> Database:
+def database(tmp_path: Path) -> Iterator[Database]:
     url = f"sqlite:///{tmp_path / 'folder' / 'own.db'}"
     upgrade(url)
-    return Database(url)
+    database = Database(url)
+    yield database
+    database.close()
 
 
 def test_the_migrations_make_exactly_the_tables_of_the_rows(database: Database) -> None:
