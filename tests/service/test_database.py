@@ -59,8 +59,9 @@ def test_many_processes_may_migrate_a_new_database_at_once(tmp_path: Path) -> No
     for process in processes:
         process.join(60)
     assert [process.exitcode for process in processes] == [0, 0, 0]
-    with make_engine(url).connect() as connection:
-        assert "scenario" in sa.inspect(connection).get_table_names()
+    engine = make_engine(url)
+    assert "scenario" in sa.inspect(engine).get_table_names()
+    engine.dispose()
 
 
 def test_sqlite_keeps_what_was_committed_and_checks_foreign_keys(database: Database) -> None:
