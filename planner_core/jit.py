@@ -2,12 +2,47 @@
 
 from __future__ import annotations
 
+import hashlib
+import os
 from collections.abc import Callable
-from typing import TypeVar, cast
+from pathlib import Path
+from typing import Any, Final, TypeVar, cast
 
 import numba
+import platformdirs
 
 F = TypeVar("F", bound=Callable[..., object])
+
+_PACKAGE: Final = Path(__file__).parent
+_MARKS: Final = (b"@kernel", b"@inlined")
+
+
+def sources_fingerprint() -> str:
+    """Return a hash of all the sources that hold kernels."""
+    digest = hashlib.sha256()
+    for path in sorted(_PACKAGE.rglob("*.py")):
+        source = path.read_bytes()
+        if any(mark in source for mark in _MARKS):
+            digest.update(path.relative_to(_PACKAGE).as_posix().encode() + b"\0" + source)
+    return digest.hexdigest()[:16]
+
+
+def _set_cache_folder() -> None:
+    """Keep compiled kernels in a folder of their own for each state of the sources.
+
+    Numba looks only at the file of a kernel to tell whether its cache is stale, not at the
+    files of the kernels it calls: an edit there, or an upgrade, would go unnoticed.
+    """
+    if "NUMBA_CACHE_DIR" in os.environ:
+        return
+    beside = _PACKAGE / "__pycache__"
+    can_write = os.access(beside if beside.is_dir() else _PACKAGE, os.W_OK)
+    base = beside if can_write else platformdirs.user_cache_path("slewline")
+    config: Any = numba.config
+    config.CACHE_DIR = str(base / f"kernels-{sources_fingerprint()}")
+
+
+_set_cache_folder()
 
 
 def kernel(function: F) -> F:
@@ -18,7 +53,7 @@ def kernel(function: F) -> F:
 def inlined(function: F) -> F:
     """Compile a small step of a hot loop into its callers.
 
-    A call that hands over a ``Track`` counts references to its thirty arrays, which costs more
-    than the step itself.
+    A call that hands over a tuple of arrays counts references to each of them, which can cost
+    more than the step itself.
     """
     return cast(F, numba.njit(cache=True, nogil=True, inline="always")(function))

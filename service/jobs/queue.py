@@ -16,7 +16,10 @@ import sqlalchemy as sa
 from dbos import DBOS, DBOSClient, DBOSConfig, EnqueueOptions
 from sqlalchemy.orm import Session
 
+from service.db.sqlite_clock import add_sqlite_clock
 from service.settings import Settings
+
+add_sqlite_clock()
 
 APPLICATION: Final = "slewline"
 QUEUE: Final = "plan"

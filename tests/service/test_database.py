@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import threading
+from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -24,10 +25,12 @@ def worker_row(name: str = "w") -> WorkerRow:
 
 
 @pytest.fixture
-def database(tmp_path: Path) -> Database:
+def database(tmp_path: Path) -> Iterator[Database]:
     url = f"sqlite:///{tmp_path / 'folder' / 'own.db'}"
     upgrade(url)
-    return Database(url)
+    database = Database(url)
+    yield database
+    database.close()
 
 
 def test_the_migrations_make_exactly_the_tables_of_the_rows(database: Database) -> None:
@@ -56,8 +59,9 @@ def test_many_processes_may_migrate_a_new_database_at_once(tmp_path: Path) -> No
     for process in processes:
         process.join(60)
     assert [process.exitcode for process in processes] == [0, 0, 0]
-    with make_engine(url).connect() as connection:
-        assert "scenario" in sa.inspect(connection).get_table_names()
+    engine = make_engine(url)
+    assert "scenario" in sa.inspect(engine).get_table_names()
+    engine.dispose()
 
 
 def test_sqlite_keeps_what_was_committed_and_checks_foreign_keys(database: Database) -> None:

@@ -1,7 +1,7 @@
-"""Make ``planner_core/data/eop.csv`` from the registry package astropy-iers-data.
+"""Make ``eop.csv`` from the registry package astropy-iers-data.
 
     python -m venv /tmp/eop && /tmp/eop/bin/pip install astropy-iers-data
-    /tmp/eop/bin/python tools/make_eop.py
+    /tmp/eop/bin/python planner_core/data/make_eop.py
 
 The package carries ``finals2000A.all``, the daily Earth orientation of the IERS Rapid
 Service (measured, then predicted for a year), and the list of leap seconds. We keep the days
@@ -15,7 +15,7 @@ from importlib.resources import files
 from pathlib import Path
 
 FIRST_MJD = 51544  # 2000-01-01
-OUT = Path(__file__).resolve().parents[1] / "planner_core" / "data" / "eop.csv"
+OUT = Path(__file__).with_name("eop.csv")
 
 
 def leap_seconds(text: str) -> list[tuple[int, int]]:
@@ -43,7 +43,10 @@ def main() -> None:
     leaps = leap_seconds((data / "Leap_Second.dat").read_text())
     rows = daily_rows((data / "finals2000A.all").read_text(), leaps)
     source = f"IERS finals2000A.all, by astropy-iers-data {version('astropy-iers-data')}"
-    header = [f"# {source}; made by tools/make_eop.py", "mjd,tai_utc_s,dut1_s,xp_arcsec,yp_arcsec"]
+    header = [
+        f"# {source}; made by planner_core/data/make_eop.py",
+        "mjd,tai_utc_s,dut1_s,xp_arcsec,yp_arcsec",
+    ]
     OUT.write_text("\n".join([*header, *rows]) + "\n")
 
 
