@@ -1,8 +1,9 @@
 """The Earth's orientation that no formula gives: UT1 and the pole, from a daily table.
 
-The package ships the IERS table from 2000 on, with a year of predictions; ``planner_core/data/make_eop.py``
-renews it. Outside the table its end values are held, which ``EarthOrientation.covers`` tells:
-a second of UT1 is 465 m at the equator, but UT1 is never more than 0.9 s from UTC.
+The package ships the IERS table from 2000 on, with a year of predictions, which
+``planner_core/data/make_eop.py`` renews. Outside the table its end values are held, as
+``EarthOrientation.covers`` tells: a second of UT1 is 465 m at the equator, but UT1 is never
+more than 0.9 s from UTC.
 """
 
 from __future__ import annotations
