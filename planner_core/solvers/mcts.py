@@ -397,14 +397,14 @@ class Mcts:
         metadata=_described("Actions of a simulation (d_solve).", minimum=1, maximum=1000),
     )
     exploration: float = field(
-        default=0.5, metadata=_described("Weight c of the upper confidence bound.", minimum=0)
+        default=10.0, metadata=_described("Weight c of the upper confidence bound.", minimum=0)
     )
     breadth: int = field(
         default=3,
         metadata=_described("Tasks in A(s), the first in time (N_a max).", minimum=1, maximum=1000),
     )
     gamma: float = field(
-        default=0.9995,
+        default=0.9999,
         metadata=_described("Discount, see discount.", exclusiveMinimum=0, maximum=1),
     )
     discount: Literal["per_second", "per_decision"] = field(

@@ -13,7 +13,7 @@ from planner_core.domain import Dynamics
 from planner_core.model import NO_TASK, WAIT, Model, compile_track, take
 from planner_core.plan import Plan
 from planner_core.problem import Problem
-from planner_core.solvers import SOLVERS, ForwardSearch, Graph, Rule
+from planner_core.solvers import SOLVERS, ForwardSearch, Graph, Mcts, Rule
 from planner_core.solvers.base import Budget, Solver, Termination
 from planner_core.solvers.forward_search import NOTHING, select_action
 from planner_core.timeline import plan_sha256, replay
@@ -22,12 +22,25 @@ from tests.planner_core.problems import TIGHT, random_problem
 
 SEEDS = st.integers(0, 10**6)
 DYNAMICS = st.sampled_from(["physical", "paper"])
+PAPER_MCTS = Mcts(
+    num_simulations=50,
+    depth=5,
+    exploration=3.0,
+    gamma=0.995,
+    rollout="random",
+    keep_incumbent=False,
+    unimaged_only=False,
+    contact_reward_per_s=0.1,
+)
 VARIANTS: list[Solver] = [
-    *(cls() for cls in SOLVERS.values()),
+    *(cls() for cls in SOLVERS.values() if cls is not Mcts),
+    Mcts(num_simulations=30, depth=8),
     ForwardSearch(unimaged_only=False),
     ForwardSearch(depth=5, breadth=2, gamma=0.999),
     Rule(contact_above_fraction=0.0),
     Graph(path="longest"),
+    Mcts(num_simulations=30, depth=4, backup="max", discount="per_decision"),
+    PAPER_MCTS,
     Rule(unimaged_only=False),
 ]
 
@@ -188,3 +201,37 @@ def test_penalty_plans_may_break_limits_and_the_referee_says_so() -> None:
         broken += not timeline.is_valid
         assert timeline.reward <= len(timeline.collected)
     assert broken > 0
+
+
+def test_mcts_follows_its_seed_and_nothing_else() -> None:
+    plans = []
+    problem = random_problem(5, num_collects=40, num_targets=30, num_contacts=4)
+    for seed in (0, 0, 1, 2, 3):
+        plans.append(PAPER_MCTS.solve(problem, Budget(), seed).plan)
+    assert plans[0] == plans[1]
+    assert len(set(plans)) > 1
+
+
+def test_an_action_without_its_own_reward_loses_images() -> None:
+    """Line 14 of Alg. 2 taken literally leaves the reward of the first action out."""
+    literal = replace(PAPER_MCTS, returns="literal", num_simulations=200)
+    whole = replace(literal, returns="with_reward")
+    totals = {literal: 0.0, whole: 0.0}
+    for seed in range(12):
+        problem = random_problem(
+            seed, num_collects=60, num_targets=40, use_resources=False, has_rewards=True
+        )
+        for solver in totals:
+            totals[solver] += replay(problem, solver.solve(problem, Budget(), 0).plan).reward
+    assert totals[literal] < totals[whole]
+
+
+def test_mcts_with_many_samples_finds_the_best_plan_of_small_problems() -> None:
+    found = missed = 0
+    for seed in range(12):
+        problem = random_problem(seed, use_resources=False, has_rewards=True)
+        solver = Mcts(num_simulations=2000, depth=8, breadth=8, gamma=1.0)
+        reward = replay(problem, solver.solve(problem, Budget(), 0).plan).reward
+        found += reward == best_reward(problem)
+        missed += reward < best_reward(problem)
+    assert (found, missed) == (12, 0)
