@@ -4,6 +4,8 @@ PYTHON ?= python3
 UV ?= uv
 BIN := .venv/bin
 STAMP := .venv/.installed
+WARM := .venv/.warm
+KERNELS := $(shell grep -rlE '^@(kernel|inlined)' planner_core --include=*.py)
 PIP := $(BIN)/python -m pip -qq --disable-pip-version-check
 
 .PHONY: help setup demo serve test check format lock clean
@@ -18,7 +20,7 @@ help:
 	@echo "make lock     resolve the dependencies again into requirements.lock (needs uv)"
 	@echo "make clean    remove all that these commands made"
 
-setup: $(STAMP)
+setup: $(WARM)
 	@:
 
 # Everything pip fetches is checked against a hash; the build of the project itself fetches nothing.
@@ -30,6 +32,10 @@ $(STAMP): pyproject.toml requirements.lock
 	@$(PYTHON) -m venv .venv
 	@$(PIP) install --require-hashes -r requirements.lock
 	@$(PIP) install --no-deps --no-build-isolation --editable .
+	@touch $@
+
+# An edited kernel is compiled here, once, and not by each worker on its own.
+$(WARM): $(STAMP) $(KERNELS)
 	@echo "Compiling the planning kernels (once) ..."
 	@$(BIN)/python -m service.jobs.warm
 	@touch $@
