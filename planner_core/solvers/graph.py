@@ -15,8 +15,8 @@ from planner_core.chains import chain_to, longest_chain, longest_chain_with_hist
 from planner_core.model import NO_TASK, Track
 from planner_core.problem import Floats, Problem
 from planner_core.solvers.base import Budget, Constraint, Feasibility, Solution
-from planner_core.solvers.rule import rule_plan
 from planner_core.solvers.sequential import Turn, plan_in_turn
+from planner_core.solvers.walk import CONTACT_ABOVE, NOTHING_TAKEN, rule_plan
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,7 +45,7 @@ class Graph:
         },
     )
     contact_above_fraction: float = field(
-        default=0.45,
+        default=CONTACT_ABOVE,
         metadata={
             "minimum": 0,
             "maximum": 1,
@@ -65,7 +65,9 @@ class Graph:
                 off_path = track.is_contact == 0
                 off_path[path] = False
                 narrowed = track._replace(blocked=track.blocked | off_path.astype(np.uint8))
-                rows = rule_plan(narrowed, turn.collected, True, True, self.contact_above_fraction)
+                rows = rule_plan(
+                    narrowed, turn.collected, True, True, self.contact_above_fraction, NOTHING_TAKEN
+                )
                 path = [int(row) for row in rows]
             turn.report(1.0, float(weight[path].sum()))
             return path

@@ -26,13 +26,10 @@ from planner_core.model import (
 )
 from planner_core.problem import Bytes, Floats, Ints, Problem
 from planner_core.solvers.base import Budget, Constraint, Feasibility, Solution
-from planner_core.solvers.rule import naive_select_action
 from planner_core.solvers.sequential import Turn, plan_in_turn
+from planner_core.solvers.walk import CONTACT_ABOVE, naive_select_action
 
 Uint64s = npt.NDArray[np.uint64]
-
-GREEDY_CONTACT_ABOVE: Final = 0.45
-"""How full the recorder is before a greedy rollout takes a contact, as in the rule."""
 
 _UNSEEN: Final = -1
 
@@ -174,7 +171,7 @@ def _rollout_action(
     m = len(track.start_s)
     if rules.is_greedy:
         row = naive_select_action(
-            track, collected, rules.is_hard, True, GREEDY_CONTACT_ABOVE,
+            track, collected, rules.is_hard, True, CONTACT_ABOVE,
             cursor, last, battery, recorder,
         )  # fmt: skip
         return row, row

@@ -5,80 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-import numpy as np
-
-from planner_core.jit import kernel
-from planner_core.model import NO_TASK, Track, is_safe, next_action, take
-from planner_core.problem import Bytes, Ints, Problem
+from planner_core.problem import Problem
 from planner_core.solvers.base import Budget, Constraint, Feasibility, Solution
 from planner_core.solvers.sequential import Turn, plan_in_turn
-
-
-@kernel
-def naive_select_action(
-    track: Track,
-    collected: Bytes,
-    is_hard: bool,
-    unimaged_only: bool,
-    contact_above: float,
-    cursor: int,
-    last: int,
-    battery: float,
-    recorder: float,
-) -> int:
-    """Return the row that NAIVESELECTACTION takes next, or ``m`` when none is left.
-
-    Tasks that it refuses are what it sun-points through. The limits are those of the text
-    (battery above its minimum, recorder not above its maximum) in the soft form, and those
-    of the plan model in the hard form.
-    """
-    m = len(track.start_s)
-    row = cursor
-    while row < m:
-        row = next_action(
-            track, last, row + 1, battery, recorder, is_hard, collected, unimaged_only
-        )
-        if row == m or not track.use_resources:
-            break
-        battery_after, recorder_after, _ = take(track, last, row, battery, recorder)
-        if battery_after <= track.battery_min or recorder_after > track.recorder_max:
-            continue
-        # A contact that is not worth it yet may pass, unless the recorder cannot do without.
-        may_pass = track.is_contact[row] and recorder < contact_above
-        if may_pass and (not track.is_guarded or is_safe(track, last, row, battery, recorder)):
-            continue
-        break
-    return row
-
-
-@kernel
-def rule_plan(
-    track: Track, collected: Bytes, is_hard: bool, unimaged_only: bool, contact_above: float
-) -> Ints:
-    """Return the rows that RULEBASEDPLANNER takes from the start to the end of the horizon.
-
-    Marks the targets it takes in ``collected``.
-    """
-    m = len(track.start_s)
-    rows = np.empty(m, dtype=np.int32)
-    count = 0
-    last = NO_TASK
-    battery, recorder = track.battery_start, track.recorder_start
-    row = naive_select_action(
-        track, collected, is_hard, unimaged_only, contact_above, last, last, battery, recorder
-    )
-    while row < m:
-        if track.use_resources:
-            battery, recorder, _ = take(track, last, row, battery, recorder)
-        if not track.is_contact[row]:
-            collected[track.place[row]] = 1
-        rows[count] = row
-        count += 1
-        last = row
-        row = naive_select_action(
-            track, collected, is_hard, unimaged_only, contact_above, row, last, battery, recorder
-        )
-    return rows[:count]
+from planner_core.solvers.walk import CONTACT_ABOVE, NOTHING_TAKEN, rule_plan
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,7 +28,7 @@ class Rule:
         },
     )
     contact_above_fraction: float = field(
-        default=0.45,
+        default=CONTACT_ABOVE,
         metadata={
             "minimum": 0,
             "maximum": 1,
@@ -125,6 +55,7 @@ class Rule:
                 self.feasibility == "hard",
                 self.unimaged_only,
                 self.contact_above_fraction,
+                NOTHING_TAKEN,
             )
             turn.report(1.0, float(problem.target_reward[turn.collected > before].sum()))
             return [int(row) for row in rows]

@@ -11,6 +11,7 @@ from planner_core.model import Track, compile_track
 from planner_core.plan import Plan
 from planner_core.problem import CONTACT, Bytes, Ints, Problem, SatelliteProblem
 from planner_core.solvers.base import Budget, Progress, Solution, Termination
+from planner_core.solvers.walk import CONTACT_ABOVE, rule_plan
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,13 +36,14 @@ PlanTurn = Callable[[Turn], list[int]]
 
 
 def plan_in_turn(problem: Problem, budget: Budget, plan_turn: PlanTurn) -> Solution:
-    """Let each satellite plan over the targets that remain and the antennas still free."""
+    """Let each satellite plan over the targets that remain and the antennas still free.
+
+    Once the budget is spent, the rule plans what is left of the horizon and of the satellites.
+    """
     table = problem.opportunities
     collected = np.zeros(len(problem.target_ids), dtype=np.uint8)
     taken: list[int] = []
     for index, satellite in enumerate(problem.satellites):
-        if budget.is_spent():
-            break
         reward_before = float(problem.target_reward[collected == 1].sum())
 
         def report(
@@ -57,13 +59,22 @@ def plan_in_turn(problem: Problem, budget: Budget, plan_turn: PlanTurn) -> Solut
 
         blocked = blocked_rows(problem, satellite, taken)
         track = compile_track(problem, satellite, blocked)
-        rows = plan_turn(Turn(track=track, collected=collected.copy(), report=report))
+        turn = Turn(track=track, collected=collected.copy(), report=report)
+        rows = [] if budget.is_spent() else plan_turn(turn)
+        if budget.is_spent():
+            rows = rows + _rest_by_rule(track, collected.copy(), rows)
         chosen = satellite.rows[np.asarray(rows, dtype=np.int64)]
         taken.extend(int(row) for row in chosen)
         images = chosen[table.kind[chosen] != CONTACT]
         collected[table.place[images]] = 1
     termination = budget.termination() if budget.is_spent() else Termination.HORIZON_COMPLETE
     return Solution(plan=Plan.of(problem, taken), termination=termination)
+
+
+def _rest_by_rule(track: Track, collected: Bytes, taken: list[int]) -> list[int]:
+    """Return what the rule adds to a search that was cut short, so that no hour stays empty."""
+    rows = np.array(taken, dtype=np.int32)
+    return [int(row) for row in rule_plan(track, collected, True, True, CONTACT_ABOVE, rows)]
 
 
 def blocked_rows(problem: Problem, satellite: SatelliteProblem, taken: list[int]) -> Bytes:

@@ -14,7 +14,7 @@ from planner_core.model import NO_TASK, WAIT, Model, compile_track, take
 from planner_core.plan import Plan
 from planner_core.problem import Problem
 from planner_core.solvers import SOLVERS, ForwardSearch, Graph, Mcts, Rule
-from planner_core.solvers.base import Budget, Solver, Termination
+from planner_core.solvers.base import Budget, Progress, Solver, Termination
 from planner_core.solvers.forward_search import NOTHING, select_action
 from planner_core.timeline import plan_sha256, replay
 from tests.planner_core.brute_force import best_reward
@@ -182,6 +182,33 @@ def test_a_cancelled_budget_answers_at_once_with_a_plan(name: str) -> None:
     solution = SOLVERS[name]().solve(problem, budget, 0)
     assert solution.termination is Termination.CANCELLED
     assert replay(problem, solution.plan).is_valid
+
+
+@pytest.mark.parametrize("use_resources", [True, False])
+@pytest.mark.parametrize("solver", [ForwardSearch(), Mcts()], ids=lambda s: s.name)
+def test_a_search_that_is_cut_short_is_finished_by_the_rule(
+    solver: Solver, use_resources: bool
+) -> None:
+    problem = random_problem(
+        2, num_collects=60, num_targets=50, num_contacts=6, num_satellites=2,
+        use_resources=use_resources,
+    )  # fmt: skip
+    budget = Budget()
+    budget.cancel()
+    assert solver.solve(problem, budget, 0).plan == Rule().solve(problem, Budget(), 0).plan
+
+    seen: list[float] = []
+
+    def stop_after_three(progress: Progress) -> None:
+        seen.append(progress.fraction)
+        if len(seen) == 3:
+            half_way.cancel()
+
+    half_way = Budget(report=stop_after_three)
+    cut = solver.solve(problem, half_way, 0).plan
+    whole = solver.solve(problem, Budget(), 0).plan
+    assert len(cut.actions) >= len(whole.actions) // 2
+    assert replay(problem, cut).is_valid
 
 
 @pytest.mark.parametrize("name", sorted(SOLVERS))

@@ -1,0 +1,98 @@
+"""The walk of the rule-based planner (Alg. 4), compiled: the next task that resources allow.
+
+The rule runs it from the start; other solvers let it finish what a spent budget cut short.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from planner_core.jit import kernel
+from planner_core.model import NO_TASK, Track, is_safe, next_action, take
+from planner_core.problem import Bytes, Ints
+
+CONTACT_ABOVE: Final = 0.45
+"""How full the recorder is before a contact is worth its power; between 0.35 and 0.45 the
+paper's mission keeps most images."""
+
+NOTHING_TAKEN: Final[Ints] = np.empty(0, dtype=np.int32)
+
+
+@kernel
+def naive_select_action(
+    track: Track,
+    collected: Bytes,
+    is_hard: bool,
+    unimaged_only: bool,
+    contact_above: float,
+    cursor: int,
+    last: int,
+    battery: float,
+    recorder: float,
+) -> int:
+    """Return the row that NAIVESELECTACTION takes next, or ``m`` when none is left.
+
+    Tasks that it refuses are what it sun-points through. The limits are those of the text
+    (battery above its minimum, recorder not above its maximum) in the soft form, and those
+    of the plan model in the hard form.
+    """
+    m = len(track.start_s)
+    row = cursor
+    while row < m:
+        row = next_action(
+            track, last, row + 1, battery, recorder, is_hard, collected, unimaged_only
+        )
+        if row == m or not track.use_resources:
+            break
+        battery_after, recorder_after, _ = take(track, last, row, battery, recorder)
+        if battery_after <= track.battery_min or recorder_after > track.recorder_max:
+            continue
+        # A contact that is not worth it yet may pass, unless the recorder cannot do without.
+        may_pass = track.is_contact[row] and recorder < contact_above
+        if may_pass and (not track.is_guarded or is_safe(track, last, row, battery, recorder)):
+            continue
+        break
+    return row
+
+
+@kernel
+def rule_plan(
+    track: Track,
+    collected: Bytes,
+    is_hard: bool,
+    unimaged_only: bool,
+    contact_above: float,
+    taken: Ints,
+) -> Ints:
+    """Return the rows that RULEBASEDPLANNER takes from the end of ``taken`` to the horizon's.
+
+    Marks the targets it takes, and those of ``taken``, in ``collected``.
+    """
+    m = len(track.start_s)
+    rows = np.empty(m, dtype=np.int32)
+    count = 0
+    last = NO_TASK
+    battery, recorder = track.battery_start, track.recorder_start
+    for row in taken:
+        if track.use_resources:
+            battery, recorder, _ = take(track, last, row, battery, recorder)
+        if not track.is_contact[row]:
+            collected[track.place[row]] = 1
+        last = row
+    row = naive_select_action(
+        track, collected, is_hard, unimaged_only, contact_above, last, last, battery, recorder
+    )
+    while row < m:
+        if track.use_resources:
+            battery, recorder, _ = take(track, last, row, battery, recorder)
+        if not track.is_contact[row]:
+            collected[track.place[row]] = 1
+        rows[count] = row
+        count += 1
+        last = row
+        row = naive_select_action(
+            track, collected, is_hard, unimaged_only, contact_above, row, last, battery, recorder
+        )
+    return rows[:count]
