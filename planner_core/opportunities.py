@@ -118,8 +118,11 @@ def rows_of(
 def in_order(
     parts: Sequence[Columns], target_ids: Sequence[str], station_ids: Sequence[str]
 ) -> Columns:
-    """Return all rows by (start, end, satellite, kind, place's id as text)."""
-    whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    """Return all rows by (start, end, satellite, kind, place's id as text).
+
+    Empties ``parts`` on the way: a week of a constellation is large.
+    """
+    whole = {name: np.concatenate([part.pop(name) for part in parts]) for name in list(parts[0])}
     is_collect = whole["kind"] == COLLECT
     rank = np.where(
         is_collect,
@@ -127,7 +130,7 @@ def in_order(
         _rank_of(station_ids, whole["place"], ~is_collect),
     )
     order = np.lexsort((rank, whole["kind"], whole["satellite"], whole["end_s"], whole["start_s"]))
-    return {name: values[order] for name, values in whole.items()}
+    return {name: whole.pop(name)[order] for name in list(whole)}
 
 
 def _rank_of(ids: Sequence[str], place: Ints, wanted: npt.NDArray[np.bool_]) -> Longs:
@@ -147,7 +150,7 @@ class Described:
         count = len(rows["start_s"])
         self._rows = rows
         self._seen: Columns = {
-            name: np.empty((count, 3) if name.startswith("los") else count, dtype=np.float64)
+            name: np.empty((count, 3)) if name.startswith("los") else np.empty(count, np.float32)
             for name in _SEEN
         }
         self._seen["in_eclipse"] = np.zeros(count, dtype=np.bool_)

@@ -19,6 +19,7 @@ from planner_core.jit import inlined, kernel
 from planner_core.slew import INSTANT, TIME_TOLERANCE_S, angle_between_deg, slew_s
 
 Floats = npt.NDArray[np.float64]
+Singles = npt.NDArray[np.float32]
 Ints = npt.NDArray[np.int32]
 Longs = npt.NDArray[np.int64]
 Bytes = npt.NDArray[np.uint8]
@@ -38,7 +39,8 @@ class Opportunities:
     """All collects and contacts of a scenario, one row each, in the order of the plan model.
 
     Instants are seconds from the start of the horizon, rounded inward to the millisecond.
-    Angles and distances hold at the middle of the opportunity. Lines of sight are unit
+    Angles and distances hold at the middle of the opportunity, in single precision (1e-5 deg,
+    a quarter of a metre): they are for people, plans do not hang on them. Lines of sight are unit
     vectors from the satellite in the inertial (TEME) frame. Shape ``(n,)`` or ``(n, 3)``.
 
     Attributes
@@ -73,11 +75,11 @@ class Opportunities:
     access_end_s: Floats
     los_start: Floats
     los_end: Floats
-    off_nadir_deg: Floats
-    elevation_deg: Floats
-    azimuth_deg: Floats
-    range_m: Floats
-    sun_elevation_deg: Floats
+    off_nadir_deg: Singles
+    elevation_deg: Singles
+    azimuth_deg: Singles
+    range_m: Singles
+    sun_elevation_deg: Singles
     in_eclipse: Bools
 
     def __len__(self) -> int:

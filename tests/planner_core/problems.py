@@ -85,11 +85,11 @@ def make_problem(
         access_end_s=end_s + margin,
         los_start=los,
         los_end=los,
-        off_nadir_deg=np.zeros(n),
-        elevation_deg=np.full(n, 45.0),
-        azimuth_deg=np.zeros(n),
-        range_m=np.full(n, 7e5),
-        sun_elevation_deg=np.zeros(n),
+        off_nadir_deg=np.zeros(n, dtype=np.float32),
+        elevation_deg=np.full(n, 45.0, dtype=np.float32),
+        azimuth_deg=np.zeros(n, dtype=np.float32),
+        range_m=np.full(n, 7e5, dtype=np.float32),
+        sun_elevation_deg=np.zeros(n, dtype=np.float32),
         in_eclipse=np.zeros(n, dtype=np.bool_),
     )
     whole = Sunlight(enter_s=np.array([0.0]), exit_s=np.array([horizon_s]))
