@@ -47,6 +47,7 @@ class Engine:
     def __init__(self, program: Program, budget: Budget, seed: int, *, is_chained: bool) -> None:
         tolerance = _CHAIN_TOLERANCE if is_chained else _TOLERANCE
         self._budget = budget
+        self._bound = float("inf")
         self._highs = highs = highspy.Highs()  # type: ignore[no-untyped-call]
         options: dict[str, bool | int | float | str] = {
             "output_flag": False,
@@ -80,12 +81,13 @@ class Engine:
         self._run()
         if self._highs.getModelStatus() != highspy.HighsModelStatus.kOptimal:
             return None
+        self._bound = float(self._highs.getInfo().objective_function_value)
         return np.array(self._highs.getSolution().col_value)
 
     @property
-    def objective(self) -> float:
-        """What the last point found is worth."""
-        return float(self._highs.getInfo().objective_function_value)
+    def bound(self) -> float:
+        """What no point exceeds, as far as the relaxations have shown."""
+        return self._bound
 
     def search(
         self, start: Floats | None, gap: float, heuristic_effort: float, watch: Watch
@@ -112,7 +114,7 @@ class Engine:
 
         def on_interrupt(event: highspy.highs.HighsCallbackEvent) -> None:
             out = event.data_out
-            watch(float(out.mip_primal_bound), float(out.mip_dual_bound))
+            watch(float(out.mip_primal_bound), min(self._bound, float(out.mip_dual_bound)))
             self._interrupt_if_spent(event)
 
         highs.cbMipInterrupt += on_interrupt
@@ -121,7 +123,7 @@ class Engine:
         has_point = info.primal_solution_status == highspy.SolutionStatus.kSolutionStatusFeasible
         return Outcome(
             columns=np.array(highs.getSolution().col_value) if has_point else None,
-            bound=float(info.mip_dual_bound),
+            bound=min(self._bound, float(info.mip_dual_bound)),
             is_infeasible=status == highspy.HighsModelStatus.kInfeasible,
         )
 

@@ -18,8 +18,9 @@ from planner_core.problem import COLLECT, Floats, Problem
 from planner_core.solvers.base import Budget, Constraint, Progress, Solution, Termination
 from planner_core.solvers.forward_search import ForwardSearch
 from planner_core.solvers.graph import Graph
+from planner_core.solvers.lns import improved
 from planner_core.solvers.milp.antichains import violated_antichains
-from planner_core.solvers.milp.highs import Engine, Outcome
+from planner_core.solvers.milp.highs import Engine, Outcome, Watch
 from planner_core.solvers.milp.model import Formulation, PlanProgram, plan_program
 from planner_core.solvers.milp.program import Rows
 from planner_core.solvers.rule import Rule
@@ -66,10 +67,22 @@ class Milp:
         },
     )
 
+    moves_per_task: float = field(
+        default=30.0,
+        metadata={
+            "minimum": 0,
+            "maximum": 100_000,
+            "description": "Moves of a local search for each opportunity, that the proof may "
+            "start from a good plan (without resources only).",
+        },
+    )
+
     def solve(self, problem: Problem, budget: Budget, seed: int) -> Solution:
         """Return the best plan; the same one for the same seed where the budget suffices."""
         best = _Best(problem)
         best.offer(*_starts(problem, budget))
+        if not problem.use_resources:
+            best.offer(improved(problem, best.plan, self.moves_per_task, budget, seed))
         if len(problem.opportunities) == 0 or budget.is_spent():
             return best.solution(problem, budget, self.gap)
         outcome = self._search(problem, budget, seed, best, _TOUCHING)
@@ -88,12 +101,16 @@ class Milp:
     ) -> Outcome:
         model = plan_program(problem, self.formulation, margin)
         engine = Engine(model.program, budget, seed, is_chained=problem.use_resources)
+        report = _Reporter(budget)
+
+        def watch(reward: float, bound: float) -> None:
+            report(max(reward, best.reward), bound)
+
         if self.formulation == "antichain":
-            _cut(engine, problem, model, self.cut_rounds)
+            _cut(engine, problem, model, self.cut_rounds, watch)
         # A good plan is known where resources do not count: all that is left is the proof.
         effort = 0.05 if problem.use_resources else 0.0
-        report = _Reporter(budget)
-        return engine.search(best.columns(problem), self.gap, effort, report)
+        return engine.search(best.columns(problem), self.gap, effort, watch)
 
 
 def _starts(problem: Problem, budget: Budget) -> list[Plan]:
@@ -107,12 +124,13 @@ def _starts(problem: Problem, budget: Budget) -> list[Plan]:
     return plans
 
 
-def _cut(engine: Engine, problem: Problem, model: PlanProgram, rounds: int) -> None:
+def _cut(engine: Engine, problem: Problem, model: PlanProgram, rounds: int, watch: Watch) -> None:
     """Add the antichains that the fractional optimum breaks, until there are none."""
     for _ in range(rounds):
         taken = engine.relaxed()
         if taken is None:
             return
+        watch(-np.inf, engine.bound)
         num_added = 0
         for satellite, order in zip(problem.satellites, model.orders, strict=True):
             own = model.taken[satellite.rows]
@@ -156,9 +174,14 @@ class _Best:
 
     def __init__(self, problem: Problem) -> None:
         self._problem = problem
-        self._plan = Plan()
-        self._timeline = replay(problem, self._plan)
+        self.plan = Plan()
+        self._timeline = replay(problem, self.plan)
         self.bound = np.inf
+
+    @property
+    def reward(self) -> float:
+        """What the plan earns, if it may be flown."""
+        return self._timeline.reward if self._timeline.is_valid else 0.0
 
     def offer(self, *plans: Plan) -> None:
         """Keep the first plan that beats all others; a valid one beats any that is not."""
@@ -166,14 +189,14 @@ class _Best:
             timeline = replay(self._problem, plan)
             worth = (timeline.is_valid, timeline.reward)
             if worth > (self._timeline.is_valid, self._timeline.reward):
-                self._plan, self._timeline = plan, timeline
+                self.plan, self._timeline = plan, timeline
 
     def columns(self, problem: Problem) -> Floats | None:
         """Return the plan as values of x, or None where it is not valid."""
         if not self._timeline.is_valid:
             return None
         taken = np.zeros(len(problem.opportunities))
-        taken[[action.opportunity for action in self._plan.actions]] = 1.0
+        taken[[action.opportunity for action in self.plan.actions]] = 1.0
         return taken
 
     def solution(self, problem: Problem, budget: Budget, gap: float) -> Solution:
@@ -183,7 +206,7 @@ class _Best:
         if np.isfinite(self.bound) and self._timeline.is_valid and not problem.continuous_starts:
             bound = rounded_bound(problem, self.bound, reward)
         return Solution(
-            plan=self._plan,
+            plan=self.plan,
             termination=_termination(reward, bound, budget, gap),
             bound=bound,
             bound_proof=None if bound is None else "milp",
