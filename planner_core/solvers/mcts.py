@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from typing import ClassVar, Final, Literal, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from planner_core.draws import Uint64s, draws_of, next_draw
 from planner_core.jit import kernel
 from planner_core.model import (
     NO_TASK,
@@ -28,8 +28,6 @@ from planner_core.problem import Bytes, Floats, Ints, Problem
 from planner_core.solvers.base import Budget, Constraint, Feasibility, Solution
 from planner_core.solvers.sequential import Turn, plan_in_turn
 from planner_core.solvers.walk import CONTACT_ABOVE, naive_select_action
-
-Uint64s = npt.NDArray[np.uint64]
 
 _UNSEEN: Final = -1
 
@@ -145,17 +143,6 @@ def _choose(tree: Tree, node: int, exploration: float) -> int:
 
 
 @kernel
-def _random(state: Uint64s) -> float:
-    """Return the next number in [0, 1) of a generator (splitmix64) that is ours alone."""
-    state[0] += np.uint64(0x9E3779B97F4A7C15)
-    z = state[0]
-    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    z = z ^ (z >> np.uint64(31))
-    return float(z >> np.uint64(11)) / 9007199254740992.0
-
-
-@kernel
 def _rollout_action(
     track: Track,
     rules: Rules,
@@ -190,7 +177,7 @@ def _rollout_action(
     if track.use_resources and may_wait(track, last, actions[0], battery, recorder, rules.is_hard):
         actions[count] = WAIT
         count += 1
-    return actions[int(_random(random) * count)], actions[0]
+    return actions[int(next_draw(random) * count)], actions[0]
 
 
 @kernel
@@ -488,7 +475,7 @@ class Mcts:
         trees = [_empty_tree(num_nodes, num_nodes * (self.breadth + 1)) for _ in range(2)]
         tree, spare = trees
         _new_node(tree, NO_TASK, NO_TASK, track.battery_start, track.recorder_start)
-        random = np.array([seed & 0xFFFF_FFFF_FFFF_FFFF], dtype=np.uint64)
+        random = draws_of(seed)
         path = Path(
             edge=np.empty(self.depth, dtype=np.int32),
             action=np.empty(self.depth, dtype=np.int32),
