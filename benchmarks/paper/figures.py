@@ -8,11 +8,8 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Final
 
-import matplotlib
-
-matplotlib.use("Agg")
-from matplotlib import pyplot as plt  # after the choice of the back end
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from benchmarks.paper.settings import KINDS, Kind
@@ -69,7 +66,8 @@ def write_points(path: Path, points: dict[bool, list[Point]]) -> None:
 
 def draw_figure(path: Path, bars: Sequence[Bar], title: str) -> None:
     """Draw reward, runtime and reward per second; the line over each bar is the bound."""
-    figure, (left, middle, right) = plt.subplots(1, 3, figsize=(11.0, 3.6), layout="constrained")
+    figure = Figure(figsize=(11.0, 3.6), layout="constrained")
+    left, middle, right = figure.subplots(1, 3)
     _panel(left, bars, [bar.reward for bar in bars], "reward")
     for i, bar in enumerate(bars):
         spread = [[bar.reward - bar.reward_min], [bar.reward_max - bar.reward]]
@@ -86,7 +84,6 @@ def draw_figure(path: Path, bars: Sequence[Bar], title: str) -> None:
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=8)
     figure.suptitle(title, fontsize=10)
     figure.savefig(path, dpi=_DPI, metadata={"Software": None})
-    plt.close(figure)
 
 
 def _panel(axes: Axes, bars: Sequence[Bar], heights: Sequence[float], label: str) -> None:

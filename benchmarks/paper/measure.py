@@ -84,9 +84,7 @@ def run_task(task: Task, deadline: float) -> Outcome | None:
     return _judged(task, problem, solution, seconds)
 
 
-def _timed(
-    solver: Solver, problem: Problem, seed: int, limit_s: float
-) -> tuple[Solution, float]:
+def _timed(solver: Solver, problem: Problem, seed: int, limit_s: float) -> tuple[Solution, float]:
     taken: list[float] = []
     while True:
         began = time.perf_counter()

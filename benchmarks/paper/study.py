@@ -139,9 +139,7 @@ class Study:
         """Return a row of the paper's tables, run under one reading."""
         if isinstance(row, ForwardRow):
             params = {**PAPER_SEARCH, **row.tuned}
-            return self.grid_task(
-                "forward_search", params, res=row.use_resources, reading=reading
-            )
+            return self.grid_task("forward_search", params, res=row.use_resources, reading=reading)
         params = {**PAPER_MCTS, **row.tuned, **MCTS_VARIANTS[variant or next(iter(MCTS_VARIANTS))]}
         return self.grid_task("mcts", params, res=row.use_resources, reading=reading)
 
