@@ -18,23 +18,26 @@ import numpy.typing as npt
 from planner_core.chains import longest_chain
 from planner_core.problem import COLLECT, Floats, Ints, Problem
 
+Proof = Literal["lagrangian", "milp", "dp"]
+
 _PAIRS_TO_SPEND = 40_000_000
 _ROUNDING = 1e-6  # relative; far above the rounding of the sums, far below one reward
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Bound:
-    """A proven upper bound, and the prices that prove it (``lagrangian_value`` checks them).
+    """A proven upper bound on what a valid plan can earn.
 
     Attributes
     ----------
     prices
-        One per target. Shape ``(num_targets,)``.
+        What proves a Lagrangian bound (``lagrangian_value`` checks them), one per target;
+        None for other proofs. Shape ``(num_targets,)``.
     """
 
     value: float
-    proof: Literal["lagrangian"]
-    prices: Floats
+    proof: Proof
+    prices: Floats | None = None
 
 
 def lagrangian_value(problem: Problem, prices: Floats) -> tuple[float, Ints]:
@@ -101,12 +104,15 @@ def lagrangian_bound(problem: Problem, reward: float, iterations: int | None = N
         step = theta * max(value - max(reward, 0.97 * best_value), 0.0) / norm
         prices = np.clip(prices - step * gradient, 0.0, problem.target_reward)
     return Bound(
-        value=_tightened(problem, best_value, reward), proof="lagrangian", prices=best_prices
+        value=rounded_bound(problem, best_value, reward), proof="lagrangian", prices=best_prices
     )
 
 
-def _tightened(problem: Problem, value: float, reward: float) -> float:
-    """Round a bound up for safety, then down to what whole rewards can add up to."""
+def rounded_bound(problem: Problem, value: float, reward: float) -> float:
+    """Return a bound rounded up for safety, then down to what whole rewards can add up to.
+
+    Never below ``reward``, which some plan has earned.
+    """
     safe = value * (1.0 + 1e-12) + 1e-9
     if np.all(problem.target_reward == np.round(problem.target_reward)):
         safe = float(np.floor(safe + _ROUNDING))

@@ -75,8 +75,7 @@ def plan_scenario(
     timeline = replay(problem, solution.plan)
     bound = None
     if not problem.continuous_starts:
-        # Someone who cancels wants the answer now: the prices of a spent budget stay rough.
-        bound = lagrangian_bound(problem, timeline.reward, 0 if budget.is_cancelled else None)
+        bound = _best_bound(problem, solution, timeline.reward, budget)
     budget.report(
         Progress(
             phase="verify",
@@ -98,3 +97,15 @@ def plan_scenario(
         outcomes=outcomes,
         runtime_s=Runtime(access=access, compile=compile_, solve=solve, verify=verify),
     )
+
+
+def _best_bound(problem: Problem, solution: Solution, reward: float, budget: Budget) -> Bound:
+    """Return what the solver has proven, or a quick bound of our own if that is lower."""
+    proven = None
+    if solution.bound is not None and solution.bound_proof is not None:
+        proven = Bound(value=max(solution.bound, reward), proof=solution.bound_proof)
+        if proven.value <= reward:
+            return proven
+    # Someone who cancels wants the answer now: the prices of a spent budget stay rough.
+    quick = lagrangian_bound(problem, reward, 0 if budget.is_cancelled else None)
+    return proven if proven is not None and proven.value < quick.value else quick

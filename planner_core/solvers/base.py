@@ -10,6 +10,7 @@ from typing import ClassVar, Literal, Protocol
 
 import numpy as np
 
+from planner_core.bounds import Proof
 from planner_core.plan import Plan
 from planner_core.problem import Bytes, Problem
 
@@ -107,11 +108,20 @@ class Budget:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Solution:
-    """A plan and how the search ended. It has no reward: only the referee awards that."""
+    """A plan and how the search ended. It has no reward: only the referee awards that.
+
+    Attributes
+    ----------
+    bound, bound_proof
+        What the search has proven on the way: no valid plan of the problem earns more, and
+        by which argument. None where it has proven nothing.
+    """
 
     plan: Plan
     termination: Termination
     statistics: Mapping[str, float] = field(default_factory=dict)
+    bound: float | None = None
+    bound_proof: Proof | None = None
 
 
 class Solver(Protocol):

@@ -46,6 +46,7 @@ class Task:
     satellite: int = 0
     angle_deg: float = 0.0
     margin_s: float = 0.0
+    turn_deg: float = 0.0  # how far the line of sight turns during the task
 
 
 def make_problem(
@@ -71,7 +72,11 @@ def make_problem(
         return np.array(values, dtype=np.float64).reshape(n)
 
     angle = np.radians(column([t.angle_deg for t in ordered]))
-    los = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(n)])
+    turned = angle + np.radians(column([t.turn_deg for t in ordered]))
+
+    def line_of_sight(angle: Floats) -> Floats:
+        return np.column_stack([np.cos(angle), np.sin(angle), np.zeros(n)])
+
     start_s, end_s = column([t.start_s for t in ordered]), column([t.end_s for t in ordered])
     margin = column([t.margin_s for t in ordered])
     table = Opportunities(
@@ -83,8 +88,8 @@ def make_problem(
         end_s=end_s,
         access_start_s=start_s - margin,
         access_end_s=end_s + margin,
-        los_start=los,
-        los_end=los,
+        los_start=line_of_sight(angle),
+        los_end=line_of_sight(turned),
         off_nadir_deg=np.zeros(n),
         elevation_deg=np.full(n, 45.0),
         azimuth_deg=np.zeros(n),
@@ -134,12 +139,20 @@ def random_problem(
     dynamics: Dynamics = "physical",
     has_rewards: bool = False,
     resources: Resources = TIGHT,
+    agility: Agility = Agility(),  # noqa: B008 - immutable
+    max_turn_deg: float = 0.0,
+    span_s: float = 940.0,
+    sunlight: Sunlight | None = None,
+    num_stations: int = 1,
 ) -> Problem:
-    """Return a small crowded problem drawn from ``seed``."""
+    """Return a small crowded problem drawn from ``seed``.
+
+    With ``max_turn_deg`` lines of sight turn during collects, by up to that either way.
+    """
     rng = np.random.default_rng(seed)
     tasks = []
     for _ in range(num_collects):
-        start_s = round(float(rng.uniform(0, 940)), 3)
+        start_s = round(float(rng.uniform(0, span_s)), 3)
         tasks.append(
             Task(
                 kind=COLLECT,
@@ -148,6 +161,7 @@ def random_problem(
                 start_s=start_s,
                 end_s=start_s + 30.0,
                 angle_deg=float(rng.uniform(-55, 55)),
+                turn_deg=float(rng.uniform(-max_turn_deg, max_turn_deg)) if max_turn_deg else 0.0,
             )
         )
     for _ in range(num_contacts if use_resources else 0):
@@ -155,7 +169,7 @@ def random_problem(
         tasks.append(
             Task(
                 kind=CONTACT,
-                place=0,
+                place=int(rng.integers(num_stations)) if num_stations > 1 else 0,
                 satellite=int(rng.integers(num_satellites)),
                 start_s=start_s,
                 end_s=start_s + round(float(rng.uniform(40, 140)), 3),
@@ -166,9 +180,12 @@ def random_problem(
     return make_problem(
         tasks,
         num_targets=num_targets,
+        num_stations=num_stations,
         num_satellites=num_satellites,
         use_resources=use_resources,
         dynamics=dynamics,
         rewards=rewards,
         resources=resources,
+        agility=agility,
+        sunlight=sunlight,
     )

@@ -44,6 +44,7 @@ def test_the_stored_prices_prove_the_bound_again(seed: int) -> None:
     plan = ForwardSearch().solve(problem, Budget(), 0).plan
     reward = replay(problem, plan).reward
     bound = lagrangian_bound(problem, reward)
+    assert bound.prices is not None
     proven, _ = lagrangian_value(problem, bound.prices)
     assert reward <= bound.value <= proven + 1e-6
 

@@ -1,0 +1,137 @@
+"""HiGHS, asked to solve a program under a budget: quiet, single-threaded and repeatable."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import highspy
+import numpy as np
+
+from planner_core.problem import Floats
+from planner_core.solvers.base import Budget
+from planner_core.solvers.milp.program import Program, Rows
+
+# Sums of zeros and ones bear HiGHS's usual tolerance. In a long chain of levels each row may
+# be off by as much, so there it must be far below one task.
+_TOLERANCE: Final = 1e-6
+_CHAIN_TOLERANCE: Final = 1e-9
+
+Watch = Callable[[float, float], None]
+"""Called now and then with the best objective so far and the bound."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Outcome:
+    """What a run left.
+
+    Attributes
+    ----------
+    columns
+        The best integer point found, or None. Shape ``(num_columns,)``.
+    bound
+        No point is worth more; infinite where nothing is known yet.
+    is_infeasible
+        Whether it is proven that there is no point at all.
+    """
+
+    columns: Floats | None
+    bound: float
+    is_infeasible: bool
+
+
+class Engine:
+    """One program in HiGHS: relaxations first, then the integer search."""
+
+    def __init__(self, program: Program, budget: Budget, seed: int, *, is_chained: bool) -> None:
+        tolerance = _CHAIN_TOLERANCE if is_chained else _TOLERANCE
+        self._budget = budget
+        self._highs = highs = highspy.Highs()  # type: ignore[no-untyped-call]
+        options: dict[str, bool | int | float | str] = {
+            "output_flag": False,
+            # More threads would outlive the solve, and workers fork.
+            "threads": 1,
+            "parallel": "off",
+            "random_seed": seed % 2**31,
+            "primal_feasibility_tolerance": tolerance,
+            "mip_feasibility_tolerance": tolerance,
+        }
+        for option, value in options.items():
+            highs.setOptionValue(option, value)
+        n = program.num_columns
+        self._is_integer = np.concatenate(program.is_integer)
+        highs.addVars(n, np.concatenate(program.lower), np.concatenate(program.upper))
+        highs.changeColsCost(n, np.arange(n, dtype=np.int32), np.concatenate(program.worth))
+        highs.changeObjectiveSense(highspy.ObjSense.kMaximize)
+        for rows in program.rows:
+            self.add_rows(rows)
+        highs.cbSimplexInterrupt += self._interrupt_if_spent
+        highs.cbIpmInterrupt += self._interrupt_if_spent
+
+    def add_rows(self, rows: Rows) -> None:
+        """Add constraints; the next run starts from the last one's basis."""
+        self._highs.addRows(
+            len(rows), rows.lower, rows.upper, len(rows.column), rows.first, rows.column, rows.value
+        )
+
+    def relaxed(self) -> Floats | None:
+        """Return the best fractional point, or None if the budget did not suffice."""
+        self._run()
+        if self._highs.getModelStatus() != highspy.HighsModelStatus.kOptimal:
+            return None
+        return np.array(self._highs.getSolution().col_value)
+
+    @property
+    def objective(self) -> float:
+        """What the last point found is worth."""
+        return float(self._highs.getInfo().objective_function_value)
+
+    def search(
+        self, start: Floats | None, gap: float, heuristic_effort: float, watch: Watch
+    ) -> Outcome:
+        """Return the best integer point.
+
+        Parameters
+        ----------
+        start
+            Values of the first columns of a point that is known, or None.
+        gap
+            Relative distance of objective and bound at which to stop.
+        heuristic_effort
+            Share of the work spent on looking for points rather than on the proof.
+        """
+        highs = self._highs
+        integer = np.flatnonzero(self._is_integer).astype(np.int32)
+        kinds = np.full(len(integer), int(highspy.HighsVarType.kInteger), dtype=np.uint8)
+        highs.changeColsIntegrality(len(integer), integer, kinds)
+        highs.setOptionValue("mip_rel_gap", gap)
+        highs.setOptionValue("mip_heuristic_effort", heuristic_effort)
+        if start is not None:
+            highs.setSolution(len(start), np.arange(len(start), dtype=np.int32), start)
+
+        def on_interrupt(event: highspy.highs.HighsCallbackEvent) -> None:
+            out = event.data_out
+            watch(float(out.mip_primal_bound), float(out.mip_dual_bound))
+            self._interrupt_if_spent(event)
+
+        highs.cbMipInterrupt += on_interrupt
+        self._run()
+        info, status = highs.getInfo(), highs.getModelStatus()
+        has_point = info.primal_solution_status == highspy.SolutionStatus.kSolutionStatusFeasible
+        return Outcome(
+            columns=np.array(highs.getSolution().col_value) if has_point else None,
+            bound=float(info.mip_dual_bound),
+            is_infeasible=status == highspy.HighsModelStatus.kInfeasible,
+        )
+
+    def _run(self) -> None:
+        remaining_s = self._budget.remaining_s()
+        if remaining_s is not None:
+            # HiGHS counts from its first run on.
+            self._highs.setOptionValue("time_limit", self._highs.getRunTime() + remaining_s)
+        self._highs.run()
+
+    def _interrupt_if_spent(self, event: highspy.highs.HighsCallbackEvent) -> None:
+        if self._budget.is_spent():
+            event.interrupt()

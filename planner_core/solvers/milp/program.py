@@ -1,0 +1,115 @@
+"""A mixed-integer linear program as plain arrays, gathered block by block."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from planner_core.problem import Bools, Floats, Ints
+
+INFINITE: Final = float("inf")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Rows:
+    """Constraints ``lower <= sum of value * column <= upper``; entries lie row after row.
+
+    Attributes
+    ----------
+    first
+        Where each row's entries begin. Shape ``(num_rows,)``.
+    column, value
+        Shape ``(num_entries,)``.
+    lower, upper
+        Shape ``(num_rows,)``.
+    """
+
+    first: Ints
+    column: Ints
+    value: Floats
+    lower: Floats
+    upper: Floats
+
+    @classmethod
+    def of(
+        cls,
+        offsets: npt.NDArray[np.int64],
+        column: npt.NDArray[np.integer],
+        value: Floats | float = 1.0,
+        *,
+        lower: Floats | float = -INFINITE,
+        upper: Floats | float = INFINITE,
+    ) -> Rows:
+        """Return rows from offsets of shape ``(num_rows + 1,)``; numbers stand for all alike."""
+        num_rows = len(offsets) - 1
+        return cls(
+            first=offsets[:-1].astype(np.int32),
+            column=column.astype(np.int32),
+            value=np.broadcast_to(np.asarray(value, dtype=np.float64), column.shape).copy(),
+            lower=np.broadcast_to(np.asarray(lower, dtype=np.float64), (num_rows,)).copy(),
+            upper=np.broadcast_to(np.asarray(upper, dtype=np.float64), (num_rows,)).copy(),
+        )
+
+    @classmethod
+    def aligned(
+        cls,
+        *terms: tuple[npt.NDArray[np.integer], Floats | float],
+        lower: Floats | float = -INFINITE,
+        upper: Floats | float = INFINITE,
+    ) -> Rows:
+        """Return as many rows as each term has columns: row i sums the i-th of every term."""
+        num_rows = len(terms[0][0])
+        column = np.column_stack([columns for columns, _ in terms]).ravel()
+        values = [np.broadcast_to(np.asarray(v, dtype=np.float64), (num_rows,)) for _, v in terms]
+        value = np.column_stack(values).ravel()
+        offsets = np.arange(num_rows + 1, dtype=np.int64) * len(terms)
+        return cls.of(offsets, column, value, lower=lower, upper=upper)
+
+    @classmethod
+    def at_most(cls, groups: Sequence[Iterable[int]], limits: Sequence[float]) -> Rows:
+        """Return one row for each group of columns: no more of them than its limit."""
+        members = [np.fromiter(group, dtype=np.int32) for group in groups]
+        offsets = np.concatenate([[0], np.cumsum([len(group) for group in members])])
+        column = np.concatenate([np.empty(0, dtype=np.int32), *members])
+        return cls.of(offsets.astype(np.int64), column, upper=np.array(limits, dtype=np.float64))
+
+    def __len__(self) -> int:
+        return len(self.first)
+
+
+@dataclass(slots=True, eq=False)
+class Program:
+    """Maximise the sum of ``worth * column`` within bounds and rows."""
+
+    worth: list[Floats] = field(default_factory=list)
+    lower: list[Floats] = field(default_factory=list)
+    upper: list[Floats] = field(default_factory=list)
+    is_integer: list[Bools] = field(default_factory=list)
+    rows: list[Rows] = field(default_factory=list)
+    num_columns: int = 0
+
+    def add_columns(
+        self,
+        worth: Floats,
+        *,
+        lower: Floats | float = 0.0,
+        upper: Floats | float = 1.0,
+        is_integer: bool = True,
+    ) -> Ints:
+        """Add one column for each worth; return their numbers."""
+        n = len(worth)
+        self.worth.append(worth)
+        self.lower.append(np.broadcast_to(np.asarray(lower, dtype=np.float64), (n,)))
+        self.upper.append(np.broadcast_to(np.asarray(upper, dtype=np.float64), (n,)))
+        self.is_integer.append(np.full(n, is_integer))
+        self.num_columns += n
+        return np.arange(self.num_columns - n, self.num_columns, dtype=np.int32)
+
+    def add_rows(self, rows: Rows) -> None:
+        """Add constraints; none is no harm."""
+        if len(rows):
+            self.rows.append(rows)

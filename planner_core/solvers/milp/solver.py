@@ -1,0 +1,234 @@
+"""Mixed-integer linear programming (section of that name): the optimum, and its proof.
+
+The paper's program, over all satellites at once, with station antennas, and with battery
+and recorder (its stated future work). Exact for the plan model.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from typing import ClassVar, Final
+
+import numpy as np
+
+from planner_core.bounds import rounded_bound
+from planner_core.plan import Plan
+from planner_core.problem import COLLECT, Floats, Problem
+from planner_core.solvers.base import Budget, Constraint, Progress, Solution, Termination
+from planner_core.solvers.forward_search import ForwardSearch
+from planner_core.solvers.graph import Graph
+from planner_core.solvers.milp.antichains import violated_antichains
+from planner_core.solvers.milp.highs import Engine, Outcome
+from planner_core.solvers.milp.model import Formulation, PlanProgram, plan_program
+from planner_core.solvers.milp.program import Rows
+from planner_core.solvers.rule import Rule
+from planner_core.timeline import replay
+
+# The limits are strict, which no linear program can say. The first search lets plans touch
+# them, so that its bound is true; a second one stays clear where the first plan does touch.
+_TOUCHING: Final = -1e-9
+_CLEAR: Final = 1e-7
+_REPORT_EVERY_S: Final = 0.25
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Milp:
+    """Let HiGHS find the best plan of all satellites together, and prove it."""
+
+    name: ClassVar[str] = "milp"
+    title: ClassVar[str] = "Mixed-integer linear programming"
+    paper: ClassVar[str] = "Section Mixed-Integer Linear Programming"
+    exact: ClassVar[bool] = True
+    honours: ClassVar[frozenset[Constraint]] = frozenset(Constraint) - {Constraint.DUPLICATE}
+
+    formulation: Formulation = field(
+        default="antichain",
+        metadata={
+            "description": "antichain: one row for each set of tasks that exclude each other, "
+            "and cutting planes; pairwise: the paper's, one row for each such pair."
+        },
+    )
+    gap: float = field(
+        default=0.0,
+        metadata={
+            "minimum": 0,
+            "maximum": 1,
+            "description": "Stop when the bound is within this share of the reward.",
+        },
+    )
+    cut_rounds: int = field(
+        default=20,
+        metadata={
+            "minimum": 0,
+            "maximum": 1000,
+            "description": "Rounds of cutting planes before the search (antichain only).",
+        },
+    )
+
+    def solve(self, problem: Problem, budget: Budget, seed: int) -> Solution:
+        """Return the best plan; the same one for the same seed where the budget suffices."""
+        best = _Best(problem)
+        best.offer(*_starts(problem, budget))
+        if len(problem.opportunities) == 0 or budget.is_spent():
+            return best.solution(problem, budget, self.gap)
+        outcome = self._search(problem, budget, seed, best, _TOUCHING)
+        best.bound = outcome.bound
+        if outcome.is_infeasible:
+            return best.solution(problem, budget, self.gap)
+        plan = _plan_of(problem, outcome)
+        best.offer(plan, _repaired(problem, plan))
+        if not replay(problem, plan).is_valid and not budget.is_spent():
+            outcome = self._search(problem, budget, seed, best, _CLEAR)
+            best.offer(_plan_of(problem, outcome))
+        return best.solution(problem, budget, self.gap)
+
+    def _search(
+        self, problem: Problem, budget: Budget, seed: int, best: _Best, margin: float
+    ) -> Outcome:
+        model = plan_program(problem, self.formulation, margin)
+        engine = Engine(model.program, budget, seed, is_chained=problem.use_resources)
+        if self.formulation == "antichain":
+            _cut(engine, problem, model, self.cut_rounds)
+        # A good plan is known where resources do not count: all that is left is the proof.
+        effort = 0.05 if problem.use_resources else 0.0
+        report = _Reporter(budget)
+        return engine.search(best.columns(problem), self.gap, effort, report)
+
+
+def _starts(problem: Problem, budget: Budget) -> list[Plan]:
+    """Return the plans of the quick solvers, the quickest one whatever the time."""
+    if budget.is_cancelled:
+        return []
+    plans = [Rule().solve(problem, Budget(), 0).plan]
+    for solver in (Graph(), ForwardSearch(depth=3, breadth=3)):
+        if not budget.is_spent():
+            plans.append(solver.solve(problem, budget, 0).plan)
+    return plans
+
+
+def _cut(engine: Engine, problem: Problem, model: PlanProgram, rounds: int) -> None:
+    """Add the antichains that the fractional optimum breaks, until there are none."""
+    for _ in range(rounds):
+        taken = engine.relaxed()
+        if taken is None:
+            return
+        num_added = 0
+        for satellite, order in zip(problem.satellites, model.orders, strict=True):
+            own = model.taken[satellite.rows]
+            offsets, members = violated_antichains(order, taken[own])
+            engine.add_rows(Rows.of(offsets, own[members], upper=1.0))
+            num_added += len(offsets) - 1
+        if num_added == 0:
+            return
+
+
+def _plan_of(problem: Problem, outcome: Outcome) -> Plan:
+    if outcome.columns is None:
+        return Plan()
+    taken = outcome.columns[: len(problem.opportunities)]
+    return Plan.of(problem, np.flatnonzero(taken > 0.5))
+
+
+def _repaired(problem: Problem, plan: Plan) -> Plan:
+    """Return the plan without the collects that bring it to a limit, the latest ones first."""
+    table = problem.opportunities
+    while True:
+        timeline = replay(problem, plan)
+        broken = [v for v in timeline.violations if v.code in ("battery", "recorder")]
+        if not broken:
+            return plan
+        first = broken[0]
+        before = [
+            action
+            for action in plan.actions
+            if table.satellite[action.opportunity] == first.satellite
+            and table.kind[action.opportunity] == COLLECT
+            and action.start_s <= first.at_s
+        ]
+        if not before:
+            return plan
+        plan = Plan(tuple(action for action in plan.actions if action is not before[-1]))
+
+
+class _Best:
+    """The best valid plan so far, by the referee, and the bound."""
+
+    def __init__(self, problem: Problem) -> None:
+        self._problem = problem
+        self._plan = Plan()
+        self._timeline = replay(problem, self._plan)
+        self.bound = np.inf
+
+    def offer(self, *plans: Plan) -> None:
+        """Keep the first plan that beats all others; a valid one beats any that is not."""
+        for plan in plans:
+            timeline = replay(self._problem, plan)
+            worth = (timeline.is_valid, timeline.reward)
+            if worth > (self._timeline.is_valid, self._timeline.reward):
+                self._plan, self._timeline = plan, timeline
+
+    def columns(self, problem: Problem) -> Floats | None:
+        """Return the plan as values of x, or None where it is not valid."""
+        if not self._timeline.is_valid:
+            return None
+        taken = np.zeros(len(problem.opportunities))
+        taken[[action.opportunity for action in self._plan.actions]] = 1.0
+        return taken
+
+    def solution(self, problem: Problem, budget: Budget, gap: float) -> Solution:
+        """Return the plan with what is known of it."""
+        reward = self._timeline.reward
+        bound = None
+        if np.isfinite(self.bound) and self._timeline.is_valid and not problem.continuous_starts:
+            bound = rounded_bound(problem, self.bound, reward)
+        return Solution(
+            plan=self._plan,
+            termination=_termination(reward, bound, budget, gap),
+            bound=bound,
+            bound_proof=None if bound is None else "milp",
+        )
+
+
+def _termination(reward: float, bound: float | None, budget: Budget, gap: float) -> Termination:
+    """Optimal only where proven; a search that ends without proof has come to its own end."""
+    if bound is not None and bound - reward <= 1e-5 * max(1.0, bound):
+        return Termination.OPTIMAL
+    if budget.is_spent():
+        return budget.termination()
+    if bound is not None and bound - reward <= gap * bound:
+        return Termination.GAP_REACHED
+    return Termination.HORIZON_COMPLETE
+
+
+class _Reporter:
+    """Passes on what HiGHS knows, a few times a second."""
+
+    def __init__(self, budget: Budget) -> None:
+        self._budget = budget
+        self._limit_s = budget.remaining_s()
+        self._last_s = 0.0
+
+    def __call__(self, reward: float, bound: float) -> None:
+        """Report the best objective so far and the bound, unless that was done just now."""
+        now_s = time.monotonic()
+        if now_s - self._last_s < _REPORT_EVERY_S:
+            return
+        self._last_s = now_s
+        is_known = np.isfinite(reward)
+        is_bounded = np.isfinite(bound)
+        self._budget.report(
+            Progress(
+                phase="solve",
+                fraction=self._fraction(reward, bound) if is_known and is_bounded else 0.0,
+                reward=reward if is_known else None,
+                bound=bound if is_bounded else None,
+                message="HiGHS searches",
+            )
+        )
+
+    def _fraction(self, reward: float, bound: float) -> float:
+        """Return the share of the time that is over, or without a limit of the bound reached."""
+        if self._limit_s:
+            return 1.0 - (self._budget.remaining_s() or 0.0) / self._limit_s
+        return min(1.0, max(0.0, reward / bound)) if bound > 0.0 else 1.0

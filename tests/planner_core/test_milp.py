@@ -1,0 +1,234 @@
+"""The MILP: the optimum by brute force in every setting, and true bounds all the way."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from planner_core.comparable import transitive_closure
+from planner_core.domain import Agility, Dynamics
+from planner_core.problem import COLLECT, CONTACT, Problem, Sunlight
+from planner_core.solvers import Milp
+from planner_core.solvers.base import Budget, Progress, Termination
+from planner_core.timeline import replay
+from tests.planner_core.brute_force import best_reward
+from tests.planner_core.problems import TIGHT, Task, make_problem, random_problem
+
+SEEDS = st.integers(0, 10**6)
+DYNAMICS = st.sampled_from(["physical", "paper"])
+FORMULATIONS = st.sampled_from(["antichain", "pairwise"])
+SLOW = Agility(slew_rate_deg_s=0.3)
+
+
+def assert_equals_brute_force(problem: Problem, formulation: Any) -> None:
+    best = best_reward(problem)
+    solution = Milp(formulation=formulation).solve(problem, Budget(), 0)
+    timeline = replay(problem, solution.plan)
+    assert timeline.is_valid, timeline.violations
+    assert timeline.reward == pytest.approx(best)
+    assert solution.bound is not None
+    assert solution.bound == pytest.approx(best, abs=1e-4)
+    assert solution.bound >= best - 1e-9
+    assert solution.bound_proof == "milp"
+    assert solution.termination is Termination.OPTIMAL
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    seed=SEEDS,
+    dynamics=DYNAMICS,
+    use_resources=st.booleans(),
+    has_rewards=st.booleans(),
+    num_satellites=st.integers(1, 3),
+    formulation=FORMULATIONS,
+)
+def test_it_equals_brute_force(
+    seed: int,
+    dynamics: Dynamics,
+    use_resources: bool,
+    has_rewards: bool,
+    num_satellites: int,
+    formulation: str,
+) -> None:
+    problem = random_problem(
+        seed, dynamics=dynamics, use_resources=use_resources, has_rewards=has_rewards,
+        num_satellites=num_satellites, num_contacts=3, span_s=600.0,
+    )  # fmt: skip
+    assert_equals_brute_force(problem, formulation)
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=SEEDS, dynamics=DYNAMICS, telemetry_per_s=st.sampled_from([0.0, 3e-4, 8e-4]))
+def test_tight_resources_and_the_eclipse_are_exact(
+    seed: int, dynamics: Dynamics, telemetry_per_s: float
+) -> None:
+    """Little energy, a filling recorder, contacts that overlap tasks, some of it in shadow."""
+    resources = replace(
+        TIGHT, initial_battery_fraction=0.55, telemetry_per_s=telemetry_per_s, eclipse_aware=True,
+        sunpoint_charge_per_s=1 / 900, initial_recorder_fraction=0.3,
+    )  # fmt: skip
+    sunlight = Sunlight(enter_s=np.array([0.0, 610.0]), exit_s=np.array([205.0, 830.0]))
+    problem = random_problem(
+        seed, dynamics=dynamics, resources=resources, num_contacts=4, num_collects=7,
+        num_stations=2, sunlight=sunlight,
+    )  # fmt: skip
+    if best_reward(problem) == 0.0:
+        return
+    assert_equals_brute_force(problem, "antichain")
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    seed=SEEDS,
+    use_resources=st.booleans(),
+    has_rewards=st.booleans(),
+    formulation=FORMULATIONS,
+    max_turn_deg=st.sampled_from([0.0, 25.0]),
+)
+def test_a_satellite_that_turns_more_slowly_than_it_tracks_is_exact(
+    seed: int, use_resources: bool, has_rewards: bool, formulation: str, max_turn_deg: float
+) -> None:
+    problem = random_problem(
+        seed, use_resources=use_resources, has_rewards=has_rewards, agility=SLOW,
+        max_turn_deg=max_turn_deg, num_targets=4, num_contacts=1,
+    )  # fmt: skip
+    assert_equals_brute_force(problem, formulation)
+
+
+def test_a_target_already_collected_may_be_the_way_to_another() -> None:
+    """From t0 to t1 there is only t0 again, which turns the satellite on the way."""
+    tasks = [
+        Task(kind=COLLECT, place=0, start_s=0.0, end_s=30.0),
+        Task(kind=COLLECT, place=0, start_s=40.0, end_s=70.0, turn_deg=50.0),
+        Task(kind=COLLECT, place=1, start_s=75.0, end_s=105.0, angle_deg=50.0),
+        Task(kind=COLLECT, place=2, start_s=0.5, end_s=31.0, angle_deg=3.0),
+    ]
+    problem = make_problem(tasks, num_targets=3, use_resources=False, agility=SLOW)
+    satellite = problem.satellites[0]
+    assert transitive_closure(problem, satellite) is not satellite.transitions
+    solution = Milp().solve(problem, Budget(), 0)
+    assert replay(problem, solution.plan).reward == best_reward(problem) == 2.0
+
+
+def test_two_satellites_share_a_station_up_to_its_antennas() -> None:
+    """Both must empty their recorders over the one station at the same time."""
+    tasks = []
+    for satellite in (0, 1):
+        tasks += [
+            Task(kind=CONTACT, place=0, satellite=satellite, start_s=300.0, end_s=400.0),
+            *(
+                Task(kind=COLLECT, place=3 * satellite + i, satellite=satellite,
+                     start_s=start_s, end_s=start_s + 30.0)
+                for i, start_s in enumerate((100.0, 200.0, 600.0))
+            ),
+        ]  # fmt: skip
+    for antennas, best in ((1, 5.0), (2, 6.0)):
+        problem = make_problem(tasks, num_targets=6, num_satellites=2, antennas=antennas)
+        assert best_reward(problem) == best
+        assert_equals_brute_force(problem, "antichain")
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=SEEDS, dynamics=DYNAMICS, use_resources=st.booleans())
+def test_however_early_it_stops_the_plan_is_valid_and_the_bound_true(
+    seed: int, dynamics: Dynamics, use_resources: bool
+) -> None:
+    problem = random_problem(seed, dynamics=dynamics, use_resources=use_resources)
+    best = best_reward(problem)
+    for time_s in (0.0, 0.002, 0.01):
+        solution = Milp().solve(problem, Budget(time_s), 0)
+        assert replay(problem, solution.plan).is_valid
+        assert solution.bound is None or solution.bound >= best - 1e-9
+        assert solution.termination in (Termination.OPTIMAL, Termination.TIME_LIMIT)
+        if solution.termination is Termination.OPTIMAL:
+            assert replay(problem, solution.plan).reward == pytest.approx(best)
+
+
+def test_a_plan_that_touches_a_limit_is_not_taken() -> None:
+    """Two images fill the recorder to its limit exactly: the bound may count both, no plan may."""
+    resources = replace(
+        TIGHT, initial_recorder_fraction=0.0, collect_fill_per_s=0.25 / 30, telemetry_per_s=0.0,
+        recorder_max_fraction=0.5, initial_battery_fraction=1.0,
+    )  # fmt: skip
+    tasks = [
+        Task(kind=COLLECT, place=i, start_s=100.0 * i, end_s=100.0 * i + 30.0) for i in range(3)
+    ]
+    problem = make_problem(tasks, num_targets=3, resources=resources)
+    solution = Milp().solve(problem, Budget(), 0)
+    timeline = replay(problem, solution.plan)
+    assert timeline.is_valid
+    assert timeline.reward == best_reward(problem) == 1.0
+    assert solution.bound == 2.0
+    assert solution.termination is Termination.HORIZON_COMPLETE
+
+
+def test_where_nothing_keeps_the_limits_nothing_is_claimed() -> None:
+    resources = replace(TIGHT, initial_recorder_fraction=0.49, telemetry_per_s=1e-3)
+    problem = random_problem(3, resources=resources, num_contacts=0)
+    solution = Milp().solve(problem, Budget(), 0)
+    assert solution.bound is None
+    assert solution.termination is Termination.HORIZON_COMPLETE
+
+
+def crowded(seed: int) -> Problem:
+    return random_problem(
+        seed, num_collects=1500, num_targets=500, num_contacts=40, num_satellites=4,
+        has_rewards=True, resources=replace(TIGHT, collect_drain_per_s=1 / 900),
+    )  # fmt: skip
+
+
+def test_cancelling_ends_the_search_at_once() -> None:
+    budget = Budget()
+    Milp().solve(crowded(0), Budget(0.0), 0)
+    cancelled_s = 0.0
+
+    def cancel() -> None:
+        nonlocal cancelled_s
+        time.sleep(1.0)
+        cancelled_s = time.monotonic()
+        budget.cancel()
+
+    problem = crowded(1)
+    thread = threading.Thread(target=cancel)
+    thread.start()
+    solution = Milp().solve(problem, budget, 0)
+    ended_s = time.monotonic()
+    thread.join()
+    assert solution.termination is Termination.CANCELLED
+    assert ended_s - cancelled_s < 1.0
+    assert replay(problem, solution.plan).is_valid
+
+
+def test_incumbents_and_bounds_are_reported_while_it_searches() -> None:
+    reports: list[Progress] = []
+    budget = Budget(2.0, reports.append)
+    solution = Milp().solve(crowded(1), budget, 0)
+    live = [r for r in reports if r.reward is not None and r.bound is not None]
+    assert live
+    assert all(r.reward is None or r.bound is None or r.reward <= r.bound + 1e-4 for r in live)
+    assert solution.bound is not None
+    assert solution.termination is Termination.TIME_LIMIT
+
+
+def test_a_wanted_gap_is_enough() -> None:
+    problem = random_problem(5, num_collects=60, num_targets=30, use_resources=False)
+    solution = Milp(gap=0.9).solve(problem, Budget(), 0)
+    reward = replay(problem, solution.plan).reward
+    assert solution.bound is not None
+    assert solution.bound - reward <= 0.9 * solution.bound
+    assert solution.termination in (Termination.GAP_REACHED, Termination.OPTIMAL)
+
+
+def test_a_solve_leaves_no_thread_behind() -> None:
+    """Workers fork from a process that has planned with every solver."""
+    before = len(os.listdir("/proc/self/task"))
+    Milp().solve(crowded(2), Budget(1.0), 0)
+    assert len(os.listdir("/proc/self/task")) == before
