@@ -66,7 +66,7 @@ def write_points(path: Path, points: dict[bool, list[Point]]) -> None:
 
 def draw_figure(path: Path, bars: Sequence[Bar], title: str) -> None:
     """Draw reward, runtime and reward per second; the line over each bar is the bound."""
-    figure = Figure(figsize=(11.0, 3.6), layout="constrained")
+    figure = Figure(figsize=(11.0, 3.9), layout="constrained")
     left, middle, right = figure.subplots(1, 3)
     _panel(left, bars, [bar.reward for bar in bars], "reward")
     for i, bar in enumerate(bars):
@@ -88,7 +88,8 @@ def draw_figure(path: Path, bars: Sequence[Bar], title: str) -> None:
 
 def _panel(axes: Axes, bars: Sequence[Bar], heights: Sequence[float], label: str) -> None:
     axes.bar(range(len(bars)), heights, color=[_COLOURS[bar.kind] for bar in bars])
-    axes.set_xticks(range(len(bars)), [bar.name.replace("_", "\n") for bar in bars])
+    names = [bar.solver.replace("_", " ") for bar in bars]
+    axes.set_xticks(range(len(bars)), names, rotation=40, ha="right", rotation_mode="anchor")
     axes.tick_params(labelsize=7)
     axes.set_title(label, fontsize=9)
     axes.spines[["top", "right"]].set_visible(False)

@@ -9,6 +9,7 @@ import time
 from dataclasses import dataclass
 
 from benchmarks.missions import problem_of
+from benchmarks.paper.energy import energy_bound
 from benchmarks.paper.readings import Reading
 from benchmarks.paper.settings import make_solver
 from planner_core.bounds import lagrangian_bound
@@ -55,7 +56,7 @@ class Outcome:
     violations, repeats
         Rules broken; images of targets that had one already.
     bound
-        The best bound proven on any plan of this problem, by this run or by prices.
+        The best bound proven on any plan of this problem: by this run, prices or energy.
     seconds
         The solver alone.
     """
@@ -100,13 +101,13 @@ def _judged(task: Task, problem: Problem, solution: Solution, seconds: float) ->
     rows = [action.opportunity for action in solution.plan.actions]
     images = {int(table.place[row]) for row in rows if table.kind[row] == COLLECT}
     repeats = sum(violation.code == "duplicate" for violation in timeline.violations)
-    proven = _price_bound(task.reading, task.use_resources, task.num_targets, task.draw)
+    proven = _quick_bound(task.reading, task.use_resources, task.num_targets, task.draw)
     return Outcome(
         reward=timeline.reward,
         images=len(images),
         violations=len(timeline.violations) - repeats,
         repeats=repeats,
-        bound=min(proven, solution.statistics.get("bound", proven)),
+        bound=proven if solution.bound is None else min(proven, solution.bound),
         seconds=seconds,
         termination=str(solution.termination),
     )
@@ -118,9 +119,9 @@ def _problem(reading: Reading, use_resources: bool, num_targets: int, draw: int)
 
 
 @functools.lru_cache(maxsize=256)
-def _price_bound(reading: Reading, use_resources: bool, num_targets: int, draw: int) -> float:
+def _quick_bound(reading: Reading, use_resources: bool, num_targets: int, draw: int) -> float:
     problem = _problem(reading, use_resources, num_targets, draw)
-    return lagrangian_bound(problem, 0.0).value
+    return min(lagrangian_bound(problem, 0.0).value, energy_bound(problem))
 
 
 @functools.lru_cache(maxsize=4096)

@@ -97,7 +97,7 @@ def _family(study: Study, done: Done, folder: Path, *, res: bool) -> str:
 
 def _bar_row(bar: Bar) -> list[str]:
     return [
-        bar.name,
+        bar.solver.replace("_", " "),
         KINDS[bar.kind],
         str(bar.draws),
         f"{bar.reward:.1f} ({bar.reward_min:.0f} to {bar.reward_max:.0f})",
@@ -128,7 +128,7 @@ def _grids(study: Study, done: Done, folder: Path) -> str:
         parts += [
             f"### {title}",
             f"Measured points of {len(grid)}: {counts}. Rewards are means over a point's runs; "
-            "(images) where rules are broken.",
+            "images in brackets where rules are broken.",
             _table(
                 ["resources", "N_a", "paper: setting", "reward", "here, same setting",
                  "our best setting", "reward"],
@@ -202,8 +202,11 @@ def _method(study: Study) -> str:
 - Figures and grids use the reading "{BASE.name}": off-nadir angles in degrees; telemetry and
   downlink rates of the text; a task books its resources at once.
 - Seconds are the solver's alone: compiled, with the problem built, median of three where quick.
-- Exact solvers stop after {study.exact_limit_s:.0f} s; the bound is the best that any of them, or a
-  price on each target, proves. "Bound reached" counts draws where a valid plan attains it.
+- Exact solvers stop after {study.exact_limit_s:.0f} s; the bound is the best that any of them, a
+  price on each target, or the energy of the battery proves. "Bound reached" counts draws where a
+  valid plan attains it.
+- MILP starts from the plans of the rule, graph and forward search, in the pairwise form too.
 - The grids are tuned on draw 0 with the paper's settings (soft limits, Table 2); gamma in
-  {", ".join(f"{g:g}" for g in gammas)}.
+  {", ".join(f"{g:g}" for g in gammas)}. Of the MCTS points, those that lead
+  for their N_a after one run get all their runs first; the best is chosen among points with equally many runs.
 - Numbers behind each plot and grid lie beside the plots as CSV."""

@@ -51,9 +51,8 @@ MCTS_TUNED: Final[Mapping[bool, Params]] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Setting:
-    """A solver with parameters, under a name; parameters left out keep their defaults."""
+    """A solver with parameters; those left out keep their defaults."""
 
-    name: str
     kind: Kind
     solver: str
     params: Params
@@ -80,24 +79,25 @@ def as_text(params: Params) -> str:
 def settings(*, use_resources: bool) -> tuple[Setting, ...]:
     """Return every setting of one problem family, in the order of the figures.
 
-    Graph search (and the integer programme) knew no resources in the paper.
+    Graph search and integer programming knew no resources in the paper.
     """
     rule = {"unimaged_only": False, "contact_above_fraction": 0.0, "feasibility": "penalty"}
     mcts = {**PAPER_MCTS, **MCTS_TUNED[use_resources]}
-    found = [Setting(name="rule", kind="paper", solver="rule", params=rule)]
+    found = [Setting(kind="paper", solver="rule", params=rule)]
     if not use_resources:
         listing = {"path": "longest", "feasibility": "penalty"}
-        found.append(Setting(name="graph", kind="paper", solver="graph", params=listing))
+        found.append(Setting(kind="paper", solver="graph", params=listing))
+        found.append(Setting(kind="paper", solver="milp", params={"formulation": "pairwise"}))
     found += [
-        Setting(name="forward", kind="paper", solver="forward_search", params=PAPER_FORWARD),
-        Setting(name="mcts", kind="paper", solver="mcts", params=mcts),
+        Setting(kind="paper", solver="forward_search", params=PAPER_FORWARD),
+        Setting(kind="paper", solver="mcts", params=mcts),
     ]
     if use_resources:
         found += [_hardened(setting) for setting in found]
-    found += [Setting(name=name, kind="ours", solver=name, params={}) for name in SOLVERS]
+    found += [Setting(kind="ours", solver=name, params={}) for name in SOLVERS]
     return tuple(found)
 
 
 def _hardened(setting: Setting) -> Setting:
     params = {**setting.params, "feasibility": "hard"}
-    return Setting(name=setting.name, kind="paper_hard", solver=setting.solver, params=params)
+    return Setting(kind="paper_hard", solver=setting.solver, params=params)

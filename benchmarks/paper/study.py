@@ -57,7 +57,7 @@ class Study:
     mcts_runs: int = MCTS_RUNS
     readings_without: tuple[Reading, ...] = readings(use_resources=False)
     readings_with: tuple[Reading, ...] = readings(use_resources=True)
-    exact_limit_s: float = 60.0
+    exact_limit_s: float = 40.0
 
     def figure_task(self, setting: Setting, num_targets: int, draw: int, *, res: bool) -> Task:
         """Return the run behind one dot of a figure."""
@@ -197,7 +197,7 @@ def quick() -> Study:
         for point in mcts_grid()
         if point["gamma"] != 0.999
         and point["depth"] in (10, 20)
-        and point["exploration"] in (1.0, 3.0)
+        and point["exploration"] == 3.0
         and point["num_simulations"] in (50, 200)
     ]
     return Study(
@@ -205,8 +205,8 @@ def quick() -> Study:
         forward_points=tuple(forward),
         mcts_points=tuple(mcts),
         mcts_runs=1,
-        readings_with=(Reading(look_deg=(5.0, 45.0)), BASE),
-        exact_limit_s=10.0,
+        readings_with=(BASE,),
+        exact_limit_s=5.0,
     )
 
 

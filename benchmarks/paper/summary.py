@@ -22,7 +22,7 @@ class Bar:
         The best bound proven by any method; in how many draws some valid plan reaches it.
     """
 
-    name: str
+    solver: str
     kind: Kind
     draws: int
     reward: float
@@ -61,7 +61,7 @@ def bars(study: Study, done: Done, num_targets: int, *, res: bool) -> list[Bar]:
         rewards = [o.reward for o in outcomes]
         found.append(
             Bar(
-                name=setting.name,
+                solver=setting.solver,
                 kind=setting.kind,
                 draws=len(pairs),
                 reward=statistics.fmean(rewards),
@@ -152,6 +152,9 @@ def outcome_rows(study: Study, done: Done, solver: str) -> list[OutcomeRow]:
         ours = [p for p in grid if p["breadth"] == row.breadth]
         same = points(study, done, solver, [row_params(row)], res=res)
         ranked = points(study, done, solver, ours, res=res)
+        # A single lucky run is no match for a mean over many.
+        most_runs = max((point.runs for point in ranked), default=0)
+        ranked = [point for point in ranked if point.runs == most_runs]
         found.append(
             OutcomeRow(
                 published=row,

@@ -7,16 +7,21 @@ import time
 from pathlib import Path
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from benchmarks.paper.claims import claims
+from benchmarks.paper.energy import energy_bound
 from benchmarks.paper.measure import Outcome, Task, run_task
 from benchmarks.paper.published import TABLE_6, TABLE_7, forward_grid, mcts_grid
 from benchmarks.paper.readings import BASE, Reading
-from benchmarks.paper.settings import settings
+from benchmarks.paper.settings import settings as named_settings
 from benchmarks.paper.store import Store
 from benchmarks.paper.study import Study, quick
 from benchmarks.paper.summary import left_out, row_params
 from planner_core.solvers import SOLVERS
+from tests.planner_core.brute_force import best_reward
+from tests.planner_core.problems import random_problem
 
 TINY = Study(
     targets=(20, 30),
@@ -48,9 +53,9 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Store:
 
 @pytest.mark.parametrize("use_resources", [False, True])
 def test_every_setting_makes_a_solver_and_every_solver_has_one(use_resources: bool) -> None:
-    found = settings(use_resources=use_resources)
+    found = named_settings(use_resources=use_resources)
     assert {setting.make().name for setting in found} == set(SOLVERS)
-    assert len({(setting.name, setting.kind) for setting in found}) == len(found)
+    assert len({(setting.solver, setting.kind) for setting in found}) == len(found)
 
 
 def test_the_grids_have_the_papers_points_and_its_best_rows_lie_on_them() -> None:
@@ -124,6 +129,18 @@ def page(finished: Store, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_report(TINY, finished.done, docs, took_min=1.0, command="make paper")
 
 
+@settings(max_examples=60, deadline=None)
+@given(seed=st.integers(0, 10**6), is_physical=st.booleans(), num_satellites=st.integers(1, 2))
+def test_no_plan_beats_the_energy(seed: int, is_physical: bool, num_satellites: int) -> None:
+    problem = random_problem(
+        seed,
+        use_resources=True,
+        dynamics="physical" if is_physical else "paper",
+        num_satellites=num_satellites,
+    )
+    assert energy_bound(problem) >= best_reward(problem)
+
+
 def test_the_page_shows_every_figure_and_table(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     pictures = sorted(path.name for path in page.parent.glob("paper/*.png"))
@@ -139,6 +156,6 @@ def test_each_figure_has_its_numbers_with_a_bound_beside_every_bar(page: Path) -
     for path in page.parent.glob("paper/*-resources-*.csv"):
         with path.open(encoding="utf-8") as file:
             lines = list(csv.DictReader(file))
-        solvers = {(line["name"], line["kind"]) for line in lines}
-        assert {("rule", "paper"), ("forward", "paper"), ("mcts", "paper")} <= solvers
+        solvers = {(line["solver"], line["kind"]) for line in lines}
+        assert {("rule", "paper"), ("forward_search", "paper"), ("mcts", "paper")} <= solvers
         assert all(float(line["bound"]) >= float(line["reward"]) > 0.0 for line in lines)
