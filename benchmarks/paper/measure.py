@@ -18,7 +18,7 @@ from planner_core.solvers.base import Budget, Solution, Solver, Termination
 from planner_core.timeline import replay
 
 _TIMED_RUNS = 3
-_REPEAT_WITHIN_S = 0.5  # quicker runs are repeated, and the median time is kept
+_REPEAT_WITHIN_S = 0.1  # quicker runs are repeated, and the median time is kept
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -208,5 +208,6 @@ def _method(study: Study) -> str:
 - MILP starts from the plans of the rule, graph and forward search, in the pairwise form too.
 - The grids are tuned on draw 0 with the paper's settings (soft limits, Table 2); gamma in
   {", ".join(f"{g:g}" for g in gammas)}. Of the MCTS points, those that lead
-  for their N_a after one run get all their runs first; the best is chosen among points with equally many runs.
+  for their N_a after one run get all their runs first; the best is chosen
+  among points with equally many runs.
 - Numbers behind each plot and grid lie beside the plots as CSV."""
