@@ -14,7 +14,7 @@ from benchmarks.paper.claims import claims
 from benchmarks.paper.energy import energy_bound
 from benchmarks.paper.measure import Outcome, Task, run_task
 from benchmarks.paper.published import TABLE_6, TABLE_7, forward_grid, mcts_grid
-from benchmarks.paper.readings import BASE, Reading
+from benchmarks.paper.readings import BASE
 from benchmarks.paper.settings import settings as named_settings
 from benchmarks.paper.store import Store
 from benchmarks.paper.study import Study, quick
@@ -31,7 +31,7 @@ TINY = Study(
     mcts_points=tuple(mcts_grid()[:1]),
     mcts_runs=2,
     readings_without=(BASE,),
-    readings_with=(BASE, Reading(look_deg=(5.0, 45.0))),
+    readings_with=(BASE,),
     exact_limit_s=2.0,
 )
 
@@ -129,7 +129,7 @@ def page(finished: Store, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_report(TINY, finished.done, docs, took_min=1.0, command="make paper")
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(seed=st.integers(0, 10**6), is_physical=st.booleans(), num_satellites=st.integers(1, 2))
 def test_no_plan_beats_the_energy(seed: int, is_physical: bool, num_satellites: int) -> None:
     problem = random_problem(
