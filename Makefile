@@ -8,7 +8,7 @@ WARM := .venv/.warm
 KERNELS := $(shell grep -rlE '^@(kernel|inlined)' planner_core --include=*.py)
 PIP := $(BIN)/python -m pip -qq --disable-pip-version-check
 
-.PHONY: help setup demo serve test check format lock clean
+.PHONY: help setup demo serve test check format lock paper paper-quick clean
 
 help:
 	@echo "make demo     plan a real-size mission through the service's own API, and end"
@@ -18,6 +18,8 @@ help:
 	@echo "make setup    the environment in .venv (the others call it)"
 	@echo "make format   rewrite the sources in the one layout"
 	@echo "make lock     resolve the dependencies again into requirements.lock (needs uv)"
+	@echo "make paper    the paper's study again, within two hours; writes docs/paper-reproduction.md"
+	@echo "make paper-quick  the same in five minutes, into build/paper-quick"
 	@echo "make clean    remove all that these commands made"
 
 setup: $(WARM)
@@ -61,8 +63,15 @@ format: setup
 	$(BIN)/ruff format .
 
 lock:
-	$(UV) pip compile pyproject.toml --extra dev --universal --python-version 3.11 \
+	$(UV) pip compile pyproject.toml --extra dev --extra study --universal --python-version 3.11 \
 		--generate-hashes --no-emit-index-url -o requirements.lock
+
+# Both go on where they were stopped.
+paper: setup
+	@$(BIN)/python -m benchmarks.paper
+
+paper-quick: setup
+	@$(BIN)/python -m benchmarks.paper --quick
 
 clean:
 	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

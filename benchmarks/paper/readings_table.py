@@ -1,0 +1,123 @@
+"""The paper's best settings under every reading, and which comes nearest to its numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from benchmarks.paper.measure import Outcome
+from benchmarks.paper.readings import Reading
+from benchmarks.paper.study import MCTS_VARIANTS, Done, Study, best_forward, best_mcts
+
+FORWARD = "forward search"
+RULE = "rule"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadRow:
+    """One reading of the mission: what each method gets there, by name of the method."""
+
+    reading: Reading
+    outcomes: Mapping[str, Outcome]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Joint:
+    """One reading for both families and both searches.
+
+    Attributes
+    ----------
+    images, published
+        Forward search and MCTS without resources, then with.
+    """
+
+    reading: Reading
+    variant: str
+    images: tuple[int, ...]
+    published: tuple[float, ...]
+
+    @property
+    def worst(self) -> float:
+        """Return the greatest error of the four, as a share of the paper's number."""
+        pairs = zip(self.images, self.published, strict=True)
+        return max(abs(images / published - 1.0) for images, published in pairs)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Nearest:
+    """The reading that brings a method nearest to the paper, and how many images it takes.
+
+    Attributes
+    ----------
+    tried
+        Of how many readings; among many, one comes near by chance.
+    """
+
+    tried: int
+    published: float
+    reading: Reading
+    method: str
+    images: int
+
+    @property
+    def error(self) -> float:
+        """Return how far off it is, as a share of the paper's number."""
+        return self.images / self.published - 1.0
+
+
+def columns() -> list[str]:
+    """Return the methods of the table in order."""
+    return [RULE, FORWARD, *(f"MCTS, {name}" for name in MCTS_VARIANTS)]
+
+
+def read_rows(study: Study, done: Done, *, res: bool) -> list[ReadRow]:
+    """Return what was measured under each reading of one family."""
+    found = []
+    for reading in study.of_family(res=res):
+        tasks = {
+            RULE: study.rule_task(reading, res=res),
+            FORWARD: study.reading_task(best_forward(res), reading),
+        }
+        for name in MCTS_VARIANTS:
+            tasks[f"MCTS, {name}"] = study.reading_task(best_mcts(res), reading, name)
+        outcomes = {name: done[task] for name, task in tasks.items() if task in done}
+        if outcomes:
+            found.append(ReadRow(reading=reading, outcomes=outcomes))
+    return found
+
+
+def nearest(study: Study, done: Done, *, is_mcts: bool, res: bool) -> Nearest | None:
+    """Return the reading nearest to the paper's best row; the paper counts every image."""
+    published = (best_mcts(res) if is_mcts else best_forward(res)).reward
+    measured = [
+        (row.reading, name, outcome.images)
+        for row in read_rows(study, done, res=res)
+        for name, outcome in row.outcomes.items()
+        if (name.startswith("MCTS") if is_mcts else name == FORWARD)
+    ]
+    found = [
+        Nearest(
+            tried=len(measured), published=published, reading=reading, method=name, images=images
+        )
+        for reading, name, images in measured
+    ]
+    return min(found, key=lambda near: abs(near.error), default=None)
+
+
+def joint(study: Study, done: Done) -> Joint | None:
+    """Return the one reading under which the worst of the paper's four numbers is nearest."""
+    without = {row.reading.look_deg: row.outcomes for row in read_rows(study, done, res=False)}
+    published = tuple(
+        row.reward for res in (False, True) for row in (best_forward(res), best_mcts(res))
+    )
+    found = []
+    for row in read_rows(study, done, res=True):
+        for variant in MCTS_VARIANTS:
+            names = (FORWARD, f"MCTS, {variant}")
+            both = (without.get(row.reading.look_deg, {}), row.outcomes)
+            if all(name in outcomes for outcomes in both for name in names):
+                images = tuple(outcomes[name].images for outcomes in both for name in names)
+                found.append(
+                    Joint(reading=row.reading, variant=variant, images=images, published=published)
+                )
+    return min(found, key=lambda one: one.worst, default=None)

@@ -1,0 +1,189 @@
+"""From finished runs to the numbers of the figures and tables."""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from benchmarks.paper.measure import Outcome, Task
+from benchmarks.paper.published import TABLE_6, TABLE_7, ForwardRow, MctsRow
+from benchmarks.paper.settings import PAPER_MCTS, PAPER_SEARCH, Kind, Params, settings
+from benchmarks.paper.study import Done, Study
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bar:
+    """One method in one figure: means over the draws, with the least and greatest reward.
+
+    Attributes
+    ----------
+    bound, proven
+        The best bound proven by any method; in how many draws some valid plan reaches it.
+    """
+
+    solver: str
+    kind: Kind
+    draws: int
+    reward: float
+    reward_min: float
+    reward_max: float
+    images: float
+    violations: float
+    repeats: float
+    seconds: float
+    reward_per_s: float
+    bound: float
+    proven: int
+
+    @property
+    def share(self) -> float:
+        """Return the reward as a share of the bound."""
+        return self.reward / self.bound if self.bound else 1.0
+
+
+def bars(study: Study, done: Done, num_targets: int, *, res: bool) -> list[Bar]:
+    """Return the bars of one figure; methods without a finished run are left out."""
+    limits = [_limit(study, done, num_targets, draw, res=res) for draw in range(study.draws)]
+    found = []
+    for setting in settings(use_resources=res):
+        tasks = [
+            study.figure_task(setting, num_targets, draw, res=res) for draw in range(study.draws)
+        ]
+        pairs = [
+            (done[task], limit)
+            for task, limit in zip(tasks, limits, strict=True)
+            if task in done and limit
+        ]
+        if not pairs:
+            continue
+        outcomes = [outcome for outcome, _ in pairs]
+        rewards = [o.reward for o in outcomes]
+        found.append(
+            Bar(
+                solver=setting.solver,
+                kind=setting.kind,
+                draws=len(pairs),
+                reward=statistics.fmean(rewards),
+                reward_min=min(rewards),
+                reward_max=max(rewards),
+                images=statistics.fmean(o.images for o in outcomes),
+                violations=statistics.fmean(o.violations for o in outcomes),
+                repeats=statistics.fmean(o.repeats for o in outcomes),
+                seconds=statistics.fmean(o.seconds for o in outcomes),
+                reward_per_s=statistics.fmean(o.reward / o.seconds for o in outcomes),
+                bound=statistics.fmean(limit[0] for _, limit in pairs),
+                proven=sum(limit[1] for _, limit in pairs),
+            )
+        )
+    return found
+
+
+def _limit(
+    study: Study, done: Done, num_targets: int, draw: int, *, res: bool
+) -> tuple[float, bool] | None:
+    """Return the best bound of one problem, and whether a valid plan reaches it."""
+    tasks = (
+        study.figure_task(setting, num_targets, draw, res=res)
+        for setting in settings(use_resources=res)
+    )
+    outcomes = [done[task] for task in tasks if task in done]
+    if not outcomes:
+        return None
+    bound = min(o.bound for o in outcomes)
+    best = max((o.reward for o in outcomes if not o.violations), default=0.0)
+    # Every reward is 1, so a bound below the next whole number is reached already.
+    return bound, best > bound - 1.0 + 1e-6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Point:
+    """A grid point: the mean over its finished runs."""
+
+    params: Params
+    runs: int
+    reward: float
+    images: float
+    violations: float
+    seconds: float
+
+
+def points(
+    study: Study, done: Done, solver: str, chosen: Sequence[Params], *, res: bool
+) -> list[Point]:
+    """Return the measured points among ``chosen``, best first."""
+    found = []
+    for params in chosen:
+        runs = study.mcts_runs if solver == "mcts" else 1
+        tasks = [study.grid_task(solver, params, res=res, seed=run) for run in range(runs)]
+        outcomes = [done[task] for task in tasks if task in done]
+        if outcomes:
+            found.append(_point(params, outcomes))
+    return sorted(found, key=lambda point: -point.reward)
+
+
+def _point(params: Params, outcomes: Sequence[Outcome]) -> Point:
+    return Point(
+        params=params,
+        runs=len(outcomes),
+        reward=statistics.fmean(o.reward for o in outcomes),
+        images=statistics.fmean(o.images for o in outcomes),
+        violations=statistics.fmean(o.violations for o in outcomes),
+        seconds=statistics.fmean(o.seconds for o in outcomes),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OutcomeRow:
+    """A row of Table 6 or 7 beside ours: at the paper's point, and at our best one."""
+
+    published: ForwardRow | MctsRow
+    same: Point | None
+    best: Point | None
+
+
+def outcome_rows(study: Study, done: Done, solver: str) -> list[OutcomeRow]:
+    """Return Table 6 (forward search) or 7 (MCTS) with what was measured."""
+    table: Sequence[ForwardRow | MctsRow] = TABLE_7 if solver == "mcts" else TABLE_6
+    grid = study.mcts_points if solver == "mcts" else study.forward_points
+    found = []
+    for row in table:
+        res = row.use_resources
+        ours = [p for p in grid if p["breadth"] == row.breadth]
+        same = points(study, done, solver, [row_params(row)], res=res)
+        ranked = points(study, done, solver, ours, res=res)
+        # A single lucky run is no match for a mean over many.
+        most_runs = max((point.runs for point in ranked), default=0)
+        ranked = [point for point in ranked if point.runs == most_runs]
+        found.append(
+            OutcomeRow(
+                published=row,
+                same=same[0] if same else None,
+                best=ranked[0] if ranked else None,
+            )
+        )
+    return found
+
+
+def row_params(row: ForwardRow | MctsRow) -> Params:
+    """Return a row's parameters with all that it leaves unsaid, as a grid point has them."""
+    return {**(PAPER_MCTS if isinstance(row, MctsRow) else PAPER_SEARCH), **row.tuned}
+
+
+def left_out(study: Study, done: Done) -> list[tuple[str, int, int]]:
+    """Return each part of the study that is unfinished: its name, runs done, runs planned."""
+    return [
+        (name, sum(task in done for task in tasks), len(tasks))
+        for name, tasks in _parts(study).items()
+        if not all(task in done for task in tasks)
+    ]
+
+
+def _parts(study: Study) -> dict[str, list[Task]]:
+    return {
+        "figures": study.figures(exact=False) + study.figures(exact=True),
+        "forward search grid (Table 4)": study.forward(slow=False) + study.forward(slow=True),
+        "MCTS grid (Table 5), first run of each point": study.mcts(range(1)),
+        "MCTS grid (Table 5), further runs": study.mcts(range(1, study.mcts_runs)),
+        "readings": study.read(slow=False) + study.read(slow=True),
+    }

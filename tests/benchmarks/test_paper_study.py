@@ -1,0 +1,161 @@
+"""The paper's study runs each thing once and writes all that it promises."""
+
+from __future__ import annotations
+
+import csv
+import time
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from benchmarks.paper.claims import claims
+from benchmarks.paper.energy import energy_bound
+from benchmarks.paper.measure import Outcome, Task, run_task
+from benchmarks.paper.published import TABLE_6, TABLE_7, forward_grid, mcts_grid
+from benchmarks.paper.readings import BASE
+from benchmarks.paper.settings import settings as named_settings
+from benchmarks.paper.store import Store
+from benchmarks.paper.study import Study, quick
+from benchmarks.paper.summary import left_out, row_params
+from planner_core.solvers import SOLVERS
+from tests.planner_core.brute_force import best_reward
+from tests.planner_core.problems import random_problem
+
+TINY = Study(
+    targets=(20, 30),
+    draws=1,
+    grid_targets=30,
+    forward_points=tuple(forward_grid()[:2]),
+    mcts_points=tuple(mcts_grid()[:1]),
+    mcts_runs=2,
+    readings_without=(BASE,),
+    readings_with=(BASE,),
+    exact_limit_s=2.0,
+)
+
+
+def far() -> float:
+    return time.time() + 300.0
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Store:
+    store = Store(tmp_path_factory.mktemp("study") / "runs.csv")
+    for _, choose in TINY.phases():
+        for task in store.missing(choose(store.done)):
+            outcome = run_task(task, far())
+            assert outcome is not None
+            store.add(task, outcome)
+    return store
+
+
+@pytest.mark.parametrize("use_resources", [False, True])
+def test_every_setting_makes_a_solver_and_every_solver_has_one(use_resources: bool) -> None:
+    found = named_settings(use_resources=use_resources)
+    assert {setting.make().name for setting in found} == set(SOLVERS)
+    assert len({(setting.solver, setting.kind) for setting in found}) == len(found)
+
+
+def test_the_grids_have_the_papers_points_and_its_best_rows_lie_on_them() -> None:
+    assert (len(forward_grid()), len(mcts_grid())) == (54, 720)
+    assert all(row_params(row) in forward_grid() for row in TABLE_6)
+    assert all(row_params(row) in mcts_grid() for row in TABLE_7)
+
+
+def test_the_whole_study_has_all_runs_and_the_quick_one_a_part() -> None:
+    full, small = Study().all_tasks(), quick().all_tasks()
+    grid = {task for task in full if task.solver == "mcts" and task.reading == BASE}
+    assert len(grid) >= 2 * 720 * 10
+    assert len(small) < len(full) / 50
+
+
+def test_finished_runs_are_read_back_and_not_run_again(finished: Store, tmp_path: Path) -> None:
+    path = tmp_path / "runs.csv"
+    store = Store(path)
+    tasks = list(finished.done)
+    for task in tasks[:3]:
+        store.add(task, finished.done[task])
+    again = Store(path)
+    assert again.done == {task: finished.done[task] for task in tasks[:3]}
+    assert again.missing(tasks) == tasks[3:]
+
+
+def test_a_line_that_was_cut_off_counts_as_not_run(finished: Store, tmp_path: Path) -> None:
+    path = tmp_path / "runs.csv"
+    store = Store(path)
+    first, second = list(finished.done)[:2]
+    store.add(first, finished.done[first])
+    store.add(second, finished.done[second])
+    path.write_text(path.read_text(encoding="utf-8")[:-9], encoding="utf-8")
+    again = Store(path)
+    assert list(again.done) == [first]
+    again.add(second, finished.done[second])
+    assert list(Store(path).done) == [first, second]
+
+
+def test_a_run_that_the_time_cuts_off_leaves_nothing() -> None:
+    task = TINY.mcts(range(1))[0]
+    assert run_task(task, time.time() - 1.0) is None
+
+
+def test_outcomes_keep_the_bound_and_hard_limits(finished: Store) -> None:
+    for task, outcome in finished.done.items():
+        assert outcome.reward <= outcome.bound
+        assert outcome.reward <= outcome.images
+        if '"penalty"' not in task.params:
+            assert outcome.violations == 0
+
+
+def test_what_is_unfinished_is_said(finished: Store) -> None:
+    assert left_out(TINY, finished.done) == []
+    part = without_grid(finished.done)
+    names = [name for name, done, total in left_out(TINY, part) if done < total]
+    assert "MCTS grid (Table 5), further runs" in names
+    assert {claim.verdict for claim in claims(TINY, {})} == {"not measured"}
+
+
+def without_grid(done: dict[Task, Outcome]) -> dict[Task, Outcome]:
+    return {task: outcome for task, outcome in done.items() if task.seed == 0}
+
+
+@pytest.fixture(scope="module")
+def page(finished: Store, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    pytest.importorskip("matplotlib")
+    from benchmarks.paper.report import write_report
+
+    docs = tmp_path_factory.mktemp("docs")
+    return write_report(TINY, finished.done, docs, took_min=1.0, command="make paper")
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=st.integers(0, 10**6), is_physical=st.booleans(), num_satellites=st.integers(1, 2))
+def test_no_plan_beats_the_energy(seed: int, is_physical: bool, num_satellites: int) -> None:
+    problem = random_problem(
+        seed,
+        use_resources=True,
+        dynamics="physical" if is_physical else "paper",
+        num_satellites=num_satellites,
+    )
+    assert energy_bound(problem) >= best_reward(problem)
+
+
+def test_the_page_shows_every_figure_and_table(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    pictures = sorted(path.name for path in page.parent.glob("paper/*.png"))
+    assert pictures == [
+        f"{family}-resources-{size}.png" for family in ("with", "without") for size in (20, 30)
+    ]
+    assert all(f"paper/{name}" in text for name in pictures)
+    for part in ("Table 6", "Table 7", "does not reproduce", "Every run of the plan was made"):
+        assert part in text
+
+
+def test_each_figure_has_its_numbers_with_a_bound_beside_every_bar(page: Path) -> None:
+    for path in page.parent.glob("paper/*-resources-*.csv"):
+        with path.open(encoding="utf-8") as file:
+            lines = list(csv.DictReader(file))
+        solvers = {(line["solver"], line["kind"]) for line in lines}
+        assert {("rule", "paper"), ("forward_search", "paper"), ("mcts", "paper")} <= solvers
+        assert all(float(line["bound"]) >= float(line["reward"]) > 0.0 for line in lines)
