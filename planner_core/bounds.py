@@ -31,13 +31,17 @@ class Bound:
     Attributes
     ----------
     prices
-        What proves a Lagrangian bound (``lagrangian_value`` checks them), one per target;
-        None for other proofs. Shape ``(num_targets,)``.
+        What proves a Lagrangian bound (``lagrangian_value`` checks them) or one by dynamic
+        programmes (``resource_bound.resource_value``), one per target; None for other proofs.
+        Shape ``(num_targets,)``.
+    unit
+        In what the dynamic programmes count worth.
     """
 
     value: float
     proof: Proof
     prices: Floats | None = None
+    unit: float | None = None
 
 
 def lagrangian_value(problem: Problem, prices: Floats) -> tuple[float, Ints]:

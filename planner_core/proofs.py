@@ -9,6 +9,7 @@ import numpy as np
 
 from planner_core.bounds import Bound, Proof, lagrangian_value
 from planner_core.problem import Problem
+from planner_core.resource_bound import resource_value
 
 VERSION = 1
 
@@ -18,6 +19,8 @@ def to_json(bound: Bound) -> str:
     document: dict[str, Any] = {"version": VERSION, "proof": bound.proof, "value": bound.value}
     if bound.prices is not None:
         document["prices"] = bound.prices.tolist()
+    if bound.unit is not None:
+        document["unit"] = bound.unit
     return json.dumps(document)
 
 
@@ -29,6 +32,7 @@ def from_json(text: str) -> Bound:
         value=float(document["value"]),
         proof=cast(Proof, document["proof"]),
         prices=None if prices is None else np.array(prices, dtype=np.float64),
+        unit=document.get("unit"),
     )
 
 
@@ -40,5 +44,7 @@ def recomputed(problem: Problem, bound: Bound) -> float | None:
     """
     if bound.prices is None:
         return None
+    if bound.unit is not None:
+        return resource_value(problem, bound.prices, bound.unit)
     value, _ = lagrangian_value(problem, bound.prices)
     return value

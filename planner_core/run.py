@@ -11,6 +11,7 @@ from planner_core.build import ScenarioOpportunities, build_problem, compute_opp
 from planner_core.domain import Scenario
 from planner_core.problem import Problem
 from planner_core.reasons import TargetOutcome, explain
+from planner_core.resource_bound import quick_bound
 from planner_core.solvers.base import Budget, Progress, Solution, Solver
 from planner_core.timeline import Timeline, replay
 
@@ -116,6 +117,9 @@ def _best_bound(
         proven = own if proven is None or own.value < proven.value else proven
     if proven is not None and (known is not None or proven.value <= reward):
         return proven
-    # Someone who cancels wants the answer now: the prices of a spent budget stay rough.
-    quick = lagrangian_bound(problem, reward, 0 if budget.is_cancelled else None)
+    if budget.is_cancelled:
+        # Someone who cancels wants the answer now: prices stay rough.
+        quick = lagrangian_bound(problem, reward, 0)
+    else:
+        quick = quick_bound(problem, reward)
     return proven if proven is not None and proven.value < quick.value else quick
