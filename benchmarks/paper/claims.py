@@ -82,7 +82,7 @@ def claims(study: Study, done: Done) -> list[Claim]:
             },
         ),
         _order(
-            f"Without resources {where}, runtime in seconds: MCTS and MILP > forward search",
+            f"Without resources {where}, runtime in CPU seconds: MCTS and MILP > forward search",
             {
                 "the quicker of MCTS and MILP": _quicker_of_both(without),
                 "forward search": _seconds(without, "forward_search"),

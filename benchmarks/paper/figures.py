@@ -74,9 +74,9 @@ def draw_figure(path: Path, bars: Sequence[Bar], title: str) -> None:
         left.errorbar(i, bar.reward, yerr=spread, color="black", capsize=3, linewidth=1)
         left.hlines(bar.bound, i - 0.45, i + 0.45, color="#b03a2e", linewidth=1.5)
         left.text(i, 0, f"{bar.reward:.0f}", ha="center", va="bottom", fontsize=7, color="white")
-    _panel(middle, bars, [bar.seconds for bar in bars], "runtime, s")
+    _panel(middle, bars, [bar.seconds for bar in bars], "runtime, CPU s")
     middle.set_yscale("log")
-    _panel(right, bars, [bar.reward_per_s for bar in bars], "reward per second")
+    _panel(right, bars, [bar.reward_per_s for bar in bars], "reward per CPU second")
     right.set_yscale("log")
     kinds = [kind for kind in KINDS if any(bar.kind == kind for bar in bars)]
     handles = [Patch(color=_COLOURS[kind], label=KINDS[kind]) for kind in kinds]

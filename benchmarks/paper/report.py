@@ -88,7 +88,7 @@ def _family(study: Study, done: Done, folder: Path, *, res: bool) -> str:
             f"![{title}]({FOLDER}/{name}.png)",
             _table(
                 ["method", "setting", "draws", "reward", "images", "broken rules", "repeats",
-                 "seconds", "reward/s", "bound", "share", "bound reached"],
+                 "CPU s", "reward/CPU s", "bound", "share", "bound reached"],
                 [_bar_row(bar) for bar in found],
             ),
         ]  # fmt: skip
@@ -201,7 +201,8 @@ def _method(study: Study) -> str:
   seed k. The paper's own samples are not published.
 - Figures and grids use the reading "{BASE.name}": off-nadir angles in degrees; telemetry and
   downlink rates of the text; a task books its resources at once.
-- Seconds are the solver's alone: compiled, with the problem built, median of three where quick.
+- Seconds are CPU seconds of the solving process (`time.process_time`), so that other load hardly
+  counts; the solver's alone: compiled, with the problem built, median of three where quick.
 - Exact solvers stop after {study.exact_limit_s:.0f} s; the bound is the best that any of them, a
   price on each target, or the energy of the battery proves. "Bound reached" counts draws where a
   valid plan attains it.

@@ -95,6 +95,18 @@ def test_a_line_that_was_cut_off_counts_as_not_run(finished: Store, tmp_path: Pa
     assert list(Store(path).done) == [first, second]
 
 
+def test_a_file_of_other_columns_is_begun_anew(finished: Store, tmp_path: Path) -> None:
+    path = tmp_path / "runs.csv"
+    task = next(iter(finished.done))
+    Store(path).add(task, finished.done[task])
+    path.write_text(path.read_text(encoding="utf-8").replace("cost_s", "cost"), encoding="utf-8")
+    assert Store(path).done == {}
+
+
+def test_a_run_counts_all_its_cpu_time(finished: Store) -> None:
+    assert all(0.0 < o.seconds <= o.cost_s for o in finished.done.values())
+
+
 def test_a_run_that_the_time_cuts_off_leaves_nothing() -> None:
     task = TINY.mcts(range(1))[0]
     assert run_task(task, time.time() - 1.0) is None
