@@ -16,7 +16,7 @@ from benchmarks.paper.readings import BASE
 from benchmarks.paper.readings_table import columns, read_rows
 from benchmarks.paper.settings import KINDS, Params
 from benchmarks.paper.study import Done, Study, best_forward, best_mcts
-from benchmarks.paper.summary import Bar, OutcomeRow, Point, bars, left_out, outcome_rows, points
+from benchmarks.paper.summary import Bar, OutcomeRow, Point, bars, outcome_rows, parts, points
 
 PAGE: Final = "paper-reproduction.md"
 FOLDER: Final = "paper"
@@ -34,6 +34,7 @@ def write_report(study: Study, done: Done, docs: Path, *, took_min: float, comma
         _grids(study, done, folder),
         _readings(study, done),
         _method(study),
+        _cost(study, done),
     ]
     page = docs / PAGE
     page.write_text("\n\n".join(sections) + "\n", encoding="utf-8")
@@ -46,9 +47,9 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def _opening(study: Study, done: Done, took_min: float, command: str) -> str:
-    unfinished = left_out(study, done)
+    unfinished = [part for part in parts(study, done) if not part.is_whole]
     if unfinished:
-        told = "; ".join(f"{name}: {n} of {total} runs" for name, n, total in unfinished)
+        told = "; ".join(f"{p.name}: {p.planned - p.runs} of {p.planned} runs" for p in unfinished)
         state = f"**Left out for lack of time**: {told}. The same command goes on from there."
     else:
         state = "Every run of the plan was made."
@@ -203,8 +204,8 @@ def _method(study: Study) -> str:
   downlink rates of the text; a task books its resources at once.
 - Seconds are CPU seconds of the solving process (`time.process_time`), so that other load hardly
   counts; the solver's alone: compiled, with the problem built, median of three where quick.
-- Exact solvers stop after {study.exact_limit_s:.0f} s; the bound is the best that any of them, a
-  price on each target, or the energy of the battery proves. "Bound reached" counts draws where a
+- Exact solvers stop after {study.exact_limit_s:.0f} CPU seconds. The bound is the best that any
+  run on the same problem, a price on each target, or the energy of the battery proves. "Bound reached" counts draws where a
   valid plan attains it.
 - MILP starts from the plans of the rule, graph and forward search, in the pairwise form too.
 - The grids are tuned on draw 0 with the paper's settings (soft limits, Table 2); gamma in
@@ -212,3 +213,19 @@ def _method(study: Study) -> str:
   for their N_a after one run get all their runs first; the best is chosen
   among points with equally many runs.
 - Numbers behind each plot and grid lie beside the plots as CSV."""
+
+
+def _cost(study: Study, done: Done) -> str:
+    made = parts(study, done)
+    rows = [
+        [part.name, f"{part.runs} of {part.planned}", f"{part.cost_s / 60.0:.1f}"] for part in made
+    ]
+    rows.append([
+        "together",
+        f"{sum(part.runs for part in made)} of {sum(part.planned for part in made)}",
+        f"{sum(part.cost_s for part in made) / 60.0:.1f}",
+    ])  # fmt: skip
+    return (
+        "## What it cost\n\nCPU time of all processes, with building the problems, repeats for "
+        "timing and the bounds.\n\n" + _table(["part", "runs", "CPU minutes"], rows)
+    )

@@ -18,7 +18,7 @@ from benchmarks.paper.readings import BASE
 from benchmarks.paper.settings import settings as named_settings
 from benchmarks.paper.store import Store
 from benchmarks.paper.study import Study, quick
-from benchmarks.paper.summary import left_out, row_params
+from benchmarks.paper.summary import parts, row_params
 from planner_core.solvers import SOLVERS
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import random_problem
@@ -121,11 +121,18 @@ def test_outcomes_keep_the_bound_and_hard_limits(finished: Store) -> None:
 
 
 def test_what_is_unfinished_is_said(finished: Store) -> None:
-    assert left_out(TINY, finished.done) == []
-    part = without_grid(finished.done)
-    names = [name for name, done, total in left_out(TINY, part) if done < total]
-    assert "MCTS grid (Table 5), further runs" in names
+    assert all(part.is_whole for part in parts(TINY, finished.done))
+    unfinished = parts(TINY, without_grid(finished.done))
+    assert [p.name for p in unfinished if not p.is_whole] == ["MCTS grid, further runs"]
     assert {claim.verdict for claim in claims(TINY, {})} == {"not measured"}
+
+
+def test_the_parts_hold_every_run_once(finished: Store) -> None:
+    made = parts(TINY, finished.done)
+    assert sum(part.runs for part in made) == len(finished.done)
+    assert sum(part.cost_s for part in made) == pytest.approx(
+        sum(outcome.cost_s for outcome in finished.done.values())
+    )
 
 
 def without_grid(done: dict[Task, Outcome]) -> dict[Task, Outcome]:
