@@ -103,9 +103,9 @@ def _rewards(axes: Axes, bars: Sequence[Bar]) -> list[Artist]:
         )  # fmt: skip
     broken = [(x, b.images) for x, b in zip(_centres(bars), bars, strict=True) if b.violations]
     if broken:
-        style = {"marker": "o", "markerfacecolor": "white", "color": "black", "linestyle": "none"}
+        xs, images = zip(*broken, strict=True)
         label = "images, broken rules forgiven"
-        shown += axes.plot(*zip(*broken, strict=True), markersize=4, label=label, **style)
+        shown += axes.plot(xs, images, "o", color="black", mfc="white", ms=4, label=label)
     return shown
 
 

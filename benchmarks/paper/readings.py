@@ -40,6 +40,10 @@ class Reading:
         rates = "paper" if self.rates == "paper" else "code"
         return f"look {low:g}-{high:g}, {rates} rates, {self.dynamics} dynamics"
 
+    def covers(self, other: Reading, *, res: bool) -> bool:
+        """Return whether a family is the same under both: only angles matter without resources."""
+        return self == other or (not res and self.look_deg == other.look_deg)
+
     def scenario(self, num_targets: int, draw: int, *, use_resources: bool) -> Scenario:
         """Return one draw of the mission, read like this."""
         scenario = paper_scenario(
