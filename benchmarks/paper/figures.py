@@ -23,7 +23,7 @@ _COLOURS: Final[dict[Kind, str]] = {
     "paper_hard": "#e69f00",
     "ours": "#0072b2",
 }
-_LABELS: Final = {"milp": "MILP", "mcts": "MCTS"}
+_ACRONYMS: Final = ("milp", "mcts")
 _DPI: Final = 80
 _GROUP: Final = 0.84  # of the width for a method; the rest parts it from the next
 
@@ -35,6 +35,15 @@ def figure_name(num_targets: int, *, res: bool) -> str:
     'with-resources-200'
     """
     return f"{'with' if res else 'without'}-resources-{num_targets}"
+
+
+def method_name(solver: str) -> str:
+    """Return what a method is called on the page.
+
+    >>> method_name("forward_search"), method_name("milp")
+    ('forward search', 'MILP')
+    """
+    return solver.upper() if solver in _ACRONYMS else solver.replace("_", " ")
 
 
 def write_csv(path: Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
@@ -91,12 +100,14 @@ def _rewards(axes: Axes, bars: Sequence[Bar]) -> list[Artist]:
     """Draw the first panel with the bound across it; return what the legend tells of it."""
     _panel(axes, bars, [bar.reward for bar in bars], "reward")
     whole = max(bars, key=lambda bar: bar.draws)
+    axes.set_ylim(0.0, 1.06 * whole.bound)
     is_optimum = whole.proven == whole.draws
     label = f"{'optimum, proven' if is_optimum else 'proven bound'}: {whole.bound:.1f}"
     shown: list[Artist] = [axes.axhline(whole.bound, color="black", linestyle="--", label=label)]
     for x, bar in zip(_centres(bars), bars, strict=True):
         spread = [[bar.reward - bar.reward_min], [bar.reward_max - bar.reward]]
-        axes.errorbar(x, bar.reward, yerr=spread, color="black", capsize=2, linewidth=1)
+        if bar.draws > 1:
+            axes.errorbar(x, bar.reward, yerr=spread, color="black", capsize=2, linewidth=1)
         axes.text(
             x, 0.02 * whole.bound, f"{bar.reward:.0f}", ha="center", va="bottom", fontsize=8,
             rotation=90, color="white" if bar.kind == "ours" else "black",
@@ -128,7 +139,7 @@ def _panel(axes: Axes, bars: Sequence[Bar], heights: Sequence[float], label: str
     colours = [_COLOURS[bar.kind] for bar in bars]
     axes.bar(_centres(bars), heights, width=0.94 * _width(bars), color=colours)
     methods = list(dict.fromkeys(bar.solver for bar in bars))
-    names = [_LABELS.get(name, name.replace("_", "\n")) for name in methods]
+    names = [method_name(name).replace(" ", "\n") for name in methods]
     axes.set_xticks(range(len(methods)), names)
     axes.tick_params(labelsize=9)
     axes.set_title(label, fontsize=10)

@@ -219,7 +219,7 @@ def quick() -> Study:
         mcts_points=tuple(mcts),
         mcts_runs=1,
         readings_with=(BASE,),
-        exact_limit_s=5.0,
+        exact_limit_s=3.0,
     )
 
 
