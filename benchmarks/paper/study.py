@@ -8,7 +8,7 @@ import random
 import statistics
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final
 
 from benchmarks.paper.measure import Outcome, Task
 from benchmarks.paper.published import (
@@ -34,7 +34,6 @@ from benchmarks.paper.settings import (
 from planner_core.solvers import SOLVERS
 
 Done = Mapping[Task, Outcome]
-Pace = Literal["quick", "slow", "slowest"]
 
 MCTS_VARIANTS: Final[Mapping[str, Params]] = {
     "Algorithm 2 with the reward in q": {},
@@ -45,9 +44,7 @@ MCTS_VARIANTS: Final[Mapping[str, Params]] = {
 """Readings of the algorithm, on top of those of the mission."""
 
 _BEST_POINTS: Final = 5
-# Forward search where resources count, by leaves of one decision: above the first a run takes
-# 20 s and more, above the second many minutes.
-_SLOW_LEAVES, _SLOWEST_LEAVES = 10_000, 100_000
+_SLOW_LEAVES: Final = 10_000  # of one decision; such searches take far longer than all others
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,14 +98,14 @@ class Study:
             seed=seed,
         )
 
-    def forward(self, pace: Pace) -> list[Task]:
-        """Return the runs of Table 4's grid in both families that take about as long."""
+    def forward(self, *, slow: bool) -> list[Task]:
+        """Return the runs of Table 4's grid in both families, the slow ones apart."""
         return [
             self.grid_task("forward_search", point, res=res)
             for point, res in itertools.product(
                 sorted(self.forward_points, key=_leaves), (False, True)
             )
-            if _pace(point, res=res) == pace
+            if _is_slow_point(point, res=res) == slow
         ]
 
     def mcts(self, runs: range) -> list[Task]:
@@ -176,15 +173,14 @@ class Study:
     def phases(self) -> Iterator[tuple[str, Callable[[Done], Sequence[Task]]]]:
         """Yield what to do in turn; a phase may depend on what came before."""
         yield "figures", lambda _: self.figures(exact=False)
-        yield "forward search grid", lambda _: self.forward("quick")
+        yield "forward search grid", lambda _: self.forward(slow=False)
         yield "figures, exact solvers", lambda _: self.figures(exact=True)
         yield "readings", lambda _: self.read(slow=False)
         yield "MCTS grid, first runs", lambda _: self.mcts(range(1))
         yield "readings, slow ones", lambda _: self.read(slow=True)
         yield "MCTS grid, leading points", self.best_so_far
-        yield "forward search grid, slow points", lambda _: self.forward("slow")
+        yield "forward search grid, slow points", lambda _: self.forward(slow=True)
         yield "MCTS grid, further runs", lambda _: self.mcts(range(1, self.mcts_runs))
-        yield "forward search grid, slowest points", lambda _: self.forward("slowest")
 
     def all_tasks(self) -> list[Task]:
         """Return everything once, as if time did not matter."""
@@ -231,15 +227,13 @@ def _leaves(point: Params) -> int:
     return int((point["breadth"] + 1) ** point["depth"])
 
 
-def _pace(point: Params, *, res: bool) -> Pace:
-    if not res or _leaves(point) <= _SLOW_LEAVES:
-        return "quick"
-    return "slow" if _leaves(point) <= _SLOWEST_LEAVES else "slowest"
+def _is_slow_point(point: Params, *, res: bool) -> bool:
+    return res and _leaves(point) > _SLOW_LEAVES
 
 
 def _is_slow(task: Task) -> bool:
     """Whether a reading takes a minute: a deep search, or MCTS that wanders."""
     params = json.loads(task.params)
     if task.solver == "forward_search":
-        return _pace(params, res=task.use_resources) != "quick"
+        return _is_slow_point(params, res=task.use_resources)
     return task.use_resources and params.get("returns") == "literal"

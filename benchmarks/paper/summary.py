@@ -199,9 +199,8 @@ def parts(study: Study, done: Done) -> list[Part]:
     named = {
         "figures, quick solvers": study.figures(exact=False),
         "figures, exact solvers": study.figures(exact=True),
-        "forward search grid (Table 4)": study.forward("quick"),
-        "forward search grid, depth 7 with resources": study.forward("slow"),
-        "forward search grid, depth 7 and N_a = 5 with resources": study.forward("slowest"),
+        "forward search grid (Table 4)": study.forward(slow=False),
+        "forward search grid, depth 7 with resources": study.forward(slow=True),
         "MCTS grid (Table 5), first run of each point": study.mcts(range(1)),
         "MCTS grid, further runs": study.mcts(range(1, study.mcts_runs)),
         "readings": study.read(slow=False) + study.read(slow=True),
