@@ -7,7 +7,7 @@ import json
 import random
 import statistics
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from benchmarks.paper.measure import Outcome, Task
@@ -214,7 +214,7 @@ def quick() -> Study:
         forward_points=tuple(forward),
         mcts_points=tuple(mcts),
         mcts_runs=1,
-        readings_with=(BASE,),
+        readings_with=(BASE, replace(BASE, look_deg=(0.0, 50.0))),
         exact_limit_s=3.0,
     )
 
