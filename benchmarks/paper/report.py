@@ -264,12 +264,12 @@ def _method(study: Study) -> str:
 def _cost(study: Study, done: Done) -> str:
     made = parts(study, done)
     rows = [
-        [part.name, f"{part.runs} of {part.planned}", f"{part.cost_s / 60.0:.1f}"] for part in made
+        [part.name, f"{part.runs} of {part.planned}", f"{part.cost_s / 60.0:.2f}"] for part in made
     ]
     rows.append([
         "together",
         f"{sum(part.runs for part in made)} of {sum(part.planned for part in made)}",
-        f"{sum(part.cost_s for part in made) / 60.0:.1f}",
+        f"{sum(part.cost_s for part in made) / 60.0:.2f}",
     ])  # fmt: skip
     return (
         "## What it cost\n\nCPU time of all processes, with building the problems, repeats for "
