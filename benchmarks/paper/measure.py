@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import functools
 import json
+import math
 import statistics
 import time
 from dataclasses import dataclass
 
 from benchmarks.missions import problem_of
+from benchmarks.paper.cpu_budget import CpuBudget
 from benchmarks.paper.energy import energy_bound
 from benchmarks.paper.readings import Reading
 from benchmarks.paper.settings import make_solver
@@ -30,7 +32,7 @@ class Task:
     params
         The solver's parameters as ``settings.as_text`` writes them.
     limit_s
-        Seconds that an exact solver may take, 0 for no limit.
+        CPU seconds that an exact solver may take, 0 for no limit.
     """
 
     reading: Reading
@@ -58,7 +60,9 @@ class Outcome:
     bound
         The best bound proven on any plan of this problem: by this run, prices or energy.
     seconds
-        The solver alone.
+        CPU time of the solving process in the solver alone: other load hardly counts.
+    cost_s
+        CPU time of the whole run: compilation, building the problem, repeats and judging too.
     """
 
     reward: float
@@ -67,35 +71,38 @@ class Outcome:
     repeats: int
     bound: float
     seconds: float
+    cost_s: float
     termination: str
 
 
 def run_task(task: Task, deadline: float) -> Outcome | None:
     """Return the outcome, or None where the study's time (``time.time``) ended first."""
-    left_s = deadline - time.time()
-    if left_s <= 0.0:
+    if time.time() >= deadline:
         return None
+    began_s = time.process_time()
     problem = _problem(task.reading, task.use_resources, task.num_targets, task.draw)
     solver = make_solver(task.solver, json.loads(task.params))
     _warm(task.solver, task.params, task.use_resources)
-    limit_s = min(task.limit_s, left_s) if task.limit_s else left_s
-    solution, seconds = _timed(solver, problem, task.seed, limit_s)
-    if solution.termination is Termination.TIME_LIMIT and limit_s != task.limit_s:
+    solution, seconds = _timed(solver, problem, task, deadline)
+    if solution.termination is Termination.TIME_LIMIT and time.time() >= deadline:
         return None
-    return _judged(task, problem, solution, seconds)
+    return _judged(task, problem, solution, seconds, began_s)
 
 
-def _timed(solver: Solver, problem: Problem, seed: int, limit_s: float) -> tuple[Solution, float]:
+def _timed(solver: Solver, problem: Problem, task: Task, deadline: float) -> tuple[Solution, float]:
+    limit_s = task.limit_s or math.inf
     taken: list[float] = []
     while True:
-        began = time.perf_counter()
-        solution = solver.solve(problem, Budget(limit_s), seed)
-        taken.append(time.perf_counter() - began)
+        began_s = time.process_time()
+        solution = solver.solve(problem, CpuBudget(limit_s, deadline), task.seed)
+        taken.append(time.process_time() - began_s)
         if len(taken) == _TIMED_RUNS or sum(taken) > _REPEAT_WITHIN_S:
             return solution, statistics.median(taken)
 
 
-def _judged(task: Task, problem: Problem, solution: Solution, seconds: float) -> Outcome:
+def _judged(
+    task: Task, problem: Problem, solution: Solution, seconds: float, began_s: float
+) -> Outcome:
     timeline = replay(problem, solution.plan)
     table = problem.opportunities
     rows = [action.opportunity for action in solution.plan.actions]
@@ -109,6 +116,7 @@ def _judged(task: Task, problem: Problem, solution: Solution, seconds: float) ->
         repeats=repeats,
         bound=proven if solution.bound is None else min(proven, solution.bound),
         seconds=seconds,
+        cost_s=time.process_time() - began_s,
         termination=str(solution.termination),
     )
 
