@@ -30,7 +30,7 @@ from typing import Final, NamedTuple, TypedDict
 
 import numpy as np
 
-from planner_core.jit import inlined, kernel
+from planner_core.jit import borrowing, inlined
 from planner_core.problem import (
     CONTACT,
     Bytes,
@@ -201,7 +201,7 @@ def take(
     return max(0.0, battery), min(1.0, recorder), is_within
 
 
-@kernel
+@borrowing
 def is_safe(track: Track, last: int, cursor: int, battery: float, recorder: float) -> bool:
     """Return whether limits can be kept to the end from here by idling and contacts alone.
 
@@ -232,7 +232,7 @@ def is_safe(track: Track, last: int, cursor: int, battery: float, recorder: floa
     return False
 
 
-@kernel
+@borrowing
 def _fill_fallbacks(track: Track) -> None:
     """Work backward over the contacts: what each must leave so that the rest can be kept."""
     for at in range(len(track.contacts) - 1, -1, -1):

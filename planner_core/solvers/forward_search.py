@@ -11,7 +11,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from planner_core.jit import kernel
+from planner_core.jit import borrowing
 from planner_core.model import (
     NO_TASK,
     WAIT,
@@ -53,7 +53,7 @@ def select_action(model: Model, state: State, depth: int, breadth: int) -> tuple
     return best, v_best
 
 
-@kernel
+@borrowing
 def _select_action(
     track: Track,
     guidance: Guidance,

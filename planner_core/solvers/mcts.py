@@ -13,7 +13,7 @@ from typing import ClassVar, Final, Literal, NamedTuple
 import numpy as np
 
 from planner_core.draws import Uint64s, draws_of, next_draw
-from planner_core.jit import kernel
+from planner_core.jit import borrowing, kernel
 from planner_core.model import (
     NO_TASK,
     WAIT,
@@ -77,7 +77,7 @@ class Rules(NamedTuple):
     is_max_backup: bool
 
 
-@kernel
+@borrowing
 def _new_node(tree: Tree, cursor: int, last: int, battery: float, recorder: float) -> int:
     node = int(tree.used[0])
     tree.used[0] += 1
@@ -90,7 +90,7 @@ def _new_node(tree: Tree, cursor: int, last: int, battery: float, recorder: floa
     return node
 
 
-@kernel
+@borrowing
 def _expand(tree: Tree, track: Track, rules: Rules, collected: Bytes, node: int) -> None:
     """Lines 5-8: enter A(s) with N = Q = 0. Its first task stands first, ``WAIT`` last."""
     m = len(track.start_s)
@@ -113,7 +113,7 @@ def _expand(tree: Tree, track: Track, rules: Rules, collected: Bytes, node: int)
         _new_edge(tree, node, WAIT)
 
 
-@kernel
+@borrowing
 def _new_edge(tree: Tree, node: int, action: int) -> None:
     edge = tree.used[1]
     tree.used[1] += 1
@@ -124,7 +124,7 @@ def _new_edge(tree: Tree, node: int, action: int) -> None:
     tree.value[edge] = 0.0
 
 
-@kernel
+@borrowing
 def _choose(tree: Tree, node: int, exploration: float) -> int:
     """Line 11: the edge of greatest upper confidence; one that was never tried comes first."""
     first = int(tree.first_edge[node])
@@ -142,7 +142,7 @@ def _choose(tree: Tree, node: int, exploration: float) -> int:
     return best
 
 
-@kernel
+@borrowing
 def _rollout_action(
     track: Track,
     rules: Rules,
@@ -180,7 +180,7 @@ def _rollout_action(
     return actions[int(next_draw(random) * count)], actions[0]
 
 
-@kernel
+@borrowing
 def _simulate(
     tree: Tree,
     track: Track,
@@ -265,11 +265,11 @@ def _simulate(
         returned = q
     if d > 0 and returned > best[0]:
         best[0] = returned
-        best_actions[:] = m
-        best_actions[:d] = path.action[:d]
+        for i in range(depth):
+            best_actions[i] = path.action[i] if i < d else m
 
 
-@kernel
+@borrowing
 def _search(
     tree: Tree,
     track: Track,

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from planner_core.jit import kernel
+from planner_core.jit import borrowing, kernel
 from planner_core.model import NO_TASK, Track, is_safe, next_action, take
 from planner_core.problem import Bytes, Ints
 
@@ -20,7 +20,7 @@ paper's mission keeps most images."""
 NOTHING_TAKEN: Final[Ints] = np.empty(0, dtype=np.int32)
 
 
-@kernel
+@borrowing
 def naive_select_action(
     track: Track,
     collected: Bytes,
