@@ -62,4 +62,4 @@ def borrowing(function: F) -> F:
 
 def inlined(function: F) -> F:
     """Compile a small step of a hot loop into its callers; it makes no arrays either."""
-    return cast(F, numba.njit(cache=True, nogil=True, inline="always", _nrt=False)(function))
+    return cast(F, numba.njit(cache=True, nogil=True, inline="always")(function))
