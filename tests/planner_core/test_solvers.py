@@ -124,6 +124,8 @@ def test_forward_search_at_full_depth_and_breadth_equals_brute_force(
     unimaged_only=st.booleans(),
     depth=st.integers(1, 4),
     breadth=st.integers(1, 3),
+    discount=st.sampled_from(["action", "next_action"]),
+    num_offers=st.integers(1, 3),
 )
 def test_the_compiled_forward_search_plans_what_the_listing_plans(
     seed: int,
@@ -133,11 +135,16 @@ def test_the_compiled_forward_search_plans_what_the_listing_plans(
     unimaged_only: bool,
     depth: int,
     breadth: int,
+    discount: Any,
+    num_offers: int,
 ) -> None:
-    problem = problems(seed, dynamics, use_resources, num_collects=14, num_contacts=4)
-    solver = ForwardSearch(
-        depth=depth, breadth=breadth, feasibility=feasibility, unimaged_only=unimaged_only
+    problem = problems(
+        seed, dynamics, use_resources, num_collects=14, num_contacts=4, num_offers=num_offers
     )
+    solver = ForwardSearch(
+        depth=depth, breadth=breadth, feasibility=feasibility, unimaged_only=unimaged_only,
+        gamma=0.99, discount=discount,
+    )  # fmt: skip
     satellite = problem.satellites[0]
     model = Model(
         track=compile_track(problem, satellite, (satellite.rows * 0).astype("uint8")),
@@ -148,7 +155,7 @@ def test_the_compiled_forward_search_plans_what_the_listing_plans(
     )
     state = model.initial_state()
     rows = []
-    while (action := select_action(model, state, depth, breadth)[0]) != NOTHING:
+    while (action := select_action(model, state, depth, breadth, discount)[0]) != NOTHING:
         state = model.step(state, action, model.actions(state, breadth)[0]).state
         if action != WAIT:
             rows.append(int(satellite.rows[action]))
