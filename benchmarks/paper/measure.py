@@ -11,11 +11,10 @@ from dataclasses import dataclass
 
 from benchmarks.missions import problem_of
 from benchmarks.paper.cpu_budget import CpuBudget
-from benchmarks.paper.energy import energy_bound
 from benchmarks.paper.readings import Reading
 from benchmarks.paper.settings import make_solver
-from planner_core.bounds import lagrangian_bound
 from planner_core.problem import COLLECT, Problem
+from planner_core.resource_bound import quick_bound
 from planner_core.solvers.base import Budget, Solution, Solver, Termination
 from planner_core.timeline import replay
 
@@ -58,7 +57,7 @@ class Outcome:
     violations, repeats
         Rules broken; images of targets that had one already.
     bound
-        The best bound proven on any plan of this problem: by this run, prices or energy.
+        The best bound proven on any plan of this problem: by this run or at once.
     seconds
         CPU time of the solving process in the solver alone: other load hardly counts.
     cost_s
@@ -129,7 +128,7 @@ def _problem(reading: Reading, use_resources: bool, num_targets: int, draw: int)
 @functools.lru_cache(maxsize=256)
 def _quick_bound(reading: Reading, use_resources: bool, num_targets: int, draw: int) -> float:
     problem = _problem(reading, use_resources, num_targets, draw)
-    return min(lagrangian_bound(problem, 0.0).value, energy_bound(problem))
+    return quick_bound(problem, 0.0).value
 
 
 @functools.lru_cache(maxsize=4096)

@@ -251,8 +251,8 @@ def _method(study: Study) -> str:
 - Seconds are CPU seconds of the solving process (`time.process_time`), so that other load hardly
   counts; the solver's alone: compiled, with the problem built, median of three where quick.
 - Exact solvers stop after {study.exact_limit_s:.0f} CPU seconds. The bound is the best that any
-  run on the same problem, a price on each target, or the energy of the battery proves. "Bound
-  reached" counts draws where a valid plan attains it.
+  run on the same problem proves, or the quick bound of every timeline. "Bound reached"
+  counts draws where a valid plan attains it.
 - MILP starts from the plans of the rule, graph and forward search, in the pairwise form too.
 - The grids are tuned on draw 0 with the paper's settings (soft limits, Table 2); gamma in
   {", ".join(f"{g:g}" for g in gammas)}. Of the MCTS points, those that lead

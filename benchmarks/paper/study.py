@@ -40,6 +40,7 @@ MCTS_VARIANTS: Final[Mapping[str, Params]] = {
     "Algorithm 2 as printed": {"returns": "literal"},
     "discount per decision": {"discount": "per_decision"},
     "hard limits": {"feasibility": "hard"},
+    "r <= 0 becomes sun-pointing": {"worthless": "sunpoint"},
 }
 """Readings of the algorithm, on top of those of the mission."""
 

@@ -11,12 +11,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from benchmarks.paper.claims import claims
 from benchmarks.paper.cpu_budget import CpuBudget
-from benchmarks.paper.energy import energy_bound
 from benchmarks.paper.measure import Outcome, Task, run_task
 from benchmarks.paper.published import TABLE_6, TABLE_7, forward_grid, mcts_grid
 from benchmarks.paper.readings import BASE, Reading
@@ -26,8 +23,6 @@ from benchmarks.paper.store import Store
 from benchmarks.paper.study import Study, best_forward, quick
 from benchmarks.paper.summary import parts, row_params
 from planner_core.solvers import SOLVERS
-from tests.planner_core.brute_force import best_reward
-from tests.planner_core.problems import random_problem
 
 FLAT = Reading(look_deg=(0.0, 50.0))
 TINY = Study(
@@ -200,18 +195,6 @@ def page(finished: Store, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
     docs = tmp_path_factory.mktemp("docs")
     return write_report(TINY, finished.done, docs, took_min=1.0, command="make paper")
-
-
-@settings(max_examples=20, deadline=None)
-@given(seed=st.integers(0, 10**6), is_physical=st.booleans(), num_satellites=st.integers(1, 2))
-def test_no_plan_beats_the_energy(seed: int, is_physical: bool, num_satellites: int) -> None:
-    problem = random_problem(
-        seed,
-        use_resources=True,
-        dynamics="physical" if is_physical else "paper",
-        num_satellites=num_satellites,
-    )
-    assert energy_bound(problem) >= best_reward(problem)
 
 
 def test_the_page_shows_every_figure_and_table(page: Path) -> None:
