@@ -69,9 +69,9 @@ def has_room(tree: Tree, breadth: int) -> bool:
 
     The root of this step and of the next always find room for A(s) and where it leads.
     """
-    return tree.used[0] + breadth + 3 <= len(tree.cursor) and tree.used[1] + 2 * (
-        breadth + 2
-    ) <= len(tree.action)
+    nodes_left = len(tree.cursor) - int(tree.used[0])
+    actions_left = len(tree.action) - int(tree.used[1])
+    return nodes_left >= breadth + 3 and actions_left >= 2 * (breadth + 2)
 
 
 @borrowing
