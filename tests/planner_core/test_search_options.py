@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -119,6 +120,24 @@ def test_the_codes_discount_reaches_to_the_next_action() -> None:
     paper = ForwardSearch(depth=2, breadth=3, gamma=0.9)
     assert rows_of(problem, paper) == [0, 2]
     assert rows_of(problem, replace(paper, discount="next_action")) == [1]
+
+
+@pytest.mark.parametrize("worthless", ["take", "sunpoint"])
+def test_a_tree_that_is_full_goes_on_by_rollouts(
+    monkeypatch: pytest.MonkeyPatch, worthless: Any
+) -> None:
+    solver = Mcts(num_simulations=200, depth=10, breadth=4, worthless=worthless)
+    earned = {10_000_000: 0.0, 100: 0.0, 1: 0.0}
+    for most in earned:
+        monkeypatch.setattr("planner_core.solvers.mcts.solver.MAX_ACTIONS", most)
+        for seed in range(10):
+            problem = random_problem(
+                seed, num_collects=40, num_targets=30, num_contacts=6, use_resources=seed % 2 == 0
+            )
+            timeline = replay(problem, solver.solve(problem, Budget(), 0).plan)
+            assert timeline.is_valid
+            earned[most] += timeline.reward
+    assert earned[1] > 0.8 * earned[10_000_000]
 
 
 def test_the_code_sunpoints_rather_than_image_a_target_again() -> None:

@@ -26,6 +26,8 @@ PAPER_MCTS = Mcts(
     num_simulations=50,
     depth=5,
     exploration=3.0,
+    breadth=3,
+    backup="mean",
     gamma=0.995,
     rollout="random",
     keep_incumbent=False,
@@ -39,7 +41,7 @@ VARIANTS: list[Solver] = [
     ForwardSearch(depth=5, breadth=2, gamma=0.999),
     Rule(contact_above_fraction=0.0),
     Graph(path="longest"),
-    Mcts(num_simulations=30, depth=4, backup="max", discount="per_decision"),
+    Mcts(num_simulations=30, depth=4, backup="mean", discount="per_decision"),
     PAPER_MCTS,
     Rule(unimaged_only=False),
 ]

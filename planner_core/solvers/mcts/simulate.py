@@ -17,7 +17,7 @@ from planner_core.model import (
     task_reward,
 )
 from planner_core.problem import Bytes, Floats, Ints
-from planner_core.solvers.mcts.tree import UNSEEN, Tree, choose, new_edge, new_node
+from planner_core.solvers.mcts.tree import UNSEEN, Tree, choose, has_room, new_edge, new_node
 from planner_core.solvers.walk import CONTACT_ABOVE, naive_select_action
 
 
@@ -134,7 +134,8 @@ def _simulate(
     is_rollout = False
     while d < depth:
         if not is_rollout and tree.first_edge[node] == UNSEEN:
-            expand(tree, track, rules, collected, node)
+            if node == root or has_room(tree, rules.breadth):
+                expand(tree, track, rules, collected, node)
             # The listing rolls out from a new state; the root itself is searched at once.
             is_rollout = node != root
         if is_rollout:
@@ -172,9 +173,13 @@ def _simulate(
         path.discount[d] = guidance.gamma if rules.is_per_decision else discount
         cursor = row
         if not is_rollout:
-            if tree.child[path.edge[d]] == UNSEEN:
+            if tree.child[path.edge[d]] != UNSEEN:
+                node = tree.child[path.edge[d]]
+            elif node == root or has_room(tree, rules.breadth):
                 tree.child[path.edge[d]] = new_node(tree, cursor, last, battery, recorder)
-            node = tree.child[path.edge[d]]
+                node = tree.child[path.edge[d]]
+            else:
+                is_rollout = True
         d += 1
     returned = 0.0
     for i in range(d - 1, -1, -1):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import ClassVar, Literal
+from typing import ClassVar, Final, Literal
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from planner_core.solvers.base import BreadthCounts, Budget, Constraint, Feasibi
 from planner_core.solvers.mcts.simulate import Path, Rules, search, sunpoint_instead
 from planner_core.solvers.mcts.tree import UNSEEN, Tree, copy_branch, empty_tree, new_node
 from planner_core.solvers.sequential import Turn, plan_in_turn
+
+MAX_ACTIONS: Final = 10_000_000
+"""Actions in a tree: 20 bytes each, and two trees."""
 
 
 def _described(text: str, **limits: float) -> dict[str, object]:
@@ -31,18 +34,18 @@ class Mcts:
     honours: ClassVar[frozenset[Constraint]] = frozenset(Constraint) - {Constraint.DUPLICATE}
 
     num_simulations: int = field(
-        default=200,
+        default=500,
         metadata=_described("Simulations per step (N_sim max).", minimum=1, maximum=1_000_000),
     )
     depth: int = field(
-        default=20,
+        default=100,
         metadata=_described("Actions of a simulation (d_solve).", minimum=1, maximum=1000),
     )
     exploration: float = field(
-        default=10.0, metadata=_described("Weight c of the upper confidence bound.", minimum=0)
+        default=30.0, metadata=_described("Weight c of the upper confidence bound.", minimum=0)
     )
     breadth: int = field(
-        default=3,
+        default=8,
         metadata=_described("Tasks in A(s), the first in time (N_a max).", minimum=1, maximum=1000),
     )
     breadth_counts: BreadthCounts = field(
@@ -71,7 +74,7 @@ class Mcts:
         ),
     )
     backup: Literal["mean", "max"] = field(
-        default="mean",
+        default="max",
         metadata=_described("Value of an action: the mean of its samples (the paper) or the best."),
     )
     rollout: Literal["random", "greedy"] = field(
@@ -143,8 +146,13 @@ class Mcts:
             is_max_backup=self.backup == "max",
         )
         # A state stays in the tree for at most ``depth`` steps, so no more ever hang together.
-        num_nodes = self.num_simulations * (self.depth + 1) + 2
-        trees = [empty_tree(num_nodes, num_nodes * (rules.breadth + 1)) for _ in range(2)]
+        # Where that is more than memory should hold, the rest is sampled by rollouts alone.
+        num_nodes = min(
+            self.num_simulations * (self.depth + 1) + 2, MAX_ACTIONS // (rules.breadth + 1)
+        )
+        num_nodes += rules.breadth + 3
+        num_edges = (num_nodes + 2) * (rules.breadth + 1) + 2
+        trees = [empty_tree(num_nodes, num_edges) for _ in range(2)]
         tree, spare = trees
         new_node(tree, NO_TASK, NO_TASK, track.battery_start, track.recorder_start)
         random = draws_of(seed)

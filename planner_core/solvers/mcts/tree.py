@@ -64,6 +64,17 @@ def new_edge(tree: Tree, node: int, action: int) -> None:
 
 
 @borrowing
+def has_room(tree: Tree, breadth: int) -> bool:
+    """Return whether a state below the root may be added or expanded.
+
+    The root of this step and of the next always find room for A(s) and where it leads.
+    """
+    nodes_left = len(tree.cursor) - int(tree.used[0])
+    actions_left = len(tree.action) - int(tree.used[1])
+    return nodes_left >= breadth + 3 and actions_left >= 2 * (breadth + 2)
+
+
+@borrowing
 def choose(tree: Tree, node: int, exploration: float) -> int:
     """Line 11: the edge of greatest upper confidence; one that was never tried comes first."""
     first = int(tree.first_edge[node])
