@@ -94,7 +94,10 @@ class Engine:
             return None
         if self._highs.getModelStatus() != highspy.HighsModelStatus.kOptimal:
             return None
-        self._bound = float(self._highs.getInfo().objective_function_value)
+        info = self._highs.getInfo()
+        # The duals prove the value but for what HiGHS tolerates of them, on columns up to one.
+        doubt = float(info.sum_dual_infeasibilities) + _TOLERANCE
+        self._bound = min(self._bound, float(info.objective_function_value) + doubt)
         return np.array(self._highs.getSolution().col_value)
 
     @property
