@@ -9,13 +9,14 @@ a subgradient search; whatever they are, the bound holds.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from planner_core.chains import longest_chain
+from planner_core.chains import Links
 from planner_core.problem import COLLECT, Floats, Ints, Problem
 
 Proof = Literal["lagrangian", "milp", "dp"]
@@ -44,26 +45,26 @@ class Bound:
     unit: float | None = None
 
 
-def lagrangian_value(problem: Problem, prices: Floats) -> tuple[float, Ints]:
+def lagrangian_value(
+    problem: Problem, prices: Floats, links: Sequence[Links] | None = None
+) -> tuple[float, Ints]:
     """Return the bound that ``prices`` prove, and how often its chains take each target.
 
-    This is the whole proof: it needs no search, only the problem.
+    This is the whole proof: it needs no search, only the problem. ``links`` of its satellites
+    save time where many prices are tried.
     """
+    links = links or [Links.of(problem, satellite) for satellite in problem.satellites]
     prices = np.clip(prices, 0.0, problem.target_reward)
     total = float(prices[_reachable(problem)].sum())
     counts = np.zeros(len(prices), dtype=np.int32)
-    for satellite in problem.satellites:
+    for satellite, own in zip(problem.satellites, links, strict=True):
         is_collect = satellite.kind == COLLECT
         weight = np.zeros(len(satellite))
         places = satellite.place[is_collect]
         weight[is_collect] = problem.target_reward[places] - prices[places]
-        before = np.full(len(satellite), -1, dtype=np.int32)
-        t = satellite.transitions
-        value, task = longest_chain(weight, t.near_from, t.far_from, t.offset, t.bits, before)
+        value, chain = own.longest(weight)
         total += value
-        while task >= 0:
-            counts[satellite.place[task]] += 1
-            task = int(before[task])
+        counts += np.bincount(satellite.place[chain], minlength=len(prices)).astype(np.int32)
     return total, counts
 
 
@@ -81,8 +82,9 @@ def lagrangian_bound(problem: Problem, reward: float, iterations: int | None = N
         How many steps; by default as many as a fraction of a second allows, counted from
         the size of the problem so that the same problem always gets the same bound.
     """
+    links = [Links.of(problem, satellite) for satellite in problem.satellites]
     if iterations is None:
-        pairs = sum(int(s.transitions.offset[-1]) + 20 * len(s) for s in problem.satellites)
+        pairs = sum(link.num_steps + 20 * len(link.order.near_from) for link in links)
         iterations = int(np.clip(_PAIRS_TO_SPEND / max(1, pairs), 4, 300))
     is_reachable = _reachable(problem)
     prices = np.where(is_reachable, problem.target_reward, 0.0)
@@ -90,7 +92,7 @@ def lagrangian_bound(problem: Problem, reward: float, iterations: int | None = N
     prices = prices * 0.5
     theta, stalled = 1.0, 0
     for _ in range(iterations):
-        value, counts = lagrangian_value(problem, prices)
+        value, counts = lagrangian_value(problem, prices, links)
         if value < best_value - 1e-9:
             best_value, best_prices, stalled = value, prices, 0
         else:
