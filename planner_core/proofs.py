@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import json
-from typing import Any, cast
+from typing import Any, Final, cast
 
 import numpy as np
 
-from planner_core.bounds import Bound, Proof, lagrangian_value
+from planner_core.bounds import Bound, Proof, lagrangian_value, reward_unit, rounded_bound
+from planner_core.certificate import Certificate, Cut, Multipliers, is_refuted
 from planner_core.problem import Problem
 from planner_core.resource_bound import resource_value
 
-VERSION = 1
+VERSION: Final = 1
+_ROUNDING: Final = 1e-8  # relative
 
 
 def to_json(bound: Bound) -> str:
@@ -21,30 +23,69 @@ def to_json(bound: Bound) -> str:
         document["prices"] = bound.prices.tolist()
     if bound.unit is not None:
         document["unit"] = bound.unit
+    if bound.certificate is not None:
+        document["certificate"] = {
+            "amount": bound.certificate.amount,
+            "steps": [_step_document(step) for step in bound.certificate.steps],
+        }
+    if bound.log is not None:
+        document["log"] = bound.log
     return json.dumps(document)
 
 
 def from_json(text: str) -> Bound:
     """Return the bound of ``to_json``."""
     document = json.loads(text)
-    prices = document.get("prices")
+    prices, certificate = document.get("prices"), document.get("certificate")
     return Bound(
         value=float(document["value"]),
         proof=cast(Proof, document["proof"]),
         prices=None if prices is None else np.array(prices, dtype=np.float64),
         unit=document.get("unit"),
+        certificate=None
+        if certificate is None
+        else Certificate(
+            amount=float(certificate["amount"]),
+            steps=tuple(_step(step) for step in certificate["steps"]),
+        ),
+        log=document.get("log"),
     )
 
 
-def recomputed(problem: Problem, bound: Bound) -> float | None:
-    """Return the bound that the stored prices prove, or None where no prices are the proof.
+def is_proven(problem: Problem, bound: Bound) -> bool | None:
+    """Return whether the stored multipliers prove the bound; None where there are none.
 
-    Nothing of the search that found the prices is used: they are put into the dual function
-    of ``problem``, whose value is a bound whatever the prices are.
+    Nothing of the search that found them is used: they are put into the dual function of
+    ``problem``, whose value is a bound whatever they are. What HiGHS has proven has its log.
     """
+    room = _ROUNDING * max(1.0, abs(bound.value))
+    if bound.certificate is not None:
+        unit = reward_unit(problem)
+        is_enough = bound.certificate.amount <= bound.value + (unit or room)
+        return is_enough and is_refuted(problem, bound.certificate)
     if bound.prices is None:
         return None
     if bound.unit is not None:
-        return resource_value(problem, bound.prices, bound.unit)
-    value, _ = lagrangian_value(problem, bound.prices)
-    return value
+        value = resource_value(problem, bound.prices, bound.unit)
+    else:
+        value, _ = lagrangian_value(problem, bound.prices)
+    return rounded_bound(problem, value, 0.0) <= bound.value + room
+
+
+def _step_document(step: Multipliers) -> dict[str, Any]:
+    return {
+        "prices": step.prices.tolist(),
+        "cuts": [[group.tolist() for group in cut.sets] for cut in step.cuts],
+        "cut_prices": list(step.cut_prices),
+    }
+
+
+def _step(document: dict[str, Any]) -> Multipliers:
+    return Multipliers(
+        prices=np.array(document["prices"], dtype=np.float64),
+        cuts=tuple(
+            Cut(sets=tuple(np.array(group, dtype=np.int32) for group in sets))
+            for sets in document["cuts"]
+        ),
+        cut_prices=tuple(document["cut_prices"]),
+    )
