@@ -103,7 +103,12 @@ def _best_bound(problem: Problem, solution: Solution, reward: float, budget: Bud
     """Return what the solver has proven, or a quick bound of our own if that is lower."""
     proven = None
     if solution.bound is not None and solution.bound_proof is not None:
-        proven = Bound(value=max(solution.bound, reward), proof=solution.bound_proof)
+        proven = Bound(
+            value=max(solution.bound, reward),
+            proof=solution.bound_proof,
+            certificate=solution.certificate,
+            log=solution.log,
+        )
         if proven.value <= reward:
             return proven
     # Someone who cancels wants the answer now: the prices of a spent budget stay rough.
