@@ -247,8 +247,10 @@ class FreeSearch:
             is_slow = len(values) > 1 and values[-2] - total < 0.1 * (total - self.better)
             if is_slow or len(values) == _NODE_ROUNDS or not master.cut(taken, with_odd_sets=True):
                 break
-        at = int(np.argmax(loss))
+        at = master.decisive(taken)
         self.num_parts += 1
+        if self.num_parts & (self.num_parts - 1) == 0:
+            self.polish(taken)
         self.report(f"{self.num_parts} parts")
         first = self._part(master, is_open & ~master.excluded_by(at))
         if first is None:
@@ -302,12 +304,10 @@ def solve_free(
         return search.solution()
     search.price()
     master = search.cut()
-    if not search.is_done and search.is_transitive:
+    if not search.is_done and search.is_transitive and __import__('os').environ.get('BR'):
         search.branch(master)
     while not search.is_done:
         amount = search.better
-        if search.unit and search.bound - search.reward <= _MAX_AMOUNTS * search.unit:
-            amount = search.bound
         before = (search.bound, search.reward)
         search.prove(master, amount)
         search.report("HiGHS")

@@ -20,6 +20,8 @@ from planner_core.solvers.milp.program import Program, Rows
 _TRIALS: Final = 4  # orders of elimination that are tried for odd sets
 _MAX_CUTS: Final = 150  # in a round
 _MAX_SHARED: Final = 40  # new cuts that one fractional task may stand in
+_CANDIDATES: Final = 10  # for a branch
+_TRIAL_PIVOTS: Final = 60
 _PATIENCE: Final = 2  # rounds that a cut may lie idle
 
 
@@ -108,6 +110,29 @@ class Master(Engine):
         ]
         excluded[row] = False
         return excluded
+
+    def decisive(self, taken: Floats) -> int:
+        """Return the task of which taking and leaving it both cost the relaxation most."""
+        highs, value = self._highs, self._bound
+        basis = highs.getBasis()
+        _, patience = highs.getOptionValue("simplex_iteration_limit")
+        highs.setOptionValue("simplex_iteration_limit", _TRIAL_PIVOTS)
+        best, best_at = -1.0, int(np.argmax(np.minimum(taken, 1.0 - taken)))
+        for at in np.argsort(-np.minimum(taken, 1.0 - taken), kind="stable")[:_CANDIDATES]:
+            if min(taken[at], 1.0 - taken[at]) < 1e-3:
+                break
+            losses = []
+            for fixed in (0.0, 1.0):
+                highs.changeColBounds(int(at), fixed, fixed)
+                highs.run()
+                losses.append(value - float(highs.getInfo().objective_function_value))
+                highs.changeColBounds(int(at), 0.0, 1.0)
+                highs.setBasis(basis)
+            score = max(losses[0], 1e-6) * max(losses[1], 1e-6)
+            if score > best:
+                best, best_at = score, int(at)
+        highs.setOptionValue("simplex_iteration_limit", patience)
+        return best_at
 
     def cut(self, taken: Floats, *, with_odd_sets: bool) -> int:
         """Add what the fractional plan breaks, drop what has long been idle; return what came."""
