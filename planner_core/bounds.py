@@ -32,8 +32,11 @@ class Bound:
     Attributes
     ----------
     prices
-        What proves a Lagrangian bound (``lagrangian_value`` checks them), one per target;
-        None for other proofs. Shape ``(num_targets,)``.
+        What proves a Lagrangian bound (``lagrangian_value`` checks them) or one by dynamic
+        programmes (``resource_bound.resource_value``), one per target; None for other proofs.
+        Shape ``(num_targets,)``.
+    unit
+        In what the dynamic programmes count worth.
     certificate
         What proves a Lagrangian bound that took cuts (``is_refuted`` checks it).
     log
@@ -43,6 +46,7 @@ class Bound:
     value: float
     proof: Proof
     prices: Floats | None = None
+    unit: float | None = None
     certificate: Certificate | None = None
     log: str | None = None
 

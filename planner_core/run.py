@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import itertools
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from planner_core.bounds import Bound, lagrangian_bound
 from planner_core.build import ScenarioOpportunities, build_problem, compute_opportunities
 from planner_core.domain import Scenario
 from planner_core.problem import Problem
 from planner_core.reasons import TargetOutcome, explain
+from planner_core.resource_bound import quick_bound
 from planner_core.solvers.base import Budget, Progress, Solution, Solver
 from planner_core.timeline import Timeline, replay
 
@@ -53,8 +54,15 @@ def plan_scenario(
     seed: int,
     budget: Budget,
     computed: ScenarioOpportunities | None = None,
+    known_bound: Bound | None = None,
 ) -> Judged:
-    """Return the judged plan of ``solver``; ``computed`` saves the access search.
+    """Return the judged plan of ``solver``.
+
+    Parameters
+    ----------
+    computed, known_bound
+        What earlier plans of the same scenario have found out already. The plan itself does
+        not depend on it.
 
     Raises
     ------
@@ -75,7 +83,7 @@ def plan_scenario(
     timeline = replay(problem, solution.plan)
     bound = None
     if not problem.continuous_starts:
-        bound = _best_bound(problem, solution, timeline.reward, budget)
+        bound = _best_bound(problem, solution, timeline.reward, budget, known_bound)
     budget.report(
         Progress(
             phase="verify",
@@ -99,18 +107,24 @@ def plan_scenario(
     )
 
 
-def _best_bound(problem: Problem, solution: Solution, reward: float, budget: Budget) -> Bound:
-    """Return what the solver has proven, or a quick bound of our own if that is lower."""
-    proven = None
+def _best_bound(
+    problem: Problem, solution: Solution, reward: float, budget: Budget, known: Bound | None
+) -> Bound:
+    """Return the lowest of what is known, what the solver has proven and a quick bound."""
+    proven = None if known is None else replace(known, value=max(known.value, reward))
     if solution.bound is not None and solution.bound_proof is not None:
-        proven = Bound(
+        own = Bound(
             value=max(solution.bound, reward),
             proof=solution.bound_proof,
             certificate=solution.certificate,
             log=solution.log,
         )
-        if proven.value <= reward:
-            return proven
-    # Someone who cancels wants the answer now: the prices of a spent budget stay rough.
-    quick = lagrangian_bound(problem, reward, 0 if budget.is_cancelled else None)
+        proven = own if proven is None or own.value < proven.value else proven
+    if proven is not None and (known is not None or proven.value <= reward):
+        return proven
+    if budget.is_cancelled:
+        # Someone who cancels wants the answer now: prices stay rough.
+        quick = lagrangian_bound(problem, reward, 0)
+    else:
+        quick = quick_bound(problem, reward)
     return proven if proven is not None and proven.value < quick.value else quick

@@ -69,7 +69,7 @@ class Master(Engine):
     @property
     def value(self) -> float:
         """Return what the last relaxation is worth."""
-        return self._bound * self._scale
+        return float(self._highs.getInfo().objective_function_value) * self._scale
 
     def multipliers(self) -> Multipliers:
         """Return the prices that the last relaxation has put on targets and cuts."""
@@ -113,7 +113,7 @@ class Master(Engine):
 
     def decisive(self, taken: Floats) -> int:
         """Return the task of which taking and leaving it both cost the relaxation most."""
-        highs, value = self._highs, self._bound
+        highs, value = self._highs, self.value / self._scale
         basis = highs.getBasis()
         _, patience = highs.getOptionValue("simplex_iteration_limit")
         highs.setOptionValue("simplex_iteration_limit", _TRIAL_PIVOTS)

@@ -1,0 +1,160 @@
+r"""An upper bound that battery and recorder tighten: prices, and exact dynamic programmes.
+
+As in ``planner_core.bounds`` each target has a price :math:`\lambda_i`, and no plan earns more
+than :math:`\sum_i \lambda_i` plus what each satellite can gain where an image of :math:`i` is
+worth :math:`r_i - \lambda_i`. Here the satellite's gain is the most that its battery and its
+recorder allow, not only its agility. Worth is counted in whole units, rounded up, so the bound
+holds for any unit; prices chosen to leave whole units lose nothing by it. Stations are left out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from planner_core.bounds import Bound, lagrangian_bound, rounded_bound
+from planner_core.data_levels import DataLevels, data_levels
+from planner_core.least_energy import least_energy
+from planner_core.most_value import STOPPED, UNREACHED, most_value
+from planner_core.problem import COLLECT, Bytes, Floats, Ints, Problem, SatelliteProblem
+from planner_core.resource_network import Network, network_of
+
+_MAX_CELLS: Final = 30_000_000  # of one table of least energy
+_MAX_UNITS: Final = 2000
+_FIRST_STEP: Final = 0.01
+_ROUNDING: Final = 1e-9  # of a unit
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SatelliteRelaxation:
+    """One satellite's programme: its network, and its recorder in levels."""
+
+    satellite: SatelliteProblem
+    network: Network
+    levels: DataLevels
+
+    @classmethod
+    def of(cls, problem: Problem, satellite: SatelliteProblem) -> SatelliteRelaxation:
+        """Return the relaxation of a satellite that has opportunities."""
+        network = network_of(problem, satellite)
+        return cls(satellite=satellite, network=network, levels=data_levels(network, 1))
+
+    def weights(self, worth: Ints) -> Ints:
+        """Return the worth of each task, from that of each target."""
+        own = np.zeros(len(self.satellite), dtype=np.int32)
+        is_collect = self.satellite.kind == COLLECT
+        own[is_collect] = worth[self.satellite.place[is_collect]]
+        return own
+
+    def most(self, worth: Ints, enough: int, stop: Bytes) -> int:
+        """Return the most units that the satellite can gain, or ``enough`` if that is more.
+
+        Answers a cheaper bound on it once ``stop`` is set.
+        """
+        weight = self.weights(worth)
+        top = self._most_with_full_recorder(weight)
+        step = max(1, int(_FIRST_STEP * top))
+        goal = top
+        idle, after = least_energy(self.network, weight, top)
+        while goal > enough:
+            # Labels that cannot reach the goal are dropped: the higher, the quicker.
+            goal, ceiling = max(enough, goal - step, 0), goal
+            most = most_value(self.network, self.levels, weight, idle, after, goal, stop)
+            if most == STOPPED:
+                return ceiling
+            if most != UNREACHED:
+                return most
+            goal, step = goal - 1, 2 * step
+        return max(enough, 0)
+
+    def _most_with_full_recorder(self, weight: Ints) -> int:
+        """Return what the battery alone allows."""
+        limit = 128 + int(weight.max(initial=0))
+        while True:
+            idle, _ = least_energy(self.network, weight, limit)
+            most = int(np.flatnonzero(idle[0] <= self.network.energy_start)[-1])
+            if most < limit:
+                return most
+            limit *= 4
+
+
+def relaxations(problem: Problem) -> tuple[SatelliteRelaxation, ...]:
+    """Return the programmes of all satellites that have anything to do."""
+    return tuple(SatelliteRelaxation.of(problem, s) for s in problem.satellites if len(s))
+
+
+def whole_worth(problem: Problem, prices: Floats, unit: float) -> Ints:
+    """Return what an image of each target is worth at these prices, in units, rounded up."""
+    worth = (problem.target_reward - np.maximum(prices, 0.0)) / unit
+    return np.maximum(np.ceil(worth - _ROUNDING), 0.0).astype(np.int32)
+
+
+def resource_value(problem: Problem, prices: Floats, unit: float) -> float:
+    """Return the bound that ``prices`` and ``unit`` prove.
+
+    This is the whole proof: it needs no search, only the problem.
+    """
+    return _value(problem, relaxations(problem), prices, unit, 0.0, np.zeros(1, dtype=np.uint8))
+
+
+def _value(
+    problem: Problem,
+    satellites: tuple[SatelliteRelaxation, ...],
+    prices: Floats,
+    unit: float,
+    enough: float,
+    stop: Bytes,
+) -> float:
+    """Return the bound of these prices, or ``enough`` where that is more."""
+    reachable = problem.target_opportunities[1]
+    prices = np.where(np.diff(reachable) > 0, np.maximum(prices, 0.0), 0.0)
+    worth = whole_worth(problem, prices, unit)
+    paid = float(prices.sum())
+    # What the other satellites gain is known only afterwards: one alone may stop early.
+    units_enough = int(np.floor((enough - paid) / unit)) if len(satellites) == 1 else 0
+    units = sum(s.most(worth, max(units_enough, 0), stop) for s in satellites)
+    rounded_away = _ROUNDING * len(problem.opportunities) * unit
+    return max(paid + units * unit + rounded_away, enough)
+
+
+def quick_bound(problem: Problem, reward: float) -> Bound:
+    """Return a cheap bound on any plan, by agility alone or by battery and recorder as well.
+
+    Parameters
+    ----------
+    reward
+        What a known plan earns: nothing below it needs proof.
+    """
+    best = lagrangian_bound(problem, reward)
+    satellites = relaxations(problem) if problem.use_resources else ()
+    if not satellites or best.value <= reward:
+        return best
+    stop = np.zeros(1, dtype=np.uint8)
+    unit = _unit(problem, satellites, best.value)
+    shares = (0.0,) if len(satellites) == 1 else (1.0, 0.5, 0.0)
+    for share in shares:
+        prices = share * (np.zeros(1) if best.prices is None else best.prices)
+        prices = _leaving_whole_units(problem, prices, unit)
+        value = _value(problem, satellites, prices, unit, reward, stop)
+        if value < best.value:
+            rounded = rounded_bound(problem, value, reward)
+            best = Bound(value=rounded, proof="dp", prices=prices, unit=unit)
+    return best
+
+
+def _unit(problem: Problem, satellites: tuple[SatelliteRelaxation, ...], value: float) -> float:
+    """Return a unit: 1 where rewards are whole and few, or what can be counted in good time."""
+    reward = problem.target_reward
+    largest = max(len(s.satellite) for s in satellites)
+    most_units = min(_MAX_UNITS, _MAX_CELLS // largest)
+    if np.all(reward == np.round(reward)) and value <= most_units:
+        return 1.0
+    return max(value / most_units, 1e-12)
+
+
+def _leaving_whole_units(problem: Problem, prices: Floats, unit: float) -> Floats:
+    """Return the nearest prices at which an image is worth a whole number of units."""
+    worth = np.round((problem.target_reward - prices) / unit)
+    return np.maximum(problem.target_reward - worth * unit, 0.0)

@@ -1,0 +1,98 @@
+"""The bound under battery and recorder holds for every plan, and is tight where it can be."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from planner_core.problem import Problem, Sunlight
+from planner_core.resource_bound import quick_bound, resource_value
+from tests.planner_core.brute_force import best_reward
+from tests.planner_core.problems import TIGHT, Task, make_problem, random_problem
+
+SEEDS = st.integers(0, 10**6)
+ECLIPSES = Sunlight(enter_s=np.array([0.0, 500.0]), exit_s=np.array([180.0, 760.0]))
+BATTERY_ONLY = replace(
+    TIGHT,
+    battery_min_fraction=0.5,
+    initial_battery_fraction=0.65,
+    recorder_max_fraction=1.0,
+    initial_recorder_fraction=0.0,
+    collect_fill_per_s=1 / 30000,
+    telemetry_per_s=0.0,
+)
+
+
+def _problem(
+    seed: int, dynamics: Literal["physical", "paper"], num_satellites: int = 1, **more: object
+) -> Problem:
+    rng = np.random.default_rng(seed)
+    return random_problem(
+        seed,
+        dynamics=dynamics,
+        num_satellites=num_satellites,
+        has_rewards=bool(rng.integers(2)),
+        sunlight=ECLIPSES if rng.integers(2) else None,
+        resources=BATTERY_ONLY if rng.integers(3) == 0 else TIGHT,
+        **more,  # type: ignore[arg-type]
+    )
+
+
+@pytest.mark.parametrize("dynamics", ["physical", "paper"])
+@settings(max_examples=80, deadline=None)
+@example(seed=0, num_satellites=1)
+@given(seed=SEEDS, num_satellites=st.integers(1, 3))
+def test_no_plan_beats_the_bound(
+    dynamics: Literal["physical", "paper"], seed: int, num_satellites: int
+) -> None:
+    problem = _problem(seed, dynamics, num_satellites)
+    best = best_reward(problem)
+    assert quick_bound(problem, reward=0.0).value >= best - 1e-9
+    rng = np.random.default_rng(seed)
+    for unit in (1.0, 0.1, 0.37):
+        prices = rng.uniform(-1.0, 6.0, len(problem.target_ids))
+        assert resource_value(problem, prices, unit) >= best - 1e-9
+
+
+@pytest.mark.parametrize("dynamics", ["physical", "paper"])
+@settings(max_examples=60, deadline=None)
+@given(seed=SEEDS)
+def test_it_is_the_optimum_where_no_target_can_be_collected_twice(
+    dynamics: Literal["physical", "paper"], seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    tasks = [
+        Task(kind=0, place=i, start_s=start_s, end_s=start_s + 30.0, angle_deg=angle_deg)
+        for i, (start_s, angle_deg) in enumerate(
+            zip(np.round(rng.uniform(0, 940, 9), 3), rng.uniform(-55, 55, 9), strict=True)
+        )
+    ]
+    problem = make_problem(
+        tasks, num_targets=9, dynamics=dynamics, resources=BATTERY_ONLY, rewards=range(1, 10)
+    )
+    assert quick_bound(problem, reward=0.0).value == best_reward(problem)
+
+
+def test_it_lies_far_below_what_agility_allows_where_energy_is_short() -> None:
+    problem = random_problem(1, num_collects=40, num_targets=40, num_contacts=0)
+    starved = random_problem(
+        1, num_collects=40, num_targets=40, num_contacts=0, use_resources=False
+    )
+    assert quick_bound(problem, 0.0).value < 0.7 * quick_bound(starved, 0.0).value
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=SEEDS)
+def test_the_stored_prices_prove_the_bound_again(seed: int) -> None:
+    problem = _problem(seed, "physical", 2, num_collects=60, num_targets=30, num_contacts=4)
+    bound = quick_bound(problem, reward=0.0)
+    if bound.proof == "dp":
+        assert bound.prices is not None
+        assert bound.unit is not None
+        proven = resource_value(problem, bound.prices, bound.unit)
+        assert bound.value <= proven + 1e-6
