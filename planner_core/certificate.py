@@ -50,10 +50,6 @@ class Cut:
             counts = counts // 2
         return rows[counts > 0], counts[counts > 0].astype(np.int32)
 
-    def among(self, is_open: Bools, number: Ints) -> Cut:
-        """Return the cut on those rows that are open, by their new numbers."""
-        return Cut(sets=tuple(number[group[is_open[group]]] for group in self.sets))
-
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Multipliers:
@@ -155,9 +151,7 @@ class _Checked:
         """Return whether the sets are an odd number and hold what excludes each other."""
         return len(cut.sets) % 2 == 1 and all(
             len(np.unique(group)) == len(group)
-            and all(
-                self._exclude(int(a), int(b)) for i, a in enumerate(group) for b in group[:i]
-            )
+            and all(self._exclude(int(a), int(b)) for i, a in enumerate(group) for b in group[:i])
             for group in cut.sets
         )
 

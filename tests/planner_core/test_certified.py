@@ -12,13 +12,13 @@ from hypothesis import strategies as st
 
 from planner_core.certificate import Certificate, Cut, Multipliers, Refutation, is_refuted
 from planner_core.domain import Agility
-from planner_core.problem import Problem
+from planner_core.problem import COLLECT, Problem
 from planner_core.solvers import Certified, Rule
 from planner_core.solvers.base import Budget, Progress, Solution, Termination
 from planner_core.solvers.certified.free import TOLERANCE
 from planner_core.timeline import replay
 from tests.planner_core.brute_force import best_reward
-from tests.planner_core.problems import COLLECT, Task, make_problem, random_problem
+from tests.planner_core.problems import Task, make_problem, random_problem
 
 SEEDS = st.integers(0, 10**6)
 SLOW = Agility(slew_rate_deg_s=0.3)
@@ -82,7 +82,9 @@ def test_it_equals_brute_force(
 
 
 @settings(max_examples=40, deadline=None)
-@given(seed=SEEDS, spread=SPREADS, num_satellites=st.integers(1, 2), gap=st.sampled_from([0.0, 0.05]))
+@given(
+    seed=SEEDS, spread=SPREADS, num_satellites=st.integers(1, 2), gap=st.sampled_from([0.0, 0.05])
+)
 def test_crowded_problems_are_proven_and_the_proof_checks_out(
     seed: int, spread: str, num_satellites: int, gap: float
 ) -> None:

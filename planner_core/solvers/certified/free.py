@@ -24,6 +24,7 @@ from planner_core.solvers.certified.master import Master
 from planner_core.solvers.certified.prover import Prover
 from planner_core.solvers.graph import Graph
 from planner_core.solvers.lns import improved
+from planner_core.solvers.milp.model import plan_program
 from planner_core.solvers.rule import Rule
 from planner_core.timeline import replay
 
@@ -190,12 +191,17 @@ class FreeSearch:
         """Let HiGHS find a plan worth this much, or prove that there is none."""
         is_open = ~is_below(self.through, amount)
         rows = self._rows[is_open]
-        number = np.cumsum(is_open) - 1
         part = restricted(self.problem, rows)
-        cuts = [c.among(is_open, number) for c in master.rows_in_use()]
-        prover = Prover(part, cuts, amount, amount, self.budget, self.seed)
+        if self.is_transitive:
+            program = master.program(is_open)
+        else:
+            # Then a plan may need tasks that it is not paid for.
+            program = plan_program(part, "antichain", 0.0).program
+            scale = float(self.problem.target_reward.max())
+            program.worth = [worth / scale for worth in program.worth]
+        prover = Prover(part, program, amount, amount, self.budget, self.seed)
 
-        def watch(reward: float, bound: float) -> None:
+        def watch(_reward: float, _bound: float) -> None:
             now_s = time.monotonic()
             if now_s - self._reported_s > _REPORT_EVERY_S:
                 self._reported_s = now_s
@@ -304,7 +310,7 @@ def solve_free(
         return search.solution()
     search.price()
     master = search.cut()
-    if not search.is_done and search.is_transitive and __import__('os').environ.get('BR'):
+    if not search.is_done and search.is_transitive and __import__("os").environ.get("BR"):
         search.branch(master)
     while not search.is_done:
         amount = search.better

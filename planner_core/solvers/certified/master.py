@@ -7,7 +7,13 @@ from typing import Final
 import numpy as np
 
 from planner_core.certificate import Cut, Multipliers
-from planner_core.comparable import Order, are_comparable, comes_before, order_of, transitive_closure
+from planner_core.comparable import (
+    Order,
+    are_comparable,
+    comes_before,
+    order_of,
+    transitive_closure,
+)
 from planner_core.draws import draws_of
 from planner_core.jit import kernel
 from planner_core.problem import COLLECT, Bools, Bytes, Floats, Ints, Problem
@@ -42,7 +48,7 @@ class Master(Engine):
         self._problem = problem
         table = problem.opportunities
         self._scale = float(problem.target_reward.max(initial=1e-300))
-        worth = np.zeros(len(table))
+        self._worth = worth = np.zeros(len(table))
         is_collect = table.kind == COLLECT
         worth[is_collect] = problem.target_reward[table.place[is_collect]] / self._scale
         self._orders = [
@@ -62,7 +68,7 @@ class Master(Engine):
         program.add_columns(worth, upper=self._useful.astype(np.float64))
         program.add_rows(Rows.of(self._sets.offsets, self._sets.members, upper=1.0))
         # For each row of the program the sets that it adds up, and how long it has lain idle.
-        self._row_sets = [(i,) for i in range(len(self._sets.offsets) - 1)]
+        self._row_sets: list[tuple[int, ...]] = [(i,) for i in range(len(self._sets.offsets) - 1)]
         self._idle = [0] * len(self._row_sets)
         super().__init__(program, budget, seed, is_chained=False)
 
@@ -101,7 +107,7 @@ class Master(Engine):
     def excluded_by(self, row: int) -> Bools:
         """Return which tasks cannot stand in a plan with this one; not itself."""
         table, local = self._problem.opportunities, self._problem.local_row
-        excluded = (table.place == table.place[row]) & (table.kind == COLLECT)
+        excluded: Bools = (table.place == table.place[row]) & (table.kind == COLLECT)
         satellite = int(table.satellite[row])
         own = self._problem.satellites[satellite].rows
         order = self._orders[satellite]
@@ -121,7 +127,7 @@ class Master(Engine):
         for at in np.argsort(-np.minimum(taken, 1.0 - taken), kind="stable")[:_CANDIDATES]:
             if min(taken[at], 1.0 - taken[at]) < 1e-3:
                 break
-            losses = []
+            losses: list[float] = []
             for fixed in (0.0, 1.0):
                 highs.changeColBounds(int(at), fixed, fixed)
                 highs.run()
@@ -157,13 +163,27 @@ class Master(Engine):
         self._idle += [0] * (len(self._row_sets) - num_before)
         return len(self._row_sets) - num_before
 
-    def rows_in_use(self) -> list[Cut]:
-        """Return the cuts that the relaxation holds."""
-        return [
-            Cut(sets=tuple(self._members(i) for i in picked))
-            for picked in self._row_sets
-            if len(picked) > 1
-        ]
+    def program(self, is_open: Bools) -> Program:
+        """Return all that the relaxation holds, for some of the tasks: exact if transitive."""
+        number = np.cumsum(is_open) - 1
+        program = Program()
+        program.add_columns(self._worth[is_open], upper=self._useful[is_open].astype(np.float64))
+        offsets, columns, values, limits = [0], [], [], []
+        for picked in self._row_sets:
+            cut = Cut(sets=tuple(self._members(i) for i in picked))
+            members, weights = cut.weights()
+            kept = is_open[members]
+            offsets.append(offsets[-1] + int(kept.sum()))
+            columns.append(number[members[kept]])
+            values.append(weights[kept].astype(np.float64))
+            limits.append(float(cut.limit))
+        program.add_rows(
+            Rows.of(
+                np.array(offsets, dtype=np.int64), np.concatenate(columns),
+                np.concatenate(values), upper=np.array(limits),
+            )
+        )  # fmt: skip
+        return program
 
     def _members(self, i: int) -> Ints:
         return self._sets.members[self._sets.offsets[i] : self._sets.offsets[i + 1]]
