@@ -84,7 +84,7 @@ def _arcs(order: Order, is_transitive: bool) -> tuple[Longs, Ints]:
             is_covered = False
             if is_transitive:
                 for at in range(offsets[b], len(found)):
-                    if comes_before(order, a, found[at]):
+                    if comes_before(order, a, int(found[at])):
                         is_covered = True
                         break
             if not is_covered:

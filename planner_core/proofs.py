@@ -8,7 +8,7 @@ from typing import Any, Final, cast
 import numpy as np
 
 from planner_core.bounds import Bound, Proof, lagrangian_value, reward_unit, rounded_bound
-from planner_core.certificate import Certificate, Cut, Multipliers, is_refuted
+from planner_core.certificate import Certificate, Cut, Multipliers, Refutation, is_refuted
 from planner_core.problem import Problem
 from planner_core.resource_bound import resource_value
 
@@ -24,10 +24,8 @@ def to_json(bound: Bound) -> str:
     if bound.unit is not None:
         document["unit"] = bound.unit
     if bound.certificate is not None:
-        document["certificate"] = {
-            "amount": bound.certificate.amount,
-            "steps": [_step_document(step) for step in bound.certificate.steps],
-        }
+        document["amount"] = bound.certificate.amount
+        document["refutation"] = _refutation_to_json(bound.certificate.refutation)
     if bound.log is not None:
         document["log"] = bound.log
     return json.dumps(document)
@@ -36,18 +34,18 @@ def to_json(bound: Bound) -> str:
 def from_json(text: str) -> Bound:
     """Return the bound of ``to_json``."""
     document = json.loads(text)
-    prices, certificate = document.get("prices"), document.get("certificate")
+    prices = document.get("prices")
     return Bound(
         value=float(document["value"]),
         proof=cast(Proof, document["proof"]),
         prices=None if prices is None else np.array(prices, dtype=np.float64),
         unit=document.get("unit"),
-        certificate=None
-        if certificate is None
-        else Certificate(
-            amount=float(certificate["amount"]),
-            steps=tuple(_step(step) for step in certificate["steps"]),
-        ),
+        certificate=Certificate(
+            amount=float(document["amount"]),
+            refutation=_refutation_from_json(document["refutation"]),
+        )
+        if "refutation" in document
+        else None,
         log=document.get("log"),
     )
 
@@ -60,8 +58,7 @@ def is_proven(problem: Problem, bound: Bound) -> bool | None:
     """
     room = _ROUNDING * max(1.0, abs(bound.value))
     if bound.certificate is not None:
-        unit = reward_unit(problem)
-        is_enough = bound.certificate.amount <= bound.value + (unit or room)
+        is_enough = bound.certificate.amount <= bound.value + (reward_unit(problem) or room)
         return is_enough and is_refuted(problem, bound.certificate)
     if bound.prices is None:
         return None
@@ -72,20 +69,39 @@ def is_proven(problem: Problem, bound: Bound) -> bool | None:
     return rounded_bound(problem, value, 0.0) <= bound.value + room
 
 
-def _step_document(step: Multipliers) -> dict[str, Any]:
-    return {
-        "prices": step.prices.tolist(),
-        "cuts": [[group.tolist() for group in cut.sets] for cut in step.cuts],
-        "cut_prices": list(step.cut_prices),
+def _refutation_to_json(refutation: Refutation) -> dict[str, Any]:
+    document: dict[str, Any] = {
+        "steps": [
+            {
+                "prices": step.prices.tolist(),
+                "cuts": [[group.tolist() for group in cut.sets] for cut in step.cuts],
+                "cut_prices": list(step.cut_prices),
+            }
+            for step in refutation.steps
+        ]
     }
+    if refutation.branch is not None:
+        row, taken, left = refutation.branch
+        document["branch"] = [row, _refutation_to_json(taken), _refutation_to_json(left)]
+    return document
 
 
-def _step(document: dict[str, Any]) -> Multipliers:
-    return Multipliers(
-        prices=np.array(document["prices"], dtype=np.float64),
-        cuts=tuple(
-            Cut(sets=tuple(np.array(group, dtype=np.int32) for group in sets))
-            for sets in document["cuts"]
+def _refutation_from_json(document: dict[str, Any]) -> Refutation:
+    branch = None
+    if "branch" in document:
+        row, taken, left = document["branch"]
+        branch = (int(row), _refutation_from_json(taken), _refutation_from_json(left))
+    return Refutation(
+        steps=tuple(
+            Multipliers(
+                prices=np.array(step["prices"], dtype=np.float64),
+                cuts=tuple(
+                    Cut(sets=tuple(np.array(group, dtype=np.int32) for group in cut))
+                    for cut in step["cuts"]
+                ),
+                cut_prices=tuple(step["cut_prices"]),
+            )
+            for step in document["steps"]
         ),
-        cut_prices=tuple(document["cut_prices"]),
+        branch=branch,
     )
