@@ -36,7 +36,7 @@ _STALLED: Final = 0.04  # of the gap, in _PATIENCE rounds of cuts
 _PATIENCE: Final = 4
 _WANTED: Final = 1e-3
 _NODE_ROUNDS: Final = 5
-_MAX_PARTS: Final = 12  # beyond that HiGHS is faster
+_MAX_PARTS: Final = 4  # beyond that HiGHS is faster
 _POLISH: Final = 50.0
 _POLISHED: Final = (1, 2, 4, 8, 16, 32)  # rounds
 _REPORT_EVERY_S: Final = 0.25
@@ -310,20 +310,24 @@ def solve_free(
         if not search.search(5.0, search.open_rows(search.reward)):
             break
         search.report("window search")
-    if search.is_done:
-        return search.solution()
+    if not search.is_done:
+        _close_in(search)
+    return search.solution()
+
+
+def _close_in(search: FreeSearch) -> None:
+    """Cut, search and branch until plan and bound meet or the budget is spent."""
     search.price()
     master = search.cut()
     for _ in range(_LAST_SEARCHES):
         if search.is_done:
-            break
+            return
         search.search(_LAST_MOVES, search.open_rows(search.bound))
-    if not search.is_done and search.is_transitive:
+    if search.is_transitive:
         search.branch(master)
     while not search.is_done:
         before = (search.bound, search.reward)
         search.prove(master, search.better)
         search.report("HiGHS")
         if (search.bound, search.reward) == before:
-            break
-    return search.solution()
+            return
