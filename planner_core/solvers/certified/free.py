@@ -274,6 +274,11 @@ class FreeSearch:
 
     def solution(self) -> Solution:
         """Return the plan with what is known of it."""
+        if self.problem.continuous_starts:
+            # The bound does not cover the freedom to shift tasks.
+            is_cut_short = self.budget.is_spent()
+            ended = self.budget.termination() if is_cut_short else Termination.HORIZON_COMPLETE
+            return Solution(plan=self.plan, termination=ended)
         if self.is_optimal:
             termination = Termination.OPTIMAL
         elif self.is_close:

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import ClassVar
 
-from planner_core.plan import Plan
 from planner_core.problem import Problem
-from planner_core.resource_bound import quick_bound
-from planner_core.solvers.base import Budget, Constraint, Progress, Solution, Termination
+from planner_core.solvers.base import Budget, Constraint, Solution
 from planner_core.solvers.certified.free import solve_free
-from planner_core.solvers.forward_search import ForwardSearch
-from planner_core.solvers.graph import Graph
-from planner_core.solvers.rule import Rule
-from planner_core.timeline import replay
+from planner_core.solvers.milp import Milp
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,25 +41,5 @@ class Certified:
     def solve(self, problem: Problem, budget: Budget, seed: int) -> Solution:
         """Return the best plan and its bound; the same for the same seed if time suffices."""
         if problem.use_resources:
-            return _best_of_the_quick(problem, budget, seed)
+            return Milp(gap=self.gap).solve(problem, budget, seed)
         return solve_free(problem, budget, seed, self.gap, self.moves_per_task)
-
-
-def _best_of_the_quick(problem: Problem, budget: Budget, seed: int) -> Solution:
-    """Return the best plan of the quick solvers, and the quick bound."""
-    best, reward = Solution(plan=Plan(), termination=Termination.HORIZON_COMPLETE), 0.0
-    for solver in (Rule(), Graph(), ForwardSearch()):
-        solution = solver.solve(problem, budget, seed)
-        timeline = replay(problem, solution.plan)
-        if timeline.is_valid and timeline.reward > reward:
-            best, reward = solution, timeline.reward
-        budget.report(Progress(phase="solve", fraction=0.5, reward=reward, message=solver.name))
-    if budget.is_spent():
-        return replace(best, termination=budget.termination())
-    bound = quick_bound(problem, reward)
-    return replace(
-        best,
-        termination=Termination.OPTIMAL if bound.value <= reward else Termination.HORIZON_COMPLETE,
-        bound=bound.value,
-        bound_proof=bound.proof,
-    )
