@@ -43,7 +43,8 @@ class Network(NamedTuple):
 def network_of(problem: Problem) -> Network:
     """Return the network of a problem."""
     table = problem.opportunities
-    first, num_arcs = [0], 0
+    first = [0]
+    num_arcs = 0
     arc_from, before, far_from = [np.zeros(1, dtype=np.int64)], [], []
     for satellite in problem.satellites:
         base = first[-1]

@@ -36,10 +36,12 @@ _STALLED: Final = 0.04  # of the gap, in _PATIENCE rounds of cuts
 _PATIENCE: Final = 4
 _WANTED: Final = 1e-3
 _NODE_ROUNDS: Final = 5
+_MAX_PARTS: Final = 4  # beyond that HiGHS is faster
 _POLISH: Final = 50.0
 _POLISHED: Final = (1, 2, 4, 8, 16, 32)  # rounds
 _REPORT_EVERY_S: Final = 0.25
-_MAX_AMOUNTS: Final = 4
+_LAST_SEARCHES: Final = 6  # among what a plan as good as the bound can hold
+_LAST_MOVES: Final = 15.0
 
 
 class FreeSearch:
@@ -107,9 +109,10 @@ class FreeSearch:
         by_row = np.empty(len(self._rows))
         by_row[self._network.row] = through
         lower = np.minimum(self.through, by_row)
+        # What is not kept must not be built upon.
         if self.bound < before or np.any(is_below(lower, self.better) > self.is_struck):
             self.steps.append(step)
-        self.through = lower
+            self.through = lower
 
     @property
     def is_struck(self) -> np.ndarray:
@@ -230,7 +233,7 @@ class FreeSearch:
             self.lower(self.reward)
 
     def _part(self, master: Master, is_open: Bools) -> Refutation | None:
-        """Return why no plan of the open tasks is better; None if the budget is spent."""
+        """Return why no plan of the open tasks is better; None where that takes too long."""
         steps, values = [], []
         while True:
             master.allow(is_open)
@@ -255,11 +258,12 @@ class FreeSearch:
                 break
         at = master.decisive(taken)
         self.num_parts += 1
-        if self.num_parts & (self.num_parts - 1) == 0:
-            self.polish(taken)
+        self.polish(taken)
+        if self.is_done or self.num_parts == _MAX_PARTS:
+            return None
         self.report(f"{self.num_parts} parts")
         first = self._part(master, is_open & ~master.excluded_by(at))
-        if first is None:
+        if first is None or self.is_done:
             return None
         others = is_open.copy()
         others[at] = False
@@ -270,6 +274,11 @@ class FreeSearch:
 
     def solution(self) -> Solution:
         """Return the plan with what is known of it."""
+        if self.problem.continuous_starts:
+            # The bound does not cover the freedom to shift tasks.
+            is_cut_short = self.budget.is_spent()
+            ended = self.budget.termination() if is_cut_short else Termination.HORIZON_COMPLETE
+            return Solution(plan=self.plan, termination=ended)
         if self.is_optimal:
             termination = Termination.OPTIMAL
         elif self.is_close:
@@ -306,17 +315,24 @@ def solve_free(
         if not search.search(5.0, search.open_rows(search.reward)):
             break
         search.report("window search")
-    if search.is_done:
-        return search.solution()
+    if not search.is_done:
+        _close_in(search)
+    return search.solution()
+
+
+def _close_in(search: FreeSearch) -> None:
+    """Cut, search and branch until plan and bound meet or the budget is spent."""
     search.price()
     master = search.cut()
-    if not search.is_done and search.is_transitive and __import__("os").environ.get("BR"):
+    for _ in range(_LAST_SEARCHES):
+        if search.is_done:
+            return
+        search.search(_LAST_MOVES, search.open_rows(search.bound))
+    if search.is_transitive:
         search.branch(master)
     while not search.is_done:
-        amount = search.better
         before = (search.bound, search.reward)
-        search.prove(master, amount)
+        search.prove(master, search.better)
         search.report("HiGHS")
         if (search.bound, search.reward) == before:
-            break
-    return search.solution()
+            return
