@@ -1,7 +1,7 @@
 r"""An upper bound on what any plan of a problem can earn.
 
 Weak duality: give each target a price :math:`0 \le \lambda_i \le r_i`. Then no plan earns more
-than :math:`\sum_i \lambda_i` plus, for each satellite, the longest chain of collects in which
+than :math:`\sum_i \lambda_i` plus, for each satellite, the heaviest path of tasks in which
 an image of :math:`i` is worth :math:`r_i - \lambda_i` (and may be taken again and again).
 Battery, recorder and stations are left out, which can only raise the bound. Prices come from
 a subgradient search; whatever they are, the bound holds.
@@ -13,14 +13,15 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
-from planner_core.chains import longest_chain
-from planner_core.problem import COLLECT, Floats, Ints, Problem
+from planner_core.certificate import Certificate
+from planner_core.network import Network, heaviest_paths, network_of
+from planner_core.prices import improve_prices
+from planner_core.problem import Floats, Ints, Problem
 
 Proof = Literal["lagrangian", "milp", "dp"]
 
-_PAIRS_TO_SPEND = 40_000_000
+_ARCS_TO_SPEND = 150_000_000
 _ROUNDING = 1e-6  # relative; far above the rounding of the sums, far below one reward
 
 
@@ -36,40 +37,42 @@ class Bound:
         Shape ``(num_targets,)``.
     unit
         In what the dynamic programmes count worth.
+    certificate
+        What proves a Lagrangian bound that took cuts (``is_refuted`` checks it).
+    log
+        What the MILP solver reported, for a bound that it has proven.
     """
 
     value: float
     proof: Proof
     prices: Floats | None = None
     unit: float | None = None
+    certificate: Certificate | None = None
+    log: str | None = None
 
 
 def lagrangian_value(problem: Problem, prices: Floats) -> tuple[float, Ints]:
-    """Return the bound that ``prices`` prove, and how often its chains take each target.
+    """Return the bound that ``prices`` prove, and how often its paths take each target.
 
     This is the whole proof: it needs no search, only the problem.
     """
-    prices = np.clip(prices, 0.0, problem.target_reward)
-    total = float(prices[_reachable(problem)].sum())
-    counts = np.zeros(len(prices), dtype=np.int32)
-    for satellite in problem.satellites:
-        is_collect = satellite.kind == COLLECT
-        weight = np.zeros(len(satellite))
-        places = satellite.place[is_collect]
-        weight[is_collect] = problem.target_reward[places] - prices[places]
-        before = np.full(len(satellite), -1, dtype=np.int32)
-        t = satellite.transitions
-        value, task = longest_chain(weight, t.near_from, t.far_from, t.offset, t.bits, before)
-        total += value
-        while task >= 0:
-            counts[satellite.place[task]] += 1
-            task = int(before[task])
-    return total, counts
-
-
-def _reachable(problem: Problem) -> npt.NDArray[np.bool_]:
-    _, offsets = problem.target_opportunities
-    return np.diff(offsets) > 0
+    network = network_of(problem)
+    num_targets = len(problem.target_reward)
+    reward = np.append(problem.target_reward, 0.0)
+    price = np.append(np.clip(prices, 0.0, problem.target_reward), 0.0)
+    price[np.setdiff1d(np.arange(num_targets), network.place)] = 0.0
+    n = len(network.row)
+    previous = np.empty(n, dtype=np.int32)
+    ends = np.empty(len(problem.satellites), dtype=np.int32)
+    weight = (reward - price)[network.place]
+    total = price.sum() + heaviest_paths(network, weight, np.empty(n), previous, ends)
+    counts = np.zeros(num_targets + 1, dtype=np.int32)
+    for end in ends:
+        at = int(end)
+        while at >= 0:
+            counts[network.place[at]] += 1
+            at = int(previous[at])
+    return float(total), counts[:-1]
 
 
 def lagrangian_bound(problem: Problem, reward: float, iterations: int | None = None) -> Bound:
@@ -81,35 +84,51 @@ def lagrangian_bound(problem: Problem, reward: float, iterations: int | None = N
         How many steps; by default as many as a fraction of a second allows, counted from
         the size of the problem so that the same problem always gets the same bound.
     """
+    network = network_of(problem)
     if iterations is None:
-        pairs = sum(int(s.transitions.offset[-1]) + 20 * len(s) for s in problem.satellites)
-        iterations = int(np.clip(_PAIRS_TO_SPEND / max(1, pairs), 4, 300))
-    is_reachable = _reachable(problem)
-    prices = np.where(is_reachable, problem.target_reward, 0.0)
-    best_value, best_prices = float(prices.sum()), prices
-    prices = prices * 0.5
-    theta, stalled = 1.0, 0
-    for _ in range(iterations):
-        value, counts = lagrangian_value(problem, prices)
-        if value < best_value - 1e-9:
-            best_value, best_prices, stalled = value, prices, 0
-        else:
-            stalled += 1
-        if stalled == 12:
-            theta, stalled, prices = theta * 0.6, 0, best_prices
-            continue
-        gradient = np.where(is_reachable, 1.0 - counts, 0.0)
-        # At a price of zero (or of the whole reward) a step outward leads nowhere.
-        gradient[(prices <= 0.0) & (gradient > 0.0)] = 0.0
-        gradient[(prices >= problem.target_reward) & (gradient < 0.0)] = 0.0
-        norm = float(gradient @ gradient)
-        if norm == 0.0 or value - reward < 1e-9:
-            break
-        step = theta * max(value - max(reward, 0.97 * best_value), 0.0) / norm
-        prices = np.clip(prices - step * gradient, 0.0, problem.target_reward)
-    return Bound(
-        value=rounded_bound(problem, best_value, reward), proof="lagrangian", prices=best_prices
-    )
+        iterations = default_steps(network)
+    value, prices = priced_bound(problem, network, reward, iterations, np.zeros(1, dtype=np.uint8))
+    return Bound(value=rounded_bound(problem, value, reward), proof="lagrangian", prices=prices)
+
+
+def default_steps(network: Network) -> int:
+    """Return how many subgradient steps a network is worth."""
+    size = len(network.before) + 10 * len(network.row)
+    return int(np.clip(_ARCS_TO_SPEND / max(1, size), 100, 1000))
+
+
+def priced_bound(
+    problem: Problem,
+    network: Network,
+    level: float,
+    num_steps: int,
+    stop: np.ndarray,
+    start: Floats | None = None,
+) -> tuple[float, Floats]:
+    """Return the value that prices prove after so many steps towards ``level``, and the prices.
+
+    Parameters
+    ----------
+    start
+        Prices to begin with; by default half the rewards.
+    """
+    reward = np.append(problem.target_reward, 0.0)
+    offered = np.zeros(len(reward), dtype=np.bool_)
+    offered[network.place] = True
+    whole = float(reward[offered].sum())
+    prices = reward * 0.5 if start is None else np.append(start, 0.0)
+    value = improve_prices(network, reward, prices, level, num_steps, stop)
+    if whole <= value:
+        return whole, problem.target_reward.astype(np.float64)
+    return float(value), prices[:-1]
+
+
+def reward_unit(problem: Problem) -> float:
+    """Return an amount of which what any plan earns is a multiple; 0 where there is none."""
+    rewards = problem.target_reward
+    if len(rewards) == 0 or rewards.max() >= 2.0**50 or np.any(rewards != np.round(rewards)):
+        return 0.0
+    return float(np.gcd.reduce(rewards.astype(np.int64)))
 
 
 def rounded_bound(problem: Problem, value: float, reward: float) -> float:
@@ -118,6 +137,7 @@ def rounded_bound(problem: Problem, value: float, reward: float) -> float:
     Never below ``reward``, which some plan has earned.
     """
     safe = value * (1.0 + 1e-12) + 1e-9
-    if np.all(problem.target_reward == np.round(problem.target_reward)):
-        safe = float(np.floor(safe + _ROUNDING))
+    unit = reward_unit(problem)
+    if unit > 0.0:
+        safe = float(np.floor((safe + _ROUNDING) / unit) * unit)
     return max(safe, reward)

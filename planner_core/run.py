@@ -104,7 +104,14 @@ def _best_bound(problem: Problem, solution: Solution, reward: float, budget: Bud
     """Return what the solver has proven, or a quick bound of our own if that is lower."""
     proven = None
     if solution.bound is not None and solution.bound_proof is not None:
-        proven = Bound(value=max(solution.bound, reward), proof=solution.bound_proof)
+        proven = Bound(
+            value=max(solution.bound, reward),
+            proof=solution.bound_proof,
+            certificate=solution.certificate,
+            log=solution.log,
+            prices=solution.prices,
+            unit=solution.unit,
+        )
         if proven.value <= reward:
             return proven
     if budget.is_cancelled:

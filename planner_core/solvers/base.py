@@ -11,8 +11,9 @@ from typing import ClassVar, Literal, Protocol
 import numpy as np
 
 from planner_core.bounds import Proof
+from planner_core.certificate import Certificate
 from planner_core.plan import Plan
-from planner_core.problem import Bytes, Problem
+from planner_core.problem import Bytes, Floats, Problem
 
 Feasibility = Literal["hard", "penalty"]
 
@@ -115,6 +116,10 @@ class Solution:
     bound, bound_proof
         What the search has proven on the way: no valid plan of the problem earns more, and
         by which argument. None where it has proven nothing.
+    certificate, log
+        What there is to check the proof with: multipliers, or the report of the MILP solver.
+    prices, unit
+        The same for a proof by dynamic programmes (``resource_bound.resource_value``).
     """
 
     plan: Plan
@@ -122,6 +127,10 @@ class Solution:
     statistics: Mapping[str, float] = field(default_factory=dict)
     bound: float | None = None
     bound_proof: Proof | None = None
+    certificate: Certificate | None = None
+    log: str | None = None
+    prices: Floats | None = None
+    unit: float | None = None
 
 
 class Solver(Protocol):

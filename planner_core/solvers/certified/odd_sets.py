@@ -1,0 +1,130 @@
+"""Cutting planes from odd numbers of sets of which a plan takes one task at most.
+
+Add up 2k + 1 of such sets, halve and round down: of the tasks that stand in two of them or
+more (each as often as half its count), a plan takes k at most (zero-half cuts). Fractional
+plans often break that where they keep each set alone.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from planner_core.draws import Uint64s, next_draw
+from planner_core.jit import kernel
+from planner_core.problem import Floats, Ints, Longs
+
+_INTEGER: Final = 1e-5  # nearer than this to 0 or 1 is no fraction
+_MIN_VIOLATION: Final = 0.02  # of the sum, before halving
+_NOISE: Final = 0.3
+
+
+class Sets(NamedTuple):
+    """Sets of tasks one after another: ``members[offsets[i]:offsets[i + 1]]``."""
+
+    offsets: Longs
+    members: Ints
+
+
+@kernel
+def _tight_sets(sets: Sets, taken: Floats, column_of: Ints) -> tuple[Ints, Floats]:
+    """Return the sets that hold fractional tasks and leave little room, and that room."""
+    own = np.empty(len(sets.offsets) - 1, dtype=np.int32)
+    slack = np.empty(len(own))
+    m = 0
+    for i in range(len(own)):
+        total, has_fraction = 0.0, False
+        for at in range(sets.offsets[i], sets.offsets[i + 1]):
+            total += taken[sets.members[at]]
+            has_fraction |= column_of[sets.members[at]] >= 0
+        if has_fraction and total > _MIN_VIOLATION:
+            own[m] = i
+            slack[m] = max(0.0, 1.0 - total)
+            m += 1
+    return own[:m], slack[:m]
+
+
+@kernel
+def odd_sets(sets: Sets, taken: Floats, draws: Uint64s) -> Sets:
+    """Return odd numbers of sets whose cuts a fractional plan breaks.
+
+    Sets are added up modulo two so that one fractional task after another, the most taken
+    first, stands in an even number of them (Koster, Zymolka and Kutschka, 2009).
+    """
+    one = np.uint64(1)
+    fractional = np.flatnonzero((taken > _INTEGER) & (taken < 1.0 - _INTEGER))
+    noise = np.array([_NOISE * next_draw(draws) for _ in range(len(fractional))])
+    fractional = fractional[np.argsort(-taken[fractional] - noise)]
+    column_of = np.full(len(taken), -1, dtype=np.int32)
+    for i in range(len(fractional)):
+        column_of[fractional[i]] = i
+    own, slack = _tight_sets(sets, taken, column_of)
+    m, n = len(own), len(fractional)
+    odd = np.zeros((m, (n + 63) // 64), dtype=np.uint64)
+    used = np.zeros((m, (m + 63) // 64), dtype=np.uint64)
+    for i in range(m):
+        used[i, i >> 6] = one << np.uint64(i & 63)
+        for at in range(sets.offsets[own[i]], sets.offsets[own[i] + 1]):
+            column = column_of[sets.members[at]]
+            if column >= 0:
+                odd[i, column >> 6] |= one << np.uint64(column & 63)
+    is_odd_number = np.ones(m, dtype=np.bool_)
+    is_live = np.ones(m, dtype=np.bool_)
+    offsets = [np.int64(0)]
+    found = [np.int32(0) for _ in range(0)]
+    for column in range(n):
+        word, bit = column >> 6, one << np.uint64(column & 63)
+        pivot = -1
+        for i in range(m):
+            if is_live[i] and odd[i, word] & bit and (pivot < 0 or slack[i] < slack[pivot]):
+                pivot = i
+        if pivot < 0:
+            continue
+        is_live[pivot] = False
+        for i in range(m):
+            if not is_live[i] or not odd[i, word] & bit:
+                continue
+            slack[i] += slack[pivot]
+            odd[i] ^= odd[pivot]
+            used[i] ^= used[pivot]
+            is_odd_number[i] ^= is_odd_number[pivot]
+            is_live[i] = slack[i] < 1.0 - _MIN_VIOLATION
+            if not is_live[i] or not is_odd_number[i]:
+                continue
+            lost = slack[i]
+            for c in range(n):
+                if odd[i, c >> 6] & (one << np.uint64(c & 63)):
+                    lost += taken[fractional[c]]
+                    if lost >= 1.0 - _MIN_VIOLATION:
+                        break
+            if lost < 1.0 - _MIN_VIOLATION:
+                for j in range(m):
+                    if used[i, j >> 6] & (one << np.uint64(j & 63)):
+                        found.append(own[j])
+                offsets.append(np.int64(len(found)))
+    return Sets(np.array(offsets), np.array(found))
+
+
+@kernel
+def depths(sets: Sets, chosen: Sets, taken: Floats) -> Floats:
+    """Return how far beyond each cut a fractional plan lies; 0 or less where it keeps it.
+
+    The distance in the space of the tasks that it takes.
+    """
+    count = np.zeros(len(taken), dtype=np.int32)
+    depth = np.zeros(len(chosen.offsets) - 1)
+    for cut in range(len(depth)):
+        picked = chosen.members[chosen.offsets[cut] : chosen.offsets[cut + 1]]
+        total, norm = -float((len(picked) - 1) // 2), 1e-9
+        for i in picked:
+            for member in sets.members[sets.offsets[i] : sets.offsets[i + 1]]:
+                count[member] += 1
+        for i in picked:
+            for member in sets.members[sets.offsets[i] : sets.offsets[i + 1]]:
+                weight = count[member] // 2
+                count[member] = 0
+                total += weight * taken[member]
+                norm += weight * weight if taken[member] > _INTEGER else 0.0
+        depth[cut] = total / np.sqrt(norm)
+    return depth

@@ -1,0 +1,73 @@
+"""HiGHS on what the prices leave: a plan worth some amount, or the proof that there is none."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import highspy
+import numpy as np
+
+from planner_core.certificate import Cut
+from planner_core.plan import Plan
+from planner_core.problem import Problem
+from planner_core.solvers.base import Budget
+from planner_core.solvers.milp.highs import Engine, Watch
+from planner_core.solvers.milp.model import plan_program
+from planner_core.solvers.milp.program import Rows
+
+_MAX_LOG: Final = 6000  # characters; the end, which holds the result
+
+
+class Prover(Engine):
+    """The program of the plans worth at least ``amount``; one worth ``enough`` ends the search."""
+
+    def __init__(
+        self,
+        problem: Problem,
+        cuts: list[Cut],
+        amount: float,
+        enough: float,
+        budget: Budget,
+        seed: int,
+    ) -> None:
+        self._problem = problem
+        self._scale = float(problem.target_reward.max(initial=1e-300))
+        model = plan_program(problem, "antichain", 0.0)
+        program = model.program
+        program.worth = [worth / self._scale for worth in program.worth]
+        if program.num_columns == len(problem.opportunities):
+            # A slow satellite may pass by a target again; then these do not hold for passes.
+            for cut in cuts:
+                members, weights = cut.weights()
+                offsets = np.array([0, len(members)], dtype=np.int64)
+                weight = weights.astype(np.float64)
+                program.add_rows(Rows.of(offsets, members, weight, upper=float(cut.limit)))
+        super().__init__(program, budget, seed, is_chained=False)
+        self._messages: list[str] = []
+        highs = self._highs
+        highs.setOptionValue("output_flag", True)
+        highs.setOptionValue("log_to_console", False)
+        highs.cbLogging += self._keep
+        for option, limit in (("objective_bound", amount), ("objective_target", enough)):
+            highs.setOptionValue(option, (limit - 1e-6 * max(1.0, limit)) / self._scale)
+
+    def prove(self, heuristic_effort: float, watch: Watch) -> tuple[Plan | None, float]:
+        """Return a plan worth the amount, if there is one, and what no plan exceeds.
+
+        The bound is infinite where the budget did not suffice for any.
+        """
+        outcome = self.search(None, 0.0, heuristic_effort, watch)
+        plan = None
+        if outcome.columns is not None:
+            taken = outcome.columns[: len(self._problem.opportunities)]
+            plan = Plan.of(self._problem, np.flatnonzero(taken > 0.5))
+        bound = -np.inf if outcome.is_infeasible else outcome.bound * self._scale
+        return plan, bound
+
+    @property
+    def log(self) -> str:
+        """What HiGHS had to say."""
+        return "".join(self._messages)[-_MAX_LOG:]
+
+    def _keep(self, event: highspy.highs.HighsCallbackEvent) -> None:
+        self._messages.append(event.message)

@@ -1,0 +1,42 @@
+"""A plan and a proof that close in on each other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+from planner_core.problem import Problem
+from planner_core.solvers.base import Budget, Constraint, Solution
+from planner_core.solvers.certified.free import solve_free
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Certified:
+    """Find a plan and prove how good it is, until that is good enough."""
+
+    name: ClassVar[str] = "certified"
+    title: ClassVar[str] = "Certified planning"
+    paper: ClassVar[str] = "Not in the paper"
+    exact: ClassVar[bool] = True
+    honours: ClassVar[frozenset[Constraint]] = frozenset(Constraint) - {Constraint.DUPLICATE}
+
+    gap: float = field(
+        default=0.0,
+        metadata={
+            "minimum": 0,
+            "maximum": 1,
+            "description": "Stop when the plan is within this share of the bound.",
+        },
+    )
+    moves_per_task: float = field(
+        default=30.0,
+        metadata={
+            "minimum": 0,
+            "maximum": 100_000,
+            "description": "Moves of the window search for each opportunity before the proof.",
+        },
+    )
+
+    def solve(self, problem: Problem, budget: Budget, seed: int) -> Solution:
+        """Return the best plan and its bound; the same for the same seed if time suffices."""
+        return solve_free(problem, budget, seed, self.gap, self.moves_per_task)
