@@ -147,9 +147,7 @@ def _longer(values: np.ndarray, length: int) -> np.ndarray:
 
 
 @kernel
-def path_of(
-    network: Network, levels: DataLevels, weight: Ints, labels: Labels, value: int
-) -> Ints:
+def path_of(network: Network, levels: DataLevels, weight: Ints, labels: Labels, value: int) -> Ints:
     """Return the rows of a path that gains ``value``, in order, worked out backward.
 
     Any label from which the next one follows to the last bit is as good as the one it was

@@ -39,7 +39,9 @@ class SatelliteRelaxation:
     def of(cls, problem: Problem, satellite: SatelliteProblem) -> SatelliteRelaxation:
         """Return the relaxation of a satellite that has opportunities."""
         network = network_of(problem, satellite)
-        return cls(satellite=satellite, network=network, levels=data_levels(network, 1, is_optimistic=True))
+        return cls(
+            satellite=satellite, network=network, levels=data_levels(network, 1, is_optimistic=True)
+        )
 
     def weights(self, worth: Ints) -> Ints:
         """Return the worth of each task, from that of each target."""
@@ -150,7 +152,7 @@ def quick_bound(problem: Problem, reward: float) -> Bound:
     shares = (0.0,) if len(satellites) == 1 else (1.0, 0.5, 0.0)
     for share in shares:
         prices = share * (np.zeros(1) if best.prices is None else best.prices)
-        prices = _leaving_whole_units(problem, prices, unit)
+        prices = leaving_whole_units(problem, prices, unit)
         value = _value(problem, satellites, prices, unit, reward, stop)
         if value < best.value:
             rounded = rounded_bound(problem, value, reward)
@@ -168,7 +170,7 @@ def _unit(problem: Problem, satellites: tuple[SatelliteRelaxation, ...], value: 
     return max(value / most_units, 1e-12)
 
 
-def _leaving_whole_units(problem: Problem, prices: Floats, unit: float) -> Floats:
+def leaving_whole_units(problem: Problem, prices: Floats, unit: float) -> Floats:
     """Return the nearest prices at which an image is worth a whole number of units."""
     worth = np.round((problem.target_reward - prices) / unit)
     return np.maximum(problem.target_reward - worth * unit, 0.0)
