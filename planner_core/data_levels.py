@@ -6,6 +6,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from planner_core.jit import kernel
 from planner_core.problem import Floats, Ints
 from planner_core.resource_network import Network
 
@@ -25,12 +26,12 @@ class DataLevels(NamedTuple):
     end: int
 
 
-def data_levels(network: Network, per_collect: int) -> DataLevels:
+def data_levels(network: Network, per_collect: int, *, is_optimistic: bool) -> DataLevels:
     """Return levels of which the smallest collect fills ``per_collect``, where that is not many.
 
-    What a task adds is rounded down, and so is an empty recorder: levels are never above what
-    a plan has on board, so that no plan is lost. (Each task may be off by a millionth of a
-    level; limits leave room for that.)
+    Optimistic levels are never above what a plan has on board, so that no plan is lost: what
+    tasks add is rounded down, and so is an empty recorder. Others are never below. (A task may
+    be off by a millionth of a level; limits leave room for that.)
     """
     m = len(network.place)
     is_filling = network.data_gain > 0.0
@@ -41,29 +42,36 @@ def data_levels(network: Network, per_collect: int) -> DataLevels:
     unit = (highest - lowest) / (_MAX_LEVELS - 4)
     if is_filling.any():
         unit = max(unit, float(network.data_gain[is_filling].min()) / per_collect)
-    room = (m + 1) * _ROUNDING
-    base = int(np.floor(lowest / unit - room))
+    sign = 1.0 if is_optimistic else -1.0
+    room = sign * (m + 1) * _ROUNDING
+    base = int(np.floor(lowest / unit - abs(room)))
 
-    def rounded_down(data: Floats | float) -> Ints:
-        return np.floor(np.asarray(data) / unit + _ROUNDING).astype(np.int32)
+    def rounded(data: Floats | float, allowance: float) -> Ints:
+        return (sign * np.floor(sign * np.asarray(data) / unit + allowance)).astype(np.int32)
 
     def limit(data: Floats | float) -> Ints:
         return np.floor(np.asarray(data) / unit + room).astype(np.int32) - base
 
     return DataLevels(
         num_levels=int(limit(highest)) + 1,
-        gain=rounded_down(network.data_gain),
-        floor=np.floor(network.data_floor / unit - room).astype(np.int32) - base,
+        gain=rounded(network.data_gain, _ROUNDING),
+        floor=rounded(network.data_floor, -abs(room)) - base,
         before=limit(network.data_before),
         after=limit(network.data_after),
-        start=int(rounded_down(network.data_start)) - base,
+        start=int(rounded(network.data_start, _ROUNDING)) - base,
         end=int(limit(network.data_end)),
     )
 
 
-def without_data(network: Network) -> DataLevels:
-    """Return a single level: the recorder is left out."""
-    nothing = np.zeros(len(network.place), dtype=np.int32)
+@kernel
+def levels_of_part(levels: DataLevels, rows: Ints) -> DataLevels:
+    """Return the levels of some rows only."""
     return DataLevels(
-        num_levels=1, gain=nothing, floor=nothing, before=nothing, after=nothing, start=0, end=0
+        levels.num_levels,
+        levels.gain[rows],
+        levels.floor[rows],
+        levels.before[rows],
+        levels.after[rows],
+        levels.start,
+        levels.end,
     )

@@ -6,18 +6,30 @@ again and again. For each whole value and data level only the most energy matter
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from planner_core.data_levels import DataLevels
 from planner_core.jit import inlined, kernel
-from planner_core.problem import Bytes, Floats, Ints, Singles
+from planner_core.problem import Bytes, Floats, Ints, Longs, Singles
 from planner_core.resource_network import Network
 
 _TIDY_EVERY: Final = 8  # rows between two passes over the idle labels
 UNREACHED: Final = -1
 STOPPED: Final = -2
+
+
+class Labels(NamedTuple):
+    """What was reached right after each task ``i``: entries ``first[i]`` up to ``first[i + 1]``.
+
+    Whole value, data level and energy of each entry; shape ``(num_labels,)``.
+    """
+
+    first: Longs
+    value: Ints
+    level: Ints
+    energy: Floats
 
 
 @kernel
@@ -28,8 +40,9 @@ def most_value(
     idle_need: Singles,
     after_need: Singles,
     goal: int,
+    keeps_labels: bool,
     stop: Bytes,
-) -> int:
+) -> tuple[int, Labels]:
     """Return the most value of any path, ``UNREACHED`` if that is below ``goal``, or ``STOPPED``.
 
     Parameters
@@ -39,6 +52,8 @@ def most_value(
     idle_need, after_need
         What ``least_energy`` answered for at least ``goal``: labels that cannot reach the goal
         are dropped.
+    keeps_labels
+        Whether to answer the labels as well, for ``path_of``; none otherwise.
     """
     m = len(weight)
     top = idle_need.shape[1] - 1
@@ -55,10 +70,16 @@ def most_value(
     own_low = np.full((m, num_levels), top + 1, dtype=np.int32)
     own_high = np.full((m, num_levels), -1, dtype=np.int32)
     best_so_far = np.empty(top + 1)
+    kept_first = np.zeros(m + 1, dtype=np.int64)
+    capacity = 1024 if keeps_labels else 0
+    kept_value = np.empty(capacity, dtype=np.int32)
+    kept_level = np.empty(capacity, dtype=np.int32)
+    kept_energy = np.empty(capacity)
+    num_kept = 0
     merged = 0
     for k in range(m):
         if stop[0]:
-            return STOPPED
+            return STOPPED, Labels(kept_first, kept_value, kept_level, kept_energy)
         while merged < m and network.idle_from[network.by_idle[merged]] <= k:
             i = network.by_idle[merged]
             _merge(labels[i], first_value[i], own_low[i], own_high[i], idle, low, high)
@@ -66,6 +87,7 @@ def most_value(
             merged += 1
         if k % _TIDY_EVERY == 0:
             _tidy(idle, 0, low, high, idle_need[k], goal, best_so_far)
+        kept_first[k + 1] = num_kept
         # The values that any label of this task can have.
         before, gained = levels.before[k], weight[k]
         lowest, highest = top + 1, -1
@@ -91,6 +113,20 @@ def most_value(
                 own, lowest, own_low[k], own_high[k],
             )  # fmt: skip
         _tidy(own, lowest, own_low[k], own_high[k], after_need[k], goal, best_so_far)
+        if not keeps_labels:
+            continue
+        for y in range(num_levels):
+            if num_kept + top + 1 > capacity:
+                capacity = 2 * capacity + top + 1
+                kept_value = _longer(kept_value, capacity)
+                kept_level = _longer(kept_level, capacity)
+                kept_energy = _longer(kept_energy, capacity)
+            for v in range(own_low[k, y], own_high[k, y] + 1):
+                if own[y, v - lowest] > none:
+                    kept_value[num_kept], kept_level[num_kept] = v, y
+                    kept_energy[num_kept] = own[y, v - lowest]
+                    num_kept += 1
+        kept_first[k + 1] = num_kept
     while merged < m:
         i = network.by_idle[merged]
         _merge(labels[i], first_value[i], own_low[i], own_high[i], idle, low, high)
@@ -100,7 +136,82 @@ def most_value(
         for v in range(max(goal, low[y]), high[y] + 1):
             if idle[y, v] > none:
                 best = max(best, v)
-    return best
+    return best, Labels(kept_first, kept_value, kept_level, kept_energy)
+
+
+@kernel
+def _longer(values: np.ndarray, length: int) -> np.ndarray:
+    longer = np.empty(length, dtype=values.dtype)
+    longer[: len(values)] = values
+    return longer
+
+
+@kernel
+def path_of(network: Network, levels: DataLevels, weight: Ints, labels: Labels, value: int) -> Ints:
+    """Return the rows of a path that gains ``value``, in order, worked out backward.
+
+    Any label from which the next one follows to the last bit is as good as the one it was
+    made from.
+    """
+    m = len(weight)
+    rows = np.empty(m, dtype=np.int32)
+    length = 0
+    k, level, energy = m, levels.end, -np.inf
+    while True:
+        if value == 0 and _leads_to(network, levels, k, levels.start, network.energy_start,
+                                    level, energy):  # fmt: skip
+            break
+        found = -1
+        i = k - 1
+        while i >= 0 and found < 0:
+            if labels.first[i + 1] > labels.first[i] and _may_be_next(network, i, k):
+                for at in range(labels.first[i], labels.first[i + 1]):
+                    if labels.value[at] == value and _leads_to(
+                        network, levels, k, labels.level[at], labels.energy[at], level, energy
+                    ):
+                        found = at
+                        break
+            i -= 1
+        if found < 0:
+            break
+        k = i + 1
+        rows[length] = k
+        length += 1
+        level, energy = labels.level[found], labels.energy[found]
+        value -= weight[k]
+    return rows[:length][::-1].copy()
+
+
+@inlined
+def _may_be_next(network: Network, i: int, k: int) -> bool:
+    if k >= network.idle_from[i]:
+        return True
+    for at in range(network.near_first[i], network.near_first[i + 1]):
+        if network.near_rows[at] == k:
+            return True
+    return False
+
+
+@inlined
+def _leads_to(
+    network: Network,
+    levels: DataLevels,
+    k: int,
+    level: int,
+    energy: float,
+    level_after: int,
+    energy_after: float,
+) -> bool:
+    """Return whether task ``k`` (or the end, at m) makes the later label of the earlier one."""
+    if k == len(network.place):
+        return level <= level_after
+    if level > levels.before[k]:
+        return False
+    to = max(levels.floor[k], level + levels.gain[k], 0)
+    return bool(
+        to == level_after
+        and min(energy, network.energy_cap[k]) - network.energy_cost[k] == energy_after
+    )
 
 
 @inlined

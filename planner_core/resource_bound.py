@@ -17,8 +17,8 @@ import numpy as np
 from planner_core.bounds import Bound, lagrangian_bound, rounded_bound
 from planner_core.data_levels import DataLevels, data_levels
 from planner_core.least_energy import least_energy
-from planner_core.most_value import STOPPED, UNREACHED, most_value
-from planner_core.problem import COLLECT, Bytes, Floats, Ints, Problem, SatelliteProblem
+from planner_core.most_value import STOPPED, UNREACHED, most_value, path_of
+from planner_core.problem import COLLECT, Bytes, Floats, Ints, Problem, SatelliteProblem, Singles
 from planner_core.resource_network import Network, network_of
 
 _MAX_CELLS: Final = 30_000_000  # of one table of least energy
@@ -39,7 +39,9 @@ class SatelliteRelaxation:
     def of(cls, problem: Problem, satellite: SatelliteProblem) -> SatelliteRelaxation:
         """Return the relaxation of a satellite that has opportunities."""
         network = network_of(problem, satellite)
-        return cls(satellite=satellite, network=network, levels=data_levels(network, 1))
+        return cls(
+            satellite=satellite, network=network, levels=data_levels(network, 1, is_optimistic=True)
+        )
 
     def weights(self, worth: Ints) -> Ints:
         """Return the worth of each task, from that of each target."""
@@ -48,36 +50,50 @@ class SatelliteRelaxation:
         own[is_collect] = worth[self.satellite.place[is_collect]]
         return own
 
-    def most(self, worth: Ints, enough: int, stop: Bytes) -> int:
-        """Return the most units that the satellite can gain, or ``enough`` if that is more.
+    def most(
+        self, worth: Ints, enough: int, stop: Bytes, *, guess: int | None = None
+    ) -> tuple[int, Ints | None]:
+        """Return the most units that the satellite can gain, and the rows of a path that does.
 
-        Answers a cheaper bound on it once ``stop`` is set.
+        Answers a cheaper bound on it, and no path, once ``stop`` is set or where the most is
+        known to be below ``enough`` (which it answers then).
+
+        Parameters
+        ----------
+        guess
+            What is expected. Paths are answered only where there is a guess.
         """
         weight = self.weights(worth)
-        top = self._most_with_full_recorder(weight)
+        idle, after, top = self._needs(weight, guess)
         step = max(1, int(_FIRST_STEP * top))
         goal = top
-        idle, after = least_energy(self.network, weight, top)
-        while goal > enough:
+        if guess is not None and guess < top:
+            goal = guess + step
+        while goal >= enough:
             # Labels that cannot reach the goal are dropped: the higher, the quicker.
             goal, ceiling = max(enough, goal - step, 0), goal
-            most = most_value(self.network, self.levels, weight, idle, after, goal, stop)
+            most, labels = most_value(
+                self.network, self.levels, weight, idle, after, goal, guess is not None, stop
+            )
             if most == STOPPED:
-                return ceiling
+                return min(ceiling, top), None
             if most != UNREACHED:
-                return most
+                if guess is None:
+                    return most, None
+                return most, path_of(self.network, self.levels, weight, labels, most)
             goal, step = goal - 1, 2 * step
-        return max(enough, 0)
+        return max(enough, 0), None
 
-    def _most_with_full_recorder(self, weight: Ints) -> int:
-        """Return what the battery alone allows."""
-        limit = 128 + int(weight.max(initial=0))
+    def _needs(self, weight: Ints, guess: int | None) -> tuple[Singles, Singles, int]:
+        """Return the tables of least energy, and what the battery alone allows."""
+        limit = int(1.05 * guess) if guess is not None else 0
+        limit += 128 + int(weight.max(initial=0))
         while True:
-            idle, _ = least_energy(self.network, weight, limit)
+            idle, after = least_energy(self.network, weight, limit)
             most = int(np.flatnonzero(idle[0] <= self.network.energy_start)[-1])
             if most < limit:
-                return most
-            limit *= 4
+                return idle[:, : most + 1].copy(), after[:, : most + 1].copy(), most
+            limit *= 4 if guess is None else 2
 
 
 def relaxations(problem: Problem) -> tuple[SatelliteRelaxation, ...]:
@@ -114,7 +130,7 @@ def _value(
     paid = float(prices.sum())
     # What the other satellites gain is known only afterwards: one alone may stop early.
     units_enough = int(np.floor((enough - paid) / unit)) if len(satellites) == 1 else 0
-    units = sum(s.most(worth, max(units_enough, 0), stop) for s in satellites)
+    units = sum(s.most(worth, max(units_enough, 0), stop)[0] for s in satellites)
     rounded_away = _ROUNDING * len(problem.opportunities) * unit
     return max(paid + units * unit + rounded_away, enough)
 
@@ -136,7 +152,7 @@ def quick_bound(problem: Problem, reward: float) -> Bound:
     shares = (0.0,) if len(satellites) == 1 else (1.0, 0.5, 0.0)
     for share in shares:
         prices = share * (np.zeros(1) if best.prices is None else best.prices)
-        prices = _leaving_whole_units(problem, prices, unit)
+        prices = leaving_whole_units(problem, prices, unit)
         value = _value(problem, satellites, prices, unit, reward, stop)
         if value < best.value:
             rounded = rounded_bound(problem, value, reward)
@@ -154,7 +170,7 @@ def _unit(problem: Problem, satellites: tuple[SatelliteRelaxation, ...], value: 
     return max(value / most_units, 1e-12)
 
 
-def _leaving_whole_units(problem: Problem, prices: Floats, unit: float) -> Floats:
+def leaving_whole_units(problem: Problem, prices: Floats, unit: float) -> Floats:
     """Return the nearest prices at which an image is worth a whole number of units."""
     worth = np.round((problem.target_reward - prices) / unit)
     return np.maximum(problem.target_reward - worth * unit, 0.0)

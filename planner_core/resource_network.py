@@ -22,7 +22,7 @@ import numpy as np
 
 from planner_core.comparable import Order, comes_before, order_of
 from planner_core.jit import kernel
-from planner_core.model import Track, compile_track
+from planner_core.model import STRICT, compile_track
 from planner_core.problem import Floats, Ints, Longs, Problem, SatelliteProblem
 from planner_core.slew import TIME_TOLERANCE_S
 
@@ -59,12 +59,17 @@ class Network(NamedTuple):
 
 def network_of(problem: Problem, satellite: SatelliteProblem) -> Network:
     """Return the network whose paths include every plan that the referee accepts."""
+    return _network(problem, satellite, _SLACK)
+
+
+def strict_network_of(problem: Problem, satellite: SatelliteProblem) -> Network:
+    """Return the network whose paths are plans that the referee accepts (stations aside)."""
+    return _network(problem, satellite, -2.0 * STRICT)
+
+
+def _network(problem: Problem, satellite: SatelliteProblem, slack: float) -> Network:
+    """Return a network; limits are passed by ``slack`` (negative: kept clear of)."""
     track = compile_track(problem, satellite, np.zeros(len(satellite), dtype=np.uint8))
-    return network_of_track(track, satellite, _SLACK)
-
-
-def network_of_track(track: Track, satellite: SatelliteProblem, slack: float) -> Network:
-    """Return a network; limits are touched and passed by ``slack`` (negative: kept clear of)."""
     order = order_of(satellite.transitions)
     idle_from, near_first, near_rows = _arcs(order)
     straight_first, straight_rows = _arcs_by_end(near_first, near_rows)
@@ -119,6 +124,49 @@ def _arcs(order: Order) -> tuple[Ints, Longs, Ints]:
                 rows[at] = j
                 at += 1
     return idle_from, first, rows
+
+
+@kernel
+def part_of(network: Network, rows: Ints) -> Network:
+    """Return the network of some rows only, ascending; levels stay those of the whole."""
+    m = len(rows)
+    new_row = np.full(len(network.place), -1, dtype=np.int32)
+    for new in range(m):
+        new_row[rows[new]] = new
+    idle_from = np.searchsorted(rows, network.idle_from[rows]).astype(np.int32)
+    first = np.zeros(m + 1, dtype=np.int64)
+    near_rows = np.empty(len(network.near_rows), dtype=np.int32)
+    num_arcs = 0
+    for new in range(m):
+        row = rows[new]
+        for at in range(network.near_first[row], network.near_first[row + 1]):
+            j = new_row[network.near_rows[at]]
+            if j >= 0:
+                near_rows[num_arcs] = j
+                num_arcs += 1
+        first[new + 1] = num_arcs
+    near_rows = near_rows[:num_arcs].copy()
+    straight_first, straight_rows = _arcs_by_end(first, near_rows)
+    return Network(
+        network.place[rows],
+        network.is_contact[rows],
+        idle_from,
+        np.argsort(idle_from, kind="mergesort").astype(np.int32),
+        first,
+        near_rows,
+        straight_first,
+        straight_rows,
+        network.energy_cap[rows],
+        network.energy_cost[rows],
+        network.energy_floor[rows],
+        network.data_gain[rows],
+        network.data_floor[rows],
+        network.data_before[rows],
+        network.data_after[rows],
+        network.energy_start,
+        network.data_start,
+        network.data_end,
+    )
 
 
 @kernel

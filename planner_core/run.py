@@ -118,6 +118,8 @@ def _best_bound(
             proof=solution.bound_proof,
             certificate=solution.certificate,
             log=solution.log,
+            prices=solution.prices,
+            unit=solution.unit,
         )
         proven = own if proven is None or own.value < proven.value else proven
     if proven is not None and (known is not None or proven.value <= reward):

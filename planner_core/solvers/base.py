@@ -13,7 +13,7 @@ import numpy as np
 from planner_core.bounds import Proof
 from planner_core.certificate import Certificate
 from planner_core.plan import Plan
-from planner_core.problem import Bytes, Problem
+from planner_core.problem import Bytes, Floats, Problem
 
 Feasibility = Literal["hard", "penalty"]
 BreadthCounts = Literal["tasks", "one_more"]
@@ -119,6 +119,8 @@ class Solution:
         by which argument. None where it has proven nothing.
     certificate, log
         What there is to check the proof with: multipliers, or the report of the MILP solver.
+    prices, unit
+        The same for a proof by dynamic programmes (``resource_bound.resource_value``).
     """
 
     plan: Plan
@@ -128,6 +130,8 @@ class Solution:
     bound_proof: Proof | None = None
     certificate: Certificate | None = None
     log: str | None = None
+    prices: Floats | None = None
+    unit: float | None = None
 
 
 class Solver(Protocol):

@@ -8,7 +8,7 @@ from typing import ClassVar
 from planner_core.problem import Problem
 from planner_core.solvers.base import Budget, Constraint, Solution
 from planner_core.solvers.certified.free import solve_free
-from planner_core.solvers.milp import Milp
+from planner_core.solvers.certified.resources import solve_with_resources
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,5 +41,5 @@ class Certified:
     def solve(self, problem: Problem, budget: Budget, seed: int) -> Solution:
         """Return the best plan and its bound; the same for the same seed if time suffices."""
         if problem.use_resources:
-            return Milp(gap=self.gap).solve(problem, budget, seed)
+            return solve_with_resources(problem, budget, seed, self.gap)
         return solve_free(problem, budget, seed, self.gap, self.moves_per_task)

@@ -1,0 +1,88 @@
+"""The best plan with given contacts, by mixed-integer programming over promising tasks.
+
+With its contacts fixed the linear relaxation is nearly tight; with contacts free it is not. The
+tasks that relaxed plans have taken on the way to good prices are few, and hold good plans.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from planner_core.plan import Plan
+from planner_core.problem import CONTACT, Bools, Floats, Ints, Problem
+from planner_core.solvers.base import Budget
+from planner_core.solvers.milp.antichains import violated_antichains
+from planner_core.solvers.milp.highs import Engine
+from planner_core.solvers.milp.model import PlanProgram, plan_program
+from planner_core.solvers.milp.program import Rows
+
+_CLEAR: Final = 1e-7  # from the limits, so that the referee accepts the plan
+_CUT_ROUNDS: Final = 5
+_EFFORT: Final = 0.2
+
+
+class _Engine(Engine):
+    def require(self, amount: float) -> None:
+        """Look only for points worth this much."""
+        self._highs.setOptionValue("objective_bound", amount - 1e-6 * max(1.0, amount))
+
+
+class FixedContacts:
+    """The program of one set of contacts over some of the tasks; its bound is not a proof."""
+
+    def __init__(
+        self, problem: Problem, offered: Bools, contacts: tuple[int, ...], budget: Budget, seed: int
+    ) -> None:
+        self._problem = problem
+        self._model = plan_program(problem, "antichain", _CLEAR)
+        _fix(self._model, problem, offered, np.array(contacts, dtype=np.int32))
+        self._engine = _Engine(self._model.program, budget, seed, is_chained=True)
+        self.relaxed = self._cut()
+
+    def _cut(self) -> float:
+        """Return the value of the relaxation with antichain cuts; minus infinity if none."""
+        for left in range(_CUT_ROUNDS, -1, -1):
+            taken = self._engine.relaxed()
+            if taken is None:
+                return -np.inf
+            if left == 0 or not self._add_cuts(taken):
+                break
+        return self._engine.bound
+
+    def _add_cuts(self, taken: Floats) -> bool:
+        is_cut = False
+        satellites = zip(self._problem.satellites, self._model.orders, strict=True)
+        for satellite, order in satellites:
+            if len(satellite) == 0:
+                continue
+            own = self._model.taken[satellite.rows]
+            offsets, members = violated_antichains(order, taken[own])
+            self._engine.add_rows(Rows.of(offsets, own[members], upper=1.0))
+            is_cut = is_cut or len(offsets) > 1
+        return is_cut
+
+    def plan(self, at_least: float) -> Plan | None:
+        """Return the best plan worth ``at_least``, or None where there is none (in time)."""
+        self._engine.require(at_least)
+        outcome = self._engine.search(None, 0.0, _EFFORT, _unwatched)
+        if outcome.columns is None:
+            return None
+        taken = outcome.columns[: len(self._problem.opportunities)]
+        return Plan.of(self._problem, np.flatnonzero(taken > 0.5))
+
+
+def _unwatched(_reward: float, _bound: float) -> None:
+    pass
+
+
+def _fix(model: PlanProgram, problem: Problem, offered: Bools, contacts: Ints) -> None:
+    """Set the bounds of x: contacts fixed, of the other tasks only those offered."""
+    program = model.program
+    n = len(problem.opportunities)
+    lower, upper = np.concatenate(program.lower), np.concatenate(program.upper)
+    is_contact = problem.opportunities.kind == CONTACT
+    upper[:n][is_contact | ~offered] = 0.0
+    lower[contacts] = upper[contacts] = 1.0
+    program.lower, program.upper = [lower], [upper]

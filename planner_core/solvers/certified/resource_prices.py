@@ -1,0 +1,116 @@
+"""Prices for the bound by dynamic programmes, from subgradient steps over the exact programme."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Final
+
+import numpy as np
+
+from planner_core.problem import COLLECT, CONTACT, Bytes, Floats, Problem
+from planner_core.resource_bound import (
+    SatelliteRelaxation,
+    leaving_whole_units,
+    relaxations,
+    whole_worth,
+)
+
+_MAX_CELLS: Final = 12_000_000
+_UNITS_PER_REWARD: Final = 16
+_DEFLECTION: Final = 0.3
+_PATIENCE: Final = 7
+_SHORTER: Final = 0.6
+_NEAR: Final = 0.99
+
+
+class PriceSearch:
+    """Prices that bring the bound down, and what the relaxed plans on the way looked like.
+
+    Attributes
+    ----------
+    value, prices, unit
+        The best bound and what proves it.
+    usage
+        How many relaxed plans took each opportunity. Shape ``(n,)``.
+    contact_sets
+        How often each set of contacts was best.
+    theta
+        Length of the steps; they get shorter as they stop helping.
+    """
+
+    def __init__(self, problem: Problem, value: float, prices: Floats, stop: Bytes) -> None:
+        self._problem, self._stop = problem, stop
+        self._satellites: tuple[SatelliteRelaxation, ...] = relaxations(problem)
+        self._is_reachable = np.diff(problem.target_opportunities[1]) > 0
+        self._now = np.where(self._is_reachable, prices, 0.0)
+        self._direction = np.zeros(len(prices))
+        self._guess: list[int | None] = [None] * len(self._satellites)
+        self._stalled = 0
+        self.unit = self._unit(value)
+        self.value, self.prices = np.inf, self._now
+        self.usage = np.zeros(len(problem.opportunities))
+        self.contact_sets: Counter[tuple[int, ...]] = Counter()
+        self.theta = 1.0
+
+    def _unit(self, value: float) -> float:
+        largest = max(len(s.satellite) for s in self._satellites)
+        reward = self._problem.target_reward
+        typical = float(reward[self._is_reachable].mean()) or 1.0
+        unit = 2.0 ** np.floor(np.log2(typical)) / _UNITS_PER_REWARD
+        while value / unit > _MAX_CELLS / largest:
+            unit *= 2.0
+        return float(unit)
+
+    def step(self, reward: float) -> bool:
+        """Evaluate the current prices and step on; return False once the work must stop."""
+        reward_of = self._problem.target_reward
+        prices = leaving_whole_units(self._problem, self._now, self.unit)
+        prices[~self._is_reachable] = 0.0
+        outcome = self._evaluate(prices)
+        if outcome is None:
+            return False
+        value, counts = outcome
+        self._stalled += 1
+        if value < self.value - 1e-9:
+            self.value, self.prices, self._stalled = value, prices, 0
+        if self._stalled >= _PATIENCE:
+            self.theta, self._stalled = self.theta * _SHORTER, 0
+            self._now, self._direction = self.prices, np.zeros_like(self._direction)
+            return True
+        gradient = np.where(self._is_reachable, counts - 1.0, 0.0)
+        gradient[(self._now <= 0.0) & (gradient < 0.0)] = 0.0
+        gradient[(self._now >= reward_of) & (gradient > 0.0)] = 0.0
+        # A step moves prices in proportion to what the targets are worth.
+        scale = np.where(reward_of > 0.0, reward_of, 1.0)
+        self._direction = (1.0 - _DEFLECTION) * gradient + _DEFLECTION * self._direction
+        norm = float(self._direction @ (scale * self._direction))
+        if norm == 0.0:
+            return False
+        length = self.theta * (value - max(reward, _NEAR * self.value)) / norm
+        self._now = np.clip(self._now + length * scale * self._direction, 0.0, reward_of)
+        return True
+
+    def _evaluate(self, prices: Floats) -> tuple[float, Floats] | None:
+        """Return the bound of these prices and how often its paths take each target."""
+        problem = self._problem
+        worth = whole_worth(problem, prices, self.unit)
+        counts = np.zeros(len(prices))
+        contacts: list[int] = []
+        units = 0
+        for i, relaxation in enumerate(self._satellites):
+            guess = self._guess[i]
+            if guess is None:
+                guess, _ = relaxation.most(worth, 0, self._stop)
+            most, path = relaxation.most(worth, 0, self._stop, guess=guess)
+            if path is None:
+                return None
+            units += most
+            self._guess[i] = most
+            rows = relaxation.satellite.rows[path]
+            self.usage[rows] += 1.0
+            images = rows[problem.opportunities.kind[rows] == COLLECT]
+            np.add.at(counts, problem.opportunities.place[images], 1.0)
+            contacts += [int(r) for r in rows[problem.opportunities.kind[rows] == CONTACT]]
+        self.contact_sets[tuple(sorted(contacts))] += 1
+        rounded_away = 1e-9 * len(problem.opportunities) * self.unit
+        return float(prices.sum()) + units * self.unit + rounded_away, counts

@@ -1,0 +1,241 @@
+"""With battery and recorder: plans and bounds by exact programmes that close in on each other.
+
+Where energy is short the programme without prices bounds the best plan within an image or two,
+and the same programme over choices of tasks finds one. Where targets are few as well, prices
+lower the bound, and the tasks of the relaxed plans on the way make a small mixed-integer
+program for each promising set of contacts. Where agility alone decides, so does the proof
+without resources.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from planner_core.bounds import Bound, reward_unit, rounded_bound
+from planner_core.plan import Plan
+from planner_core.problem import CONTACT, Bools, Problem
+from planner_core.resource_bound import quick_bound
+from planner_core.solvers.base import Budget, Progress, Solution, Termination
+from planner_core.solvers.certified.choices import ChoiceSearch
+from planner_core.solvers.certified.contact_sets import FixedContacts
+from planner_core.solvers.certified.free import TOLERANCE, solve_free
+from planner_core.solvers.certified.resource_prices import PriceSearch
+from planner_core.solvers.rule import Rule
+from planner_core.timeline import replay
+
+_MAX_UNITS: Final = 2000
+_FIRST_GOAL: Final = 0.95
+_MOVES: Final = 40  # of the search for plans, between two looks at the bound
+_FIRST_ROUNDS: Final = 4
+_ROUNDS: Final = 40
+_STEPS: Final = 5  # of the search for prices, in a round
+_SHORTEST: Final = 0.02
+_SETS_FROM: Final = 6  # rounds of prices before contact sets are tried
+_SETS_EVERY: Final = 4
+_SETS_LOOKED_AT: Final = 5
+_SET_TIME_S: Final = 15.0
+_LEAST_USAGE: Final = 2.0
+
+
+class ResourceSearch:
+    """A plan and a bound of a problem with resources."""
+
+    def __init__(self, problem: Problem, budget: Budget, seed: int, gap: float) -> None:
+        self.problem, self.budget, self.seed, self.gap = problem, budget, seed, gap
+        self.unit = reward_unit(problem)
+        self.plan = Plan()
+        timeline = replay(problem, self.plan)
+        self.is_valid, self.reward = timeline.is_valid, timeline.reward
+        self.bound = Bound(value=float(problem.target_reward.sum()), proof="lagrangian")
+        self._tried: set[tuple[int, ...]] = set()
+
+    @property
+    def is_optimal(self) -> bool:
+        """Whether no plan is better, to the stated tolerance."""
+        return self.bound.value - self.reward < max(self.unit, TOLERANCE * self.reward, 1e-9)
+
+    @property
+    def is_close(self) -> bool:
+        """Whether plan and bound are as close as was asked for."""
+        return self.is_optimal or self.bound.value - self.reward <= self.gap * self.bound.value
+
+    @property
+    def is_done(self) -> bool:
+        """Whether plan and bound are close enough, or the budget is spent."""
+        return self.is_close or self.budget.is_spent()
+
+    def offer(self, plan: Plan) -> bool:
+        """Take a plan if it is better; a valid one is better than any other."""
+        timeline = replay(self.problem, plan)
+        if (timeline.is_valid, timeline.reward) <= (self.is_valid, self.reward):
+            return False
+        self.plan, self.is_valid, self.reward = plan, timeline.is_valid, timeline.reward
+        return True
+
+    def lower(self, bound: Bound) -> None:
+        """Note what no plan exceeds."""
+        value = rounded_bound(self.problem, bound.value, self.reward)
+        if value < self.bound.value:
+            self.bound = replace(bound, value=value)
+
+    def report(self, message: str) -> None:
+        """Tell how far plan and bound are apart."""
+        share = self.reward / self.bound.value if self.bound.value > 0.0 else 1.0
+        self.budget.report(
+            Progress(
+                phase="solve",
+                fraction=min(1.0, share),
+                reward=self.reward,
+                bound=self.bound.value,
+                message=message,
+            )
+        )
+
+    def search(self, choices: ChoiceSearch, num_moves: int) -> None:
+        """Make moves from the best plan."""
+        for _ in range(num_moves):
+            if self.is_done:
+                return
+            choices.move()
+            if choices.reward > self.reward + 1e-12:
+                self.offer(choices.plan)
+        self.report("plans")
+
+    def without_resources(self) -> Bools:
+        """Let agility alone bound the plans; return the tasks of the best plan then."""
+        free = replace(self.problem, use_resources=False)
+        solution = solve_free(free, self.budget, self.seed, self.gap, 30.0)
+        if solution.bound is not None and solution.bound_proof is not None:
+            self.lower(
+                Bound(
+                    value=solution.bound,
+                    proof=solution.bound_proof,
+                    certificate=solution.certificate,
+                    log=solution.log,
+                )
+            )
+        self.report("without resources")
+        return self.mask(action.opportunity for action in solution.plan.actions)
+
+    def mask(self, rows: Iterable[int]) -> Bools:
+        """Return which opportunities these are."""
+        mask = np.zeros(len(self.problem.opportunities), dtype=np.bool_)
+        mask[list(rows)] = True
+        return mask
+
+    def price(self, prices: PriceSearch) -> bool:
+        """Make steps towards better prices; return whether there are more to make."""
+        for _ in range(_STEPS):
+            if self.is_done or not prices.step(self.reward):
+                return False
+            self.lower(
+                Bound(value=prices.value, proof="dp", prices=prices.prices, unit=prices.unit)
+            )
+        self.report("prices")
+        return prices.theta > _SHORTEST
+
+    def fix_contacts(self, prices: PriceSearch) -> bool:
+        """Search among promising tasks with the most promising contacts; return whether any."""
+        offered = prices.usage >= _LEAST_USAGE
+        offered |= self.mask(action.opportunity for action in self.plan.actions)
+        is_contact = self.problem.opportunities.kind == CONTACT
+        own = tuple(a.opportunity for a in self.plan.actions if is_contact[a.opportunity])
+        sets = [own, *(key for key, _ in prices.contact_sets.most_common(_SETS_LOOKED_AT))]
+        found: list[tuple[float, tuple[int, ...], FixedContacts]] = []
+        for contacts in dict.fromkeys(sets):
+            if contacts in self._tried or self.is_done:
+                continue
+            program = FixedContacts(self.problem, offered, contacts, self._share(), self.seed)
+            if program.relaxed >= self.better - 1e-6:
+                found.append((program.relaxed, contacts, program))
+            else:
+                self._tried.add(contacts)
+        if not found or self.is_done:
+            return False
+        _, contacts, program = max(found, key=lambda entry: entry[0])
+        self._tried.add(contacts)
+        self.report("contacts fixed")
+        plan = program.plan(self.better)
+        return plan is not None and self.offer(plan)
+
+    @property
+    def better(self) -> float:
+        """What a plan must be worth that is better than the one at hand."""
+        return self.reward + max(self.unit, TOLERANCE * self.reward, 1e-9)
+
+    def _share(self) -> Budget:
+        """Return a budget for one program, that ends with the whole at the latest."""
+        left_s = self.budget.remaining_s()
+        share = Budget(_SET_TIME_S if left_s is None else min(left_s, _SET_TIME_S))
+        share.stop = self.budget.stop
+        return share
+
+    def solution(self) -> Solution:
+        """Return the plan with what is known of it."""
+        if self.is_optimal and self.is_valid:
+            termination = Termination.OPTIMAL
+        elif self.is_close and self.is_valid:
+            termination = Termination.GAP_REACHED
+        elif self.budget.is_spent():
+            termination = self.budget.termination()
+        else:
+            termination = Termination.HORIZON_COMPLETE
+        return Solution(
+            plan=self.plan,
+            termination=termination,
+            bound=self.bound.value,
+            bound_proof=self.bound.proof,
+            certificate=self.bound.certificate,
+            log=self.bound.log,
+            prices=self.bound.prices,
+            unit=self.bound.unit,
+        )
+
+
+def solve_with_resources(problem: Problem, budget: Budget, seed: int, gap: float) -> Solution:
+    """Return the best plan of a problem with resources, and its proof."""
+    search = ResourceSearch(problem, budget, seed, gap)
+    search.offer(Rule().solve(problem, Budget(), seed).plan)
+    if len(problem.opportunities) == 0:
+        return search.solution()
+    search.lower(quick_bound(problem, search.reward))
+    unit = search.unit
+    if unit == 0.0 or search.bound.value / unit > _MAX_UNITS:
+        unit = max(search.bound.value / _MAX_UNITS, 1e-12)
+    choices = ChoiceSearch(problem, unit, seed, budget.stop)
+    choices.start(search.mask([]), _FIRST_GOAL)
+    search.offer(choices.plan)
+    search.report("plans")
+    if search.bound.proof == "lagrangian" and not search.is_done:
+        preferred = search.without_resources()
+        choices.start(preferred, 1.0)
+        search.offer(choices.plan)
+    for _ in range(_FIRST_ROUNDS):
+        search.search(choices, _MOVES)
+    _close_in(search, choices)
+    return search.solution()
+
+
+def _close_in(search: ResourceSearch, choices: ChoiceSearch) -> None:
+    """Search for prices and plans in turn, until neither gets anywhere."""
+    if search.is_done:
+        return
+    start = search.bound.prices
+    prices = PriceSearch(
+        search.problem,
+        search.bound.value,
+        np.zeros(len(search.problem.target_ids)) if start is None else start,
+        search.budget.stop,
+    )
+    for number in range(_ROUNDS):
+        has_more = search.price(prices)
+        search.search(choices, _MOVES)
+        is_due = number >= _SETS_FROM and (number - _SETS_FROM) % _SETS_EVERY == 0
+        if (is_due or not has_more) and search.fix_contacts(prices):
+            choices.adopt(search.plan)
+        elif not has_more:
+            return
