@@ -309,11 +309,11 @@ def solve_free(
     if not search.is_done:
         search.price()
         search.report("prices")
-    left = moves_per_task
-    while left > 0 and not search.is_done:
+    left, num_idle = moves_per_task, 0
+    while left > 0 and num_idle < 2 and not search.is_done:
         left -= 5.0
-        if not search.search(5.0, search.open_rows(search.reward)):
-            break
+        is_better = search.search(5.0, search.open_rows(search.reward))
+        num_idle = 0 if is_better else num_idle + 1
         search.report("window search")
     if not search.is_done:
         _close_in(search)
