@@ -15,7 +15,7 @@ _PATIENCE: Final = 20  # steps without gain before they get shorter
 _SHORTER: Final = 0.7
 _SHORTEST: Final = 1e-4
 _GAIN: Final = 1e-4
-_NEAR: Final = 0.98
+_NEAR: Final = 0.8
 
 
 @kernel

@@ -40,7 +40,7 @@ _MAX_PARTS: Final = 4  # beyond that HiGHS is faster
 _POLISH: Final = 50.0
 _POLISHED: Final = (1, 2, 4, 8, 16, 32)  # rounds
 _REPORT_EVERY_S: Final = 0.25
-_LAST_SEARCHES: Final = 6  # among what a plan as good as the bound can hold
+_LAST_SEARCHES: Final = 2  # among what a plan as good as the bound can hold
 _LAST_MOVES: Final = 15.0
 
 
@@ -202,7 +202,7 @@ class FreeSearch:
             program = plan_program(part, "antichain", 0.0).program
             scale = float(self.problem.target_reward.max())
             program.worth = [worth / scale for worth in program.worth]
-        prover = Prover(part, program, amount, amount, self.budget, self.seed)
+        prover = Prover(part, program, amount, self.bound, self.budget, self.seed)
 
         def watch(_reward: float, _bound: float) -> None:
             now_s = time.monotonic()
@@ -309,11 +309,11 @@ def solve_free(
     if not search.is_done:
         search.price()
         search.report("prices")
-    left = moves_per_task
-    while left > 0 and not search.is_done:
+    left, num_idle = moves_per_task, 0
+    while left > 0 and num_idle < 2 and not search.is_done:
         left -= 5.0
-        if not search.search(5.0, search.open_rows(search.reward)):
-            break
+        is_better = search.search(5.0, search.open_rows(search.reward))
+        num_idle = 0 if is_better else num_idle + 1
         search.report("window search")
     if not search.is_done:
         _close_in(search)
@@ -328,6 +328,7 @@ def _close_in(search: FreeSearch) -> None:
         if search.is_done:
             return
         search.search(_LAST_MOVES, search.open_rows(search.bound))
+        search.report("last search")
     if search.is_transitive:
         search.branch(master)
     while not search.is_done:
