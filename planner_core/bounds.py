@@ -17,7 +17,7 @@ import numpy as np
 from planner_core.certificate import Certificate
 from planner_core.network import Network, heaviest_paths, network_of
 from planner_core.prices import improve_prices
-from planner_core.problem import Floats, Ints, Problem
+from planner_core.problem import Bytes, Floats, Ints, Problem
 
 Proof = Literal["lagrangian", "milp", "dp"]
 
@@ -102,21 +102,14 @@ def priced_bound(
     network: Network,
     level: float,
     num_steps: int,
-    stop: np.ndarray,
-    start: Floats | None = None,
+    stop: Bytes,
 ) -> tuple[float, Floats]:
-    """Return the value that prices prove after so many steps towards ``level``, and the prices.
-
-    Parameters
-    ----------
-    start
-        Prices to begin with; by default half the rewards.
-    """
+    """Return the value that prices prove after so many steps towards ``level``, and the prices."""
     reward = np.append(problem.target_reward, 0.0)
     offered = np.zeros(len(reward), dtype=np.bool_)
     offered[network.place] = True
     whole = float(reward[offered].sum())
-    prices = reward * 0.5 if start is None else np.append(start, 0.0)
+    prices = reward * 0.5
     value = improve_prices(network, reward, prices, level, num_steps, stop)
     if whole <= value:
         return whole, problem.target_reward.astype(np.float64)

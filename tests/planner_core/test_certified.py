@@ -10,9 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from planner_core.bounds import Bound
 from planner_core.certificate import Certificate, Cut, Multipliers, Refutation, is_refuted
 from planner_core.domain import Agility
 from planner_core.problem import COLLECT, Problem
+from planner_core.proofs import from_json, recomputed, to_json
 from planner_core.solvers import Certified, Rule
 from planner_core.solvers.base import Budget, Progress, Solution, Termination
 from planner_core.solvers.certified.free import TOLERANCE
@@ -201,3 +203,16 @@ def test_problems_without_a_choice(num_collects: int) -> None:
     solution = Certified().solve(problem, Budget(), 0)
     assert solution.bound == float(num_collects)
     assert solution.termination is Termination.OPTIMAL
+
+
+def test_a_proof_survives_being_written_down() -> None:
+    problem = random_problem(3, use_resources=False, num_collects=120, num_targets=30)
+    solution = Certified().solve(problem, Budget(), 0)
+    assert solution.bound is not None
+    assert solution.certificate is not None
+    bound = Bound(value=solution.bound, proof="lagrangian", certificate=solution.certificate)
+    again = from_json(to_json(bound))
+    assert again.value == bound.value
+    proven = recomputed(problem, again)
+    assert proven is not None
+    assert bound.value < proven <= bound.value + 1.0

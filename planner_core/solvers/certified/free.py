@@ -176,7 +176,7 @@ class FreeSearch:
             bounds.append(master.value)
             if len(bounds) in _POLISHED and not self.is_done:
                 self.polish(taken)
-                self.report(f"polish {np.sum(taken > _WANTED)}")
+                self.report("window search")
             if self.is_done:
                 break
             master.allow(~self.is_struck)
@@ -328,7 +328,7 @@ def _close_in(search: FreeSearch) -> None:
         if search.is_done:
             return
         search.search(_LAST_MOVES, search.open_rows(search.bound))
-        search.report("last search")
+        search.report("window search")
     if search.is_transitive:
         search.branch(master)
     while not search.is_done:
