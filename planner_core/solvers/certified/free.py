@@ -70,9 +70,11 @@ class FreeSearch:
 
     @property
     def better(self) -> float:
-        """What a plan must be worth that is better than the one at hand."""
-        least = max(TOLERANCE * self.reward, 1e-9)
-        return self.reward + max(self.unit, least)
+        """What a plan must be worth that is better than the one at hand.
+
+        Refuting it must suffice for "optimal", so it stays well within the tolerance.
+        """
+        return self.reward + max(self.unit, 0.5 * TOLERANCE * self.reward, 1e-9)
 
     @property
     def is_done(self) -> bool:
@@ -87,7 +89,7 @@ class FreeSearch:
     @property
     def is_optimal(self) -> bool:
         """Whether no plan is better, to the stated tolerance."""
-        return self.bound < self.better
+        return self.bound < self.reward + max(self.unit, TOLERANCE * self.reward, 4e-9)
 
     def offer(self, plan: Plan) -> bool:
         """Take a plan if it is better; return whether it is."""
