@@ -22,7 +22,7 @@ HARD = {"feasibility": "hard"}
 @functools.cache
 def day(*, use_resources: bool, dynamics: Dynamics = "physical") -> Problem:
     return problem_of(
-        paper_scenario(TARGETS, 0, use_resources=use_resources, dynamics=dynamics, preset="paper")
+        paper_scenario(TARGETS, 2, use_resources=use_resources, dynamics=dynamics, preset="paper")
     )
 
 
@@ -69,7 +69,7 @@ def test_with_resources_the_bound_of_the_program_is_true(dynamics: Dynamics) -> 
 
 def test_many_collects_of_each_access_are_planned_as_well() -> None:
     """Ten times the opportunities, and no fewer images than with one collect per access."""
-    scenario = paper_scenario(TARGETS, 0, use_resources=False)
+    scenario = paper_scenario(TARGETS, 2, use_resources=False)
     spaced = problem_of(replace(scenario, collect_spacing_s=15.0))
     plain = day(use_resources=False)
     assert len(spaced.opportunities) > 5 * len(plain.opportunities)
