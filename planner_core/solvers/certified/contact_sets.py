@@ -28,9 +28,24 @@ class _Engine(Engine):
         """Look only for points worth this much."""
         self._highs.setOptionValue("objective_bound", amount - 1e-6 * max(1.0, amount))
 
+    def duals(self) -> tuple[Floats, Floats]:
+        """Return what the last relaxation says rows and columns are worth."""
+        solution = self._highs.getSolution()
+        return np.array(solution.row_dual), np.array(solution.col_dual)
+
 
 class FixedContacts:
-    """The program of one set of contacts over some of the tasks; its bound is not a proof."""
+    """The program of one set of contacts over some of the tasks; its bound is not a proof.
+
+    Attributes
+    ----------
+    relaxed
+        Value of the relaxation with antichain cuts; minus infinity where it has no point.
+    prices
+        What it says that each target is worth by itself. Shape ``(num_targets,)``.
+    reduced_costs
+        What taking an opportunity would change; 0 where it hardly matters. Shape ``(n,)``.
+    """
 
     def __init__(
         self, problem: Problem, offered: Bools, contacts: tuple[int, ...], budget: Budget, seed: int
@@ -40,6 +55,19 @@ class FixedContacts:
         _fix(self._model, problem, offered, np.array(contacts, dtype=np.int32))
         self._engine = _Engine(self._model.program, budget, seed, is_chained=True)
         self.relaxed = self._cut()
+        self.prices = np.zeros(len(problem.target_ids))
+        self.reduced_costs = np.zeros(len(problem.opportunities))
+        if np.isfinite(self.relaxed):
+            self._read_duals()
+
+    def _read_duals(self) -> None:
+        # The rows of the targets come first in the program.
+        rows, columns = self._engine.duals()
+        worth = np.abs(rows[: len(self.prices)])
+        reward = self._problem.target_reward
+        has_own_columns = bool(np.any(self._model.program.worth[0] > 0.0))
+        self.prices = np.clip(worth if has_own_columns else reward - worth, 0.0, reward)
+        self.reduced_costs = np.abs(columns[: len(self.reduced_costs)])
 
     def _cut(self) -> float:
         """Return the value of the relaxation with antichain cuts; minus infinity if none."""
