@@ -50,10 +50,6 @@ class Cut:
             counts = counts // 2
         return rows[counts > 0], counts[counts > 0].astype(np.int32)
 
-    def among(self, is_open: Bools, number: Ints) -> Cut:
-        """Return the cut on those rows that are open, by their new numbers."""
-        return Cut(sets=tuple(number[group[is_open[group]]] for group in self.sets))
-
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Multipliers:
@@ -73,34 +69,95 @@ class Multipliers:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Refutation:
+    """Why no plan of the tasks at hand is worth so much.
+
+    Attributes
+    ----------
+    steps
+        Multipliers that strike out tasks one after another, down to none.
+    branch
+        Where some remain: an opportunity, what refutes the plans that take it, and what
+        refutes those that leave it.
+    """
+
+    steps: tuple[Multipliers, ...]
+    branch: tuple[int, Refutation, Refutation] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Certificate:
     """The proof that no plan is worth ``amount`` or more."""
 
     amount: float
-    steps: tuple[Multipliers, ...]
+    refutation: Refutation
 
 
 def is_refuted(problem: Problem, certificate: Certificate) -> bool:
     """Return whether the certificate proves what it claims. This is the whole proof."""
+    every = np.arange(len(problem.opportunities), dtype=np.int32)
     orders = [order_of(transitive_closure(problem, s)) for s in problem.satellites]
-    left = np.arange(len(problem.opportunities))
-    for step in certificate.steps:
-        if np.any(step.prices < 0.0) or any(price < 0.0 for price in step.cut_prices):
+    checked = _Checked(problem, orders, certificate.amount)
+    return checked.is_refuted(certificate.refutation, every)
+
+
+class _Checked:
+    """A problem and an amount that its plans do not reach, as is to be proven."""
+
+    def __init__(self, problem: Problem, orders: list[Order], amount: float) -> None:
+        self._problem, self._orders, self._amount = problem, orders, amount
+
+    def is_refuted(self, refutation: Refutation, left: Ints) -> bool:
+        for step in refutation.steps:
+            if np.any(step.prices < 0.0) or any(price < 0.0 for price in step.cut_prices):
+                return False
+            if not all(self._is_sound(cut) for cut in step.cuts):
+                return False
+            network = network_of(restricted(self._problem, left))
+            total, through = values_through(self._problem, network, left, step)
+            if is_below(total, self._amount):
+                return True
+            is_left = np.empty(len(left), dtype=np.bool_)
+            is_left[network.row] = ~is_below(through, self._amount)
+            left = left[is_left]
+        if refutation.branch is None:
             return False
-        if not all(_is_sound(problem, orders, cut) for cut in step.cuts):
+        row, taken, leaving = refutation.branch
+        # A slow satellite may pass by a target again, which is not to take it.
+        is_transitive = all(
+            order.bits is satellite.transitions.bits
+            for order, satellite in zip(self._orders, self._problem.satellites, strict=True)
+        )
+        beside = left[[a == row or not self._exclude(row, int(a)) for a in left]]
+        return (
+            is_transitive
+            and self.is_refuted(taken, beside)
+            and self.is_refuted(leaving, left[left != row])
+        )
+
+    def _exclude(self, a: int, b: int) -> bool:
+        """Return whether no plan without duplicates holds both collects."""
+        table, local = self._problem.opportunities, self._problem.local_row
+        if table.kind[a] != COLLECT or table.kind[b] != COLLECT:
             return False
-        network = network_of(restricted(problem, left))
-        total, through = values_through(problem, network, left, step)
-        if is_below(total, certificate.amount):
+        if table.place[a] == table.place[b]:
             return True
-        is_left = np.empty(len(left), dtype=np.bool_)
-        is_left[network.row] = ~is_below(through, certificate.amount)
-        left = left[is_left]
-    return False
+        satellite = int(table.satellite[a])
+        if table.satellite[b] != satellite:
+            return False
+        return not are_comparable(self._orders[satellite], int(local[a]), int(local[b]))
+
+    def _is_sound(self, cut: Cut) -> bool:
+        """Return whether the sets are an odd number and hold what excludes each other."""
+        return len(cut.sets) % 2 == 1 and all(
+            len(np.unique(group)) == len(group)
+            and all(self._exclude(int(a), int(b)) for i, a in enumerate(group) for b in group[:i])
+            for group in cut.sets
+        )
 
 
 def values_through(
-    problem: Problem, network: Network, rows: Ints, step: Multipliers
+    problem: Problem, network: Network, rows: Ints, step: Multipliers, is_open: Bools | None = None
 ) -> tuple[float, Floats]:
     """Return what bounds all plans, and the plans that hold each node of the network.
 
@@ -108,8 +165,13 @@ def values_through(
     ----------
     network
         Of the problem restricted to ``rows``.
+    is_open
+        Which of the rows a plan may be paid for; all by default. Shape ``(len(rows),)``.
     """
-    constant, worth = _priced(problem, rows, step)
+    meant = rows if is_open is None else rows[is_open]
+    constant, paid = _priced(problem, meant, step)
+    worth = np.zeros(len(rows))
+    worth[slice(None) if is_open is None else is_open] = paid
     total, through = heaviest_through(network, worth[network.row])
     return constant + total, constant + through
 
@@ -134,22 +196,3 @@ def _priced(problem: Problem, rows: Ints, step: Multipliers) -> tuple[float, Flo
     offered = table.place[rows][table.kind[rows] == COLLECT]
     constant += float(step.prices[np.unique(offered)].sum())
     return constant, np.maximum(worth, 0.0)[rows]
-
-
-def _is_sound(problem: Problem, orders: list[Order], cut: Cut) -> bool:
-    """Return whether the sets are an odd number and hold only tasks that exclude each other."""
-    table, local = problem.opportunities, problem.local_row
-    for members in cut.sets:
-        rows = np.unique(members)
-        if len(rows) != len(members) or np.any(table.kind[rows] != COLLECT):
-            return False
-        for i, a in enumerate(rows):
-            for b in rows[:i]:
-                satellite = int(table.satellite[a])
-                if table.place[a] == table.place[b]:
-                    continue
-                if table.satellite[b] != satellite:
-                    return False
-                if are_comparable(orders[satellite], int(local[b]), int(local[a])):
-                    return False
-    return len(cut.sets) % 2 == 1

@@ -1,17 +1,114 @@
-"""Longest paths through the tasks of one satellite, on the sparse table of what may follow."""
+"""Longest paths through the tasks of one satellite.
+
+Where "may follow" is transitive, they run on the arcs of its Hasse diagram; for a satellite
+that turns more slowly than it tracks, on the whole table of what may follow what.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import NamedTuple
+
 import numpy as np
 
+from planner_core.comparable import Order, comes_before, order_of, transitive_closure
 from planner_core.jit import kernel
-from planner_core.problem import Bytes, Floats, Ints, Longs
+from planner_core.problem import Floats, Ints, Longs, Problem, SatelliteProblem
+
+
+class CoveringArcs(NamedTuple):
+    """Pairs of tasks that may follow each other with none in between: the order's own arcs.
+
+    Where "may follow" is transitive, a chain of these leads from each task to every task that
+    may follow it. There are about ten for each task, far fewer than pairs.
+
+    Attributes
+    ----------
+    first
+        Where each task's arcs begin. Shape ``(m + 1,)``.
+    to
+        The tasks they lead to.
+    """
+
+    first: Longs
+    to: Ints
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Links:
+    """What may follow what among one satellite's tasks, ready for longest paths.
+
+    Attributes
+    ----------
+    arcs
+        None where "may follow" is not transitive.
+    """
+
+    order: Order
+    arcs: CoveringArcs | None
+
+    @classmethod
+    def of(cls, problem: Problem, satellite: SatelliteProblem) -> Links:
+        """Return the links of one satellite."""
+        order = order_of(satellite.transitions)
+        is_transitive = transitive_closure(problem, satellite) is satellite.transitions
+        arcs = CoveringArcs(*_covering_arcs(order)) if is_transitive else None
+        return cls(order=order, arcs=arcs)
+
+    @property
+    def num_steps(self) -> int:
+        """How many pairs of tasks one longest path looks at."""
+        return int(self.order.offset[-1]) if self.arcs is None else len(self.arcs.to)
+
+    def longest(self, weight: Floats) -> tuple[float, list[int]]:
+        """Return the heaviest chain: its weight, and its tasks in order of time."""
+        before = np.full(len(weight), -1, dtype=np.int32)
+        if self.arcs is None:
+            value, task = longest_chain(weight, self.order, before)
+        else:
+            value, task = longest_path(weight, self.arcs, before)
+        return value, _chain_to(task, before)
+
+    def longest_with_history(self, weight: Floats, place: Ints) -> list[int]:
+        """Return the tasks of a heavy chain in which no place stands twice."""
+        before = np.full(len(weight), -1, dtype=np.int32)
+        if self.arcs is None:
+            _, task = longest_chain_with_history(weight, place, self.order, before)
+        else:
+            _, task = longest_path_with_history(weight, place, self.arcs, before)
+        return _chain_to(task, before)
 
 
 @kernel
-def longest_chain(
-    weight: Floats, near_from: Ints, far_from: Ints, offset: Longs, bits: Bytes, before: Ints
-) -> tuple[float, int]:
+def _covering_arcs(order: Order) -> tuple[Longs, Ints]:
+    """Return offsets and ends of the arcs; ``order`` must be transitive."""
+    m = len(order.near_from)
+    first = np.zeros(m + 1, dtype=np.int64)
+    to = np.empty(16 * m + 16, dtype=np.int32)
+    count = 0
+    for a in range(m):
+        # Whatever the longest slew from one of the arcs' ends reaches is covered by it.
+        end = m
+        b = order.near_from[a]
+        while b < end:
+            is_covered = not comes_before(order, a, b)
+            at = first[a]
+            while not is_covered and at < count:
+                is_covered = comes_before(order, to[at], b)
+                at += 1
+            if not is_covered:
+                if count == len(to):
+                    to = np.concatenate((to, np.empty_like(to)))
+                to[count] = b
+                count += 1
+                end = min(end, order.far_from[b])
+            b += 1
+        first[a + 1] = count
+    return first, to[:count].copy()
+
+
+@kernel
+def longest_path(weight: Floats, arcs: CoveringArcs, before: Ints) -> tuple[float, int]:
     """Return the greatest weight of a chain of tasks that may follow each other, and its end.
 
     Parameters
@@ -21,6 +118,89 @@ def longest_chain(
     before
         Filled with the task before each on its best chain, or -1. Shape ``(m,)``.
     """
+    m = len(weight)
+    value = np.zeros(m)  # of the best chain that ends here or, passing over the task, before
+    last = np.full(m, -1, dtype=np.int32)
+    best, best_task = 0.0, -1
+    for a in range(m):
+        if weight[a] > 0.0:
+            before[a] = last[a]
+            value[a] += weight[a]
+            last[a] = a
+            if value[a] > best:
+                best, best_task = value[a], a
+        for at in range(arcs.first[a], arcs.first[a + 1]):
+            b = arcs.to[at]
+            if value[a] > value[b]:
+                value[b] = value[a]
+                last[b] = last[a]
+    return best, best_task
+
+
+@kernel
+def longest_path_with_history(
+    weight: Floats, place: Ints, arcs: CoveringArcs, before: Ints
+) -> tuple[float, int]:
+    """Return the weight and end of a heavy chain in which no place stands twice.
+
+    Each task hands on the heaviest chain that ends with it or before it, and the set of places
+    on that chain; a chain that holds a task's place already goes past the task. This is a
+    heuristic: the best chain to a task need not be part of the best chain through it.
+
+    Parameters
+    ----------
+    weight, place
+        Worth of each task, not negative; where it happens. Shape ``(m,)``.
+    before
+        Filled with the task before each on its chain, or -1. Shape ``(m,)``.
+    """
+    m = len(weight)
+    num_words = 1
+    for a in range(m):
+        if weight[a] > 0.0:
+            num_words = max(num_words, (place[a] >> 6) + 1)
+    history = np.zeros((m, num_words), dtype=np.uint64)
+    value = np.zeros(m)
+    passed = np.full(m, -1, dtype=np.int32)  # where the heaviest chain comes from
+    fitting = np.full(m, -1, dtype=np.int32)  # and the heaviest without this task's place
+    last = np.full(m, -1, dtype=np.int32)
+    best, best_task = 0.0, -1
+    for a in range(m):
+        total = value[fitting[a]] if fitting[a] >= 0 else 0.0
+        other = value[passed[a]] if passed[a] >= 0 else 0.0
+        if weight[a] > 0.0 and total + weight[a] >= other:
+            source = fitting[a]
+            if source >= 0:
+                history[a] = history[source]
+                before[a] = last[source]
+            else:
+                before[a] = -1
+            history[a, place[a] >> 6] |= np.uint64(1) << np.uint64(place[a] & 63)
+            value[a] = total + weight[a]
+            last[a] = a
+            if value[a] > best:
+                best, best_task = value[a], a
+        elif passed[a] >= 0:
+            history[a] = history[passed[a]]
+            value[a] = other
+            last[a] = last[passed[a]]
+        for at in range(arcs.first[a], arcs.first[a + 1]):
+            b = arcs.to[at]
+            if passed[b] < 0 or value[a] > value[passed[b]]:
+                passed[b] = a
+            if fitting[b] >= 0 and value[a] <= value[fitting[b]]:
+                continue
+            if weight[b] > 0.0 and not (
+                history[a, place[b] >> 6] & (np.uint64(1) << np.uint64(place[b] & 63))
+            ):
+                fitting[b] = a
+    return best, best_task
+
+
+@kernel
+def longest_chain(weight: Floats, order: Order, before: Ints) -> tuple[float, int]:
+    """Return what ``longest_path`` does, on the table of all pairs."""
+    near_from, far_from, offset, bits = order
     m = len(weight)
     value = np.zeros(m)
     # Beyond the longest slew everything may follow: only the best so far counts there.
@@ -54,27 +234,10 @@ def longest_chain(
 
 @kernel
 def longest_chain_with_history(
-    weight: Floats,
-    place: Ints,
-    near_from: Ints,
-    far_from: Ints,
-    offset: Longs,
-    bits: Bytes,
-    before: Ints,
+    weight: Floats, place: Ints, order: Order, before: Ints
 ) -> tuple[float, int]:
-    """Return the weight and end of a heavy chain in which no place stands twice.
-
-    Each task keeps the set of places on its best chain; a chain that holds a task's place
-    already does not lead to it. This is a heuristic: the best chain to a task need not be
-    part of the best chain through it.
-
-    Parameters
-    ----------
-    weight, place
-        Worth of each task, not negative; where it happens. Shape ``(m,)``.
-    before
-        Filled with the task before each on its chain, or -1. Shape ``(m,)``.
-    """
+    """Return what ``longest_path_with_history`` does, on the table of all pairs."""
+    near_from, far_from, offset, bits = order
     m = len(weight)
     num_words = 1
     for a in range(m):
@@ -128,7 +291,7 @@ def longest_chain_with_history(
     return best, best_task
 
 
-def chain_to(task: int, before: Ints) -> list[int]:
+def _chain_to(task: int, before: Ints) -> list[int]:
     """Return the tasks of a chain in order of time (EXTRACTPATH of Alg. 3)."""
     chain = []
     while task >= 0:

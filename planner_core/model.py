@@ -30,7 +30,7 @@ from typing import Final, NamedTuple, TypedDict
 
 import numpy as np
 
-from planner_core.jit import inlined, kernel
+from planner_core.jit import borrowing, inlined
 from planner_core.problem import (
     CONTACT,
     Bytes,
@@ -57,16 +57,19 @@ _MAX_CONTACTS_AHEAD: Final = 12
 class Track(NamedTuple):
     """One satellite's problem as plain arrays; shape ``(m,)`` unless said otherwise.
 
-    ``contacts`` lists the usable contact rows; ``contact_after[i]`` is the place in it of the
-    first one after row ``i - 1`` (shape ``(m + 1,)``). ``fallback_*`` hold, for each contact,
-    up to eight pairs (battery needed, recorder allowed) after it, from which the satellite
-    can keep its limits to the end by contacts alone; shape ``(num_contacts, 8)``.
+    ``first_offer`` is the first row of the same access: itself, unless the access offers several
+    collects to choose from. ``contacts`` lists the usable contact rows; ``contact_after[i]``
+    is the place in it of the first one after row ``i - 1`` (shape ``(m + 1,)``).
+    ``fallback_*`` hold, for each contact, up to eight pairs (battery needed, recorder
+    allowed) after it, from which the satellite can keep its limits to the end by contacts
+    alone; shape ``(num_contacts, 8)``.
     """
 
     start_s: Floats
     end_s: Floats
     is_contact: Bytes
     place: Ints
+    first_offer: Ints
     blocked: Bytes
     near_from: Ints
     far_from: Ints
@@ -116,11 +119,14 @@ def compile_track(problem: Problem, satellite: SatelliteProblem, blocked: Bytes)
     m = len(satellite)
     is_contact = (satellite.kind == CONTACT).astype(np.uint8)
     contacts = np.flatnonzero((is_contact == 1) & (blocked == 0)).astype(np.int32)
+    access = problem.opportunities.access[satellite.rows]
+    _, first_offer, offer_of = np.unique(access, return_index=True, return_inverse=True)
     track = Track(
         start_s=satellite.start_s,
         end_s=satellite.end_s,
         is_contact=is_contact,
         place=satellite.place,
+        first_offer=first_offer[offer_of].astype(np.int32),
         blocked=blocked,
         near_from=satellite.transitions.near_from,
         far_from=satellite.transitions.far_from,
@@ -201,7 +207,7 @@ def take(
     return max(0.0, battery), min(1.0, recorder), is_within
 
 
-@kernel
+@borrowing
 def is_safe(track: Track, last: int, cursor: int, battery: float, recorder: float) -> bool:
     """Return whether limits can be kept to the end from here by idling and contacts alone.
 
@@ -232,7 +238,7 @@ def is_safe(track: Track, last: int, cursor: int, battery: float, recorder: floa
     return False
 
 
-@kernel
+@borrowing
 def _fill_fallbacks(track: Track) -> None:
     """Work backward over the contacts: what each must leave so that the rest can be kept."""
     for at in range(len(track.contacts) - 1, -1, -1):
@@ -324,6 +330,22 @@ def next_action(
                 continue
         return row
     return len(track.start_s)
+
+
+@inlined
+def is_repeated(track: Track, chosen: Ints, begin: int, end: int, row: int) -> bool:
+    """Return whether ``chosen[begin:end]``, in time order, has an earlier collect of its access.
+
+    A(s) holds the first feasible collect of each access: the later ones would push other
+    targets out of its ``breadth``, and are on offer again after the next action.
+    """
+    first = track.first_offer[row]
+    at = end - 1
+    while at >= begin and chosen[at] >= first:
+        if track.first_offer[chosen[at]] == first:
+            return True
+        at -= 1
+    return False
 
 
 @inlined
@@ -422,7 +444,10 @@ class Model:
         return float(self.track.start_s[state.cursor]) if state.cursor >= 0 else 0.0
 
     def actions(self, state: State, breadth: int) -> Sequence[int]:
-        """Return the first ``breadth`` tasks of A(s) in time order, then ``WAIT`` if allowed."""
+        """Return the first ``breadth`` tasks of A(s) in time order, then ``WAIT`` if allowed.
+
+        Of the collects that one access offers only the first feasible one counts.
+        """
         collected = self._mask(state)
         rows: list[int] = []
         row = state.cursor
@@ -433,7 +458,8 @@ class Model:
             )  # fmt: skip
             if row == len(self.track.start_s):
                 break
-            rows.append(row)
+            if all(self.track.first_offer[row] != self.track.first_offer[r] for r in rows):
+                rows.append(row)
         if rows and self.track.use_resources and self._may_wait(state, rows[0]):
             rows.append(WAIT)
         return rows

@@ -44,13 +44,15 @@ def network_of(problem: Problem) -> Network:
     """Return the network of a problem."""
     table = problem.opportunities
     first = [0]
+    num_arcs = 0
     arc_from, before, far_from = [np.zeros(1, dtype=np.int64)], [], []
     for satellite in problem.satellites:
         base = first[-1]
         order = order_of(satellite.transitions)
         is_transitive = transitive_closure(problem, satellite) is satellite.transitions
         offsets, rows = _arcs(order, is_transitive)
-        arc_from.append(offsets[1:] + arc_from[-1][-1])
+        arc_from.append(offsets[1:] + num_arcs)
+        num_arcs += len(rows)
         before.append(rows + np.int32(base))
         far_from.append(satellite.transitions.far_from + np.int32(base))
         first.append(base + len(satellite))
@@ -83,7 +85,7 @@ def _arcs(order: Order, is_transitive: bool) -> tuple[Longs, Ints]:
             is_covered = False
             if is_transitive:
                 for at in range(offsets[b], len(found)):
-                    if comes_before(order, a, found[at]):
+                    if comes_before(order, a, int(found[at])):
                         is_covered = True
                         break
             if not is_covered:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from planner_core.bounds import Bound, lagrangian_bound
 from planner_core.build import ScenarioOpportunities, build_problem, compute_opportunities
@@ -54,8 +54,15 @@ def plan_scenario(
     seed: int,
     budget: Budget,
     computed: ScenarioOpportunities | None = None,
+    known_bound: Bound | None = None,
 ) -> Judged:
-    """Return the judged plan of ``solver``; ``computed`` saves the access search.
+    """Return the judged plan of ``solver``.
+
+    Parameters
+    ----------
+    computed, known_bound
+        What earlier plans of the same scenario have found out already. The plan itself does
+        not depend on it.
 
     Raises
     ------
@@ -76,7 +83,7 @@ def plan_scenario(
     timeline = replay(problem, solution.plan)
     bound = None
     if not problem.continuous_starts:
-        bound = _best_bound(problem, solution, timeline.reward, budget)
+        bound = _best_bound(problem, solution, timeline.reward, budget, known_bound)
     budget.report(
         Progress(
             phase="verify",
@@ -100,11 +107,13 @@ def plan_scenario(
     )
 
 
-def _best_bound(problem: Problem, solution: Solution, reward: float, budget: Budget) -> Bound:
-    """Return what the solver has proven, or a quick bound of our own if that is lower."""
-    proven = None
+def _best_bound(
+    problem: Problem, solution: Solution, reward: float, budget: Budget, known: Bound | None
+) -> Bound:
+    """Return the lowest of what is known, what the solver has proven and a quick bound."""
+    proven = None if known is None else replace(known, value=max(known.value, reward))
     if solution.bound is not None and solution.bound_proof is not None:
-        proven = Bound(
+        own = Bound(
             value=max(solution.bound, reward),
             proof=solution.bound_proof,
             certificate=solution.certificate,
@@ -112,8 +121,9 @@ def _best_bound(problem: Problem, solution: Solution, reward: float, budget: Bud
             prices=solution.prices,
             unit=solution.unit,
         )
-        if proven.value <= reward:
-            return proven
+        proven = own if proven is None or own.value < proven.value else proven
+    if proven is not None and (known is not None or proven.value <= reward):
+        return proven
     if budget.is_cancelled:
         # Someone who cancels wants the answer now: prices stay rough.
         quick = lagrangian_bound(problem, reward, 0)

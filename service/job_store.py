@@ -96,6 +96,11 @@ def timeline_of(session: Session, job_id: str) -> str | None:
     return session.scalar(sa.select(JobResultRow.timeline).where(JobResultRow.job_id == job_id))
 
 
+def proof_of(session: Session, job_id: str) -> str | None:
+    """Return what proves a job's bound as JSON text, or None where there is none."""
+    return session.scalar(sa.select(JobResultRow.proof).where(JobResultRow.job_id == job_id))
+
+
 def targets_of(session: Session, job_id: str) -> str | None:
     """Return a job's list of targets as JSON text, or None where there is none (yet)."""
     return session.scalar(sa.select(JobResultRow.targets).where(JobResultRow.job_id == job_id))

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
+import threading
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from multiprocessing.process import BaseProcess
 from types import TracebackType
 
 from benchmarks.paper.measure import Outcome, Task, run_task
@@ -17,7 +20,9 @@ class Pool:
     def __init__(self, workers: int, deadline: float):
         # Fresh processes: a fork would share the state of HiGHS and numba.
         context = multiprocessing.get_context("spawn")
-        self._executor = ProcessPoolExecutor(workers, mp_context=context)
+        self._executor = ProcessPoolExecutor(
+            workers, mp_context=context, initializer=_end_with_parent
+        )
         self._workers, self._deadline = workers, deadline
 
     def __enter__(self) -> Pool:
@@ -49,3 +54,15 @@ class Pool:
                 task, outcome = running.pop(future), future.result()
                 if outcome is not None:
                     yield task, outcome
+
+
+def _end_with_parent() -> None:
+    """Let this process end when its parent does, even if that was killed."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=_outlive_nobody, args=(parent,), daemon=True).start()
+
+
+def _outlive_nobody(parent: BaseProcess) -> None:
+    parent.join()
+    os._exit(1)

@@ -16,7 +16,8 @@ class Reading:
     Attributes
     ----------
     look_deg
-        Least and greatest off-nadir angle; the text gives none, the authors' files differ.
+        Least and greatest off-nadir angle. The text gives none; the authors' code has 5 to 55
+        as its default, their files 5 to 50 from 1,200 targets up and 0 to 50 below.
     rates
         Telemetry and downlink of the text (``paper``) or of the authors' code (``paper_code``).
     dynamics
@@ -39,6 +40,10 @@ class Reading:
         rates = "paper" if self.rates == "paper" else "code"
         return f"look {low:g}-{high:g}, {rates} rates, {self.dynamics} dynamics"
 
+    def covers(self, other: Reading, *, res: bool) -> bool:
+        """Return whether a family is the same under both: only angles matter without resources."""
+        return self == other or (not res and self.look_deg == other.look_deg)
+
     def scenario(self, num_targets: int, draw: int, *, use_resources: bool) -> Scenario:
         """Return one draw of the mission, read like this."""
         scenario = paper_scenario(
@@ -57,7 +62,7 @@ class Reading:
 BASE = Reading()
 """The reading of the figures and the grids."""
 
-_LOOKS = ((5.0, 45.0), (5.0, 50.0), (5.0, 55.0))
+_LOOKS = ((0.0, 50.0), (5.0, 45.0), (5.0, 50.0), (5.0, 55.0))
 _DYNAMICS: tuple[Dynamics, ...] = ("paper", "physical")
 
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from benchmarks.paper.measure import Outcome
-from benchmarks.paper.readings import Reading
+from benchmarks.paper.readings import BASE, Reading
 from benchmarks.paper.study import MCTS_VARIANTS, Done, Study, best_forward, best_mcts
 
 FORWARD = "forward search"
@@ -37,6 +37,12 @@ class Joint:
     published: tuple[float, ...]
 
     @property
+    def told(self) -> str:
+        """Return ours for theirs, in words."""
+        pairs = zip(self.images, self.published, strict=True)
+        return ", ".join(f"{images} for {published:.0f}" for images, published in pairs)
+
+    @property
     def worst(self) -> float:
         """Return the greatest error of the four, as a share of the paper's number."""
         pairs = zip(self.images, self.published, strict=True)
@@ -51,13 +57,21 @@ class Nearest:
     ----------
     tried
         Of how many readings; among many, one comes near by chance.
+    own
+        How many images it takes under the study's own reading, if that was run.
     """
 
     tried: int
+    own: int | None
     published: float
     reading: Reading
     method: str
     images: int
+
+    @property
+    def told(self) -> str:
+        """Return the reading in words, of the algorithm too where it has several."""
+        return self.reading.name + self.method.removeprefix("MCTS").removeprefix(FORWARD)
 
     @property
     def error(self) -> float:
@@ -88,30 +102,39 @@ def read_rows(study: Study, done: Done, *, res: bool) -> list[ReadRow]:
 
 def nearest(study: Study, done: Done, *, is_mcts: bool, res: bool) -> Nearest | None:
     """Return the reading nearest to the paper's best row; the paper counts every image."""
-    published = (best_mcts(res) if is_mcts else best_forward(res)).reward
+    row = best_mcts(res) if is_mcts else best_forward(res)
+    own = done.get(study.reading_task(row, BASE))
     measured = [
-        (row.reading, name, outcome.images)
-        for row in read_rows(study, done, res=res)
-        for name, outcome in row.outcomes.items()
+        (read.reading, name, outcome.images)
+        for read in read_rows(study, done, res=res)
+        for name, outcome in read.outcomes.items()
         if (name.startswith("MCTS") if is_mcts else name == FORWARD)
     ]
     found = [
         Nearest(
-            tried=len(measured), published=published, reading=reading, method=name, images=images
+            tried=len(measured),
+            own=own.images if own else None,
+            published=row.reward,
+            reading=reading,
+            method=name,
+            images=images,
         )
         for reading, name, images in measured
     ]
     return min(found, key=lambda near: abs(near.error), default=None)
 
 
-def joint(study: Study, done: Done) -> Joint | None:
+def joint(study: Study, done: Done, among: Sequence[Reading] | None = None) -> Joint | None:
     """Return the one reading under which the worst of the paper's four numbers is nearest."""
+    among = study.readings_with if among is None else among
     without = {row.reading.look_deg: row.outcomes for row in read_rows(study, done, res=False)}
     published = tuple(
         row.reward for res in (False, True) for row in (best_forward(res), best_mcts(res))
     )
     found = []
     for row in read_rows(study, done, res=True):
+        if row.reading not in among:
+            continue
         for variant in MCTS_VARIANTS:
             names = (FORWARD, f"MCTS, {variant}")
             both = (without.get(row.reading.look_deg, {}), row.outcomes)
@@ -121,3 +144,16 @@ def joint(study: Study, done: Done) -> Joint | None:
                     Joint(reading=row.reading, variant=variant, images=images, published=published)
                 )
     return min(found, key=lambda one: one.worst, default=None)
+
+
+def rankings(
+    study: Study, done: Done, names: Sequence[str], *, res: bool
+) -> dict[tuple[Reading, str], list[int]]:
+    """Return the images of these methods by reading of the mission and of MCTS, where all ran."""
+    found = {}
+    for row in read_rows(study, done, res=res):
+        for variant in MCTS_VARIANTS:
+            keys = [f"MCTS, {variant}" if name == "MCTS" else name for name in names]
+            if all(key in row.outcomes for key in keys):
+                found[row.reading, variant] = [row.outcomes[key].images for key in keys]
+    return found

@@ -40,8 +40,11 @@ class Store:
         text = path.read_text(encoding="utf-8") if path.exists() else ""
         # A run that was killed may have left half a line behind.
         whole = text[: text.rfind("\n") + 1]
-        if whole != text or not whole:
-            path.write_text(whole or ",".join(COLUMNS) + "\n", encoding="utf-8")
+        head = ",".join(COLUMNS) + "\n"
+        if not whole.startswith(head):
+            whole = head
+        if whole != text:
+            path.write_text(whole, encoding="utf-8")
         for line in csv.DictReader(io.StringIO(whole)):
             task, outcome = _read(line)
             self.done[task] = outcome
@@ -88,6 +91,7 @@ def _read(line: dict[str, str]) -> tuple[Task, Outcome]:
         repeats=int(line["repeats"]),
         bound=float(line["bound"]),
         seconds=float(line["seconds"]),
+        cost_s=float(line["cost_s"]),
         termination=line["termination"],
     )
     return task, outcome

@@ -5,11 +5,18 @@ from __future__ import annotations
 import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 from benchmarks.paper.measure import Outcome, Task
 from benchmarks.paper.published import TABLE_6, TABLE_7, ForwardRow, MctsRow
-from benchmarks.paper.settings import PAPER_MCTS, PAPER_SEARCH, Kind, Params, settings
+from benchmarks.paper.readings import BASE
+from benchmarks.paper.settings import KINDS, PAPER_MCTS, PAPER_SEARCH, Kind, Params, settings
 from benchmarks.paper.study import Done, Study
+from planner_core.solvers import SOLVERS
+
+_PAPERS: Final = ("rule", "graph", "milp", "forward_search", "mcts")
+METHODS: Final = (*_PAPERS, *(name for name in SOLVERS if name not in _PAPERS))
+"""The order of all figures and tables: the paper's methods, then those it has not."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,17 +51,13 @@ class Bar:
 
 def bars(study: Study, done: Done, num_targets: int, *, res: bool) -> list[Bar]:
     """Return the bars of one figure; methods without a finished run are left out."""
-    limits = [_limit(study, done, num_targets, draw, res=res) for draw in range(study.draws)]
+    limits = _limits(study, done, num_targets, res=res)
     found = []
     for setting in settings(use_resources=res):
         tasks = [
             study.figure_task(setting, num_targets, draw, res=res) for draw in range(study.draws)
         ]
-        pairs = [
-            (done[task], limit)
-            for task, limit in zip(tasks, limits, strict=True)
-            if task in done and limit
-        ]
+        pairs = [(done[task], limits[task.draw]) for task in tasks if task in done]
         if not pairs:
             continue
         outcomes = [outcome for outcome, _ in pairs]
@@ -72,28 +75,34 @@ def bars(study: Study, done: Done, num_targets: int, *, res: bool) -> list[Bar]:
                 repeats=statistics.fmean(o.repeats for o in outcomes),
                 seconds=statistics.fmean(o.seconds for o in outcomes),
                 reward_per_s=statistics.fmean(o.reward / o.seconds for o in outcomes),
-                bound=statistics.fmean(limit[0] for _, limit in pairs),
-                proven=sum(limit[1] for _, limit in pairs),
+                bound=statistics.fmean(limit.bound for _, limit in pairs),
+                proven=sum(limit.is_reached for _, limit in pairs),
             )
         )
-    return found
+    return sorted(found, key=lambda bar: (METHODS.index(bar.solver), tuple(KINDS).index(bar.kind)))
 
 
-def _limit(
-    study: Study, done: Done, num_targets: int, draw: int, *, res: bool
-) -> tuple[float, bool] | None:
-    """Return the best bound of one problem, and whether a valid plan reaches it."""
-    tasks = (
-        study.figure_task(setting, num_targets, draw, res=res)
-        for setting in settings(use_resources=res)
-    )
-    outcomes = [done[task] for task in tasks if task in done]
-    if not outcomes:
-        return None
-    bound = min(o.bound for o in outcomes)
-    best = max((o.reward for o in outcomes if not o.violations), default=0.0)
-    # Every reward is 1, so a bound below the next whole number is reached already.
-    return bound, best > bound - 1.0 + 1e-6
+def _limits(study: Study, done: Done, num_targets: int, *, res: bool) -> dict[int, _Limit]:
+    """Return what all runs together have proven of each draw of a figure."""
+    of_draw: dict[int, list[Outcome]] = {}
+    for task, outcome in done.items():
+        here = (task.reading, task.use_resources, task.num_targets)
+        if here == (BASE, res, num_targets) and task.draw < study.draws:
+            of_draw.setdefault(task.draw, []).append(outcome)
+    return {draw: _Limit.of(outcomes) for draw, outcomes in of_draw.items()}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Limit:
+    bound: float
+    is_reached: bool
+
+    @classmethod
+    def of(cls, outcomes: Sequence[Outcome]) -> _Limit:
+        bound = min(o.bound for o in outcomes)
+        best = max((o.reward for o in outcomes if not o.violations), default=0.0)
+        # Every reward is 1, so a bound below the next whole number is reached already.
+        return cls(bound=bound, is_reached=best > bound - 1.0 + 1e-6)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -170,20 +179,39 @@ def row_params(row: ForwardRow | MctsRow) -> Params:
     return {**(PAPER_MCTS if isinstance(row, MctsRow) else PAPER_SEARCH), **row.tuned}
 
 
-def left_out(study: Study, done: Done) -> list[tuple[str, int, int]]:
-    """Return each part of the study that is unfinished: its name, runs done, runs planned."""
-    return [
-        (name, sum(task in done for task in tasks), len(tasks))
-        for name, tasks in _parts(study).items()
-        if not all(task in done for task in tasks)
-    ]
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Part:
+    """A part of the study: how many of its runs were made, and the CPU time they took."""
+
+    name: str
+    runs: int
+    planned: int
+    cost_s: float
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether no run is missing."""
+        return self.runs == self.planned
 
 
-def _parts(study: Study) -> dict[str, list[Task]]:
-    return {
-        "figures": study.figures(exact=False) + study.figures(exact=True),
-        "forward search grid (Table 4)": study.forward(slow=False) + study.forward(slow=True),
+def parts(study: Study, done: Done) -> list[Part]:
+    """Return the parts of the study; a run that two of them share counts in the first."""
+    named = {
+        "figures, quick solvers": study.figures(exact=False),
+        "figures, exact solvers": study.figures(exact=True),
+        "forward search grid (Table 4)": study.forward(slow=False),
+        "forward search grid, depth 7 with resources": study.forward(slow=True),
         "MCTS grid (Table 5), first run of each point": study.mcts(range(1)),
-        "MCTS grid (Table 5), further runs": study.mcts(range(1, study.mcts_runs)),
+        "MCTS grid, further runs": study.mcts(range(1, study.mcts_runs)),
         "readings": study.read(slow=False) + study.read(slow=True),
     }
+    seen: set[Task] = set()
+    found = []
+    for name, tasks in named.items():
+        own = dict.fromkeys(task for task in tasks if task not in seen)
+        seen.update(own)
+        made = [done[task] for task in own if task in done]
+        if own:
+            cost_s = sum(outcome.cost_s for outcome in made)
+            found.append(Part(name=name, runs=len(made), planned=len(own), cost_s=cost_s))
+    return found

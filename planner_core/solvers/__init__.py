@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from planner_core.errors import UnknownSolver
 from planner_core.solvers.base import Solver
+from planner_core.solvers.certified import Certified
 from planner_core.solvers.forward_search import ForwardSearch
 from planner_core.solvers.graph import Graph
 from planner_core.solvers.mcts import Mcts
 from planner_core.solvers.milp import Milp
 from planner_core.solvers.rule import Rule
 
-__all__ = ["SOLVERS", "ForwardSearch", "Graph", "Mcts", "Milp", "Rule", "solver_class"]
+__all__ = ["SOLVERS", "Certified", "ForwardSearch", "Graph", "Mcts", "Milp", "Rule", "solver_class"]
 
 SOLVERS: dict[str, type[Solver]] = {
-    solver.name: solver for solver in (Rule, Graph, ForwardSearch, Mcts, Milp)
+    solver.name: solver for solver in (Rule, Graph, ForwardSearch, Mcts, Milp, Certified)
 }
 """Every solver by its name in the API."""
 

@@ -16,6 +16,7 @@ from planner_core.plan import Plan
 from planner_core.problem import Bytes, Floats, Problem
 
 Feasibility = Literal["hard", "penalty"]
+BreadthCounts = Literal["tasks", "one_more"]
 
 
 class Constraint(StrEnum):

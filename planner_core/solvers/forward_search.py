@@ -7,11 +7,11 @@ which ``ForwardSearch`` runs. Tests compare the two.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from planner_core.jit import kernel
+from planner_core.jit import borrowing
 from planner_core.model import (
     NO_TASK,
     WAIT,
@@ -19,20 +19,25 @@ from planner_core.model import (
     Model,
     State,
     Track,
+    is_repeated,
     may_wait,
     next_action,
     take,
     task_reward,
 )
-from planner_core.problem import Bytes, Floats, Problem
-from planner_core.solvers.base import Budget, Constraint, Feasibility, Solution
+from planner_core.problem import Bytes, Floats, Ints, Problem
+from planner_core.solvers.base import BreadthCounts, Budget, Constraint, Feasibility, Solution
 from planner_core.solvers.sequential import Turn, plan_in_turn
+
+Discount = Literal["action", "next_action"]
 
 NOTHING = -2
 """No action is left in this state."""
 
 
-def select_action(model: Model, state: State, depth: int, breadth: int) -> tuple[int, float]:
+def select_action(
+    model: Model, state: State, depth: int, breadth: int, discount: Discount = "action"
+) -> tuple[int, float]:
     """Return the best first action and its value: SELECTACTION of Alg. 1.
 
     Ties go to the earliest action. ``NOTHING`` where A(s) is empty.
@@ -44,24 +49,36 @@ def select_action(model: Model, state: State, depth: int, breadth: int) -> tuple
     actions = model.actions(state, breadth)
     for a in actions:
         step = model.step(state, a, actions[0])
-        _, v_next = select_action(model, step.state, depth - 1, breadth)
+        a_next, v_next = select_action(model, step.state, depth - 1, breadth, discount)
+        waited_s = step.sojourn_s
+        if discount == "next_action" and a_next != NOTHING:
+            row = model.actions(step.state, breadth)[0] if a_next == WAIT else a_next
+            waited_s = float(model.track.start_s[row]) - model.now_s(state)
         # Line 9: v <- R(s, a) + gamma^(a.t_s - s.t) v'. The end of the horizon is worth 0,
         # not the listing's -infinity, which would forbid every path to it.
-        v = step.reward + gamma**step.sojourn_s * (v_next if v_next > -np.inf else 0.0)
+        v = step.reward + gamma**waited_s * (v_next if v_next > -np.inf else 0.0)
         if v > v_best:
             best, v_best = a, v
     return best, v_best
 
 
-@kernel
+class Rules(NamedTuple):
+    """The parameters of the search, as kernels take them."""
+
+    breadth: int
+    is_hard: bool
+    unimaged_only: bool
+    is_discounted_by_next: bool
+
+
+@borrowing
 def _select_action(
     track: Track,
     guidance: Guidance,
+    rules: Rules,
     target_reward: Floats,
     collected: Bytes,
-    is_hard: bool,
-    unimaged_only: bool,
-    breadth: int,
+    chosen: Ints,
     stop: Bytes,
     cursor: int,
     last: int,
@@ -69,19 +86,27 @@ def _select_action(
     recorder: float,
     depth: int,
 ) -> tuple[int, float, int]:
-    """Return the best action, its value, and the first row of A(s); see ``select_action``."""
+    """Return the best action, its value, and the first row of A(s); see ``select_action``.
+
+    ``chosen`` is room for the tasks of A(s) at each depth; shape ``(depth * breadth,)``.
+    """
     m = len(track.start_s)
     best, v_best, first = NOTHING, -np.inf, m
     if depth == 0:
         return best, 0.0, first
     now_s = track.start_s[cursor] if cursor >= 0 else 0.0
     row = cursor
-    for _ in range(breadth):
+    begin = end = (depth - 1) * rules.breadth
+    while end < begin + rules.breadth:
         row = next_action(
-            track, last, row + 1, battery, recorder, is_hard, collected, unimaged_only
+            track, last, row + 1, battery, recorder, rules.is_hard, collected, rules.unimaged_only
         )
         if row == m or stop[0]:
             break
+        if is_repeated(track, chosen, begin, end, row):
+            continue
+        chosen[end] = row
+        end += 1
         first = min(first, row)
         battery_after, recorder_after = battery, recorder
         if track.use_resources:
@@ -95,26 +120,32 @@ def _select_action(
             is_new = not track.is_contact[row] and not collected[place]
             if is_new:
                 collected[place] = 1
-            _, v_next, _ = _select_action(
-                track, guidance, target_reward, collected, is_hard, unimaged_only, breadth,
+            a_next, v_next, first_next = _select_action(
+                track, guidance, rules, target_reward, collected, chosen,
                 stop, row, row, battery_after, recorder_after, depth - 1,
             )  # fmt: skip
             if is_new:
                 collected[place] = 0
+            if rules.is_discounted_by_next and a_next != NOTHING:
+                row_next = first_next if a_next == WAIT else a_next
+                discount = guidance.gamma ** (track.start_s[row_next] - now_s)
             if v_next > -np.inf:
                 v += discount * v_next
         if v > v_best:
             best, v_best = row, v
     if first == m or not track.use_resources:
         return best, v_best, first
-    if may_wait(track, last, first, battery, recorder, is_hard):
+    if may_wait(track, last, first, battery, recorder, rules.is_hard):
         waited_s = track.start_s[first] - now_s
         v = guidance.sunpoint_reward_per_s * waited_s
         if depth > 1:
-            _, v_next, _ = _select_action(
-                track, guidance, target_reward, collected, is_hard, unimaged_only, breadth,
+            a_next, v_next, first_next = _select_action(
+                track, guidance, rules, target_reward, collected, chosen,
                 stop, first, last, battery, recorder, depth - 1,
             )  # fmt: skip
+            if rules.is_discounted_by_next and a_next != NOTHING:
+                row_next = first_next if a_next == WAIT else a_next
+                waited_s = track.start_s[row_next] - now_s
             if v_next > -np.inf:
                 v += guidance.gamma**waited_s * v_next
         if v > v_best:
@@ -170,6 +201,20 @@ class ForwardSearch:
             "the paper keeps them in."
         },
     )
+    breadth_counts: BreadthCounts = field(
+        default="tasks",
+        metadata={
+            "description": "tasks: A(s) has breadth tasks (the paper); "
+            "one_more: one more than that (the authors' code, which stops after the limit)."
+        },
+    )
+    discount: Discount = field(
+        default="action",
+        metadata={
+            "description": "What follows an action is discounted to the start of action: that "
+            "action (the paper); next_action: the best action after it (the authors' code)."
+        },
+    )
     contact_reward_per_s: float = field(
         default=1e-3,
         metadata={
@@ -212,12 +257,19 @@ class ForwardSearch:
         track, collected = turn.track, turn.collected
         cursor, last = NO_TASK, NO_TASK
         battery, recorder = track.battery_start, track.recorder_start
+        breadth = self.breadth + (self.breadth_counts == "one_more")
+        rules = Rules(
+            breadth=breadth,
+            is_hard=self.feasibility == "hard",
+            unimaged_only=self.unimaged_only,
+            is_discounted_by_next=self.discount == "next_action",
+        )
+        chosen = np.empty(self.depth * breadth, dtype=np.int32)
         taken: list[int] = []
         reward = 0.0
         while not budget.is_spent():
             action, _, first = _select_action(
-                track, guidance, target_reward, collected, self.feasibility == "hard",
-                self.unimaged_only, self.breadth, budget.stop,
+                track, guidance, rules, target_reward, collected, chosen, budget.stop,
                 cursor, last, battery, recorder, self.depth,
             )  # fmt: skip
             # A search that was stopped half way has not compared all its actions.

@@ -11,9 +11,8 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from planner_core.chains import chain_to, longest_chain, longest_chain_with_history
-from planner_core.model import NO_TASK, Track
-from planner_core.problem import Floats, Problem
+from planner_core.chains import Links
+from planner_core.problem import Problem
 from planner_core.solvers.base import Budget, Constraint, Feasibility, Solution
 from planner_core.solvers.sequential import Turn, plan_in_turn
 from planner_core.solvers.walk import CONTACT_ABOVE, NOTHING_TAKEN, rule_plan
@@ -60,7 +59,11 @@ class Graph:
             track = turn.track
             is_wanted = (track.is_contact == 0) & (turn.collected[track.place] == 0)
             weight = np.where(is_wanted, problem.target_reward[track.place], 0.0)
-            path = self._path(track, weight)
+            links = Links.of(problem, turn.satellite)
+            if self.path == "longest":
+                _, path = links.longest(weight)
+            else:
+                path = links.longest_with_history(weight, track.place)
             if problem.use_resources and self.feasibility == "hard":
                 off_path = track.is_contact == 0
                 off_path[path] = False
@@ -73,12 +76,3 @@ class Graph:
             return path
 
         return plan_in_turn(problem, budget, plan_turn)
-
-    def _path(self, track: Track, weight: Floats) -> list[int]:
-        before = np.full(len(weight), NO_TASK, dtype=np.int32)
-        arcs = (track.near_from, track.far_from, track.offset, track.bits, before)
-        if self.path == "longest":
-            _, task = longest_chain(weight, *arcs)
-        else:
-            _, task = longest_chain_with_history(weight, track.place, *arcs)
-        return chain_to(task, before)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from planner_core.problem import Problem
 from planner_core.solvers.base import Budget, Constraint, Feasibility, Solution
@@ -44,6 +44,15 @@ class Rule:
         },
     )
 
+    thresholds: Literal["text", "code"] = field(
+        default="text",
+        metadata={
+            "description": "When resources allow a task. text: battery above and recorder not "
+            "above its limit after it (the paper); code: battery not empty, recorder not full, "
+            "and no collects while the recorder is half full or more (the authors' code)."
+        },
+    )
+
     def solve(self, problem: Problem, budget: Budget, seed: int) -> Solution:
         """Return the plan; the same one whatever the seed."""
 
@@ -56,6 +65,7 @@ class Rule:
                 self.unimaged_only,
                 self.contact_above_fraction,
                 NOTHING_TAKEN,
+                self.thresholds == "code",
             )
             turn.report(1.0, float(problem.target_reward[turn.collected > before].sum()))
             return [int(row) for row in rows]

@@ -26,6 +26,7 @@ class Turn:
         Call with the fraction of this turn and the reward it has gathered.
     """
 
+    satellite: SatelliteProblem
     track: Track
     collected: Bytes
     report: Callable[[float, float], None]
@@ -59,7 +60,7 @@ def plan_in_turn(problem: Problem, budget: Budget, plan_turn: PlanTurn) -> Solut
 
         blocked = blocked_rows(problem, satellite, taken)
         track = compile_track(problem, satellite, blocked)
-        turn = Turn(track=track, collected=collected.copy(), report=report)
+        turn = Turn(satellite=satellite, track=track, collected=collected.copy(), report=report)
         rows = [] if budget.is_spent() else plan_turn(turn)
         if budget.is_spent():
             rows = rows + _rest_by_rule(track, collected.copy(), rows)

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from planner_core.jit import kernel
+from planner_core.jit import borrowing, kernel
 from planner_core.model import NO_TASK, Track, is_safe, next_action, take
 from planner_core.problem import Bytes, Ints
 
@@ -17,10 +17,13 @@ CONTACT_ABOVE: Final = 0.45
 """How full the recorder is before a contact is worth its power; between 0.35 and 0.45 the
 paper's mission keeps most images."""
 
+CODE_COLLECTS_BELOW: Final = 0.5
+"""How full the recorder may be for a collect in the rule of the authors' code."""
+
 NOTHING_TAKEN: Final[Ints] = np.empty(0, dtype=np.int32)
 
 
-@kernel
+@borrowing
 def naive_select_action(
     track: Track,
     collected: Bytes,
@@ -31,12 +34,14 @@ def naive_select_action(
     last: int,
     battery: float,
     recorder: float,
+    follows_code: bool = False,
 ) -> int:
     """Return the row that NAIVESELECTACTION takes next, or ``m`` when none is left.
 
     Tasks that it refuses are what it sun-points through. The limits are those of the text
-    (battery above its minimum, recorder not above its maximum) in the soft form, and those
-    of the plan model in the hard form.
+    (battery above its minimum, recorder not above its maximum) or, with ``follows_code``, of
+    the authors' code (battery not empty, recorder not full, no collects from half full on).
+    In the hard form those of the plan model come on top.
     """
     m = len(track.start_s)
     row = cursor
@@ -47,7 +52,12 @@ def naive_select_action(
         if row == m or not track.use_resources:
             break
         battery_after, recorder_after, _ = take(track, last, row, battery, recorder)
-        if battery_after <= track.battery_min or recorder_after > track.recorder_max:
+        if follows_code:
+            if battery_after <= 0.0 or recorder_after >= 1.0:
+                continue
+            if not track.is_contact[row] and recorder >= CODE_COLLECTS_BELOW:
+                continue
+        elif battery_after <= track.battery_min or recorder_after > track.recorder_max:
             continue
         # A contact that is not worth it yet may pass, unless the recorder cannot do without.
         may_pass = track.is_contact[row] and recorder < contact_above
@@ -65,6 +75,7 @@ def rule_plan(
     unimaged_only: bool,
     contact_above: float,
     taken: Ints,
+    follows_code: bool = False,
 ) -> Ints:
     """Return the rows that RULEBASEDPLANNER takes from the end of ``taken`` to the horizon's.
 
@@ -82,8 +93,9 @@ def rule_plan(
             collected[track.place[row]] = 1
         last = row
     row = naive_select_action(
-        track, collected, is_hard, unimaged_only, contact_above, last, last, battery, recorder
-    )
+        track, collected, is_hard, unimaged_only, contact_above,
+        last, last, battery, recorder, follows_code,
+    )  # fmt: skip
     while row < m:
         if track.use_resources:
             battery, recorder, _ = take(track, last, row, battery, recorder)
@@ -93,6 +105,7 @@ def rule_plan(
         count += 1
         last = row
         row = naive_select_action(
-            track, collected, is_hard, unimaged_only, contact_above, row, last, battery, recorder
-        )
+            track, collected, is_hard, unimaged_only, contact_above,
+            row, last, battery, recorder, follows_code,
+        )  # fmt: skip
     return rows[:count]

@@ -159,6 +159,30 @@ def get_timeline_as(
     return _timeline(job_id, database, request, acceptable=suffix == "json")
 
 
+@router.get(
+    "/{job_id}/proof",
+    responses={
+        200: {"content": {"application/json": {}}, "description": "The proof document."},
+        **problem_responses(404, 409),
+    },
+)
+def get_proof(job_id: str, database: DatabaseDep, request: Request) -> Response:
+    """Return what proves the bound of the timeline, or `null` where it has none.
+
+    `proof` names the argument and `value` the bound. `prices` holds a multiplier for each
+    target, in the order of the scenario: the dual function at these prices is the bound.
+    """
+    etag = f'"{job_id}"'
+    with database.reading() as session:
+        job = _find(session, job_id)
+        if store.timeline_of(session, job_id) is None:
+            raise _not_ready(job)
+        proof = store.proof_of(session, job_id)
+    if matches(request.headers.get("if-none-match"), etag):
+        return Response(status_code=304, headers={"ETag": etag})
+    return Response(proof or "null", media_type="application/json", headers={"ETag": etag})
+
+
 @router.get("/{job_id}/targets", responses=problem_responses(404, 409))
 def list_targets(
     job_id: str,

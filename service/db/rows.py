@@ -128,6 +128,18 @@ class OpportunitySetRow(Row):
     created_at: Mapped[datetime]
 
 
+class BoundRow(Row):
+    """The best proven bound of a scenario so far, whichever job found it."""
+
+    __tablename__ = "scenario_bound"
+
+    scenario_sha256: Mapped[str] = mapped_column(sa.String(64), primary_key=True)
+    version: Mapped[str]
+    value: Mapped[float] = mapped_column(sa.Double)
+    proof: Mapped[str]
+    created_at: Mapped[datetime]
+
+
 class JobRow(Row):
     """A job: the truth about one piece of queue work (DBOS only dispatches it).
 
@@ -172,6 +184,7 @@ class JobResultRow(Row):
     job_id: Mapped[str] = mapped_column(sa.ForeignKey("job.id"), primary_key=True)
     timeline: Mapped[str] = mapped_column(sa.Text, deferred=True)
     targets: Mapped[str] = mapped_column(sa.Text, deferred=True)
+    proof: Mapped[str | None] = mapped_column(sa.Text, deferred=True)
     created_at: Mapped[datetime]
 
 

@@ -34,7 +34,7 @@ class Lease:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """How a run ended. ``timeline`` and ``targets`` are documents as JSON text, or None.
+    """How a run ended. ``timeline``, ``targets``, ``proof`` are documents as JSON text, or None.
 
     ``progress`` is the last report; None leaves the one that the job has.
     """
@@ -45,6 +45,7 @@ class Outcome:
     progress: Mapping[str, Any] | None = None
     timeline: str | None = None
     targets: str | None = None
+    proof: str | None = None
 
     @classmethod
     def failed(cls, code: str, detail: str) -> Outcome:
@@ -128,6 +129,7 @@ def finish(session: Session, lease: Lease, outcome: Outcome) -> bool:
                 job_id=lease.job_id,
                 timeline=outcome.timeline,
                 targets=outcome.targets,
+                proof=outcome.proof,
                 created_at=utc_now(),
             )
         )

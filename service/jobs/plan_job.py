@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import Any, cast
 
+from planner_core import proofs
 from planner_core.build import ScenarioOpportunities
 from planner_core.domain import (
     GroundStation,
@@ -39,6 +40,8 @@ class PlanRequest:
         ``time_s`` and ``memory_mb``.
     opportunity_block
         The scenario's stored opportunities, or None where they are still to be computed.
+    bound
+        The best bound known of the scenario with its proof (JSON text), or None.
     """
 
     job_id: str
@@ -49,6 +52,7 @@ class PlanRequest:
     seed: int
     limits: Mapping[str, Any]
     opportunity_block: bytes | None = None
+    bound: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,6 +69,8 @@ class PlanAnswer:
         Why the search ended.
     reward, bound
         What the referee awarded; what no plan can exceed, where it is known.
+    proof
+        That bound with what proves it (JSON text).
     opportunity_block
         Opportunities to store, where this job was the first to compute them.
     """
@@ -74,6 +80,7 @@ class PlanAnswer:
     termination: str
     reward: float
     bound: float | None = None
+    proof: str | None = None
     opportunity_block: bytes | None = None
 
 
@@ -95,6 +102,7 @@ def run_plan_job(request: PlanRequest, budget: Budget) -> PlanAnswer:
         request.seed,
         budget,
         ScenarioOpportunities.from_bytes(block) if block is not None else None,
+        proofs.from_json(request.bound) if request.bound is not None else None,
     )
     documents = Documents(judged, job_id=request.job_id, scenario_sha256=request.scenario_sha256)
     termination = judged.solution.termination.value
@@ -107,6 +115,7 @@ def run_plan_job(request: PlanRequest, budget: Budget) -> PlanAnswer:
         termination=termination,
         reward=judged.timeline.reward,
         bound=judged.bound.value if judged.bound else None,
+        proof=proofs.to_json(judged.bound) if judged.bound else None,
         opportunity_block=judged.opportunities.to_bytes() if block is None else None,
     )
 

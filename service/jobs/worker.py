@@ -16,14 +16,14 @@ from sqlalchemy.exc import OperationalError
 from sqlalchemy.orm import Session
 
 from planner_core.solvers.base import Progress
-from service import opportunity_store
+from service import bound_store, opportunity_store
 from service.db.clock import utc_now
 from service.db.rows import JobRow, ScenarioRow, WorkerRow
 from service.db.session import Database
 from service.jobs import lease
 from service.jobs.child import Answered, Ending, Refused, Stopped
 from service.jobs.lease import Lease, Outcome
-from service.jobs.plan_job import PlanRequest
+from service.jobs.plan_job import PlanAnswer, PlanRequest
 from service.jobs.queue import DbosConsumer, DbosQueue
 from service.jobs.reconcile import Reconciler
 from service.jobs.runner import Abandoned, Limits, Order, Runner, Work
@@ -133,6 +133,7 @@ class Worker:
                 seed=job.seed,
                 limits=job.limits,
                 opportunity_block=opportunity_store.load(session, sha256),
+                bound=bound_store.load(session, sha256),
             )
 
     def _tick(self, held: Lease, progress: Progress | None) -> Order:
@@ -153,14 +154,20 @@ class Worker:
         if isinstance(ending, Abandoned):
             self._persist(lambda session: lease.hand_back(session, self._queue, held))
             return
-        if isinstance(ending, Answered) and ending.answer.opportunity_block is not None:
-            block = ending.answer.opportunity_block
-            self._persist(
-                lambda session: opportunity_store.save(session, request.scenario_sha256, block)
-            )
+        if isinstance(ending, Answered):
+            self._share(request.scenario_sha256, ending.answer)
         outcome = outcome_of(ending)
         if not self._persist(lambda session: lease.finish(session, held, outcome)):
             log.warning("a job went on without this worker", extra={"job_id": held.job_id})
+
+    def _share(self, sha256: str, answer: PlanAnswer) -> None:
+        """Store what other jobs of the scenario need not find out again."""
+        block, bound, proof = answer.opportunity_block, answer.bound, answer.proof
+        if block is not None:
+            self._persist(lambda session: opportunity_store.save(session, sha256, block))
+        # Who cancels does not wait for a good bound; the next job shall look for one.
+        if bound is not None and proof is not None and answer.termination != "cancelled":
+            self._persist(lambda session: bound_store.save(session, sha256, bound, proof))
 
     def _persist(self, write: Callable[[Session], T]) -> T:
         """Write in one transaction, as often as it takes while the database is away."""
@@ -212,4 +219,5 @@ def outcome_of(ending: Ending) -> Outcome:
         ),
         timeline=answer.timeline,
         targets=answer.targets,
+        proof=answer.proof,
     )

@@ -3,26 +3,28 @@
 from __future__ import annotations
 
 import csv
+import math
+import subprocess
+import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from benchmarks.paper.claims import claims
-from benchmarks.paper.energy import energy_bound
+from benchmarks.paper.cpu_budget import CpuBudget
 from benchmarks.paper.measure import Outcome, Task, run_task
 from benchmarks.paper.published import TABLE_6, TABLE_7, forward_grid, mcts_grid
-from benchmarks.paper.readings import BASE
+from benchmarks.paper.readings import BASE, Reading
+from benchmarks.paper.readings_table import nearest
 from benchmarks.paper.settings import settings as named_settings
 from benchmarks.paper.store import Store
-from benchmarks.paper.study import Study, quick
-from benchmarks.paper.summary import left_out, row_params
+from benchmarks.paper.study import Study, best_forward, quick
+from benchmarks.paper.summary import parts, row_params
 from planner_core.solvers import SOLVERS
-from tests.planner_core.brute_force import best_reward
-from tests.planner_core.problems import random_problem
 
+FLAT = Reading(look_deg=(0.0, 50.0))
 TINY = Study(
     targets=(20, 30),
     draws=1,
@@ -30,7 +32,7 @@ TINY = Study(
     forward_points=tuple(forward_grid()[:2]),
     mcts_points=tuple(mcts_grid()[:1]),
     mcts_runs=2,
-    readings_without=(BASE,),
+    readings_without=(BASE, FLAT),
     readings_with=(BASE,),
     exact_limit_s=2.0,
 )
@@ -95,6 +97,54 @@ def test_a_line_that_was_cut_off_counts_as_not_run(finished: Store, tmp_path: Pa
     assert list(Store(path).done) == [first, second]
 
 
+def test_a_file_of_other_columns_is_begun_anew(finished: Store, tmp_path: Path) -> None:
+    path = tmp_path / "runs.csv"
+    task = next(iter(finished.done))
+    Store(path).add(task, finished.done[task])
+    path.write_text(path.read_text(encoding="utf-8").replace("cost_s", "cost"), encoding="utf-8")
+    assert Store(path).done == {}
+
+
+def test_a_run_counts_all_its_cpu_time(finished: Store) -> None:
+    assert all(0.0 < o.seconds <= o.cost_s for o in finished.done.values())
+
+
+def test_a_limit_counts_the_cpu_time_of_this_process() -> None:
+    budget = CpuBudget(0.05, math.inf)
+    began_s = time.process_time()
+    while not budget.is_spent():
+        pass
+    assert time.process_time() - began_s >= 0.04
+    assert budget.remaining_s() == 0.0
+
+
+def test_the_deadline_ends_a_run_without_a_limit() -> None:
+    assert CpuBudget(math.inf, time.time() - 1.0).is_spent()
+    budget = CpuBudget(math.inf, far())
+    assert not budget.is_spent()
+    assert budget.remaining_s() <= 300.0
+
+
+_KILLED = """
+import math, time
+from benchmarks.paper.pool import Pool
+from tests.benchmarks.test_paper_study import TINY
+with Pool(1, math.inf) as pool:
+    next(pool.run(TINY.figures(exact=False)[:1]))
+    print("ready", flush=True)
+    time.sleep(600.0)
+"""
+
+
+def test_no_worker_outlives_a_study_that_is_killed() -> None:
+    with subprocess.Popen([sys.executable, "-c", _KILLED], stdout=subprocess.PIPE) as study:
+        assert study.stdout is not None
+        assert study.stdout.readline() == b"ready\n"
+        study.kill()
+        # The workers hold the other end too: this returns when the last of them is gone.
+        assert study.communicate(timeout=60.0)[0] == b""
+
+
 def test_a_run_that_the_time_cuts_off_leaves_nothing() -> None:
     task = TINY.mcts(range(1))[0]
     assert run_task(task, time.time() - 1.0) is None
@@ -109,11 +159,29 @@ def test_outcomes_keep_the_bound_and_hard_limits(finished: Store) -> None:
 
 
 def test_what_is_unfinished_is_said(finished: Store) -> None:
-    assert left_out(TINY, finished.done) == []
-    part = without_grid(finished.done)
-    names = [name for name, done, total in left_out(TINY, part) if done < total]
-    assert "MCTS grid (Table 5), further runs" in names
+    assert all(part.is_whole for part in parts(TINY, finished.done))
+    unfinished = parts(TINY, without_grid(finished.done))
+    assert [p.name for p in unfinished if not p.is_whole] == ["MCTS grid, further runs"]
     assert {claim.verdict for claim in claims(TINY, {})} == {"not measured"}
+
+
+def test_the_nearest_reading_is_judged_beside_our_own(finished: Store) -> None:
+    task = TINY.reading_task(best_forward(False), FLAT)
+    exact = replace(finished.done[task], images=450)
+    done = {**finished.done, task: exact}
+    near = nearest(TINY, done, is_mcts=False, res=False)
+    assert near is not None
+    assert (near.reading, near.images, near.error) == (FLAT, 450, 0.0)
+    level = claims(TINY, done)[0]
+    assert (level.verdict, level.near) == ("does not reproduce", "reproduces")
+
+
+def test_the_parts_hold_every_run_once(finished: Store) -> None:
+    made = parts(TINY, finished.done)
+    assert sum(part.runs for part in made) == len(finished.done)
+    assert sum(part.cost_s for part in made) == pytest.approx(
+        sum(outcome.cost_s for outcome in finished.done.values())
+    )
 
 
 def without_grid(done: dict[Task, Outcome]) -> dict[Task, Outcome]:
@@ -127,18 +195,6 @@ def page(finished: Store, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
     docs = tmp_path_factory.mktemp("docs")
     return write_report(TINY, finished.done, docs, took_min=1.0, command="make paper")
-
-
-@settings(max_examples=20, deadline=None)
-@given(seed=st.integers(0, 10**6), is_physical=st.booleans(), num_satellites=st.integers(1, 2))
-def test_no_plan_beats_the_energy(seed: int, is_physical: bool, num_satellites: int) -> None:
-    problem = random_problem(
-        seed,
-        use_resources=True,
-        dynamics="physical" if is_physical else "paper",
-        num_satellites=num_satellites,
-    )
-    assert energy_bound(problem) >= best_reward(problem)
 
 
 def test_the_page_shows_every_figure_and_table(page: Path) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -46,6 +46,7 @@ class Task:
     satellite: int = 0
     angle_deg: float = 0.0
     margin_s: float = 0.0
+    access: int | None = None  # shared by the collects that one access offers
     turn_deg: float = 0.0  # how far the line of sight turns during the task
 
 
@@ -83,7 +84,10 @@ def make_problem(
         satellite=np.array([t.satellite for t in ordered], dtype=np.int32),
         kind=np.array([t.kind for t in ordered], dtype=np.int8),
         place=np.array([t.place for t in ordered], dtype=np.int32),
-        access=np.arange(n, dtype=np.int32),
+        access=np.array(
+            [i if t.access is None else n + t.access for i, t in enumerate(ordered)],
+            dtype=np.int32,
+        ),
         start_s=start_s,
         end_s=end_s,
         access_start_s=start_s - margin,
@@ -144,25 +148,30 @@ def random_problem(
     span_s: float = 940.0,
     sunlight: Sunlight | None = None,
     num_stations: int = 1,
+    num_offers: int = 1,
 ) -> Problem:
     """Return a small crowded problem drawn from ``seed``.
 
+    Each access offers ``num_offers`` collects, 9 s apart.
     With ``max_turn_deg`` lines of sight turn during collects, by up to that either way.
     """
     rng = np.random.default_rng(seed)
-    tasks = []
-    for _ in range(num_collects):
+    tasks: list[Task] = []
+    for access in range(num_collects):
         start_s = round(float(rng.uniform(0, span_s)), 3)
-        tasks.append(
-            Task(
-                kind=COLLECT,
-                place=int(rng.integers(num_targets)),
-                satellite=int(rng.integers(num_satellites)),
-                start_s=start_s,
-                end_s=start_s + 30.0,
-                angle_deg=float(rng.uniform(-55, 55)),
-                turn_deg=float(rng.uniform(-max_turn_deg, max_turn_deg)) if max_turn_deg else 0.0,
-            )
+        task = Task(
+            kind=COLLECT,
+            place=int(rng.integers(num_targets)),
+            satellite=int(rng.integers(num_satellites)),
+            start_s=start_s,
+            end_s=start_s + 30.0,
+            angle_deg=float(rng.uniform(-55, 55)),
+            turn_deg=float(rng.uniform(-max_turn_deg, max_turn_deg)) if max_turn_deg else 0.0,
+            access=access,
+        )
+        tasks.extend(
+            replace(task, start_s=start_s + 9.0 * k, end_s=start_s + 9.0 * k + 30.0)
+            for k in range(num_offers)
         )
     for _ in range(num_contacts if use_resources else 0):
         start_s = round(float(rng.uniform(0, 850)), 3)

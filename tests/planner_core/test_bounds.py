@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planner_core.bounds import lagrangian_bound, lagrangian_value
+from planner_core.domain import Agility
 from planner_core.solvers import ForwardSearch
 from planner_core.solvers.base import Budget
 from planner_core.timeline import replay
@@ -34,6 +37,21 @@ def test_no_plan_beats_the_bound(
     rng = np.random.default_rng(seed)
     for _ in range(5):
         prices = rng.uniform(-1.0, 10.0, len(problem.target_ids))
+        assert lagrangian_value(problem, prices)[0] >= best - 1e-9
+
+
+@settings(max_examples=60, deadline=None)
+@given(seed=SEEDS)
+def test_a_slow_satellite_may_turn_by_way_of_tasks_that_are_worth_nothing(seed: int) -> None:
+    problem = random_problem(
+        seed, use_resources=False, num_collects=9, num_targets=4, span_s=300.0,
+        max_turn_deg=25.0, agility=Agility(slew_rate_deg_s=0.3),
+    )  # fmt: skip
+    rng = np.random.default_rng(seed)
+    problem = replace(problem, target_reward=rng.integers(0, 2, 4).astype(np.float64))
+    best = best_reward(problem)
+    assert lagrangian_bound(problem, reward=0.0).value >= best - 1e-9
+    for prices in (np.zeros(4), np.ones(4), rng.uniform(0.0, 1.0, 4)):
         assert lagrangian_value(problem, prices)[0] >= best - 1e-9
 
 

@@ -18,6 +18,7 @@ from planner_core.domain import Agility, Dynamics
 from planner_core.problem import COLLECT, CONTACT, Problem, Sunlight
 from planner_core.solvers import Milp
 from planner_core.solvers.base import Budget, Progress, Termination
+from planner_core.solvers.milp.highs import Engine
 from planner_core.timeline import replay
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import TIGHT, Task, make_problem, random_problem
@@ -201,6 +202,42 @@ def test_cancelling_ends_a_search_without_any_other_limit() -> None:
     assert replay(problem, solution.plan).is_valid
 
 
+def highs_threads() -> list[threading.Thread]:
+    return [thread for thread in threading.enumerate() if thread.name == "highs"]
+
+
+@pytest.mark.parametrize("num_questions", [1, 200])
+def test_an_answer_does_not_wait_for_highs(
+    monkeypatch: pytest.MonkeyPatch, num_questions: int
+) -> None:
+    """HiGHS is held where it asks whether to go on: what is known by then comes back."""
+    budget, may_go_on = Budget(), threading.Event()
+    asked = 0
+
+    def hold(engine: Engine, event: Any) -> None:
+        nonlocal asked
+        asked += 1
+        if asked >= num_questions:
+            budget.cancel()
+            may_go_on.wait()
+            event.interrupt()
+
+    monkeypatch.setattr(Engine, "_interrupt_if_spent", hold)
+    problem = crowded(1)
+    try:
+        solution = Milp().solve(problem, budget, 0)
+        assert highs_threads()
+    finally:
+        may_go_on.set()
+        for thread in highs_threads():
+            thread.join()
+    timeline = replay(problem, solution.plan)
+    assert solution.termination is Termination.CANCELLED
+    assert timeline.is_valid
+    assert timeline.reward > 0.0
+    assert solution.bound is None or solution.bound >= timeline.reward
+
+
 def test_incumbents_and_bounds_are_reported_while_it_searches() -> None:
     reports: list[Progress] = []
     budget = Budget(2.0, reports.append)
@@ -225,4 +262,6 @@ def test_a_solve_leaves_no_thread_behind() -> None:
     """Workers fork from a process that has planned with every solver."""
     before = len(os.listdir("/proc/self/task"))
     Milp().solve(crowded(2), Budget(1.0), 0)
+    for thread in highs_threads():
+        thread.join()
     assert len(os.listdir("/proc/self/task")) == before

@@ -26,6 +26,8 @@ PAPER_MCTS = Mcts(
     num_simulations=50,
     depth=5,
     exploration=3.0,
+    breadth=3,
+    backup="mean",
     gamma=0.995,
     rollout="random",
     keep_incumbent=False,
@@ -39,7 +41,7 @@ VARIANTS: list[Solver] = [
     ForwardSearch(depth=5, breadth=2, gamma=0.999),
     Rule(contact_above_fraction=0.0),
     Graph(path="longest"),
-    Mcts(num_simulations=30, depth=4, backup="max", discount="per_decision"),
+    Mcts(num_simulations=30, depth=4, backup="mean", discount="per_decision"),
     PAPER_MCTS,
     Rule(unimaged_only=False),
 ]
@@ -124,6 +126,8 @@ def test_forward_search_at_full_depth_and_breadth_equals_brute_force(
     unimaged_only=st.booleans(),
     depth=st.integers(1, 4),
     breadth=st.integers(1, 3),
+    discount=st.sampled_from(["action", "next_action"]),
+    num_offers=st.integers(1, 3),
 )
 def test_the_compiled_forward_search_plans_what_the_listing_plans(
     seed: int,
@@ -133,11 +137,16 @@ def test_the_compiled_forward_search_plans_what_the_listing_plans(
     unimaged_only: bool,
     depth: int,
     breadth: int,
+    discount: Any,
+    num_offers: int,
 ) -> None:
-    problem = problems(seed, dynamics, use_resources, num_collects=14, num_contacts=4)
-    solver = ForwardSearch(
-        depth=depth, breadth=breadth, feasibility=feasibility, unimaged_only=unimaged_only
+    problem = problems(
+        seed, dynamics, use_resources, num_collects=14, num_contacts=4, num_offers=num_offers
     )
+    solver = ForwardSearch(
+        depth=depth, breadth=breadth, feasibility=feasibility, unimaged_only=unimaged_only,
+        gamma=0.99, discount=discount,
+    )  # fmt: skip
     satellite = problem.satellites[0]
     model = Model(
         track=compile_track(problem, satellite, (satellite.rows * 0).astype("uint8")),
@@ -148,7 +157,7 @@ def test_the_compiled_forward_search_plans_what_the_listing_plans(
     )
     state = model.initial_state()
     rows = []
-    while (action := select_action(model, state, depth, breadth)[0]) != NOTHING:
+    while (action := select_action(model, state, depth, breadth, discount)[0]) != NOTHING:
         state = model.step(state, action, model.actions(state, breadth)[0]).state
         if action != WAIT:
             rows.append(int(satellite.rows[action]))

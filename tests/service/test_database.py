@@ -13,8 +13,9 @@ import sqlalchemy as sa
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 
+from service import bound_store
 from service.db.migrate import upgrade
-from service.db.rows import Row, TargetCatalogRow, TargetRow, WorkerRow
+from service.db.rows import BoundRow, Row, TargetCatalogRow, TargetRow, WorkerRow
 from service.db.session import Database, make_engine
 from service.ids import new_id
 
@@ -136,3 +137,21 @@ def test_ids_are_uuid7_and_sort_by_age() -> None:
     made = [new_id() for _ in range(5000)]
     assert made == sorted(set(made))
     assert {(one[14], one[19] in "89ab") for one in made} == {("7", True)}
+
+
+def test_bounds_of_a_scenario_only_get_better(database: Database) -> None:
+    def best() -> str | None:
+        with database.reading() as session:
+            return bound_store.load(session, "s")
+
+    assert best() is None
+    for value, proof, expected in ((5.0, "a", "a"), (7.0, "b", "a"), (4.0, "c", "c")):
+        with database.transaction() as session:
+            bound_store.save(session, "s", value, proof)
+        assert best() == expected
+    with database.transaction() as session:
+        session.execute(sa.update(BoundRow).values(version="of old", value=0.0))
+    assert best() is None
+    with database.transaction() as session:
+        bound_store.save(session, "s", 9.0, "d")
+    assert best() == "d"

@@ -15,6 +15,7 @@ import httpx
 import psutil
 import pytest
 
+from planner_core.solvers import SOLVERS
 from tests import independent
 from tests.missions import (
     PAPER_ORBIT,
@@ -185,20 +186,24 @@ def test_cancelling_a_running_job_takes_two_seconds_and_keeps_the_plan(service: 
     assert again.status_code == 409
 
 
-def test_the_same_question_gives_the_same_plan_over_http_and_from_a_file(
-    service: Service, tmp_path: Path
+@pytest.mark.parametrize("use_resources", [True, False], ids=["resources", "free"])
+@pytest.mark.parametrize("solver", sorted(SOLVERS))
+def test_the_same_question_gives_the_same_plan_in_every_process(
+    service: Service, tmp_path: Path, solver: str, use_resources: bool
 ) -> None:
-    scenario = post_mission(service, drawn_targets(120, seed=3))
-    job = service.until(service.submit(scenario["id"], "rule"), *FINAL)
-    online = service.get(f"/v1/jobs/{job['id']}/timeline")
+    """Twice over HTTP, each job in a process of its own, and from a file."""
+    scenario = post_mission(service, drawn_targets(60, seed=3), use_resources=use_resources)
+    jobs = [service.submit(scenario["id"], solver) for _ in range(2)]
+    timelines = [service.get(service.until(job, *FINAL)["links"]["timeline"]) for job in jobs]
     file = tmp_path / "scenario.json"
     file.write_text(service.http.get(f"/v1/scenarios/{scenario['id']}?expand=true").text)
     out = tmp_path / "timeline.json"
-    command = ["solve", str(file), "--solver", "rule", "--out", str(out)]
+    command = ["solve", str(file), "--solver", solver, "--out", str(out)]
     subprocess.run([sys.executable, "-m", "service", *command], check=True, capture_output=True)
-    offline = httpx.Response(200, content=out.read_bytes()).json()
-    assert offline["plan_sha256"] == online["plan_sha256"]
-    assert offline["scenario_sha256"] == online["scenario_sha256"] == scenario["sha256"]
+    timelines.append(httpx.Response(200, content=out.read_bytes()).json())
+    assert timelines[0]["totals"]["collects"] > 0
+    assert len({timeline["plan_sha256"] for timeline in timelines}) == 1
+    assert {timeline["scenario_sha256"] for timeline in timelines} == {scenario["sha256"]}
 
 
 def test_a_job_may_bring_its_scenario_along(service: Service) -> None:

@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import pytest
 
+from planner_core import proofs
+from planner_core.bounds import Bound
+from planner_core.build import build_problem, compute_opportunities
 from planner_core.solvers import SOLVERS
 from planner_core.solvers.base import Budget
 from service.jobs.plan_job import PlanAnswer, PlanRequest, run_plan_job
-from service.translate import canonical, sha256_of
+from service.translate import canonical, scenario_from_content, sha256_of
 from tests import independent
 from tests.missions import Document, drawn_targets, paper_mission
 
 
-def run(scenario: Document, solver: str, block: bytes | None = None) -> PlanAnswer:
+def run(
+    scenario: Document, solver: str, block: bytes | None = None, bound: str | None = None
+) -> PlanAnswer:
     content = canonical(scenario)
     params: Any = SOLVERS[solver]()
     request = PlanRequest(
@@ -28,6 +33,7 @@ def run(scenario: Document, solver: str, block: bytes | None = None) -> PlanAnsw
         seed=0,
         limits={"time_s": 60, "memory_mb": 2048},
         opportunity_block=block,
+        bound=bound,
     )
     return run_plan_job(request, Budget())
 
@@ -56,3 +62,30 @@ def test_stored_opportunities_give_the_same_plan_as_computed_ones() -> None:
     assert again.opportunity_block is None
     assert json.loads(first.timeline)["plan_sha256"] == json.loads(again.timeline)["plan_sha256"]
     assert first.targets == again.targets
+
+
+@pytest.mark.parametrize("use_resources", [True, False])
+@pytest.mark.parametrize("solver", ["rule", *(["certified"] if "certified" in SOLVERS else [])])
+def test_the_stored_proof_proves_the_bound(solver: str, use_resources: bool) -> None:
+    """From the file alone: nothing is left of the search that found it."""
+    scenario = paper_mission(drawn_targets(120), use_resources=use_resources)
+    answer = run(scenario, solver)
+    assert answer.proof is not None
+    bound = proofs.from_json(answer.proof)
+    assert bound.value == answer.bound
+    read = scenario_from_content(json.loads(canonical(scenario)))
+    problem = build_problem(read, compute_opportunities(read, Budget()), Budget())
+    assert proofs.is_proven(problem, bound)
+    assert not proofs.is_proven(problem, replace(bound, value=bound.value - 1.0))
+
+
+def test_a_known_bound_is_used_again_and_only_a_better_one_replaces_it() -> None:
+    scenario = paper_mission(drawn_targets(60), use_resources=False)
+    first = run(scenario, "rule")
+    assert first.bound is not None
+    assert first.proof is not None
+    again = run(scenario, "rule", bound=first.proof)
+    assert (again.bound, again.proof) == (first.bound, first.proof)
+    assert json.loads(again.timeline)["plan_sha256"] == json.loads(first.timeline)["plan_sha256"]
+    better = run(scenario, "milp", bound=proofs.to_json(Bound(value=1e6, proof="lagrangian")))
+    assert better.bound == better.reward

@@ -13,7 +13,8 @@ from typing import Final
 import numpy as np
 
 from planner_core.bounds import default_steps, priced_bound, reward_unit, rounded_bound
-from planner_core.certificate import Certificate, Multipliers, is_below, values_through
+from planner_core.certificate import Certificate, Multipliers, Refutation, is_below, values_through
+from planner_core.comparable import transitive_closure
 from planner_core.network import network_of
 from planner_core.plan import Plan
 from planner_core.problem import Bools, Floats, Ints, Problem
@@ -23,6 +24,7 @@ from planner_core.solvers.certified.master import Master
 from planner_core.solvers.certified.prover import Prover
 from planner_core.solvers.graph import Graph
 from planner_core.solvers.lns import improved
+from planner_core.solvers.milp.model import plan_program
 from planner_core.solvers.rule import Rule
 from planner_core.timeline import replay
 
@@ -33,8 +35,13 @@ _MAX_ROUNDS: Final = 60
 _STALLED: Final = 0.04  # of the gap, in _PATIENCE rounds of cuts
 _PATIENCE: Final = 4
 _WANTED: Final = 1e-3
+_NODE_ROUNDS: Final = 5
+_MAX_PARTS: Final = 4  # beyond that HiGHS is faster
+_POLISH: Final = 50.0
+_POLISHED: Final = (1, 2, 4, 8, 16, 32)  # rounds
 _REPORT_EVERY_S: Final = 0.25
-_MAX_AMOUNTS: Final = 4
+_LAST_SEARCHES: Final = 6  # among what a plan as good as the bound can hold
+_LAST_MOVES: Final = 15.0
 
 
 class FreeSearch:
@@ -49,10 +56,15 @@ class FreeSearch:
         self.bound = float(problem.target_reward[targets].sum())
         self.steps = [Multipliers(prices=problem.target_reward.astype(np.float64))]
         self.log: str | None = None
-        self.wanted = np.zeros(len(problem.opportunities), dtype=np.bool_)
+        self.tree: Refutation | None = None
+        self.num_parts = 0
+        self.is_transitive = all(
+            transitive_closure(problem, s) is s.transitions for s in problem.satellites
+        )
         self._rows = np.arange(len(problem.opportunities), dtype=np.int32)
         self._rest = problem
         self._reported_s = 0.0
+        self._num_searches = 0
         self._network = network_of(problem)
         self.through: Floats = np.full(len(self._rows), self.bound)
 
@@ -97,9 +109,10 @@ class FreeSearch:
         by_row = np.empty(len(self._rows))
         by_row[self._network.row] = through
         lower = np.minimum(self.through, by_row)
+        # What is not kept must not be built upon.
         if self.bound < before or np.any(is_below(lower, self.better) > self.is_struck):
             self.steps.append(step)
-        self.through = lower
+            self.through = lower
 
     @property
     def is_struck(self) -> np.ndarray:
@@ -123,10 +136,11 @@ class FreeSearch:
     def search(self, moves_per_task: float, rows: Ints) -> bool:
         """Search windows among some of the problem's tasks; return whether that helped."""
         own = np.array([a.opportunity for a in self.plan.actions], dtype=np.int32)
+        self._num_searches += 1
         rows = np.union1d(rows, own).astype(np.int32)
         focus = restricted(self.problem, rows)
         start = Plan.of(focus, np.searchsorted(rows, own))
-        plan = improved(focus, start, moves_per_task, self.budget, self.seed + int(self.reward))
+        plan = improved(focus, start, moves_per_task, self.budget, self.seed + self._num_searches)
         return self.offer(Plan.of(self.problem, rows[[a.opportunity for a in plan.actions]]))
 
     def report(self, message: str) -> None:
@@ -141,39 +155,31 @@ class FreeSearch:
         """Return the tasks that a plan worth this much can hold."""
         return self._rows[~is_below(self.through, amount)]
 
-    def _among(self, is_meant: Bools) -> Bools:
-        among = np.zeros(len(self.problem.opportunities), dtype=np.bool_)
-        among[self._rows[is_meant]] = True
-        return among
-
-    def polish(self) -> None:
-        """Let HiGHS find the best plan of the tasks that relaxations have taken, in part."""
-        own = [a.opportunity for a in self.plan.actions]
-        self.wanted[own] = True
-        rows = np.flatnonzero(self.wanted).astype(np.int32)
-        part = restricted(self.problem, rows)
-        prover = Prover(part, [], self.better, self.bound, self.budget, self.seed)
-        plan, _ = prover.prove(0.0, lambda _, __: None)
-        if plan is not None:
-            self.offer(Plan.of(self.problem, rows[[a.opportunity for a in plan.actions]]))
+    def polish(self, taken: Floats) -> None:
+        """Search windows among the tasks that a relaxation takes, in part."""
+        rows = self._rows[taken > _WANTED]
+        while self.search(_POLISH, rows) and not self.is_done:
+            pass
 
     def cut(self) -> Master:
         """Price with cutting planes until that leads no further; return the relaxation."""
         self.shrink()
         priced = self.bound + self.unit
-        master = Master(self._rest, self.budget, self.seed)
+        master = Master(self._rest, self._rows, self.budget, self.seed)
         bounds: list[float] = []
         for _ in range(_MAX_ROUNDS):
             taken = master.relaxed()
             if taken is None:
                 break
-            self.wanted |= self._among(taken > _WANTED) if len(bounds) > 2 else False
-            self.step(master.multipliers(self._rows))
+            self.step(master.multipliers())
             self.report("cutting planes")
             bounds.append(master.value)
+            if len(bounds) in _POLISHED and not self.is_done:
+                self.polish(taken)
+                self.report(f"polish {np.sum(taken > _WANTED)}")
             if self.is_done:
                 break
-            master.close(~self.is_struck)
+            master.allow(~self.is_struck)
             gap = max(bounds[-1] - self.reward, 1e-9)
             # Until paths are priced nearly as well as by the subgradient, odd sets lead astray.
             num_added = master.cut(taken, with_odd_sets=bounds[-1] <= priced + 0.2 * gap)
@@ -188,12 +194,17 @@ class FreeSearch:
         """Let HiGHS find a plan worth this much, or prove that there is none."""
         is_open = ~is_below(self.through, amount)
         rows = self._rows[is_open]
-        number = np.cumsum(is_open) - 1
         part = restricted(self.problem, rows)
-        cuts = [c.among(is_open, number) for c in master.rows_in_use()]
-        prover = Prover(part, cuts, amount, amount, self.budget, self.seed)
+        if self.is_transitive:
+            program = master.program(is_open)
+        else:
+            # Then a plan may need tasks that it is not paid for.
+            program = plan_program(part, "antichain", 0.0).program
+            scale = float(self.problem.target_reward.max())
+            program.worth = [worth / scale for worth in program.worth]
+        prover = Prover(part, program, amount, amount, self.budget, self.seed)
 
-        def watch(reward: float, bound: float) -> None:
+        def watch(_reward: float, _bound: float) -> None:
             now_s = time.monotonic()
             if now_s - self._reported_s > _REPORT_EVERY_S:
                 self._reported_s = now_s
@@ -208,8 +219,66 @@ class FreeSearch:
             self.log = prover.log
             self.lower(max(bound, below, self.reward))
 
+    def refutation(self) -> Refutation:
+        """Return why no plan is worth more than the bound."""
+        if self.tree is None:
+            return Refutation(steps=tuple(self.steps))
+        return Refutation(steps=(*self.steps, *self.tree.steps), branch=self.tree.branch)
+
+    def branch(self, master: Master) -> None:
+        """Split the plans by what they take until all parts are refuted."""
+        tree = self._part(master, ~self.is_struck)
+        if tree is not None:
+            self.tree = tree
+            self.lower(self.reward)
+
+    def _part(self, master: Master, is_open: Bools) -> Refutation | None:
+        """Return why no plan of the open tasks is better; None where that takes too long."""
+        steps, values = [], []
+        while True:
+            master.allow(is_open)
+            taken = master.relaxed()
+            if taken is None:
+                return None
+            steps.append(master.multipliers())
+            total, through = values_through(
+                self.problem, self._network, self._rows, steps[-1], is_open
+            )
+            if is_below(total, self.better):
+                return Refutation(steps=tuple(steps))
+            values.append(total)
+            by_row = np.empty(len(is_open))
+            by_row[self._network.row] = through
+            is_open = is_open & ~is_below(by_row, self.better)
+            loss = np.minimum(taken, 1.0 - taken)
+            if loss.max() < _WANTED and self.offer(Plan.of(self.problem, self._rows[taken > 0.5])):
+                continue
+            is_slow = len(values) > 1 and values[-2] - total < 0.1 * (total - self.better)
+            if is_slow or len(values) == _NODE_ROUNDS or not master.cut(taken, with_odd_sets=True):
+                break
+        at = master.decisive(taken)
+        self.num_parts += 1
+        self.polish(taken)
+        if self.is_done or self.num_parts == _MAX_PARTS:
+            return None
+        self.report(f"{self.num_parts} parts")
+        first = self._part(master, is_open & ~master.excluded_by(at))
+        if first is None or self.is_done:
+            return None
+        others = is_open.copy()
+        others[at] = False
+        second = self._part(master, others)
+        if second is None:
+            return None
+        return Refutation(steps=tuple(steps), branch=(int(self._rows[at]), first, second))
+
     def solution(self) -> Solution:
         """Return the plan with what is known of it."""
+        if self.problem.continuous_starts:
+            # The bound does not cover the freedom to shift tasks.
+            is_cut_short = self.budget.is_spent()
+            ended = self.budget.termination() if is_cut_short else Termination.HORIZON_COMPLETE
+            return Solution(plan=self.plan, termination=ended)
         if self.is_optimal:
             termination = Termination.OPTIMAL
         elif self.is_close:
@@ -219,7 +288,7 @@ class FreeSearch:
         else:
             termination = Termination.HORIZON_COMPLETE
         above = self.bound + (self.unit or 4e-9 * max(1.0, self.bound))
-        certificate = Certificate(amount=above, steps=tuple(self.steps))
+        certificate = Certificate(amount=above, refutation=self.refutation())
         return Solution(
             plan=self.plan,
             termination=termination,
@@ -242,23 +311,28 @@ def solve_free(
         search.report("prices")
     left = moves_per_task
     while left > 0 and not search.is_done:
-        search.search(5.0, search.open_rows(search.reward))
-        search.report("window search")
         left -= 5.0
-    if search.is_done:
-        return search.solution()
+        if not search.search(5.0, search.open_rows(search.reward)):
+            break
+        search.report("window search")
+    if not search.is_done:
+        _close_in(search)
+    return search.solution()
+
+
+def _close_in(search: FreeSearch) -> None:
+    """Cut, search and branch until plan and bound meet or the budget is spent."""
     search.price()
     master = search.cut()
-    if not search.is_done:
-        search.polish()
-        search.report("polish")
+    for _ in range(_LAST_SEARCHES):
+        if search.is_done:
+            return
+        search.search(_LAST_MOVES, search.open_rows(search.bound))
+    if search.is_transitive:
+        search.branch(master)
     while not search.is_done:
-        amount = search.better
-        if search.unit and search.bound - search.reward <= _MAX_AMOUNTS * search.unit:
-            amount = search.bound
         before = (search.bound, search.reward)
-        search.prove(master, amount)
+        search.prove(master, search.better)
         search.report("HiGHS")
         if (search.bound, search.reward) == before:
-            break
-    return search.solution()
+            return

@@ -7,20 +7,27 @@ from typing import Final
 import numpy as np
 
 from planner_core.certificate import Cut, Multipliers
-from planner_core.comparable import Order, comes_before, order_of, transitive_closure
+from planner_core.comparable import (
+    Order,
+    are_comparable,
+    comes_before,
+    order_of,
+    transitive_closure,
+)
 from planner_core.draws import draws_of
 from planner_core.jit import kernel
 from planner_core.problem import COLLECT, Bools, Bytes, Floats, Ints, Problem
 from planner_core.solvers.base import Budget
-from planner_core.solvers.certified.odd_sets import Sets, depths, odd_sets
+from planner_core.solvers.certified.odd_sets import Sets, deepest, odd_sets
 from planner_core.solvers.milp.antichains import antichain_cover, violated_antichains
 from planner_core.solvers.milp.highs import Engine
 from planner_core.solvers.milp.program import Program, Rows
 
 _TRIALS: Final = 4  # orders of elimination that are tried for odd sets
 _MAX_CUTS: Final = 150  # in a round
-_MAX_SHARED: Final = 8  # new cuts that one fractional task may stand in
-_MIN_DEPTH: Final = 1e-3
+_MAX_SHARED: Final = 40  # new cuts that one fractional task may stand in
+_CANDIDATES: Final = 10  # for a branch
+_TRIAL_PIVOTS: Final = 60
 _PATIENCE: Final = 2  # rounds that a cut may lie idle
 
 
@@ -29,13 +36,19 @@ class Master(Engine):
 
     Paths are not in it: sets of tasks of one satellite that exclude each other say as much,
     and those that matter are few.
+
+    Parameters
+    ----------
+    rows
+        For each opportunity of the problem its row in the problem that is to be proven.
     """
 
-    def __init__(self, problem: Problem, budget: Budget, seed: int) -> None:
+    def __init__(self, problem: Problem, rows: Ints, budget: Budget, seed: int) -> None:
+        self._rows = rows
         self._problem = problem
         table = problem.opportunities
         self._scale = float(problem.target_reward.max(initial=1e-300))
-        worth = np.zeros(len(table))
+        self._worth = worth = np.zeros(len(table))
         is_collect = table.kind == COLLECT
         worth[is_collect] = problem.target_reward[table.place[is_collect]] / self._scale
         self._orders = [
@@ -43,6 +56,7 @@ class Master(Engine):
             for s in problem.satellites
         ]
         self._draws = draws_of(seed)
+        self._cuts: dict[tuple[int, ...], Cut] = {}
         members, offsets = problem.target_opportunities
         self._sets = Sets(offsets, members)
         self._num_targets = len(offsets) - 1
@@ -50,26 +64,22 @@ class Master(Engine):
             cover, rows = antichain_cover(order)
             self._keep_sets(cover, satellite.rows[rows])
         program = Program()
-        program.add_columns(worth, upper=(worth > 0.0).astype(np.float64))
+        self._useful = worth > 0.0
+        program.add_columns(worth, upper=self._useful.astype(np.float64))
         program.add_rows(Rows.of(self._sets.offsets, self._sets.members, upper=1.0))
         # For each row of the program the sets that it adds up, and how long it has lain idle.
-        self._row_sets = [(i,) for i in range(len(self._sets.offsets) - 1)]
+        self._row_sets: list[tuple[int, ...]] = [(i,) for i in range(len(self._sets.offsets) - 1)]
         self._idle = [0] * len(self._row_sets)
         super().__init__(program, budget, seed, is_chained=False)
 
     @property
     def value(self) -> float:
         """Return what the last relaxation is worth."""
-        return self._bound * self._scale
+        return float(self._highs.getInfo().objective_function_value) * self._scale
 
-    def multipliers(self, rows: Ints) -> Multipliers:
-        """Return the prices that the last relaxation has put on targets and cuts.
-
-        Parameters
-        ----------
-        rows
-            For each opportunity of this problem its row in the problem that is to be proven.
-        """
+    def multipliers(self) -> Multipliers:
+        """Return the prices that the last relaxation has put on targets and cuts."""
+        rows = self._rows
         price = np.abs(np.array(self._highs.getSolution().row_dual)) * self._scale
         prices = price[: self._num_targets].copy()
         place = self._problem.opportunities.place
@@ -81,15 +91,54 @@ class Master(Engine):
             groups = [self._members(i) for i in picked]
             is_on_path = len(groups) == 1 and len(np.unique(place[groups[0]])) == len(groups[0])
             if not is_on_path:
-                cuts.append(Cut(sets=tuple(rows[group] for group in groups)))
+                if picked not in self._cuts:
+                    self._cuts[picked] = Cut(sets=tuple(rows[group] for group in groups))
+                cuts.append(self._cuts[picked])
                 cut_prices.append(float(price[row]))
         return Multipliers(prices=prices, cuts=tuple(cuts), cut_prices=tuple(cut_prices))
 
-    def close(self, is_open: Bools) -> None:
-        """Allow only these tasks from now on."""
-        closed = np.flatnonzero(~is_open).astype(np.int32)
-        zeros = np.zeros(len(closed))
-        self._highs.changeColsBounds(len(closed), closed, zeros, zeros)
+    def allow(self, is_open: Bools) -> None:
+        """Allow these tasks, and no others, from now on."""
+        n = len(self._useful)
+        upper = self._useful & is_open
+        columns = np.arange(n, dtype=np.int32)
+        self._highs.changeColsBounds(n, columns, np.zeros(n), upper.astype(np.float64))
+
+    def excluded_by(self, row: int) -> Bools:
+        """Return which tasks cannot stand in a plan with this one; not itself."""
+        table, local = self._problem.opportunities, self._problem.local_row
+        excluded: Bools = (table.place == table.place[row]) & (table.kind == COLLECT)
+        satellite = int(table.satellite[row])
+        own = self._problem.satellites[satellite].rows
+        order = self._orders[satellite]
+        excluded[own] |= [
+            not are_comparable(order, int(local[row]), int(other)) for other in local[own]
+        ]
+        excluded[row] = False
+        return excluded
+
+    def decisive(self, taken: Floats) -> int:
+        """Return the task of which taking and leaving it both cost the relaxation most."""
+        highs, value = self._highs, self.value / self._scale
+        basis = highs.getBasis()
+        _, patience = highs.getOptionValue("simplex_iteration_limit")
+        highs.setOptionValue("simplex_iteration_limit", _TRIAL_PIVOTS)
+        best, best_at = -1.0, int(np.argmax(np.minimum(taken, 1.0 - taken)))
+        for at in np.argsort(-np.minimum(taken, 1.0 - taken), kind="stable")[:_CANDIDATES]:
+            if min(taken[at], 1.0 - taken[at]) < 1e-3:
+                break
+            losses: list[float] = []
+            for fixed in (0.0, 1.0):
+                highs.changeColBounds(int(at), fixed, fixed)
+                highs.run()
+                losses.append(value - float(highs.getInfo().objective_function_value))
+                highs.changeColBounds(int(at), 0.0, 1.0)
+                highs.setBasis(basis)
+            score = max(losses[0], 1e-6) * max(losses[1], 1e-6)
+            if score > best:
+                best, best_at = score, int(at)
+        highs.setOptionValue("simplex_iteration_limit", patience)
+        return best_at
 
     def cut(self, taken: Floats, *, with_odd_sets: bool) -> int:
         """Add what the fractional plan breaks, drop what has long been idle; return what came."""
@@ -114,13 +163,27 @@ class Master(Engine):
         self._idle += [0] * (len(self._row_sets) - num_before)
         return len(self._row_sets) - num_before
 
-    def rows_in_use(self) -> list[Cut]:
-        """Return the cuts that the relaxation holds."""
-        return [
-            Cut(sets=tuple(self._members(i) for i in picked))
-            for picked in self._row_sets
-            if len(picked) > 1
-        ]
+    def program(self, is_open: Bools) -> Program:
+        """Return all that the relaxation holds, for some of the tasks: exact if transitive."""
+        number = np.cumsum(is_open) - 1
+        program = Program()
+        program.add_columns(self._worth[is_open], upper=self._useful[is_open].astype(np.float64))
+        offsets, columns, values, limits = [0], [], [], []
+        for picked in self._row_sets:
+            cut = Cut(sets=tuple(self._members(i) for i in picked))
+            members, weights = cut.weights()
+            kept = is_open[members]
+            offsets.append(offsets[-1] + int(kept.sum()))
+            columns.append(number[members[kept]])
+            values.append(weights[kept].astype(np.float64))
+            limits.append(float(cut.limit))
+        program.add_rows(
+            Rows.of(
+                np.array(offsets, dtype=np.int64), np.concatenate(columns),
+                np.concatenate(values), upper=np.array(limits),
+            )
+        )  # fmt: skip
+        return program
 
     def _members(self, i: int) -> Ints:
         return self._sets.members[self._sets.offsets[i] : self._sets.offsets[i + 1]]
@@ -134,25 +197,14 @@ class Master(Engine):
 
     def _odd_sets(self, taken: Floats) -> list[tuple[int, ...]]:
         """Return the deepest cuts, not too many of them about the same tasks."""
-        deepest: dict[tuple[int, ...], float] = {}
+        depth_of: dict[tuple[int, ...], float] = {}
         for _ in range(_TRIALS):
             chosen = odd_sets(self._sets, taken, self._draws)
-            depth = depths(self._sets, chosen, taken)
-            for i in np.flatnonzero(depth > _MIN_DEPTH):
-                group = chosen.members[chosen.offsets[i] : chosen.offsets[i + 1]]
-                deepest[tuple(int(one) for one in np.sort(group))] = float(depth[i])
-        is_fractional = (taken > 1e-5) & (taken < 1.0 - 1e-5)
-        shared = np.zeros(len(taken), dtype=np.int32)
-        picked = []
-        for group in sorted(deepest, key=lambda g: (-deepest[g], g)):
-            members, _ = Cut(sets=tuple(self._members(i) for i in group)).weights()
-            about = members[is_fractional[members]]
-            if np.all(shared[about] < _MAX_SHARED):
-                shared[about] += 1
-                picked.append(group)
-                if len(picked) == _MAX_CUTS:
-                    break
-        return picked
+            cuts, depth = deepest(self._sets, chosen, taken, _MAX_CUTS, _MAX_SHARED)
+            for cut, beyond in zip(cuts, depth, strict=True):
+                group = chosen.members[chosen.offsets[cut] : chosen.offsets[cut + 1]]
+                depth_of[tuple(np.sort(group).tolist())] = float(beyond)
+        return sorted(depth_of, key=lambda group: (-depth_of[group], group))[:_MAX_CUTS]
 
     def _drop_idle(self) -> None:
         solution = self._highs.getSolution()

@@ -18,6 +18,7 @@ from planner_core.problem import Floats, Ints, Longs
 _INTEGER: Final = 1e-5  # nearer than this to 0 or 1 is no fraction
 _MIN_VIOLATION: Final = 0.02  # of the sum, before halving
 _NOISE: Final = 0.3
+_MIN_DEPTH: Final = 1e-3
 
 
 class Sets(NamedTuple):
@@ -107,10 +108,13 @@ def odd_sets(sets: Sets, taken: Floats, draws: Uint64s) -> Sets:
 
 
 @kernel
-def depths(sets: Sets, chosen: Sets, taken: Floats) -> Floats:
-    """Return how far beyond each cut a fractional plan lies; 0 or less where it keeps it.
+def deepest(
+    sets: Sets, chosen: Sets, taken: Floats, max_cuts: int, max_shared: int
+) -> tuple[Ints, Floats]:
+    """Return the cuts that a fractional plan breaks most, and how far beyond them it lies.
 
-    The distance in the space of the tasks that it takes.
+    The distance in the space of the tasks that it takes. No more than ``max_shared`` of the
+    cuts answered are about the same task.
     """
     count = np.zeros(len(taken), dtype=np.int32)
     depth = np.zeros(len(chosen.offsets) - 1)
@@ -127,4 +131,24 @@ def depths(sets: Sets, chosen: Sets, taken: Floats) -> Floats:
                 total += weight * taken[member]
                 norm += weight * weight if taken[member] > _INTEGER else 0.0
         depth[cut] = total / np.sqrt(norm)
-    return depth
+    shared = np.zeros(len(taken), dtype=np.int32)
+    found = np.empty(max_cuts, dtype=np.int32)
+    m = 0
+    for cut in np.argsort(-depth, kind="mergesort"):
+        if m == max_cuts or depth[cut] < _MIN_DEPTH:
+            break
+        picked = chosen.members[chosen.offsets[cut] : chosen.offsets[cut + 1]]
+        is_free = True
+        for i in picked:
+            for member in sets.members[sets.offsets[i] : sets.offsets[i + 1]]:
+                is_free &= shared[member] < 2 * max_shared
+        if not is_free:
+            continue
+        for i in picked:
+            for member in sets.members[sets.offsets[i] : sets.offsets[i + 1]]:
+                if _INTEGER < taken[member] < 1.0 - _INTEGER:
+                    # Whoever counts stands in two of the sets.
+                    shared[member] += 1
+        found[m] = cut
+        m += 1
+    return found[:m], depth[found[:m]]

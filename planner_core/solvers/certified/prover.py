@@ -7,24 +7,25 @@ from typing import Final
 import highspy
 import numpy as np
 
-from planner_core.certificate import Cut
 from planner_core.plan import Plan
 from planner_core.problem import Problem
 from planner_core.solvers.base import Budget
 from planner_core.solvers.milp.highs import Engine, Watch
-from planner_core.solvers.milp.model import plan_program
-from planner_core.solvers.milp.program import Rows
+from planner_core.solvers.milp.program import Program
 
 _MAX_LOG: Final = 6000  # characters; the end, which holds the result
 
 
 class Prover(Engine):
-    """The program of the plans worth at least ``amount``; one worth ``enough`` ends the search."""
+    """The program of the plans worth at least ``amount``; one worth ``enough`` ends the search.
+
+    ``program`` counts in the greatest reward of ``problem``, and its columns begin with x.
+    """
 
     def __init__(
         self,
         problem: Problem,
-        cuts: list[Cut],
+        program: Program,
         amount: float,
         enough: float,
         budget: Budget,
@@ -32,16 +33,6 @@ class Prover(Engine):
     ) -> None:
         self._problem = problem
         self._scale = float(problem.target_reward.max(initial=1e-300))
-        model = plan_program(problem, "antichain", 0.0)
-        program = model.program
-        program.worth = [worth / self._scale for worth in program.worth]
-        if program.num_columns == len(problem.opportunities):
-            # A slow satellite may pass by a target again; then these do not hold for passes.
-            for cut in cuts:
-                members, weights = cut.weights()
-                offsets = np.array([0, len(members)], dtype=np.int64)
-                weight = weights.astype(np.float64)
-                program.add_rows(Rows.of(offsets, members, weight, upper=float(cut.limit)))
         super().__init__(program, budget, seed, is_chained=False)
         self._messages: list[str] = []
         highs = self._highs

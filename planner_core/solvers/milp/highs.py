@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
@@ -17,6 +18,10 @@ from planner_core.solvers.milp.program import Program, Rows
 # be off by as much, so there it must be far below one task.
 _TOLERANCE: Final = 1e-6
 _CHAIN_TOLERANCE: Final = 1e-9
+
+_POLL_S: Final = 0.02
+_PATIENCE_S: Final = 0.25
+"""How long HiGHS may take to stop by itself; between two of its interrupts lie seconds at times."""
 
 Watch = Callable[[float, float], None]
 """Called now and then with the best objective so far and the bound."""
@@ -42,12 +47,19 @@ class Outcome:
 
 
 class Engine:
-    """One program in HiGHS: relaxations first, then the integer search."""
+    """One program in HiGHS: relaxations first, then the integer search.
+
+    HiGHS runs in a thread of its own. A spent budget asks it to stop, and it does when it
+    comes to ask; who waits for an answer need not wait for that. What is then left behind is
+    never touched again, and the thread ends with its next question.
+    """
 
     def __init__(self, program: Program, budget: Budget, seed: int, *, is_chained: bool) -> None:
         tolerance = _CHAIN_TOLERANCE if is_chained else _TOLERANCE
         self._budget = budget
         self._bound = float("inf")
+        self._incumbent: Floats | None = None
+        self._is_abandoned = False
         self._highs = highs = highspy.Highs()  # type: ignore[no-untyped-call]
         options: dict[str, bool | int | float | str] = {
             "output_flag": False,
@@ -78,10 +90,14 @@ class Engine:
 
     def relaxed(self) -> Floats | None:
         """Return the best fractional point, or None if the budget did not suffice."""
-        self._run()
+        if not self._run():
+            return None
         if self._highs.getModelStatus() != highspy.HighsModelStatus.kOptimal:
             return None
-        self._bound = float(self._highs.getInfo().objective_function_value)
+        info = self._highs.getInfo()
+        # The duals prove the value but for what HiGHS tolerates of them, on columns up to one.
+        doubt = float(info.sum_dual_infeasibilities) + _TOLERANCE
+        self._bound = min(self._bound, float(info.objective_function_value) + doubt)
         return np.array(self._highs.getSolution().col_value)
 
     @property
@@ -103,6 +119,9 @@ class Engine:
         heuristic_effort
             Share of the work spent on looking for points rather than on the proof.
         """
+        if self._is_abandoned:
+            # HiGHS is still in its last relaxation, and must not be touched.
+            return Outcome(columns=None, bound=self._bound, is_infeasible=False)
         highs = self._highs
         integer = np.flatnonzero(self._is_integer).astype(np.int32)
         kinds = np.full(len(integer), int(highspy.HighsVarType.kInteger), dtype=np.uint8)
@@ -114,11 +133,18 @@ class Engine:
 
         def on_interrupt(event: highspy.highs.HighsCallbackEvent) -> None:
             out = event.data_out
-            watch(float(out.mip_primal_bound), min(self._bound, float(out.mip_dual_bound)))
+            if not self._is_abandoned:
+                self._bound = min(self._bound, float(out.mip_dual_bound))
+                watch(float(out.mip_primal_bound), self._bound)
             self._interrupt_if_spent(event)
 
+        def on_improved(event: highspy.highs.HighsCallbackEvent) -> None:
+            self._incumbent = np.array(event.data_out.mip_solution)
+
         highs.cbMipInterrupt += on_interrupt
-        self._run()
+        highs.cbMipImprovingSolution += on_improved
+        if not self._run():
+            return Outcome(columns=self._incumbent, bound=self._bound, is_infeasible=False)
         info, status = highs.getInfo(), highs.getModelStatus()
         has_point = info.primal_solution_status == highspy.SolutionStatus.kSolutionStatusFeasible
         return Outcome(
@@ -127,13 +153,21 @@ class Engine:
             is_infeasible=status == highspy.HighsModelStatus.kInfeasible,
         )
 
-    def _run(self) -> None:
+    def _run(self) -> bool:
+        """Run HiGHS; return whether it ended in time, and may be asked what it found."""
         remaining_s = self._budget.remaining_s()
         if remaining_s is not None:
             # HiGHS counts from its first run on.
             self._highs.setOptionValue("time_limit", self._highs.getRunTime() + remaining_s)
-        self._highs.run()
+        # Not a daemon: the interpreter must not end under a thread that will call into it.
+        thread = threading.Thread(target=self._highs.run, name="highs")
+        thread.start()
+        while thread.is_alive() and not self._budget.is_spent():
+            thread.join(_POLL_S)
+        thread.join(_PATIENCE_S)
+        self._is_abandoned = thread.is_alive()
+        return not self._is_abandoned
 
     def _interrupt_if_spent(self, event: highspy.highs.HighsCallbackEvent) -> None:
-        if self._budget.is_spent():
+        if self._is_abandoned or self._budget.is_spent():
             event.interrupt()

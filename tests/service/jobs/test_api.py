@@ -173,7 +173,7 @@ def test_jobs_are_listed_newest_first_by_pages_and_filters(
 
 
 def test_what_does_not_exist_is_not_found(client: httpx.Client) -> None:
-    for path in ("", "/timeline", "/timeline.csv", "/targets"):
+    for path in ("", "/timeline", "/timeline.csv", "/targets", "/proof"):
         assert_problem(client.get(f"/v1/jobs/none{path}"), 404, "not_found")
     assert_problem(client.post("/v1/jobs/none/cancel"), 404, "not_found")
 
@@ -259,7 +259,7 @@ def test_the_timeline_is_not_ready_before_the_job_has_ended(
     client: httpx.Client, jobs: Jobs
 ) -> None:
     job_id = posted(client, jobs)
-    for path in ("timeline", "timeline.json", "targets"):
+    for path in ("timeline", "timeline.json", "targets", "proof"):
         early = client.get(f"/v1/jobs/{job_id}/{path}")
         assert_problem(early, 409, "not_ready")
         assert early.headers["retry-after"] == "1"
@@ -269,6 +269,18 @@ def test_the_timeline_is_not_ready_before_the_job_has_ended(
     assert "retry-after" not in late.headers
     failed = client.get(f"/v1/jobs/{job_id}").json()
     assert failed["error"] == {"code": "time_limit", "detail": "No plan within the limit of 1 s."}
+
+
+def test_the_proof_of_a_bound_is_kept_with_the_answer(client: httpx.Client, jobs: Jobs) -> None:
+    for proof, shown in (('{"value": 3.0}', {"value": 3.0}), (None, None)):
+        job_id = posted(client, jobs)
+        answered = Outcome(state="succeeded", timeline="{}", targets="[]", proof=proof)
+        finish(jobs, job_id, answered)
+        path = f"/v1/jobs/{job_id}/proof"
+        answer = client.get(path)
+        assert answer.json() == shown
+        known = {"If-None-Match": answer.headers["etag"]}
+        assert client.get(path, headers=known).status_code == 304
 
 
 def test_the_timeline_comes_as_json_and_in_no_other_form_yet(

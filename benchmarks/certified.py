@@ -1,0 +1,160 @@
+"""How near certified plans are to the best, and in what time (``python -m benchmarks.certified``).
+
+Prints, for each size of the paper's mission without resources and its draws, how many plans are
+proven optimal, median and greatest CPU seconds and the greatest gap; and the CPU seconds of
+HiGHS on the paper's pairwise program and of CP-SAT (extra ``peers``, left out where it is not
+installed) over those of ours. Each solve is one process on one core, warmed up on a small
+mission and given ``LIMIT_S`` seconds; a peer that ran out of them counts with what it used.
+
+``python -m benchmarks.certified 1000 2000 --draws 3 --alone`` picks sizes and draws, and leaves
+out the peers.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import json
+import statistics
+import subprocess
+import sys
+import time
+from typing import Any
+
+from benchmarks.missions import paper_scenario, problem_of
+from planner_core.problem import COLLECT, Problem
+from planner_core.solvers.base import Budget
+
+LIMIT_S = 60.0
+SIZES = (200, 500, 1000, 2000)
+WARM_UP = 100  # targets
+
+
+def certified(problem: Problem) -> tuple[float, float]:
+    """Return reward and bound of our solver."""
+    from planner_core.solvers.certified import Certified
+    from planner_core.timeline import replay
+
+    solution = Certified().solve(problem, Budget(LIMIT_S), 0)
+    assert solution.bound is not None
+    return replay(problem, solution.plan).reward, solution.bound
+
+
+def pairwise(problem: Problem) -> tuple[float, float]:
+    """Return reward and bound of HiGHS on the paper's program, as it comes."""
+    from planner_core.solvers.milp.highs import Engine
+    from planner_core.solvers.milp.model import plan_program
+
+    program = plan_program(problem, "pairwise", 0.0).program
+    engine = Engine(program, Budget(LIMIT_S), 0, is_chained=False)
+    outcome = engine.search(None, 0.0, 0.05, lambda _reward, _bound: None)
+    reward = 0.0
+    if outcome.columns is not None:
+        table = problem.opportunities
+        taken = outcome.columns[: len(table)] > 0.5
+        reward = float(problem.target_reward[table.place[taken]].sum())
+    return reward, outcome.bound
+
+
+def cp_sat(problem: Problem) -> tuple[float, float]:
+    """Return reward and bound of CP-SAT, with a row for each set of excluding tasks."""
+    from ortools.sat.python import cp_model
+
+    from planner_core.comparable import order_of
+    from planner_core.solvers.milp.antichains import antichain_cover
+
+    table = problem.opportunities
+    model = cp_model.CpModel()
+    taken = [model.new_bool_var(f"x{i}") for i in range(len(table))]
+    for target in range(len(problem.target_ids)):
+        model.add_at_most_one(taken[row] for row in problem.collects_of(target))
+    for satellite in problem.satellites:
+        offsets, members = antichain_cover(order_of(satellite.transitions))
+        for i in range(len(offsets) - 1):
+            rows = satellite.rows[members[offsets[i] : offsets[i + 1]]]
+            model.add_at_most_one(taken[row] for row in rows)
+    is_collect = table.kind == COLLECT
+    model.maximize(
+        sum(
+            float(problem.target_reward[table.place[i]]) * taken[i]
+            for i in range(len(table))
+            if is_collect[i]
+        )
+    )
+    solver = cp_model.CpSolver()
+    solver.parameters.num_workers = 1
+    solver.parameters.max_time_in_seconds = LIMIT_S
+    solver.solve(model)
+    return solver.objective_value, solver.best_objective_bound
+
+
+METHODS = {"certified": certified, "pairwise": pairwise, "cp_sat": cp_sat}
+
+
+def one(method: str, num_targets: int, draw: int) -> dict[str, Any]:
+    """Return what one solve came to, after a warm-up."""
+    solve = METHODS[method]
+    solve(problem_of(paper_scenario(WARM_UP, 99, use_resources=False)))
+    problem = problem_of(paper_scenario(num_targets, draw, use_resources=False))
+    began = time.process_time()
+    reward, bound = solve(problem)
+    return {"reward": reward, "bound": bound, "cpu_s": time.process_time() - began}
+
+
+def apart(method: str, num_targets: int, draw: int) -> dict[str, Any]:
+    """Return the same from a process of its own: HiGHS and CP-SAT cannot share one."""
+    command = [sys.executable, "-m", "benchmarks.certified", "--one", method]
+    command += [str(num_targets), "--draw", str(draw)]
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    answer: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    return answer
+
+
+def print_size(num_targets: int, num_draws: int, peers: list[str]) -> None:
+    """Print one line for each draw and one for the size."""
+    times: dict[str, list[float]] = {method: [] for method in ["certified", *peers]}
+    gaps, num_proven = [], 0
+    for draw in range(num_draws):
+        ended = []
+        for method in ("certified", *peers):
+            answer = apart(method, num_targets, draw)
+            times[method].append(answer["cpu_s"])
+            is_proven = answer["bound"] - answer["reward"] <= 1e-6 * answer["bound"]
+            ended.append(f"{method} {answer['reward']:.0f}/{answer['bound']:.1f} "
+                         f"{answer['cpu_s']:.2f}s")  # fmt: skip
+            if method == "certified":
+                num_proven += is_proven
+                gaps.append(1.0 - answer["reward"] / answer["bound"])
+        print(f"{'':8}draw {draw}: {', '.join(ended)}", flush=True)
+    own = times["certified"]
+    ratios = [
+        f"{peer} {sum(times[peer]) / sum(own):.1f}x (median {statistics.median(ratio):.1f}x)"
+        for peer in peers
+        for ratio in [[a / b for a, b in zip(times[peer], own, strict=True)]]
+    ]
+    print(f"{num_targets:7} {num_proven:3} of {num_draws:2} {statistics.median(own):8.2f} "
+          f"{max(own):8.2f} {100 * max(gaps):7.3f}%  {', '.join(ratios)}", flush=True)  # fmt: skip
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("sizes", nargs="*", type=int, default=SIZES)
+    parser.add_argument("--draws", type=int, default=10)
+    parser.add_argument("--alone", action="store_true")
+    parser.add_argument("--one", choices=METHODS)
+    parser.add_argument("--draw", type=int, default=0)
+    options = parser.parse_args()
+    if options.one:
+        print(json.dumps(one(options.one, options.sizes[0], options.draw)))
+        return
+    has_cp_sat = importlib.util.find_spec("ortools") is not None
+    peers = [] if options.alone else ["pairwise", *(["cp_sat"] if has_cp_sat else [])]
+    print("Without resources.")
+    print(f"{'targets':>7} {'proven':>9} {'median_s':>8} {'max_s':>8} {'gap':>8}  time over ours")
+    for size in options.sizes:
+        print_size(size, options.draws, peers)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,284 @@
+"""SIMULATE and ROLLOUT of Alg. 2, compiled."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from planner_core.draws import Uint64s, next_draw
+from planner_core.jit import borrowing
+from planner_core.model import (
+    WAIT,
+    Guidance,
+    Track,
+    is_repeated,
+    may_wait,
+    next_action,
+    take,
+    task_reward,
+)
+from planner_core.problem import Bytes, Floats, Ints
+from planner_core.solvers.mcts.tree import UNSEEN, Tree, choose, has_room, new_edge, new_node
+from planner_core.solvers.walk import CONTACT_ABOVE, naive_select_action
+
+
+class Path(NamedTuple):
+    """Room for one simulation; shape ``(depth,)``, ``options`` of ``(breadth + 1,)``."""
+
+    edge: Ints
+    action: Ints
+    image: Ints
+    reward: Floats
+    discount: Floats
+    options: Ints
+
+
+class Rules(NamedTuple):
+    """The parameters of the search, as kernels take them."""
+
+    depth: int
+    breadth: int
+    exploration: float
+    is_hard: bool
+    unimaged_only: bool
+    is_per_decision: bool
+    is_literal: bool
+    is_greedy: bool
+    is_max_backup: bool
+
+
+@borrowing
+def expand(tree: Tree, track: Track, rules: Rules, collected: Bytes, node: int) -> None:
+    """Lines 5-8: enter A(s) with N = Q = 0. Its first task stands first, ``WAIT`` last."""
+    m = len(track.start_s)
+    tree.first_edge[node] = tree.used[1]
+    row = tree.cursor[node]
+    while tree.num_edges[node] < rules.breadth:
+        row = next_action(
+            track, tree.last[node], row + 1, tree.battery[node], tree.recorder[node],
+            rules.is_hard, collected, rules.unimaged_only,
+        )  # fmt: skip
+        if row == m:
+            break
+        if not is_repeated(track, tree.action, tree.first_edge[node], tree.used[1], row):
+            new_edge(tree, node, row)
+    if tree.num_edges[node] == 0 or not track.use_resources:
+        return
+    first = tree.action[tree.first_edge[node]]
+    if may_wait(
+        track, tree.last[node], first, tree.battery[node], tree.recorder[node], rules.is_hard
+    ):
+        new_edge(tree, node, WAIT)
+
+
+@borrowing
+def _rollout_action(
+    track: Track,
+    rules: Rules,
+    collected: Bytes,
+    random: Uint64s,
+    actions: Ints,
+    cursor: int,
+    last: int,
+    battery: float,
+    recorder: float,
+) -> tuple[int, int]:
+    """Return an action of the rollout policy and the first task of A(s), or (m, m) at the end."""
+    m = len(track.start_s)
+    if rules.is_greedy:
+        row = naive_select_action(
+            track, collected, rules.is_hard, True, CONTACT_ABOVE,
+            cursor, last, battery, recorder,
+        )  # fmt: skip
+        return row, row
+    count = 0
+    row = cursor
+    while count < rules.breadth:
+        row = next_action(
+            track, last, row + 1, battery, recorder, rules.is_hard, collected, rules.unimaged_only
+        )
+        if row == m:
+            break
+        if not is_repeated(track, actions, 0, count, row):
+            actions[count] = row
+            count += 1
+    if count == 0:
+        return m, m
+    if track.use_resources and may_wait(track, last, actions[0], battery, recorder, rules.is_hard):
+        actions[count] = WAIT
+        count += 1
+    return actions[int(next_draw(random) * count)], actions[0]
+
+
+@borrowing
+def _simulate(
+    tree: Tree,
+    track: Track,
+    rules: Rules,
+    guidance: Guidance,
+    target_reward: Floats,
+    collected: Bytes,
+    random: Uint64s,
+    path: Path,
+    root: int,
+    best: Floats,
+    best_actions: Ints,
+) -> None:
+    """SIMULATE and ROLLOUT from ``root``; keeps the sequence of greatest return in ``best``."""
+    m = len(track.start_s)
+    depth = rules.depth
+    node = root
+    cursor, last = tree.cursor[root], tree.last[root]
+    battery, recorder = tree.battery[root], tree.recorder[root]
+    in_tree = 0
+    d = 0
+    is_rollout = False
+    while d < depth:
+        if not is_rollout and tree.first_edge[node] == UNSEEN:
+            if node == root or has_room(tree, rules.breadth):
+                expand(tree, track, rules, collected, node)
+            # The listing rolls out from a new state; the root itself is searched at once.
+            is_rollout = node != root
+        if is_rollout:
+            action, first = _rollout_action(
+                track, rules, collected, random, path.options, cursor, last, battery, recorder
+            )
+            if action == m:
+                break
+        else:
+            if tree.num_edges[node] == 0:
+                break
+            edge = choose(tree, node, rules.exploration)
+            action, first = tree.action[edge], tree.action[tree.first_edge[node]]
+            path.edge[d] = edge
+            in_tree = d + 1
+        now_s = track.start_s[cursor] if cursor >= 0 else 0.0
+        path.image[d] = -1
+        row = first if action == WAIT else action
+        sojourn_s = track.start_s[row] - now_s
+        discount = guidance.gamma**sojourn_s
+        if action == WAIT:
+            path.reward[d] = guidance.sunpoint_reward_per_s * sojourn_s
+        else:
+            if track.use_resources:
+                battery, recorder, _ = take(track, last, row, battery, recorder)
+            path.reward[d] = task_reward(
+                track, guidance, target_reward, collected, discount, row, battery, recorder
+            )
+            last = row
+            place = track.place[row]
+            if not track.is_contact[row] and not collected[place]:
+                collected[place] = 1
+                path.image[d] = place
+        path.action[d] = action
+        path.discount[d] = guidance.gamma if rules.is_per_decision else discount
+        cursor = row
+        if not is_rollout:
+            if tree.child[path.edge[d]] != UNSEEN:
+                node = tree.child[path.edge[d]]
+            elif node == root or has_room(tree, rules.breadth):
+                tree.child[path.edge[d]] = new_node(tree, cursor, last, battery, recorder)
+                node = tree.child[path.edge[d]]
+            else:
+                is_rollout = True
+        d += 1
+    returned = 0.0
+    for i in range(d - 1, -1, -1):
+        if path.image[i] >= 0:
+            collected[path.image[i]] = 0
+        q = path.discount[i] * returned
+        if i >= in_tree or not rules.is_literal:
+            q += path.reward[i]
+        if i < in_tree:
+            edge = path.edge[i]
+            tree.visits[edge] += 1
+            if rules.is_max_backup:
+                if tree.visits[edge] == 1 or q > tree.value[edge]:
+                    tree.value[edge] = q
+            else:
+                tree.value[edge] += (q - tree.value[edge]) / tree.visits[edge]
+        returned = q
+    if d > 0 and returned > best[0]:
+        best[0] = returned
+        for i in range(depth):
+            best_actions[i] = path.action[i] if i < d else m
+
+
+@borrowing
+def search(
+    tree: Tree,
+    track: Track,
+    rules: Rules,
+    guidance: Guidance,
+    target_reward: Floats,
+    collected: Bytes,
+    random: Uint64s,
+    path: Path,
+    num_simulations: int,
+    stop: Bytes,
+    best: Floats,
+    best_actions: Ints,
+) -> int:
+    """Run the simulations of one step from node 0 and return the edge of greatest value."""
+    for _ in range(num_simulations):
+        if stop[0]:
+            break
+        _simulate(
+            tree,
+            track,
+            rules,
+            guidance,
+            target_reward,
+            collected,
+            random,
+            path,
+            0,
+            best,
+            best_actions,
+        )
+    chosen = UNSEEN
+    if tree.first_edge[0] == UNSEEN:
+        return chosen
+    for edge in range(tree.first_edge[0], tree.first_edge[0] + tree.num_edges[0]):
+        if tree.visits[edge] == 0:
+            continue
+        if chosen == UNSEEN or tree.value[edge] > tree.value[chosen]:
+            chosen = edge
+    return chosen
+
+
+@borrowing
+def sunpoint_instead(
+    tree: Tree,
+    track: Track,
+    rules: Rules,
+    guidance: Guidance,
+    target_reward: Floats,
+    collected: Bytes,
+    edge: int,
+) -> int:
+    """Return the edge of sun-pointing where the action of ``edge`` earns nothing by itself.
+
+    Without resources A(s) has no sun-pointing; it is added here, and lets the first task pass.
+    """
+    row = tree.action[edge]
+    if row == WAIT:
+        return edge
+    last, battery, recorder = tree.last[0], tree.battery[0], tree.recorder[0]
+    battery_after, recorder_after = battery, recorder
+    if track.use_resources:
+        battery_after, recorder_after, _ = take(track, last, row, battery, recorder)
+    reward = task_reward(
+        track, guidance, target_reward, collected, 1.0, row, battery_after, recorder_after
+    )
+    end = tree.first_edge[0] + tree.num_edges[0]
+    first = tree.action[tree.first_edge[0]]
+    if reward > 0.0 or not may_wait(track, last, first, battery, recorder, rules.is_hard):
+        return edge
+    wait = end - 1
+    if tree.action[wait] != WAIT:
+        # It need not stand beside the others, since only what hangs below it is kept.
+        wait = tree.used[1]
+        new_edge(tree, 0, WAIT)
+    if tree.child[wait] == UNSEEN:
+        tree.child[wait] = new_node(tree, first, last, battery, recorder)
+    return int(wait)

@@ -1,0 +1,29 @@
+"""Proven bounds of scenarios: every job of a scenario starts from the best one so far."""
+
+from __future__ import annotations
+
+import contextlib
+
+import sqlalchemy as sa
+from sqlalchemy.exc import IntegrityError
+from sqlalchemy.orm import Session
+
+from service.db.clock import utc_now
+from service.db.rows import BoundRow
+from service.opportunity_store import VERSION
+
+
+def load(session: Session, sha256: str) -> str | None:
+    """Return the best bound of a scenario with its proof (JSON text), or None."""
+    row = session.get(BoundRow, sha256)
+    return None if row is None or row.version != VERSION else row.proof
+
+
+def save(session: Session, sha256: str, value: float, proof: str) -> None:
+    """Store a bound of a scenario, where none as low is stored."""
+    own = BoundRow.scenario_sha256 == sha256
+    is_beaten = sa.or_(BoundRow.version != VERSION, BoundRow.value > value)
+    row = {"version": VERSION, "value": value, "proof": proof, "created_at": utc_now()}
+    session.execute(sa.update(BoundRow).where(own, is_beaten).values(**row))
+    with contextlib.suppress(IntegrityError), session.begin_nested():
+        session.execute(sa.insert(BoundRow).values(scenario_sha256=sha256, **row))

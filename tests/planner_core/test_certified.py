@@ -1,0 +1,203 @@
+"""The certified solver: the optimum by brute force, true bounds, and proofs that check out."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from planner_core.certificate import Certificate, Cut, Multipliers, Refutation, is_refuted
+from planner_core.domain import Agility
+from planner_core.problem import COLLECT, Problem
+from planner_core.solvers import Certified, Rule
+from planner_core.solvers.base import Budget, Progress, Solution, Termination
+from planner_core.solvers.certified.free import TOLERANCE
+from planner_core.timeline import replay
+from tests.planner_core.brute_force import best_reward
+from tests.planner_core.problems import Task, make_problem, random_problem
+
+SEEDS = st.integers(0, 10**6)
+SLOW = Agility(slew_rate_deg_s=0.3)
+SETTLING = Agility(settle_s=12.0)
+AGILITY = st.sampled_from([Agility(), SLOW, SETTLING])
+SPREADS = st.sampled_from(["one", "whole", "tenfold", "odd"])
+
+
+def with_rewards(problem: Problem, seed: int, spread: str) -> Problem:
+    """Return the problem with rewards that are alike, whole, orders of magnitude apart, or odd."""
+    rng = np.random.default_rng(seed)
+    n = len(problem.target_ids)
+    rewards = {
+        "one": np.ones(n),
+        "whole": rng.integers(0, 9, n).astype(np.float64),
+        "tenfold": 10.0 ** rng.integers(0, 6, n),
+        "odd": np.exp(rng.uniform(-7.0, 7.0, n)),
+    }[spread]
+    return replace(problem, target_reward=rewards)
+
+
+def wide_problem(seed: int, *, num_collects: int, num_targets: int, span_s: float) -> Problem:
+    """Return a problem too large for brute force."""
+    problem = random_problem(
+        seed, use_resources=False, num_collects=num_collects, num_targets=num_targets, span_s=span_s
+    )
+    return replace(problem, horizon_s=span_s + 60.0)
+
+
+def assert_proven(problem: Problem, solution: Solution, best: float) -> None:
+    """Reward <= brute-force optimum <= bound; equal where optimal is claimed; proofs hold."""
+    timeline = replay(problem, solution.plan)
+    assert timeline.is_valid, timeline.violations
+    assert solution.bound is not None
+    slack = 1e-9 * max(1.0, best)
+    assert timeline.reward <= best + slack
+    assert solution.bound >= best - slack
+    if solution.termination is Termination.OPTIMAL:
+        assert timeline.reward >= best * (1.0 - TOLERANCE) - slack
+    if solution.bound_proof == "lagrangian":
+        assert solution.certificate is not None
+        assert is_refuted(problem, solution.certificate)
+        assert solution.certificate.amount > best
+    else:
+        assert solution.log
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    seed=SEEDS, spread=SPREADS, num_satellites=st.integers(1, 3), agility=AGILITY,
+    max_turn_deg=st.sampled_from([0.0, 25.0]), num_targets=st.integers(2, 6),
+)  # fmt: skip
+def test_it_equals_brute_force(
+    seed: int,
+    spread: str,
+    num_satellites: int,
+    agility: Agility,
+    max_turn_deg: float,
+    num_targets: int,
+) -> None:
+    problem = random_problem(
+        seed, use_resources=False, num_satellites=num_satellites, num_collects=11,
+        num_targets=num_targets, span_s=400.0, agility=agility, max_turn_deg=max_turn_deg,
+    )  # fmt: skip
+    problem = with_rewards(problem, seed, spread)
+    solution = Certified().solve(problem, Budget(), 0)
+    assert solution.termination is Termination.OPTIMAL
+    assert_proven(problem, solution, best_reward(problem))
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    seed=SEEDS, spread=SPREADS, num_satellites=st.integers(1, 2), gap=st.sampled_from([0.0, 0.05])
+)
+def test_crowded_problems_are_proven_and_the_proof_checks_out(
+    seed: int, spread: str, num_satellites: int, gap: float
+) -> None:
+    """Too large for brute force: the proof is checked instead, by code that does not search."""
+    problem = random_problem(
+        seed, use_resources=False, num_satellites=num_satellites, num_collects=120,
+        num_targets=30,
+    )  # fmt: skip
+    problem = with_rewards(problem, seed, spread)
+    solution = Certified(gap=gap).solve(problem, Budget(), seed)
+    reward = replay(problem, solution.plan).reward
+    assert solution.bound is not None
+    assert solution.bound - reward <= max(gap, TOLERANCE) * solution.bound + 1e-9
+    assert solution.termination in {Termination.OPTIMAL, Termination.GAP_REACHED}
+    assert_proven(problem, solution, reward)
+
+
+@settings(max_examples=40, deadline=None)
+@given(seed=SEEDS, agility=AGILITY)
+def test_a_certificate_that_claims_less_than_a_plan_earns_is_never_sound(
+    seed: int, agility: Agility
+) -> None:
+    """Multipliers drawn at random, cuts of true sets: none of them refutes the optimum."""
+    problem = random_problem(
+        seed, use_resources=False, num_collects=10, num_targets=4, span_s=300.0,
+        agility=agility, max_turn_deg=25.0,
+    )  # fmt: skip
+    best = best_reward(problem)
+    rng = np.random.default_rng(seed)
+    proof = Certified().solve(problem, Budget(), 0).certificate
+    cuts = [c for step in proof.refutation.steps for c in step.cuts] if proof else []
+    rows = [problem.collects_of(target) for target in range(4)]
+    cuts += [Cut(sets=(row,)) for row in rows if len(row)]
+    steps = tuple(
+        Multipliers(
+            prices=rng.uniform(0.0, 1.2, 4),
+            cuts=tuple(cuts),
+            cut_prices=tuple(rng.uniform(0.0, 0.8, len(cuts))),
+        )
+        for _ in range(4)
+    )
+    branch = (0, Refutation(steps=steps), Refutation(steps=steps))
+    for amount in (best, best - 0.5):
+        certificate = Certificate(amount=amount, refutation=Refutation(steps=steps, branch=branch))
+        assert not is_refuted(problem, certificate)
+
+
+def test_sets_that_a_plan_may_take_two_of_prove_nothing() -> None:
+    tasks = [Task(kind=COLLECT, place=i, start_s=200.0 * i, end_s=200.0 * i + 30) for i in range(2)]
+    problem = make_problem(tasks, num_targets=2, use_resources=False)
+    wrong = Multipliers(
+        prices=np.zeros(2), cuts=(Cut(sets=(np.array([0, 1]),)),), cut_prices=(1.0,)
+    )
+    certificate = Certificate(amount=2.0, refutation=Refutation(steps=(wrong,)))
+    assert not is_refuted(problem, certificate)
+
+
+def test_both_plan_and_bound_are_reported_and_close_in() -> None:
+    problem = wide_problem(5, num_collects=400, num_targets=150, span_s=20_000.0)
+    seen: list[Progress] = []
+    solution = Certified().solve(problem, Budget(report=seen.append), 0)
+    rewards = [p.reward for p in seen if p.reward is not None]
+    bounds = [p.bound for p in seen if p.bound is not None]
+    assert len(rewards) == len(bounds) == len(seen) > 0
+    assert rewards == sorted(rewards)
+    assert bounds == sorted(bounds, reverse=True)
+    assert solution.bound is not None
+    assert bounds[-1] >= solution.bound
+
+
+@pytest.mark.parametrize("is_cancelled", [True, False])
+def test_a_spent_budget_keeps_plan_and_bound(is_cancelled: bool) -> None:
+    problem = wide_problem(5, num_collects=400, num_targets=150, span_s=8_000.0)
+    budget = Budget(None if is_cancelled else 0.0)
+    if is_cancelled:
+        budget.cancel()
+    solution = Certified().solve(problem, budget, 0)
+    timeline = replay(problem, solution.plan)
+    rule = replay(problem, Rule().solve(problem, Budget(), 0).plan).reward
+    assert timeline.is_valid
+    assert timeline.reward >= rule
+    assert solution.termination in {Termination.CANCELLED, Termination.TIME_LIMIT}
+    assert_proven(problem, solution, timeline.reward)
+
+
+def test_cancelling_from_another_thread_ends_it() -> None:
+    problem = wide_problem(7, num_collects=3000, num_targets=900, span_s=60_000.0)
+    budget = Budget()
+    timer = threading.Timer(0.5, budget.cancel)
+    timer.start()
+    solution = Certified().solve(problem, budget, 0)
+    timer.cancel()
+    assert_proven(problem, solution, replay(problem, solution.plan).reward)
+
+
+def test_the_same_seed_gives_the_same_plan_and_bound() -> None:
+    problem = wide_problem(11, num_collects=300, num_targets=100, span_s=15_000.0)
+    first, again = (Certified().solve(problem, Budget(), 3) for _ in range(2))
+    assert first.plan == again.plan
+    assert first.bound == again.bound
+
+
+@pytest.mark.parametrize("num_collects", [0, 1])
+def test_problems_without_a_choice(num_collects: int) -> None:
+    problem = random_problem(0, use_resources=False, num_collects=num_collects)
+    solution = Certified().solve(problem, Budget(), 0)
+    assert solution.bound == float(num_collects)
+    assert solution.termination is Termination.OPTIMAL

@@ -1,0 +1,85 @@
+"""Longest paths: covering arcs say what the whole table says, in fewer pairs."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from planner_core.chains import Links
+from planner_core.domain import Agility
+from planner_core.problem import COLLECT
+from planner_core.solvers import Graph
+from planner_core.solvers.base import Budget
+from planner_core.timeline import replay
+from tests.planner_core.brute_force import best_reward
+from tests.planner_core.problems import Task, make_problem, random_problem
+
+SEEDS = st.integers(0, 10**6)
+
+
+@settings(max_examples=60, deadline=None)
+@given(seed=SEEDS, num_collects=st.integers(0, 60), span_s=st.sampled_from([300.0, 5000.0]))
+def test_arcs_are_the_pairs_with_nothing_in_between(
+    seed: int, num_collects: int, span_s: float
+) -> None:
+    problem = random_problem(seed, num_collects=num_collects, span_s=span_s, use_resources=False)
+    satellite = problem.satellites[0]
+    arcs = Links.of(problem, satellite).arcs
+    assert arcs is not None
+    m = len(satellite)
+    follows = np.array(
+        [[a < b and satellite.transitions.allows(a, b) for b in range(m)] for a in range(m)],
+        dtype=np.int64,
+    ).reshape(m, m)
+    covering = (follows == 1) & (follows @ follows == 0)
+    found = np.zeros((m, m), dtype=np.bool_)
+    found[np.repeat(np.arange(m), np.diff(arcs.first)), arcs.to] = True
+    assert (found == covering).all()
+
+
+@settings(max_examples=60, deadline=None)
+@given(seed=SEEDS, slew_rate_deg_s=st.sampled_from([1.0, 0.3]))
+def test_chains_are_as_heavy_as_those_of_the_listing(seed: int, slew_rate_deg_s: float) -> None:
+    """Alg. 3 in plain Python, over all pairs; tasks without worth stand in no chain."""
+    problem = random_problem(
+        seed, num_collects=40, num_targets=30, use_resources=False, max_turn_deg=25.0,
+        agility=Agility(slew_rate_deg_s=slew_rate_deg_s), span_s=1500.0,
+    )  # fmt: skip
+    satellite = problem.satellites[0]
+    allows = satellite.transitions.allows
+    weight = np.maximum(0.0, np.random.default_rng(seed).uniform(-0.5, 1.0, 40))
+    value = np.zeros(40)
+    for b in range(40):
+        earlier = [value[a] for a in range(b) if weight[a] > 0.0 and allows(a, b)]
+        value[b] = weight[b] + max(earlier, default=0.0)
+    links = Links.of(problem, satellite)
+    found, chain = links.longest(weight)
+    assert found == pytest.approx(value[weight > 0.0].max(initial=0.0))
+    assert found == pytest.approx(weight[chain].sum())
+    for tasks in (chain, links.longest_with_history(weight, satellite.place)):
+        assert (weight[tasks] > 0.0).all()
+        assert all(allows(a, b) for a, b in itertools.pairwise(tasks))
+    assert len(set(satellite.place[tasks])) == len(tasks)
+
+
+@settings(max_examples=60, deadline=None)
+@given(seed=SEEDS)
+@pytest.mark.parametrize("path", ["history", "longest"])
+def test_graph_finds_the_optimum_where_no_target_comes_twice(path: str, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    starts_s = rng.uniform(0.0, 400.0, 9).round(3)
+    tasks = [
+        Task(kind=COLLECT, place=i, start_s=float(s), end_s=float(s) + 30.0,
+             angle_deg=float(rng.uniform(-55.0, 55.0)))
+        for i, s in enumerate(starts_s)
+    ]  # fmt: skip
+    rewards = [float(reward) for reward in rng.integers(0, 9, 9)]
+    problem = make_problem(tasks, num_targets=9, use_resources=False, rewards=rewards)
+    plan = Graph(path=path).solve(problem, Budget(), 0).plan  # type: ignore[arg-type]
+    timeline = replay(problem, plan)
+    assert timeline.is_valid
+    assert timeline.reward == best_reward(problem)

@@ -1,0 +1,77 @@
+"""The paper's mission at the paper's size: a day over 1,000 land scenes."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import replace
+
+import pytest
+
+from benchmarks.missions import paper_scenario, problem_of
+from benchmarks.paper.settings import MCTS_TUNED, PAPER_FORWARD, PAPER_MCTS, make_solver
+from planner_core.domain import Dynamics
+from planner_core.problem import Problem
+from planner_core.solvers import ForwardSearch, Graph, Mcts, Milp, Rule
+from planner_core.solvers.base import Budget, Solver, Termination
+from planner_core.timeline import Timeline, replay
+
+TARGETS = 1000
+HARD = {"feasibility": "hard"}
+
+
+@functools.cache
+def day(*, use_resources: bool, dynamics: Dynamics = "physical") -> Problem:
+    return problem_of(
+        paper_scenario(TARGETS, 0, use_resources=use_resources, dynamics=dynamics, preset="paper")
+    )
+
+
+def judged(problem: Problem, solver: Solver) -> Timeline:
+    timeline = replay(problem, solver.solve(problem, Budget(), 0).plan)
+    assert timeline.is_valid, timeline.violations[:3]
+    return timeline
+
+
+def test_without_resources_every_method_stands_where_it_should() -> None:
+    problem = day(use_resources=False)
+    solution = Milp().solve(problem, Budget(), 0)
+    optimum = replay(problem, solution.plan).reward
+    assert solution.termination is Termination.OPTIMAL
+    graph, rule = (judged(problem, solver).reward for solver in (Graph(), Rule()))
+    assert optimum >= graph >= rule > 0.0
+    for solver in (ForwardSearch(), Mcts()):
+        assert 0.95 * optimum <= judged(problem, solver).reward <= optimum
+
+
+@pytest.mark.parametrize("dynamics", ["physical", "paper"])
+def test_with_resources_the_improved_search_leads_the_papers_methods(dynamics: Dynamics) -> None:
+    problem = day(use_resources=True, dynamics=dynamics)
+    mcts = judged(problem, Mcts()).reward
+    paper_mcts = make_solver("mcts", {**PAPER_MCTS, **MCTS_TUNED[True], **HARD})
+    paper_forward = make_solver("forward_search", {**PAPER_FORWARD, **HARD})
+    for other in (paper_mcts, paper_forward):
+        assert judged(problem, other).reward < mcts, other
+    assert judged(problem, ForwardSearch()).reward <= mcts
+
+
+@pytest.mark.parametrize("dynamics", ["physical", "paper"])
+def test_with_resources_the_bound_of_the_program_is_true(dynamics: Dynamics) -> None:
+    """Cut short it has proven something all the same, and no plan of anyone contradicts it."""
+    problem = day(use_resources=True, dynamics=dynamics)
+    solution = Milp().solve(problem, Budget(15.0), 0)
+    own = replay(problem, solution.plan)
+    assert own.is_valid
+    assert solution.bound is not None
+    others = (Rule(), Graph(), ForwardSearch(), Mcts())
+    best = max(own.reward, *(judged(problem, solver).reward for solver in others))
+    assert solution.bound >= best
+
+
+def test_many_collects_of_each_access_are_planned_as_well() -> None:
+    """Ten times the opportunities, and no fewer images than with one collect per access."""
+    scenario = paper_scenario(TARGETS, 0, use_resources=False)
+    spaced = problem_of(replace(scenario, collect_spacing_s=15.0))
+    plain = day(use_resources=False)
+    assert len(spaced.opportunities) > 5 * len(plain.opportunities)
+    for solver in (Rule(), ForwardSearch(), Graph()):
+        assert judged(spaced, solver).reward > judged(plain, solver).reward
