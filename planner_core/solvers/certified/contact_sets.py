@@ -39,6 +39,8 @@ class FixedContacts:
 
     Attributes
     ----------
+    offered
+        The collects that it may take. Shape ``(n,)``.
     relaxed
         Value of the relaxation with antichain cuts; minus infinity where it has no point.
     prices
@@ -50,7 +52,7 @@ class FixedContacts:
     def __init__(
         self, problem: Problem, offered: Bools, contacts: tuple[int, ...], budget: Budget, seed: int
     ) -> None:
-        self._problem = problem
+        self._problem, self.offered = problem, offered
         self._model = plan_program(problem, "antichain", _CLEAR)
         _fix(self._model, problem, offered, np.array(contacts, dtype=np.int32))
         self._engine = _Engine(self._model.program, budget, seed, is_chained=True)

@@ -37,7 +37,6 @@ _PATIENCE: Final = 6  # rounds without a new set of contacts or a better plan
 _SETS_AT_A_TIME: Final = 2
 _SET_TIME_S: Final = 15.0
 _AS_GOOD: Final = 0.75  # of a target: sets whose prices count
-_MOST_ROWS: Final = 3000  # of a relaxation
 _OFFERED: Final = 800  # tasks in a search with fixed contacts
 
 
@@ -143,7 +142,7 @@ class ResourceSearch:
         self.report("prices")
         return prices.theta > _SHORTEST
 
-    def relax_sets(self, prices: PriceSearch) -> bool:
+    def relax_sets(self, prices: PriceSearch, choices: ChoiceSearch) -> bool:
         """Learn prices from the relaxations of sets of contacts; return whether any is new."""
         table = self.problem.opportunities
         own = (a.opportunity for a in self.plan.actions)
@@ -152,10 +151,8 @@ class ResourceSearch:
             *(key for key, _ in prices.contact_sets.most_common()),
         ]
         new = [key for key in dict.fromkeys(sets) if key not in self._relaxed][:_SETS_AT_A_TIME]
-        offered = np.ones(len(table), dtype=np.bool_)
-        if len(table) > _MOST_ROWS:
-            offered = prices.usage > 0.0
-            offered |= self.mask(action.opportunity for action in self.plan.actions)
+        offered = (prices.usage > 0.0) | (choices.usage > 0.0)
+        offered |= self.mask(action.opportunity for action in self.plan.actions)
         for contacts in new:
             if self.is_done:
                 return False
@@ -194,8 +191,8 @@ class ResourceSearch:
         self._tried.add(contacts)
         # Tasks that the relaxation would take at little loss.
         costs = program.reduced_costs
-        cut_off = np.partition(costs, min(_OFFERED, len(costs) - 1))[min(_OFFERED, len(costs) - 1)]
-        offered = costs <= cut_off
+        cut_off = np.sort(costs[program.offered])[:_OFFERED][-1]
+        offered = (costs <= cut_off) & program.offered
         offered |= self.mask(action.opportunity for action in self.plan.actions)
         part = FixedContacts(self.problem, offered, contacts, self._share(), self.seed)
         self.report("contacts fixed")
@@ -278,7 +275,7 @@ def _close_in(search: ResourceSearch, choices: ChoiceSearch) -> None:
     idle_rounds = 0
     while idle_rounds < _PATIENCE and not search.is_done:
         has_more = search.price(prices)
-        is_new = search.relax_sets(prices)
+        is_new = search.relax_sets(prices, choices)
         is_better = search.fix_contacts()
         if is_better:
             choices.adopt(search.plan)
