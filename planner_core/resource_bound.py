@@ -94,14 +94,14 @@ class SatelliteRelaxation:
 
     def _needs(self, weight: Ints, near: int | None) -> tuple[Singles, Singles, int]:
         """Return the tables of least energy, and what the battery alone allows."""
-        limit = int(1.05 * near) if near is not None else 0
+        limit = int(1.07 * near) if near is not None else 0
         limit += 128 + int(weight.max(initial=0))
         while True:
             idle, after = least_energy(self.network, weight, limit)
             most = int(np.flatnonzero(idle[0] <= self.network.energy_start)[-1])
             if most < limit:
                 return idle, after, most
-            limit *= 4 if near is None else 2
+            limit = 4 * limit if near is None else int(1.1 * limit)
 
 
 def relaxations(problem: Problem) -> tuple[SatelliteRelaxation, ...]:

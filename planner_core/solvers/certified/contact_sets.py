@@ -6,6 +6,7 @@ tasks that relaxed plans have taken on the way to good prices are few, and hold 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -34,20 +35,30 @@ class _Engine(Engine):
         return np.array(solution.row_dual), np.array(solution.col_dual)
 
 
-class FixedContacts:
-    """The program of one set of contacts over some of the tasks; its bound is not a proof.
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Relaxation:
+    """What the relaxation of a program with fixed contacts tells.
 
     Attributes
     ----------
+    value
+        With antichain cuts; minus infinity where there is no point.
     offered
         The collects that it may take. Shape ``(n,)``.
-    relaxed
-        Value of the relaxation with antichain cuts; minus infinity where it has no point.
     prices
         What it says that each target is worth by itself. Shape ``(num_targets,)``.
     reduced_costs
         What taking an opportunity would change; 0 where it hardly matters. Shape ``(n,)``.
     """
+
+    value: float
+    offered: Bools
+    prices: Floats
+    reduced_costs: Floats
+
+
+class FixedContacts:
+    """The program of one set of contacts over some of the tasks; its bound is not a proof."""
 
     def __init__(
         self, problem: Problem, offered: Bools, contacts: tuple[int, ...], budget: Budget, seed: int
@@ -57,19 +68,21 @@ class FixedContacts:
         _fix(self._model, problem, offered, np.array(contacts, dtype=np.int32))
         self._engine = _Engine(self._model.program, budget, seed, is_chained=True)
         self.relaxed = self._cut()
-        self.prices = np.zeros(len(problem.target_ids))
-        self.reduced_costs = np.zeros(len(problem.opportunities))
-        if np.isfinite(self.relaxed):
-            self._read_duals()
 
-    def _read_duals(self) -> None:
-        # The rows of the targets come first in the program.
-        rows, columns = self._engine.duals()
-        worth = np.abs(rows[: len(self.prices)])
+    def relaxation(self) -> Relaxation:
+        """Return what the relaxation tells, without the program, which takes much memory."""
         reward = self._problem.target_reward
-        has_own_columns = bool(np.any(self._model.program.worth[0] > 0.0))
-        self.prices = np.clip(worth if has_own_columns else reward - worth, 0.0, reward)
-        self.reduced_costs = np.abs(columns[: len(self.reduced_costs)])
+        prices, costs = np.zeros(len(reward)), np.zeros(len(self.offered))
+        if np.isfinite(self.relaxed):
+            # The rows of the targets come first in the program.
+            rows, columns = self._engine.duals()
+            worth = np.abs(rows[: len(reward)])
+            has_own_columns = bool(np.any(self._model.program.worth[0] > 0.0))
+            prices = np.clip(worth if has_own_columns else reward - worth, 0.0, reward)
+            costs = np.abs(columns[: len(costs)])
+        return Relaxation(
+            value=self.relaxed, offered=self.offered, prices=prices, reduced_costs=costs
+        )
 
     def _cut(self) -> float:
         """Return the value of the relaxation with antichain cuts; minus infinity if none."""

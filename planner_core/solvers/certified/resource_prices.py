@@ -22,7 +22,7 @@ _PATIENCE: Final = 7
 _SHORTER: Final = 0.6
 _NEAR: Final = 0.99
 _AFRESH: Final = 0.4  # length of the steps from given prices
-_FINER: Final = 2
+_FINER: Final = 3
 
 
 class PriceSearch:

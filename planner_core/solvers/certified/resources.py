@@ -21,7 +21,7 @@ from planner_core.problem import CONTACT, Bools, Floats, Problem
 from planner_core.resource_bound import quick_bound
 from planner_core.solvers.base import Budget, Progress, Solution, Termination
 from planner_core.solvers.certified.choices import ChoiceSearch
-from planner_core.solvers.certified.contact_sets import FixedContacts
+from planner_core.solvers.certified.contact_sets import FixedContacts, Relaxation
 from planner_core.solvers.certified.free import TOLERANCE, solve_free
 from planner_core.solvers.certified.resource_prices import PriceSearch
 from planner_core.solvers.rule import Rule
@@ -30,14 +30,15 @@ from planner_core.timeline import replay
 _MAX_UNITS: Final = 2000
 _FIRST_GOAL: Final = 0.95
 _MOVES: Final = 40  # of the search for plans, between two looks at the bound
-_FIRST_ROUNDS: Final = 4
+_FIRST_ROUNDS: Final = 2
 _STEPS: Final = 5  # of the search for prices, in a round
-_SHORTEST: Final = 0.02
 _PATIENCE: Final = 6  # rounds without a new set of contacts or a better plan
 _SETS_AT_A_TIME: Final = 2
-_SET_TIME_S: Final = 15.0
+_SET_TIME_S: Final = 25.0
 _AS_GOOD: Final = 0.75  # of a target: sets whose prices count
-_OFFERED: Final = 800  # tasks in a search with fixed contacts
+_OFFERED: Final = (800, 500)  # tasks in a search with fixed contacts
+_LESS_LIKELY: Final = 0.15  # of a target: what a set is worth less at each further attempt
+_MOST_ROWS: Final = 3000  # of a relaxation
 
 
 class ResourceSearch:
@@ -50,8 +51,8 @@ class ResourceSearch:
         timeline = replay(problem, self.plan)
         self.is_valid, self.reward = timeline.is_valid, timeline.reward
         self.bound = Bound(value=float(problem.target_reward.sum()), proof="lagrangian")
-        self._relaxed: dict[tuple[int, ...], FixedContacts] = {}
-        self._tried: set[tuple[int, ...]] = set()
+        self._relaxed: dict[tuple[int, ...], Relaxation] = {}
+        self._tried: set[tuple[tuple[int, ...], int]] = set()
         self._one = float(problem.target_reward.mean()) if len(problem.target_ids) else 1.0
 
     @property
@@ -131,16 +132,15 @@ class ResourceSearch:
         mask[list(rows)] = True
         return mask
 
-    def price(self, prices: PriceSearch) -> bool:
-        """Make steps towards better prices; return whether there are more to make."""
+    def price(self, prices: PriceSearch) -> None:
+        """Make steps towards better prices."""
         for _ in range(_STEPS):
             if self.is_done or not prices.step(self.reward):
-                return False
+                return
             self.lower(
                 Bound(value=prices.value, proof="dp", prices=prices.prices, unit=prices.unit)
             )
         self.report("prices")
-        return prices.theta > _SHORTEST
 
     def relax_sets(self, prices: PriceSearch, choices: ChoiceSearch) -> bool:
         """Learn prices from the relaxations of sets of contacts; return whether any is new."""
@@ -151,21 +151,20 @@ class ResourceSearch:
             *(key for key, _ in prices.contact_sets.most_common()),
         ]
         new = [key for key in dict.fromkeys(sets) if key not in self._relaxed][:_SETS_AT_A_TIME]
-        offered = (prices.usage > 0.0) | (choices.usage > 0.0)
+        offered = np.ones(len(table), dtype=np.bool_)
+        if len(table) > _MOST_ROWS:
+            offered = (prices.usage > 0.0) | (choices.usage > 0.0)
         offered |= self.mask(action.opportunity for action in self.plan.actions)
         for contacts in new:
             if self.is_done:
                 return False
             share = self._share()
-            self._relaxed[contacts] = FixedContacts(
-                self.problem, offered, contacts, share, self.seed
-            )
-        best = max(program.relaxed for program in self._relaxed.values())
+            program = FixedContacts(self.problem, offered, contacts, share, self.seed)
+            self._relaxed[contacts] = program.relaxation()
+        best = max(relaxation.value for relaxation in self._relaxed.values())
         if not new or not np.isfinite(best):
             return False
-        near = [
-            p.prices for p in self._relaxed.values() if p.relaxed >= best - _AS_GOOD * self._one
-        ]
+        near = [p.prices for p in self._relaxed.values() if p.value >= best - _AS_GOOD * self._one]
         mean = np.mean(near, axis=0)
         prices.restart(mean)
         self.refine(prices, mean)
@@ -180,24 +179,31 @@ class ResourceSearch:
 
     def fix_contacts(self) -> bool:
         """Search for a better plan with the most promising contacts; return whether it is."""
-        open_sets = {
-            key: program
-            for key, program in self._relaxed.items()
-            if key not in self._tried and program.relaxed >= self.better - 1e-6
-        }
-        if not open_sets or self.is_done:
+        hopeful = [
+            (relaxation.value - _LESS_LIKELY * attempt * self._one, contacts, size)
+            for contacts, relaxation in self._relaxed.items()
+            for attempt, size in enumerate(_OFFERED)
+            if (contacts, size) not in self._tried and relaxation.value >= self.better - 1e-6
+        ]
+        if not hopeful or self.is_done:
             return False
-        contacts, program = max(open_sets.items(), key=lambda entry: entry[1].relaxed)
-        self._tried.add(contacts)
-        # Tasks that the relaxation would take at little loss.
-        costs = program.reduced_costs
-        cut_off = np.sort(costs[program.offered])[:_OFFERED][-1]
-        offered = (costs <= cut_off) & program.offered
-        offered |= self.mask(action.opportunity for action in self.plan.actions)
+        _, contacts, size = max(hopeful)
+        self._tried.add((contacts, size))
+        offered = self.promising(self._relaxed[contacts], size)
         part = FixedContacts(self.problem, offered, contacts, self._share(), self.seed)
+        if part.relaxed < self.better - 1e-6:
+            return False
         self.report("contacts fixed")
         plan = part.plan(self.better)
         return plan is not None and self.offer(plan)
+
+    def promising(self, relaxation: Relaxation, size: int) -> Bools:
+        """Return the tasks that the relaxation would take at the least loss."""
+        costs = relaxation.reduced_costs
+        cut_off = np.sort(costs[relaxation.offered])[:size][-1]
+        own = self.mask(action.opportunity for action in self.plan.actions)
+        promising: Bools = ((costs <= cut_off) & relaxation.offered) | own
+        return promising
 
     @property
     def better(self) -> float:
@@ -221,6 +227,9 @@ class ResourceSearch:
             termination = self.budget.termination()
         else:
             termination = Termination.HORIZON_COMPLETE
+        if self.problem.continuous_starts:
+            # Another start may suit the next task better: nothing here bounds that.
+            return Solution(plan=self.plan, termination=termination)
         return Solution(
             plan=self.plan,
             termination=termination,
@@ -274,12 +283,11 @@ def _close_in(search: ResourceSearch, choices: ChoiceSearch) -> None:
     )
     idle_rounds = 0
     while idle_rounds < _PATIENCE and not search.is_done:
-        has_more = search.price(prices)
+        search.price(prices)
+        search.refine(prices, prices.prices)
         is_new = search.relax_sets(prices, choices)
+        search.search(choices, 2 * _MOVES)
         is_better = search.fix_contacts()
         if is_better:
             choices.adopt(search.plan)
-        search.search(choices, _MOVES)
         idle_rounds = 0 if is_new or is_better else idle_rounds + 1
-        if not has_more and not is_new:
-            return
