@@ -157,7 +157,9 @@ def quick_bound(problem: Problem, reward: float) -> Bound:
         return best
     stop = np.zeros(1, dtype=np.uint8)
     unit = _unit(problem, satellites, best.value)
-    shares = (0.0,) if len(satellites) == 1 else (1.0, 0.5, 0.0)
+    # Where all targets are worth the same and energy is short, prices of zero are best.
+    is_plain = len(satellites) == 1 and np.ptp(problem.target_reward) == 0.0
+    shares = (0.0,) if is_plain else (0.0, 0.25, 0.75, 1.0)
     for share in shares:
         prices = share * (np.zeros(1) if best.prices is None else best.prices)
         prices = leaving_whole_units(problem, prices, unit)
