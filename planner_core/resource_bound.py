@@ -51,7 +51,13 @@ class SatelliteRelaxation:
         return own
 
     def most(
-        self, worth: Ints, enough: int, stop: Bytes, *, guess: int | None = None
+        self,
+        worth: Ints,
+        enough: int,
+        stop: Bytes,
+        *,
+        near: int | None = None,
+        keeps_path: bool = False,
     ) -> tuple[int, Ints | None]:
         """Return the most units that the satellite can gain, and the rows of a path that does.
 
@@ -60,40 +66,42 @@ class SatelliteRelaxation:
 
         Parameters
         ----------
-        guess
-            What is expected. Paths are answered only where there is a guess.
+        near
+            What is expected, if anything.
+        keeps_path
+            Whether to answer the path.
         """
         weight = self.weights(worth)
-        idle, after, top = self._needs(weight, guess)
+        idle, after, top = self._needs(weight, near)
         step = max(1, int(_FIRST_STEP * top))
         goal = top
-        if guess is not None and guess < top:
-            goal = guess + step
+        if near is not None and near < top:
+            goal = min(top, near + step)
         while goal >= enough:
             # Labels that cannot reach the goal are dropped: the higher, the quicker.
             goal, ceiling = max(enough, goal - step, 0), goal
             most, labels = most_value(
-                self.network, self.levels, weight, idle, after, goal, guess is not None, stop
+                self.network, self.levels, weight, idle, after, goal, keeps_path, stop
             )
             if most == STOPPED:
                 return min(ceiling, top), None
             if most != UNREACHED:
-                if guess is None:
+                if not keeps_path:
                     return most, None
                 return most, path_of(self.network, self.levels, weight, labels, most)
             goal, step = goal - 1, 2 * step
         return max(enough, 0), None
 
-    def _needs(self, weight: Ints, guess: int | None) -> tuple[Singles, Singles, int]:
+    def _needs(self, weight: Ints, near: int | None) -> tuple[Singles, Singles, int]:
         """Return the tables of least energy, and what the battery alone allows."""
-        limit = int(1.05 * guess) if guess is not None else 0
+        limit = int(1.07 * near) if near is not None else 0
         limit += 128 + int(weight.max(initial=0))
         while True:
             idle, after = least_energy(self.network, weight, limit)
             most = int(np.flatnonzero(idle[0] <= self.network.energy_start)[-1])
             if most < limit:
-                return idle[:, : most + 1].copy(), after[:, : most + 1].copy(), most
-            limit *= 4 if guess is None else 2
+                return idle, after, most
+            limit = 4 * limit if near is None else int(1.1 * limit)
 
 
 def relaxations(problem: Problem) -> tuple[SatelliteRelaxation, ...]:
@@ -149,7 +157,9 @@ def quick_bound(problem: Problem, reward: float) -> Bound:
         return best
     stop = np.zeros(1, dtype=np.uint8)
     unit = _unit(problem, satellites, best.value)
-    shares = (0.0,) if len(satellites) == 1 else (1.0, 0.5, 0.0)
+    # Where all targets are worth the same and energy is short, prices of zero are best.
+    is_plain = len(satellites) == 1 and np.ptp(problem.target_reward) == 0.0
+    shares = (0.0,) if is_plain else (0.0, 0.25, 0.75, 1.0)
     for share in shares:
         prices = share * (np.zeros(1) if best.prices is None else best.prices)
         prices = leaving_whole_units(problem, prices, unit)

@@ -95,7 +95,8 @@ class Budget:
 
     def is_spent(self) -> bool:
         """Return whether the work should stop now and answer with the best it has."""
-        return self._cancelled or (
+        # Budgets for a part of the work share the stop byte of the whole.
+        return bool(self.stop[0]) or (
             self._deadline is not None and time.monotonic() >= self._deadline
         )
 

@@ -92,6 +92,8 @@ class ChoiceSearch:
         Whether the plan takes each opportunity. Shape ``(n,)``.
     reward
         What its targets are worth.
+    usage
+        How many of the plans kept so far took each opportunity. Shape ``(n,)``.
     """
 
     def __init__(self, problem: Problem, unit: float, seed: int, stop: Bytes) -> None:
@@ -105,6 +107,7 @@ class ChoiceSearch:
         self._turn = 0
         self.taken: Bools = np.zeros(len(problem.opportunities), dtype=np.bool_)
         self.reward = 0.0
+        self.usage = np.zeros(len(problem.opportunities))
 
     @property
     def plan(self) -> Plan:
@@ -174,6 +177,7 @@ class ChoiceSearch:
         reward = self._worth(changed)
         if reward >= self.reward:
             self.taken, self.reward = changed, reward
+            self.usage += changed
 
     def _settled(self, satellite: SatelliteChoices, allowed: Bools, goal: int) -> tuple[int, Ints]:
         """Return the plan that is left when each target has been settled on one task."""

@@ -6,6 +6,7 @@ tasks that relaxed plans have taken on the way to good prices are few, and hold 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -28,6 +29,33 @@ class _Engine(Engine):
         """Look only for points worth this much."""
         self._highs.setOptionValue("objective_bound", amount - 1e-6 * max(1.0, amount))
 
+    def duals(self) -> tuple[Floats, Floats]:
+        """Return what the last relaxation says rows and columns are worth."""
+        solution = self._highs.getSolution()
+        return np.array(solution.row_dual), np.array(solution.col_dual)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Relaxation:
+    """What the relaxation of a program with fixed contacts tells.
+
+    Attributes
+    ----------
+    value
+        With antichain cuts; minus infinity where there is no point.
+    offered
+        The collects that it may take. Shape ``(n,)``.
+    prices
+        What it says that each target is worth by itself. Shape ``(num_targets,)``.
+    reduced_costs
+        What taking an opportunity would change; 0 where it hardly matters. Shape ``(n,)``.
+    """
+
+    value: float
+    offered: Bools
+    prices: Floats
+    reduced_costs: Floats
+
 
 class FixedContacts:
     """The program of one set of contacts over some of the tasks; its bound is not a proof."""
@@ -35,11 +63,26 @@ class FixedContacts:
     def __init__(
         self, problem: Problem, offered: Bools, contacts: tuple[int, ...], budget: Budget, seed: int
     ) -> None:
-        self._problem = problem
+        self._problem, self.offered = problem, offered
         self._model = plan_program(problem, "antichain", _CLEAR)
         _fix(self._model, problem, offered, np.array(contacts, dtype=np.int32))
         self._engine = _Engine(self._model.program, budget, seed, is_chained=True)
         self.relaxed = self._cut()
+
+    def relaxation(self) -> Relaxation:
+        """Return what the relaxation tells, without the program, which takes much memory."""
+        reward = self._problem.target_reward
+        prices, costs = np.zeros(len(reward)), np.zeros(len(self.offered))
+        if np.isfinite(self.relaxed):
+            # The rows of the targets come first in the program.
+            rows, columns = self._engine.duals()
+            worth = np.abs(rows[: len(reward)])
+            has_own_columns = bool(np.any(self._model.program.worth[0] > 0.0))
+            prices = np.clip(worth if has_own_columns else reward - worth, 0.0, reward)
+            costs = np.abs(columns[: len(costs)])
+        return Relaxation(
+            value=self.relaxed, offered=self.offered, prices=prices, reduced_costs=costs
+        )
 
     def _cut(self) -> float:
         """Return the value of the relaxation with antichain cuts; minus infinity if none."""

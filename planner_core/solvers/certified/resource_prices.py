@@ -21,6 +21,8 @@ _DEFLECTION: Final = 0.3
 _PATIENCE: Final = 7
 _SHORTER: Final = 0.6
 _NEAR: Final = 0.99
+_AFRESH: Final = 0.4  # length of the steps from given prices
+_FINER: Final = 3
 
 
 class PriceSearch:
@@ -90,6 +92,34 @@ class PriceSearch:
         self._now = np.clip(self._now + length * scale * self._direction, 0.0, reward_of)
         return True
 
+    def restart(self, prices: Floats) -> None:
+        """Go on from other prices, in shorter steps."""
+        self._now = np.where(self._is_reachable, prices, 0.0)
+        self._direction = np.zeros_like(self._now)
+        self.value, self.prices = np.inf, self._now
+        self.theta, self._stalled = _AFRESH, 0
+
+    def refined(self, prices: Floats) -> tuple[float, Floats, float]:
+        """Return what prices prove where worth is counted in smaller units, and with which.
+
+        Without labels, which would take several times the memory.
+        """
+        unit = self.unit / _FINER
+        prices = leaving_whole_units(self._problem, prices, unit)
+        prices[~self._is_reachable] = 0.0
+        worth = whole_worth(self._problem, prices, unit)
+        units = 0
+        for i, relaxation in enumerate(self._satellites):
+            known = self._guess[i]
+            near = None if known is None else known * _FINER
+            most, _ = relaxation.most(worth, 0, self._stop, near=near)
+            units += most
+        return self._total(prices, units, unit), prices, unit
+
+    def _total(self, prices: Floats, units: int, unit: float) -> float:
+        rounded_away = 1e-9 * len(self._problem.opportunities) * unit
+        return float(prices.sum()) + units * unit + rounded_away
+
     def _evaluate(self, prices: Floats) -> tuple[float, Floats] | None:
         """Return the bound of these prices and how often its paths take each target."""
         problem = self._problem
@@ -101,7 +131,7 @@ class PriceSearch:
             guess = self._guess[i]
             if guess is None:
                 guess, _ = relaxation.most(worth, 0, self._stop)
-            most, path = relaxation.most(worth, 0, self._stop, guess=guess)
+            most, path = relaxation.most(worth, 0, self._stop, near=guess, keeps_path=True)
             if path is None:
                 return None
             units += most
@@ -112,5 +142,4 @@ class PriceSearch:
             np.add.at(counts, problem.opportunities.place[images], 1.0)
             contacts += [int(r) for r in rows[problem.opportunities.kind[rows] == CONTACT]]
         self.contact_sets[tuple(sorted(contacts))] += 1
-        rounded_away = 1e-9 * len(problem.opportunities) * self.unit
-        return float(prices.sum()) + units * self.unit + rounded_away, counts
+        return self._total(prices, units, self.unit), counts

@@ -15,13 +15,13 @@ from typing import Final
 
 import numpy as np
 
-from planner_core.bounds import Bound, reward_unit, rounded_bound
+from planner_core.bounds import Bound, lagrangian_bound, reward_unit, rounded_bound
 from planner_core.plan import Plan
-from planner_core.problem import CONTACT, Bools, Problem
+from planner_core.problem import CONTACT, Bools, Floats, Problem
 from planner_core.resource_bound import quick_bound
 from planner_core.solvers.base import Budget, Progress, Solution, Termination
 from planner_core.solvers.certified.choices import ChoiceSearch
-from planner_core.solvers.certified.contact_sets import FixedContacts
+from planner_core.solvers.certified.contact_sets import FixedContacts, Relaxation
 from planner_core.solvers.certified.free import TOLERANCE, solve_free
 from planner_core.solvers.certified.resource_prices import PriceSearch
 from planner_core.solvers.rule import Rule
@@ -30,15 +30,15 @@ from planner_core.timeline import replay
 _MAX_UNITS: Final = 2000
 _FIRST_GOAL: Final = 0.95
 _MOVES: Final = 40  # of the search for plans, between two looks at the bound
-_FIRST_ROUNDS: Final = 4
-_ROUNDS: Final = 40
+_FIRST_ROUNDS: Final = 2
 _STEPS: Final = 5  # of the search for prices, in a round
-_SHORTEST: Final = 0.02
-_SETS_FROM: Final = 6  # rounds of prices before contact sets are tried
-_SETS_EVERY: Final = 4
-_SETS_LOOKED_AT: Final = 5
-_SET_TIME_S: Final = 15.0
-_LEAST_USAGE: Final = 2.0
+_PATIENCE: Final = 6  # rounds without a new set of contacts or a better plan
+_SETS_AT_A_TIME: Final = 2
+_SET_TIME_S: Final = 25.0
+_AS_GOOD: Final = 0.75  # of a target: sets whose prices count
+_OFFERED: Final = (800, 500)  # tasks in a search with fixed contacts
+_LESS_LIKELY: Final = 0.15  # of a target: what a set is worth less at each further attempt
+_MOST_ROWS: Final = 3000  # of a relaxation
 
 
 class ResourceSearch:
@@ -51,7 +51,9 @@ class ResourceSearch:
         timeline = replay(problem, self.plan)
         self.is_valid, self.reward = timeline.is_valid, timeline.reward
         self.bound = Bound(value=float(problem.target_reward.sum()), proof="lagrangian")
-        self._tried: set[tuple[int, ...]] = set()
+        self._relaxed: dict[tuple[int, ...], Relaxation] = {}
+        self._tried: set[tuple[tuple[int, ...], int]] = set()
+        self._one = float(problem.target_reward.mean()) if len(problem.target_ids) else 1.0
 
     @property
     def is_optimal(self) -> bool:
@@ -108,7 +110,10 @@ class ResourceSearch:
     def without_resources(self) -> Bools:
         """Let agility alone bound the plans; return the tasks of the best plan then."""
         free = replace(self.problem, use_resources=False)
-        solution = solve_free(free, self.budget, self.seed, self.gap, 30.0)
+        # Its plans are not for this problem: they are not reported.
+        quiet = Budget(self.budget.remaining_s())
+        quiet.stop = self.budget.stop
+        solution = solve_free(free, quiet, self.seed, self.gap, 30.0)
         if solution.bound is not None and solution.bound_proof is not None:
             self.lower(
                 Bound(
@@ -127,40 +132,78 @@ class ResourceSearch:
         mask[list(rows)] = True
         return mask
 
-    def price(self, prices: PriceSearch) -> bool:
-        """Make steps towards better prices; return whether there are more to make."""
+    def price(self, prices: PriceSearch) -> None:
+        """Make steps towards better prices."""
         for _ in range(_STEPS):
             if self.is_done or not prices.step(self.reward):
-                return False
+                return
             self.lower(
                 Bound(value=prices.value, proof="dp", prices=prices.prices, unit=prices.unit)
             )
         self.report("prices")
-        return prices.theta > _SHORTEST
 
-    def fix_contacts(self, prices: PriceSearch) -> bool:
-        """Search among promising tasks with the most promising contacts; return whether any."""
-        offered = prices.usage >= _LEAST_USAGE
+    def relax_sets(self, prices: PriceSearch, choices: ChoiceSearch) -> bool:
+        """Learn prices from the relaxations of sets of contacts; return whether any is new."""
+        table = self.problem.opportunities
+        own = (a.opportunity for a in self.plan.actions)
+        sets = [
+            tuple(row for row in own if table.kind[row] == CONTACT),
+            *(key for key, _ in prices.contact_sets.most_common()),
+        ]
+        new = [key for key in dict.fromkeys(sets) if key not in self._relaxed][:_SETS_AT_A_TIME]
+        offered = np.ones(len(table), dtype=np.bool_)
+        if len(table) > _MOST_ROWS:
+            offered = (prices.usage > 0.0) | (choices.usage > 0.0)
         offered |= self.mask(action.opportunity for action in self.plan.actions)
-        is_contact = self.problem.opportunities.kind == CONTACT
-        own = tuple(a.opportunity for a in self.plan.actions if is_contact[a.opportunity])
-        sets = [own, *(key for key, _ in prices.contact_sets.most_common(_SETS_LOOKED_AT))]
-        found: list[tuple[float, tuple[int, ...], FixedContacts]] = []
-        for contacts in dict.fromkeys(sets):
-            if contacts in self._tried or self.is_done:
-                continue
-            program = FixedContacts(self.problem, offered, contacts, self._share(), self.seed)
-            if program.relaxed >= self.better - 1e-6:
-                found.append((program.relaxed, contacts, program))
-            else:
-                self._tried.add(contacts)
-        if not found or self.is_done:
+        for contacts in new:
+            if self.is_done:
+                return False
+            share = self._share()
+            program = FixedContacts(self.problem, offered, contacts, share, self.seed)
+            self._relaxed[contacts] = program.relaxation()
+        best = max(relaxation.value for relaxation in self._relaxed.values())
+        if not new or not np.isfinite(best):
             return False
-        _, contacts, program = max(found, key=lambda entry: entry[0])
-        self._tried.add(contacts)
+        near = [p.prices for p in self._relaxed.values() if p.value >= best - _AS_GOOD * self._one]
+        mean = np.mean(near, axis=0)
+        prices.restart(mean)
+        self.refine(prices, mean)
         self.report("contacts fixed")
-        plan = program.plan(self.better)
+        return True
+
+    def refine(self, prices: PriceSearch, start: Floats) -> None:
+        """See what prices prove in smaller units."""
+        value, finer, unit = prices.refined(start)
+        if not self.budget.is_spent():
+            self.lower(Bound(value=value, proof="dp", prices=finer, unit=unit))
+
+    def fix_contacts(self) -> bool:
+        """Search for a better plan with the most promising contacts; return whether it is."""
+        hopeful = [
+            (relaxation.value - _LESS_LIKELY * attempt * self._one, contacts, size)
+            for contacts, relaxation in self._relaxed.items()
+            for attempt, size in enumerate(_OFFERED)
+            if (contacts, size) not in self._tried and relaxation.value >= self.better - 1e-6
+        ]
+        if not hopeful or self.is_done:
+            return False
+        _, contacts, size = max(hopeful)
+        self._tried.add((contacts, size))
+        offered = self.promising(self._relaxed[contacts], size)
+        part = FixedContacts(self.problem, offered, contacts, self._share(), self.seed)
+        if part.relaxed < self.better - 1e-6:
+            return False
+        self.report("contacts fixed")
+        plan = part.plan(self.better)
         return plan is not None and self.offer(plan)
+
+    def promising(self, relaxation: Relaxation, size: int) -> Bools:
+        """Return the tasks that the relaxation would take at the least loss."""
+        costs = relaxation.reduced_costs
+        cut_off = np.sort(costs[relaxation.offered])[:size][-1]
+        own = self.mask(action.opportunity for action in self.plan.actions)
+        promising: Bools = ((costs <= cut_off) & relaxation.offered) | own
+        return promising
 
     @property
     def better(self) -> float:
@@ -184,6 +227,9 @@ class ResourceSearch:
             termination = self.budget.termination()
         else:
             termination = Termination.HORIZON_COMPLETE
+        if self.problem.continuous_starts:
+            # Another start may suit the next task better: nothing here bounds that.
+            return Solution(plan=self.plan, termination=termination)
         return Solution(
             plan=self.plan,
             termination=termination,
@@ -225,17 +271,23 @@ def _close_in(search: ResourceSearch, choices: ChoiceSearch) -> None:
     if search.is_done:
         return
     start = search.bound.prices
+    if start is None:
+        start = lagrangian_bound(search.problem, search.reward).prices
+    if start is None:
+        start = np.zeros(len(search.problem.target_ids))
     prices = PriceSearch(
         search.problem,
         search.bound.value,
-        np.zeros(len(search.problem.target_ids)) if start is None else start,
+        start,
         search.budget.stop,
     )
-    for number in range(_ROUNDS):
-        has_more = search.price(prices)
-        search.search(choices, _MOVES)
-        is_due = number >= _SETS_FROM and (number - _SETS_FROM) % _SETS_EVERY == 0
-        if (is_due or not has_more) and search.fix_contacts(prices):
+    idle_rounds = 0
+    while idle_rounds < _PATIENCE and not search.is_done:
+        search.price(prices)
+        search.refine(prices, prices.prices)
+        is_new = search.relax_sets(prices, choices)
+        search.search(choices, 2 * _MOVES)
+        is_better = search.fix_contacts()
+        if is_better:
             choices.adopt(search.plan)
-        elif not has_more:
-            return
+        idle_rounds = 0 if is_new or is_better else idle_rounds + 1

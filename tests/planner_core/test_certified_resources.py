@@ -1,0 +1,103 @@
+"""Plans with resources: the bound holds, the plan is valid, and "optimal" is the optimum."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from planner_core.problem import Problem, Sunlight
+from planner_core.resource_bound import resource_value
+from planner_core.solvers.base import Budget, Progress, Termination
+from planner_core.solvers.certified import Certified
+from planner_core.timeline import replay
+from tests.planner_core.brute_force import best_reward
+from tests.planner_core.problems import TIGHT, random_problem
+
+SEEDS = st.integers(0, 10**6)
+ECLIPSES = Sunlight(enter_s=np.array([0.0, 500.0]), exit_s=np.array([180.0, 760.0]))
+STARVED = replace(TIGHT, battery_min_fraction=0.5, initial_battery_fraction=0.62)
+
+
+def _problem(seed: int, dynamics: Literal["physical", "paper"], num_satellites: int = 1) -> Problem:
+    rng = np.random.default_rng(seed)
+    return random_problem(
+        seed,
+        dynamics=dynamics,
+        num_satellites=num_satellites,
+        has_rewards=bool(rng.integers(2)),
+        sunlight=ECLIPSES if rng.integers(2) else None,
+        resources=STARVED if rng.integers(3) == 0 else TIGHT,
+    )
+
+
+@pytest.mark.parametrize("dynamics", ["physical", "paper"])
+@settings(max_examples=50, deadline=None)
+@given(seed=SEEDS, num_satellites=st.integers(1, 3))
+def test_bound_and_plan_enclose_the_optimum(
+    dynamics: Literal["physical", "paper"], seed: int, num_satellites: int
+) -> None:
+    problem = _problem(seed, dynamics, num_satellites)
+    best = best_reward(problem)
+    solution = Certified().solve(problem, Budget(), 0)
+    timeline = replay(problem, solution.plan)
+    assert solution.bound is not None
+    assert solution.bound >= best - 1e-6
+    assert timeline.is_valid
+    assert timeline.reward <= best + 1e-6
+    if solution.termination == Termination.OPTIMAL:
+        assert timeline.reward == pytest.approx(best, rel=1e-6)
+
+
+def test_small_problems_end_near_the_optimum() -> None:
+    reached = 0
+    for seed in range(30):
+        problem = _problem(seed, "physical" if seed % 2 else "paper", 1 + seed % 2)
+        plan = Certified().solve(problem, Budget(), 0).plan
+        reached += replay(problem, plan).reward == best_reward(problem)
+    assert reached >= 27
+
+
+def test_what_is_stored_proves_the_bound_again() -> None:
+    problem = random_problem(5, num_collects=60, num_targets=30, num_contacts=4)
+    solution = Certified().solve(problem, Budget(), 0)
+    assert solution.bound is not None
+    assert solution.bound_proof == "dp"
+    assert solution.prices is not None
+    assert solution.unit is not None
+    proven = resource_value(problem, solution.prices, solution.unit)
+    assert solution.bound <= proven + 1e-6
+    assert proven < solution.bound + 1.0
+
+
+def test_the_same_seed_gives_the_same_plan() -> None:
+    problem = random_problem(8, num_collects=60, num_targets=30, num_contacts=4)
+    first, second = (Certified().solve(problem, Budget(), 3) for _ in range(2))
+    assert first.plan == second.plan
+    assert first.bound == second.bound
+
+
+def test_bound_and_reward_close_in_and_a_gap_ends_the_search() -> None:
+    problem = random_problem(11, num_collects=80, num_targets=40, num_contacts=4)
+    seen: list[Progress] = []
+    solution = Certified(gap=0.9).solve(problem, Budget(report=seen.append), 0)
+    assert solution.termination in (Termination.GAP_REACHED, Termination.OPTIMAL)
+    Certified().solve(problem, Budget(report=seen.append), 0)
+    bounds = [p.bound for p in seen if p.bound is not None]
+    rewards = [p.reward for p in seen if p.reward is not None]
+    assert len(bounds) == len(rewards) > 0
+    assert all(b >= r for b, r in zip(bounds, rewards, strict=True))
+
+
+def test_cancelling_keeps_plan_and_bound() -> None:
+    problem = random_problem(12, num_collects=80, num_targets=40, num_contacts=4)
+    budget = Budget()
+    budget.cancel()
+    solution = Certified().solve(problem, budget, 0)
+    assert solution.termination == Termination.CANCELLED
+    assert solution.bound is not None
+    assert replay(problem, solution.plan).is_valid
