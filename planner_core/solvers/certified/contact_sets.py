@@ -22,6 +22,7 @@ from planner_core.solvers.milp.program import Rows
 _CLEAR: Final = 1e-7  # from the limits, so that the referee accepts the plan
 _CUT_ROUNDS: Final = 5
 _EFFORT: Final = 0.2
+_MAX_NODES: Final = 200
 
 
 class _Engine(Engine):
@@ -107,9 +108,9 @@ class FixedContacts:
         return is_cut
 
     def plan(self, at_least: float) -> Plan | None:
-        """Return the best plan worth ``at_least``, or None where there is none (in time)."""
+        """Return the best plan worth ``at_least``, or None where none turns up soon."""
         self._engine.require(at_least)
-        outcome = self._engine.search(None, 0.0, _EFFORT, _unwatched)
+        outcome = self._engine.search(None, 0.0, _EFFORT, _unwatched, _MAX_NODES)
         if outcome.columns is None:
             return None
         taken = outcome.columns[: len(self._problem.opportunities)]

@@ -34,7 +34,6 @@ _FIRST_ROUNDS: Final = 2
 _STEPS: Final = 5  # of the search for prices, in a round
 _PATIENCE: Final = 6  # rounds without a new set of contacts or a better plan
 _SETS_AT_A_TIME: Final = 2
-_SET_TIME_S: Final = 25.0
 _AS_GOOD: Final = 0.75  # of a target: sets whose prices count
 _OFFERED: Final = (800, 500)  # tasks in a search with fixed contacts
 _LESS_LIKELY: Final = 0.15  # of a target: what a set is worth less at each further attempt
@@ -158,8 +157,7 @@ class ResourceSearch:
         for contacts in new:
             if self.is_done:
                 return False
-            share = self._share()
-            program = FixedContacts(self.problem, offered, contacts, share, self.seed)
+            program = FixedContacts(self.problem, offered, contacts, self.budget, self.seed)
             self._relaxed[contacts] = program.relaxation()
         best = max(relaxation.value for relaxation in self._relaxed.values())
         if not new or not np.isfinite(best):
@@ -190,7 +188,7 @@ class ResourceSearch:
         _, contacts, size = max(hopeful)
         self._tried.add((contacts, size))
         offered = self.promising(self._relaxed[contacts], size)
-        part = FixedContacts(self.problem, offered, contacts, self._share(), self.seed)
+        part = FixedContacts(self.problem, offered, contacts, self.budget, self.seed)
         if part.relaxed < self.better - 1e-6:
             return False
         self.report("contacts fixed")
@@ -209,13 +207,6 @@ class ResourceSearch:
     def better(self) -> float:
         """What a plan must be worth that is better than the one at hand."""
         return self.reward + max(self.unit, TOLERANCE * self.reward, 1e-9)
-
-    def _share(self) -> Budget:
-        """Return a budget for one program, that ends with the whole at the latest."""
-        left_s = self.budget.remaining_s()
-        share = Budget(_SET_TIME_S if left_s is None else min(left_s, _SET_TIME_S))
-        share.stop = self.budget.stop
-        return share
 
     def solution(self) -> Solution:
         """Return the plan with what is known of it."""

@@ -106,7 +106,12 @@ class Engine:
         return self._bound
 
     def search(
-        self, start: Floats | None, gap: float, heuristic_effort: float, watch: Watch
+        self,
+        start: Floats | None,
+        gap: float,
+        heuristic_effort: float,
+        watch: Watch,
+        max_nodes: int | None = None,
     ) -> Outcome:
         """Return the best integer point.
 
@@ -118,6 +123,9 @@ class Engine:
             Relative distance of objective and bound at which to stop.
         heuristic_effort
             Share of the work spent on looking for points rather than on the proof.
+        max_nodes
+            How many parts of the search to look at; unlike a limit in seconds, the same
+            everywhere.
         """
         if self._is_abandoned:
             # HiGHS is still in its last relaxation, and must not be touched.
@@ -128,6 +136,8 @@ class Engine:
         highs.changeColsIntegrality(len(integer), integer, kinds)
         highs.setOptionValue("mip_rel_gap", gap)
         highs.setOptionValue("mip_heuristic_effort", heuristic_effort)
+        if max_nodes is not None:
+            highs.setOptionValue("mip_max_nodes", max_nodes)
         if start is not None:
             highs.setSolution(len(start), np.arange(len(start), dtype=np.int32), start)
 
