@@ -112,15 +112,8 @@ def _best_bound(
 ) -> Bound:
     """Return the lowest of what is known, what the solver has proven and a quick bound."""
     proven = None if known is None else replace(known, value=max(known.value, reward))
-    if solution.bound is not None and solution.bound_proof is not None:
-        own = Bound(
-            value=max(solution.bound, reward),
-            proof=solution.bound_proof,
-            certificate=solution.certificate,
-            log=solution.log,
-            prices=solution.prices,
-            unit=solution.unit,
-        )
+    if solution.proven is not None:
+        own = replace(solution.proven, value=max(solution.proven.value, reward))
         proven = own if proven is None or own.value < proven.value else proven
     if proven is not None and (known is not None or proven.value <= reward):
         return proven

@@ -10,10 +10,9 @@ from typing import ClassVar, Literal, Protocol
 
 import numpy as np
 
-from planner_core.bounds import Proof
-from planner_core.certificate import Certificate
+from planner_core.bounds import Bound
 from planner_core.plan import Plan
-from planner_core.problem import Bytes, Floats, Problem
+from planner_core.problem import Bytes, Problem
 
 Feasibility = Literal["hard", "penalty"]
 BreadthCounts = Literal["tasks", "one_more"]
@@ -115,24 +114,20 @@ class Solution:
 
     Attributes
     ----------
-    bound, bound_proof
-        What the search has proven on the way: no valid plan of the problem earns more, and
-        by which argument. None where it has proven nothing.
-    certificate, log
-        What there is to check the proof with: multipliers, or the report of the MILP solver.
-    prices, unit
-        The same for a proof by dynamic programmes (``resource_bound.resource_value``).
+    proven
+        What the search has proven on the way: no valid plan of the problem earns more. None
+        where it has proven nothing.
     """
 
     plan: Plan
     termination: Termination
     statistics: Mapping[str, float] = field(default_factory=dict)
-    bound: float | None = None
-    bound_proof: Proof | None = None
-    certificate: Certificate | None = None
-    log: str | None = None
-    prices: Floats | None = None
-    unit: float | None = None
+    proven: Bound | None = None
+
+    @property
+    def bound(self) -> float | None:
+        """The value of what is proven."""
+        return None if self.proven is None else self.proven.value
 
 
 class Solver(Protocol):

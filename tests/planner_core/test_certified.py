@@ -55,17 +55,18 @@ def assert_proven(problem: Problem, solution: Solution, best: float) -> None:
     timeline = replay(problem, solution.plan)
     assert timeline.is_valid, timeline.violations
     assert solution.bound is not None
+    assert solution.proven is not None
     slack = 1e-9 * max(1.0, best)
     assert timeline.reward <= best + slack
     assert solution.bound >= best - slack
     if solution.termination is Termination.OPTIMAL:
         assert timeline.reward >= best * (1.0 - TOLERANCE) - slack
-    if solution.bound_proof == "lagrangian":
-        assert solution.certificate is not None
-        assert is_refuted(problem, solution.certificate)
-        assert solution.certificate.amount > best
+    if solution.proven.proof == "lagrangian":
+        assert solution.proven.certificate is not None
+        assert is_refuted(problem, solution.proven.certificate)
+        assert solution.proven.certificate.amount > best
     else:
-        assert solution.log
+        assert solution.proven.log
 
 
 @settings(max_examples=150, deadline=None)
@@ -124,7 +125,8 @@ def test_a_certificate_that_claims_less_than_a_plan_earns_is_never_sound(
     )  # fmt: skip
     best = best_reward(problem)
     rng = np.random.default_rng(seed)
-    proof = Certified().solve(problem, Budget(), 0).certificate
+    proven = Certified().solve(problem, Budget(), 0).proven
+    proof = proven.certificate if proven else None
     cuts = [c for step in proof.refutation.steps for c in step.cuts] if proof else []
     rows = [problem.collects_of(target) for target in range(4)]
     cuts += [Cut(sets=(row,)) for row in rows if len(row)]
@@ -209,8 +211,9 @@ def test_a_proof_survives_being_written_down() -> None:
     problem = random_problem(3, use_resources=False, num_collects=120, num_targets=30)
     solution = Certified().solve(problem, Budget(), 0)
     assert solution.bound is not None
-    assert solution.certificate is not None
-    bound = Bound(value=solution.bound, proof="lagrangian", certificate=solution.certificate)
+    assert solution.proven is not None
+    assert solution.proven.certificate is not None
+    bound = Bound(value=solution.bound, proof="lagrangian", certificate=solution.proven.certificate)
     again = from_json(to_json(bound))
     assert again.value == bound.value
     assert is_proven(problem, again)

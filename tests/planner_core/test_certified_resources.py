@@ -66,10 +66,11 @@ def test_what_is_stored_proves_the_bound_again() -> None:
     problem = random_problem(5, num_collects=60, num_targets=30, num_contacts=4)
     solution = Certified().solve(problem, Budget(), 0)
     assert solution.bound is not None
-    assert solution.bound_proof == "dp"
-    assert solution.prices is not None
-    assert solution.unit is not None
-    proven = resource_value(problem, solution.prices, solution.unit)
+    assert solution.proven is not None
+    assert solution.proven.proof == "dp"
+    assert solution.proven.prices is not None
+    assert solution.proven.unit is not None
+    proven = resource_value(problem, solution.proven.prices, solution.proven.unit)
     assert solution.bound <= proven + 1e-6
     assert proven < solution.bound + 1.0
 

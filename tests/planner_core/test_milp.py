@@ -36,9 +36,10 @@ def assert_equals_brute_force(problem: Problem, formulation: Any) -> None:
     assert timeline.is_valid, timeline.violations
     assert timeline.reward == pytest.approx(best)
     assert solution.bound is not None
+    assert solution.proven is not None
     assert solution.bound == pytest.approx(best, abs=1e-4)
     assert solution.bound >= best - 1e-9
-    assert solution.bound_proof == "milp"
+    assert solution.proven.proof == "milp"
     assert solution.termination is Termination.OPTIMAL
 
 

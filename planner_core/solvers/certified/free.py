@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from planner_core.bounds import default_steps, priced_bound, reward_unit, rounded_bound
+from planner_core.bounds import Bound, default_steps, priced_bound, reward_unit, rounded_bound
 from planner_core.certificate import Certificate, Multipliers, Refutation, is_below, values_through
 from planner_core.comparable import transitive_closure
 from planner_core.network import network_of
@@ -289,16 +289,13 @@ class FreeSearch:
             termination = self.budget.termination()
         else:
             termination = Termination.HORIZON_COMPLETE
-        above = self.bound + (self.unit or 4e-9 * max(1.0, self.bound))
-        certificate = Certificate(amount=above, refutation=self.refutation())
-        return Solution(
-            plan=self.plan,
-            termination=termination,
-            bound=self.bound,
-            bound_proof="milp" if self.log else "lagrangian",
-            certificate=None if self.log else certificate,
-            log=self.log,
-        )
+        if self.log:
+            proven = Bound(value=self.bound, proof="milp", log=self.log)
+        else:
+            above = self.bound + (self.unit or 4e-9 * max(1.0, self.bound))
+            certificate = Certificate(amount=above, refutation=self.refutation())
+            proven = Bound(value=self.bound, proof="lagrangian", certificate=certificate)
+        return Solution(plan=self.plan, termination=termination, proven=proven)
 
 
 def solve_free(

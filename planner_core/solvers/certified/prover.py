@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Final
-
-import highspy
 import numpy as np
 
 from planner_core.plan import Plan
@@ -12,8 +9,6 @@ from planner_core.problem import Problem
 from planner_core.solvers.base import Budget
 from planner_core.solvers.milp.highs import Engine, Watch
 from planner_core.solvers.milp.program import Program
-
-_MAX_LOG: Final = 6000  # characters; the end, which holds the result
 
 
 class Prover(Engine):
@@ -34,11 +29,7 @@ class Prover(Engine):
         self._problem = problem
         self._scale = float(problem.target_reward.max(initial=1e-300))
         super().__init__(program, budget, seed, is_chained=False)
-        self._messages: list[str] = []
         highs = self._highs
-        highs.setOptionValue("output_flag", True)
-        highs.setOptionValue("log_to_console", False)
-        highs.cbLogging += self._keep
         for option, limit in (("objective_bound", amount), ("objective_target", enough)):
             highs.setOptionValue(option, (limit - 1e-6 * max(1.0, limit)) / self._scale)
 
@@ -54,11 +45,3 @@ class Prover(Engine):
             plan = Plan.of(self._problem, np.flatnonzero(taken > 0.5))
         bound = -np.inf if outcome.is_infeasible else outcome.bound * self._scale
         return plan, bound
-
-    @property
-    def log(self) -> str:
-        """What HiGHS had to say."""
-        return "".join(self._messages)[-_MAX_LOG:]
-
-    def _keep(self, event: highspy.highs.HighsCallbackEvent) -> None:
-        self._messages.append(event.message)

@@ -113,15 +113,8 @@ class ResourceSearch:
         quiet = Budget(self.budget.remaining_s())
         quiet.stop = self.budget.stop
         solution = solve_free(free, quiet, self.seed, self.gap, 30.0)
-        if solution.bound is not None and solution.bound_proof is not None:
-            self.lower(
-                Bound(
-                    value=solution.bound,
-                    proof=solution.bound_proof,
-                    certificate=solution.certificate,
-                    log=solution.log,
-                )
-            )
+        if solution.proven is not None:
+            self.lower(solution.proven)
         self.report("without resources")
         return self.mask(action.opportunity for action in solution.plan.actions)
 
@@ -221,16 +214,7 @@ class ResourceSearch:
         if self.problem.continuous_starts:
             # Another start may suit the next task better: nothing here bounds that.
             return Solution(plan=self.plan, termination=termination)
-        return Solution(
-            plan=self.plan,
-            termination=termination,
-            bound=self.bound.value,
-            bound_proof=self.bound.proof,
-            certificate=self.bound.certificate,
-            log=self.bound.log,
-            prices=self.bound.prices,
-            unit=self.bound.unit,
-        )
+        return Solution(plan=self.plan, termination=termination, proven=self.bound)
 
 
 def solve_with_resources(problem: Problem, budget: Budget, seed: int, gap: float) -> Solution:

@@ -23,6 +23,8 @@ _POLL_S: Final = 0.02
 _PATIENCE_S: Final = 0.25
 """How long HiGHS may take to stop by itself; between two of its interrupts lie seconds at times."""
 
+_MAX_LOG: Final = 6000  # characters
+
 Watch = Callable[[float, float], None]
 """Called now and then with the best objective so far and the bound."""
 
@@ -39,11 +41,14 @@ class Outcome:
         No point is worth more; infinite where nothing is known yet.
     is_infeasible
         Whether it is proven that there is no point at all.
+    log
+        The end of what HiGHS had to say.
     """
 
     columns: Floats | None
     bound: float
     is_infeasible: bool
+    log: str
 
 
 class Engine:
@@ -60,9 +65,11 @@ class Engine:
         self._bound = float("inf")
         self._incumbent: Floats | None = None
         self._is_abandoned = False
+        self._messages: list[str] = []
         self._highs = highs = highspy.Highs()  # type: ignore[no-untyped-call]
         options: dict[str, bool | int | float | str] = {
-            "output_flag": False,
+            "output_flag": True,
+            "log_to_console": False,
             # More threads would outlive the solve, and workers fork.
             "threads": 1,
             "parallel": "off",
@@ -79,6 +86,7 @@ class Engine:
         highs.changeObjectiveSense(highspy.ObjSense.kMaximize)
         for rows in program.rows:
             self.add_rows(rows)
+        highs.cbLogging += self._keep_message
         highs.cbSimplexInterrupt += self._interrupt_if_spent
         highs.cbIpmInterrupt += self._interrupt_if_spent
 
@@ -105,6 +113,11 @@ class Engine:
         """What no point exceeds, as far as the relaxations have shown."""
         return self._bound
 
+    @property
+    def log(self) -> str:
+        """What HiGHS had to say: the end of it, which holds the result."""
+        return "".join(self._messages)[-_MAX_LOG:]
+
     def search(
         self,
         start: Floats | None,
@@ -129,7 +142,7 @@ class Engine:
         """
         if self._is_abandoned:
             # HiGHS is still in its last relaxation, and must not be touched.
-            return Outcome(columns=None, bound=self._bound, is_infeasible=False)
+            return self._so_far(None)
         highs = self._highs
         integer = np.flatnonzero(self._is_integer).astype(np.int32)
         kinds = np.full(len(integer), int(highspy.HighsVarType.kInteger), dtype=np.uint8)
@@ -154,14 +167,20 @@ class Engine:
         highs.cbMipInterrupt += on_interrupt
         highs.cbMipImprovingSolution += on_improved
         if not self._run():
-            return Outcome(columns=self._incumbent, bound=self._bound, is_infeasible=False)
+            return Outcome(
+                columns=self._incumbent, bound=self._bound, is_infeasible=False, log=self.log
+            )
         info, status = highs.getInfo(), highs.getModelStatus()
         has_point = info.primal_solution_status == highspy.SolutionStatus.kSolutionStatusFeasible
         return Outcome(
             columns=np.array(highs.getSolution().col_value) if has_point else None,
             bound=min(self._bound, float(info.mip_dual_bound)),
             is_infeasible=status == highspy.HighsModelStatus.kInfeasible,
+            log=self.log,
         )
+
+    def _so_far(self, columns: Floats | None) -> Outcome:
+        return Outcome(columns=columns, bound=self._bound, is_infeasible=False, log=self.log)
 
     def _run(self) -> bool:
         """Run HiGHS; return whether it ended in time, and may be asked what it found."""
@@ -177,6 +196,9 @@ class Engine:
         thread.join(_PATIENCE_S)
         self._is_abandoned = thread.is_alive()
         return not self._is_abandoned
+
+    def _keep_message(self, event: highspy.highs.HighsCallbackEvent) -> None:
+        self._messages.append(event.message)
 
     def _interrupt_if_spent(self, event: highspy.highs.HighsCallbackEvent) -> None:
         if self._is_abandoned or self._budget.is_spent():

@@ -12,7 +12,7 @@ from typing import ClassVar, Final
 
 import numpy as np
 
-from planner_core.bounds import rounded_bound
+from planner_core.bounds import Bound, rounded_bound
 from planner_core.plan import Plan
 from planner_core.problem import COLLECT, Floats, Problem
 from planner_core.solvers.base import Budget, Constraint, Progress, Solution, Termination
@@ -86,7 +86,7 @@ class Milp:
         if len(problem.opportunities) == 0 or budget.is_spent():
             return best.solution(problem, budget, self.gap)
         outcome = self._search(problem, budget, seed, best, _TOUCHING)
-        best.bound = outcome.bound
+        best.bound, best.log = outcome.bound, outcome.log
         if outcome.is_infeasible:
             return best.solution(problem, budget, self.gap)
         plan = _plan_of(problem, outcome)
@@ -178,7 +178,7 @@ class _Best:
         self._problem = problem
         self.plan = Plan()
         self._timeline = replay(problem, self.plan)
-        self.bound = np.inf
+        self.bound, self.log = np.inf, ""
 
     @property
     def reward(self) -> float:
@@ -204,14 +204,14 @@ class _Best:
     def solution(self, problem: Problem, budget: Budget, gap: float) -> Solution:
         """Return the plan with what is known of it."""
         reward = self._timeline.reward
-        bound = None
+        bound, proven = None, None
         if np.isfinite(self.bound) and self._timeline.is_valid and not problem.continuous_starts:
             bound = rounded_bound(problem, self.bound, reward)
+            proven = Bound(value=bound, proof="milp", log=self.log)
         return Solution(
             plan=self.plan,
             termination=_termination(reward, bound, budget, gap),
-            bound=bound,
-            bound_proof=None if bound is None else "milp",
+            proven=proven,
         )
 
 
