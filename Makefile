@@ -5,7 +5,7 @@ UV ?= uv
 BIN := .venv/bin
 STAMP := .venv/.installed
 WARM := .venv/.warm
-KERNELS := $(shell grep -rlE '^@(kernel|inlined)' planner_core --include=*.py)
+KERNELS := $(shell grep -rlE '^@(kernel|borrowing|inlined)' planner_core --include=*.py)
 PIP := $(BIN)/python -m pip -qq --disable-pip-version-check
 
 .PHONY: help setup demo serve test check format lock paper paper-quick clean

@@ -10,7 +10,7 @@ import statistics
 import time
 
 from benchmarks.missions import paper_scenario, problem_of
-from planner_core.bounds import lagrangian_bound
+from planner_core.bounds.lagrangian import lagrangian_bound
 from planner_core.problem import Problem
 from planner_core.solvers import ForwardSearch, Rule
 from planner_core.solvers.base import Budget, Solver

@@ -7,31 +7,13 @@ that turns more slowly than it tracks, on the whole table of what may follow wha
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
-from planner_core.comparable import Order, comes_before, order_of, transitive_closure
+from planner_core.arcs import Arcs, covering_arcs
+from planner_core.comparable import Order, order_of, transitive_closure
 from planner_core.jit import kernel
-from planner_core.problem import Floats, Ints, Longs, Problem, SatelliteProblem
-
-
-class CoveringArcs(NamedTuple):
-    """Pairs of tasks that may follow each other with none in between: the order's own arcs.
-
-    Where "may follow" is transitive, a chain of these leads from each task to every task that
-    may follow it. There are about ten for each task, far fewer than pairs.
-
-    Attributes
-    ----------
-    first
-        Where each task's arcs begin. Shape ``(m + 1,)``.
-    to
-        The tasks they lead to.
-    """
-
-    first: Longs
-    to: Ints
+from planner_core.problem import Floats, Ints, Problem, SatelliteProblem
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -45,14 +27,14 @@ class Links:
     """
 
     order: Order
-    arcs: CoveringArcs | None
+    arcs: Arcs | None
 
     @classmethod
     def of(cls, problem: Problem, satellite: SatelliteProblem) -> Links:
         """Return the links of one satellite."""
         order = order_of(satellite.transitions)
         is_transitive = transitive_closure(problem, satellite) is satellite.transitions
-        arcs = CoveringArcs(*_covering_arcs(order)) if is_transitive else None
+        arcs = covering_arcs(order) if is_transitive else None
         return cls(order=order, arcs=arcs)
 
     @property
@@ -80,35 +62,7 @@ class Links:
 
 
 @kernel
-def _covering_arcs(order: Order) -> tuple[Longs, Ints]:
-    """Return offsets and ends of the arcs; ``order`` must be transitive."""
-    m = len(order.near_from)
-    first = np.zeros(m + 1, dtype=np.int64)
-    to = np.empty(16 * m + 16, dtype=np.int32)
-    count = 0
-    for a in range(m):
-        # Whatever the longest slew from one of the arcs' ends reaches is covered by it.
-        end = m
-        b = order.near_from[a]
-        while b < end:
-            is_covered = not comes_before(order, a, b)
-            at = first[a]
-            while not is_covered and at < count:
-                is_covered = comes_before(order, to[at], b)
-                at += 1
-            if not is_covered:
-                if count == len(to):
-                    to = np.concatenate((to, np.empty_like(to)))
-                to[count] = b
-                count += 1
-                end = min(end, order.far_from[b])
-            b += 1
-        first[a + 1] = count
-    return first, to[:count].copy()
-
-
-@kernel
-def longest_path(weight: Floats, arcs: CoveringArcs, before: Ints) -> tuple[float, int]:
+def longest_path(weight: Floats, arcs: Arcs, before: Ints) -> tuple[float, int]:
     """Return the greatest weight of a chain of tasks that may follow each other, and its end.
 
     Parameters
@@ -139,7 +93,7 @@ def longest_path(weight: Floats, arcs: CoveringArcs, before: Ints) -> tuple[floa
 
 @kernel
 def longest_path_with_history(
-    weight: Floats, place: Ints, arcs: CoveringArcs, before: Ints
+    weight: Floats, place: Ints, arcs: Arcs, before: Ints
 ) -> tuple[float, int]:
     """Return the weight and end of a heavy chain in which no place stands twice.
 

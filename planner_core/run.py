@@ -6,12 +6,13 @@ import itertools
 import time
 from dataclasses import dataclass, replace
 
-from planner_core.bounds import Bound, lagrangian_bound
+from planner_core.bounds.bound import Bound
+from planner_core.bounds.lagrangian import lagrangian_bound
+from planner_core.bounds.resource_bound import quick_bound
 from planner_core.build import ScenarioOpportunities, build_problem, compute_opportunities
 from planner_core.domain import Scenario
 from planner_core.problem import Problem
 from planner_core.reasons import TargetOutcome, explain
-from planner_core.resource_bound import quick_bound
 from planner_core.solvers.base import Budget, Progress, Solution, Solver
 from planner_core.timeline import Timeline, replay
 

@@ -13,8 +13,8 @@ from benchmarks.missions import problem_of
 from benchmarks.paper.cpu_budget import CpuBudget
 from benchmarks.paper.readings import Reading
 from benchmarks.paper.settings import make_solver
+from planner_core.bounds.resource_bound import quick_bound
 from planner_core.problem import COLLECT, Problem
-from planner_core.resource_bound import quick_bound
 from planner_core.solvers.base import Budget, Solution, Solver, Termination
 from planner_core.timeline import replay
 

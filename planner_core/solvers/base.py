@@ -10,7 +10,7 @@ from typing import ClassVar, Literal, Protocol
 
 import numpy as np
 
-from planner_core.bounds import Bound
+from planner_core.bounds.bound import Bound
 from planner_core.plan import Plan
 from planner_core.problem import Bytes, Problem
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import Any, cast
 
-from planner_core import proofs
+from planner_core.bounds import proofs
 from planner_core.build import ScenarioOpportunities
 from planner_core.domain import (
     GroundStation,

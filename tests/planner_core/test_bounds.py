@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planner_core.bounds import lagrangian_bound, lagrangian_value
+from planner_core.bounds.lagrangian import lagrangian_bound, lagrangian_value
 from planner_core.domain import Agility
 from planner_core.solvers import ForwardSearch
 from planner_core.solvers.base import Budget

@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planner_core.bounds import Bound
-from planner_core.certificate import Certificate, Cut, Multipliers, Refutation, is_refuted
+from planner_core.bounds.bound import Bound
+from planner_core.bounds.certificate import Certificate, Cut, Multipliers, Refutation, is_refuted
+from planner_core.bounds.proofs import from_json, is_proven, to_json
 from planner_core.domain import Agility
 from planner_core.problem import COLLECT, Problem
-from planner_core.proofs import from_json, is_proven, to_json
 from planner_core.solvers import Certified, Rule
 from planner_core.solvers.base import Budget, Progress, Solution, Termination
 from planner_core.solvers.certified.free import TOLERANCE

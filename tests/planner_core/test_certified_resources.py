@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from planner_core.bounds.resource_bound import resource_value
 from planner_core.problem import Problem, Sunlight
-from planner_core.resource_bound import resource_value
 from planner_core.solvers.base import Budget, Progress, Termination
 from planner_core.solvers.certified import Certified
 from planner_core.timeline import replay

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from planner_core.bounds.resource_bound import quick_bound, resource_value
 from planner_core.problem import Problem, Sunlight
-from planner_core.resource_bound import quick_bound, resource_value
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import TIGHT, Task, make_problem, random_problem
 

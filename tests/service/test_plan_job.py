@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from planner_core import proofs
-from planner_core.bounds import Bound
+from planner_core.bounds import proofs
+from planner_core.bounds.bound import Bound
 from planner_core.build import build_problem, compute_opportunities
 from planner_core.solvers import SOLVERS
 from planner_core.solvers.base import Budget

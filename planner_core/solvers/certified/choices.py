@@ -13,12 +13,12 @@ from typing import Final
 
 import numpy as np
 
-from planner_core.data_levels import DataLevels, data_levels, levels_of_part
-from planner_core.least_energy import least_energy
-from planner_core.most_value import most_value, path_of
+from planner_core.bounds.data_levels import DataLevels, data_levels, levels_of_part
+from planner_core.bounds.least_energy import least_energy
+from planner_core.bounds.most_value import most_value, path_of
+from planner_core.bounds.resource_network import Network, part_of, strict_network_of
 from planner_core.plan import Plan
 from planner_core.problem import COLLECT, Bools, Bytes, Ints, Problem
-from planner_core.resource_network import Network, part_of, strict_network_of
 from planner_core.solvers.sequential import blocked_rows
 
 _SETTLED: Final = 0.2  # share of the targets collected once that each round settles as well

@@ -12,10 +12,17 @@ from typing import Final
 
 import numpy as np
 
-from planner_core.bounds import Bound, default_steps, priced_bound, reward_unit, rounded_bound
-from planner_core.certificate import Certificate, Multipliers, Refutation, is_below, values_through
+from planner_core.bounds.bound import Bound, reward_unit, rounded_bound
+from planner_core.bounds.certificate import (
+    Certificate,
+    Multipliers,
+    Refutation,
+    is_below,
+    values_through,
+)
+from planner_core.bounds.lagrangian import default_steps, priced_bound
+from planner_core.bounds.network import network_of
 from planner_core.comparable import transitive_closure
-from planner_core.network import network_of
 from planner_core.plan import Plan
 from planner_core.problem import Bools, Floats, Ints, Problem
 from planner_core.restrict import restricted

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from planner_core.certificate import Cut, Multipliers
+from planner_core.bounds.certificate import Cut, Multipliers
 from planner_core.comparable import (
     Order,
     are_comparable,

@@ -7,13 +7,13 @@ from typing import Final
 
 import numpy as np
 
-from planner_core.problem import COLLECT, CONTACT, Bytes, Floats, Problem
-from planner_core.resource_bound import (
+from planner_core.bounds.resource_bound import (
     SatelliteRelaxation,
     leaving_whole_units,
     relaxations,
     whole_worth,
 )
+from planner_core.problem import COLLECT, CONTACT, Bytes, Floats, Problem
 
 _MAX_CELLS: Final = 12_000_000
 _UNITS_PER_REWARD: Final = 16

@@ -15,10 +15,11 @@ from typing import Final
 
 import numpy as np
 
-from planner_core.bounds import Bound, lagrangian_bound, reward_unit, rounded_bound
+from planner_core.bounds.bound import Bound, reward_unit, rounded_bound
+from planner_core.bounds.lagrangian import lagrangian_bound
+from planner_core.bounds.resource_bound import quick_bound
 from planner_core.plan import Plan
 from planner_core.problem import CONTACT, Bools, Floats, Problem
-from planner_core.resource_bound import quick_bound
 from planner_core.solvers.base import Budget, Progress, Solution, Termination
 from planner_core.solvers.certified.choices import ChoiceSearch
 from planner_core.solvers.certified.contact_sets import FixedContacts, Relaxation

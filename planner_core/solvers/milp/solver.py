@@ -12,7 +12,7 @@ from typing import ClassVar, Final
 
 import numpy as np
 
-from planner_core.bounds import Bound, rounded_bound
+from planner_core.bounds.bound import Bound, rounded_bound
 from planner_core.plan import Plan
 from planner_core.problem import COLLECT, Floats, Problem
 from planner_core.solvers.base import Budget, Constraint, Progress, Solution, Termination

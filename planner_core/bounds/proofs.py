@@ -7,10 +7,11 @@ from typing import Any, Final, cast
 
 import numpy as np
 
-from planner_core.bounds import Bound, Proof, lagrangian_value, reward_unit, rounded_bound
-from planner_core.certificate import Certificate, Cut, Multipliers, Refutation, is_refuted
+from planner_core.bounds.bound import Bound, Proof, reward_unit, rounded_bound
+from planner_core.bounds.certificate import Certificate, Cut, Multipliers, Refutation, is_refuted
+from planner_core.bounds.lagrangian import lagrangian_value
+from planner_core.bounds.resource_bound import resource_value
 from planner_core.problem import Problem
-from planner_core.resource_bound import resource_value
 
 VERSION: Final = 1
 _ROUNDING: Final = 1e-8  # relative

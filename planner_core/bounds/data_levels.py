@@ -6,9 +6,9 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from planner_core.bounds.resource_network import Network
 from planner_core.jit import kernel
 from planner_core.problem import Floats, Ints
-from planner_core.resource_network import Network
 
 _MAX_LEVELS: Final = 256
 _ROUNDING: Final = 1e-6  # of a level: tasks of "the same" length differ by as much

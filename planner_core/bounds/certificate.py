@@ -15,8 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planner_core.bounds.network import Network, heaviest_through, network_of
 from planner_core.comparable import Order, are_comparable, order_of, transitive_closure
-from planner_core.network import Network, heaviest_through, network_of
 from planner_core.problem import COLLECT, Bools, Floats, Ints, Problem
 from planner_core.restrict import restricted
 

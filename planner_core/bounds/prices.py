@@ -6,8 +6,8 @@ from typing import Final
 
 import numpy as np
 
+from planner_core.bounds.network import Network, heaviest_paths
 from planner_core.jit import kernel
-from planner_core.network import Network, heaviest_paths
 from planner_core.problem import Bytes, Floats
 
 _DEFLECTION: Final = 0.7  # share of the last direction that is kept

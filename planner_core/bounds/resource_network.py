@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planner_core.arcs import Arcs, reversed_arcs
 from planner_core.comparable import Order, comes_before, order_of
 from planner_core.jit import kernel
 from planner_core.model import STRICT, compile_track
@@ -72,7 +73,7 @@ def _network(problem: Problem, satellite: SatelliteProblem, slack: float) -> Net
     track = compile_track(problem, satellite, np.zeros(len(satellite), dtype=np.uint8))
     order = order_of(satellite.transitions)
     idle_from, near_first, near_rows = _arcs(order)
-    straight_first, straight_rows = _arcs_by_end(near_first, near_rows)
+    straight_first, straight_rows = reversed_arcs(Arcs(near_first, near_rows))
     charge_from = track.charge_per_s * track.charge_from_s
     charge_to = track.charge_per_s * track.charge_to_s
     # A task may begin before another's end by the tolerance, and sunlight counts from there.
@@ -146,7 +147,7 @@ def part_of(network: Network, rows: Ints) -> Network:
                 num_arcs += 1
         first[new + 1] = num_arcs
     near_rows = near_rows[:num_arcs].copy()
-    straight_first, straight_rows = _arcs_by_end(first, near_rows)
+    straight_first, straight_rows = reversed_arcs(Arcs(first, near_rows))
     return Network(
         network.place[rows],
         network.is_contact[rows],
@@ -167,22 +168,3 @@ def part_of(network: Network, rows: Ints) -> Network:
         network.data_start,
         network.data_end,
     )
-
-
-@kernel
-def _arcs_by_end(near_first: Longs, near_rows: Ints) -> tuple[Longs, Ints]:
-    """Return the same arcs grouped by the row they lead to."""
-    m = len(near_first) - 1
-    first = np.zeros(m + 1, dtype=np.int64)
-    for j in near_rows:
-        first[j + 1] += 1
-    for j in range(m):
-        first[j + 1] += first[j]
-    filled = first[:m].copy()
-    rows = np.empty(len(near_rows), dtype=np.int32)
-    for i in range(m):
-        for at in range(near_first[i], near_first[i + 1]):
-            j = near_rows[at]
-            rows[filled[j]] = i
-            filled[j] += 1
-    return first, rows

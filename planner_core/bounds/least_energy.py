@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from planner_core.bounds.resource_network import Network
 from planner_core.jit import inlined, kernel
 from planner_core.problem import Ints, Singles
-from planner_core.resource_network import Network
 
 
 @kernel

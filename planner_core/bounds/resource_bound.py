@@ -1,10 +1,11 @@
 r"""An upper bound that battery and recorder tighten: prices, and exact dynamic programmes.
 
-As in ``planner_core.bounds`` each target has a price :math:`\lambda_i`, and no plan earns more
-than :math:`\sum_i \lambda_i` plus what each satellite can gain where an image of :math:`i` is
-worth :math:`r_i - \lambda_i`. Here the satellite's gain is the most that its battery and its
-recorder allow, not only its agility. Worth is counted in whole units, rounded up, so the bound
-holds for any unit; prices chosen to leave whole units lose nothing by it. Stations are left out.
+As in ``planner_core.bounds.lagrangian`` each target has a price :math:`\lambda_i`, and no plan
+earns more than :math:`\sum_i \lambda_i` plus what each satellite can gain where an image of
+:math:`i` is worth :math:`r_i - \lambda_i`. Here the satellite's gain is the most that its battery
+and its recorder allow, not only its agility. Worth is counted in whole units, rounded up, so the
+bound holds for any unit; prices chosen to leave whole units lose nothing by it. Stations are
+left out.
 """
 
 from __future__ import annotations
@@ -14,12 +15,13 @@ from typing import Final
 
 import numpy as np
 
-from planner_core.bounds import Bound, lagrangian_bound, rounded_bound
-from planner_core.data_levels import DataLevels, data_levels
-from planner_core.least_energy import least_energy
-from planner_core.most_value import STOPPED, UNREACHED, most_value, path_of
+from planner_core.bounds.bound import Bound, rounded_bound
+from planner_core.bounds.data_levels import DataLevels, data_levels
+from planner_core.bounds.lagrangian import lagrangian_bound
+from planner_core.bounds.least_energy import least_energy
+from planner_core.bounds.most_value import STOPPED, UNREACHED, most_value, path_of
+from planner_core.bounds.resource_network import Network, network_of
 from planner_core.problem import COLLECT, Bytes, Floats, Ints, Problem, SatelliteProblem, Singles
-from planner_core.resource_network import Network, network_of
 
 _MAX_CELLS: Final = 30_000_000  # of one table of least energy
 _MAX_UNITS: Final = 2000

@@ -10,10 +10,10 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from planner_core.data_levels import DataLevels
+from planner_core.bounds.data_levels import DataLevels
+from planner_core.bounds.resource_network import Network
 from planner_core.jit import inlined, kernel
 from planner_core.problem import Bytes, Floats, Ints, Longs, Singles
-from planner_core.resource_network import Network
 
 _TIDY_EVERY: Final = 8  # rows between two passes over the idle labels
 UNREACHED: Final = -1

@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner_core.comparable import Order, comes_before, order_of, transitive_closure
+from planner_core.arcs import covering_arcs, near_arcs, reversed_arcs
+from planner_core.comparable import order_of, transitive_closure
 from planner_core.jit import kernel
 from planner_core.problem import COLLECT, Floats, Ints, Longs, Problem
 
@@ -50,7 +51,7 @@ def network_of(problem: Problem) -> Network:
         base = first[-1]
         order = order_of(satellite.transitions)
         is_transitive = transitive_closure(problem, satellite) is satellite.transitions
-        offsets, rows = _arcs(order, is_transitive)
+        offsets, rows = reversed_arcs(covering_arcs(order) if is_transitive else near_arcs(order))
         arc_from.append(offsets[1:] + num_arcs)
         num_arcs += len(rows)
         before.append(rows + np.int32(base))
@@ -66,32 +67,6 @@ def network_of(problem: Problem) -> Network:
         before=np.concatenate([np.empty(0, dtype=np.int32), *before]),
         far_from=np.concatenate([np.empty(0, dtype=np.int32), *far_from]),
     )
-
-
-@kernel
-def _arcs(order: Order, is_transitive: bool) -> tuple[Longs, Ints]:
-    """Return the near predecessors of each task: covering ones only, if that is enough."""
-    m = len(order.near_from)
-    offsets = np.zeros(m + 1, dtype=np.int64)
-    found = [np.int32(0) for _ in range(0)]
-    first_near = 0
-    for b in range(m):
-        while first_near < b and order.far_from[first_near] <= b:
-            first_near += 1
-        # The later ones first: what they cover comes before them.
-        for a in range(b - 1, first_near - 1, -1):
-            if b >= order.far_from[a] or not comes_before(order, a, b):
-                continue
-            is_covered = False
-            if is_transitive:
-                for at in range(offsets[b], len(found)):
-                    if comes_before(order, a, int(found[at])):
-                        is_covered = True
-                        break
-            if not is_covered:
-                found.append(np.int32(a))
-        offsets[b + 1] = len(found)
-    return offsets, np.array(found, dtype=np.int32)
 
 
 @kernel
