@@ -1,13 +1,13 @@
 """How near certified plans are to the best, and in what time (``python -m benchmarks.certified``).
 
-Prints, for each size of the paper's mission without resources and its draws, how many plans are
-proven optimal, median and greatest CPU seconds and the greatest gap; and the CPU seconds of
+Prints, for each size of the paper's mission and its draws, how many plans are proven optimal,
+median and greatest CPU seconds and the greatest gap. Without resources also the CPU seconds of
 HiGHS on the paper's pairwise program and of CP-SAT (extra ``peers``, left out where it is not
 installed) over those of ours. Each solve is one process on one core, warmed up on a small
 mission and given ``LIMIT_S`` seconds; a peer that ran out of them counts with what it used.
 
-``python -m benchmarks.certified 1000 2000 --draws 3 --alone`` picks sizes and draws, and leaves
-out the peers.
+``python -m benchmarks.certified 1000 2000 --families free --draws 3 --alone`` picks sizes, families
+and draws, and leaves out the peers.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ import statistics
 import subprocess
 import sys
 import time
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, Final
 
 from benchmarks.missions import paper_scenario, problem_of
 from planner_core.problem import COLLECT, Problem
@@ -28,6 +29,14 @@ from planner_core.solvers.base import Budget
 LIMIT_S = 60.0
 SIZES = (200, 500, 1000, 2000)
 WARM_UP = 100  # targets
+FAMILIES: Final[Mapping[str, Mapping[str, Any]]] = {
+    "free": {"use_resources": False},
+    "physical": {"use_resources": True, "dynamics": "physical", "preset": "paper"},
+    "paper": {"use_resources": True, "dynamics": "paper", "preset": "paper"},
+    "physical-code": {"use_resources": True, "dynamics": "physical", "preset": "paper_code"},
+    "paper-code": {"use_resources": True, "dynamics": "paper", "preset": "paper_code"},
+}
+"""Without resources, and by dynamics with the rates of the paper's text or of its code."""
 
 
 def certified(problem: Problem) -> tuple[float, float]:
@@ -91,33 +100,33 @@ def cp_sat(problem: Problem) -> tuple[float, float]:
 METHODS = {"certified": certified, "pairwise": pairwise, "cp_sat": cp_sat}
 
 
-def one(method: str, num_targets: int, draw: int) -> dict[str, Any]:
+def one(method: str, family: str, num_targets: int, draw: int) -> dict[str, Any]:
     """Return what one solve came to, after a warm-up."""
     solve = METHODS[method]
-    solve(problem_of(paper_scenario(WARM_UP, 99, use_resources=False)))
-    problem = problem_of(paper_scenario(num_targets, draw, use_resources=False))
+    solve(problem_of(paper_scenario(WARM_UP, 99, **FAMILIES[family])))
+    problem = problem_of(paper_scenario(num_targets, draw, **FAMILIES[family]))
     began = time.process_time()
     reward, bound = solve(problem)
     return {"reward": reward, "bound": bound, "cpu_s": time.process_time() - began}
 
 
-def apart(method: str, num_targets: int, draw: int) -> dict[str, Any]:
+def apart(method: str, family: str, num_targets: int, draw: int) -> dict[str, Any]:
     """Return the same from a process of its own: HiGHS and CP-SAT cannot share one."""
     command = [sys.executable, "-m", "benchmarks.certified", "--one", method]
-    command += [str(num_targets), "--draw", str(draw)]
+    command += [str(num_targets), "--families", family, "--draw", str(draw)]
     done = subprocess.run(command, check=True, capture_output=True, text=True)
     answer: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
     return answer
 
 
-def print_size(num_targets: int, num_draws: int, peers: list[str]) -> None:
+def print_size(family: str, num_targets: int, num_draws: int, peers: list[str]) -> None:
     """Print one line for each draw and one for the size."""
     times: dict[str, list[float]] = {method: [] for method in ["certified", *peers]}
     gaps, num_proven = [], 0
     for draw in range(num_draws):
         ended = []
         for method in ("certified", *peers):
-            answer = apart(method, num_targets, draw)
+            answer = apart(method, family, num_targets, draw)
             times[method].append(answer["cpu_s"])
             is_proven = answer["bound"] - answer["reward"] <= 1e-6 * answer["bound"]
             ended.append(f"{method} {answer['reward']:.0f}/{answer['bound']:.1f} "
@@ -140,20 +149,23 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("sizes", nargs="*", type=int, default=SIZES)
+    parser.add_argument("--families", nargs="+", choices=FAMILIES, default=list(FAMILIES))
     parser.add_argument("--draws", type=int, default=10)
     parser.add_argument("--alone", action="store_true")
     parser.add_argument("--one", choices=METHODS)
     parser.add_argument("--draw", type=int, default=0)
     options = parser.parse_args()
     if options.one:
-        print(json.dumps(one(options.one, options.sizes[0], options.draw)))
+        print(json.dumps(one(options.one, options.families[0], options.sizes[0], options.draw)))
         return
     has_cp_sat = importlib.util.find_spec("ortools") is not None
     peers = [] if options.alone else ["pairwise", *(["cp_sat"] if has_cp_sat else [])]
-    print("Without resources.")
-    print(f"{'targets':>7} {'proven':>9} {'median_s':>8} {'max_s':>8} {'gap':>8}  time over ours")
-    for size in options.sizes:
-        print_size(size, options.draws, peers)
+    for family in options.families:
+        print(f"Family {family}")
+        print(f"{'targets':>7} {'proven':>9} {'median_s':>8} {'max_s':>8} {'gap':>8}"
+              f"{'  time over ours' if family == 'free' else ''}")  # fmt: skip
+        for size in options.sizes:
+            print_size(family, size, options.draws, peers if family == "free" else [])
 
 
 if __name__ == "__main__":
