@@ -5,22 +5,12 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
 from typing import Any, cast
 
 from planner_core.bounds import proofs
 from planner_core.build import ScenarioOpportunities
-from planner_core.domain import (
-    GroundStation,
-    Horizon,
-    OrbitElements,
-    Resources,
-    Satellite,
-    Scenario,
-    Target,
-)
 from planner_core.run import plan_scenario
-from planner_core.solvers import SOLVERS, solver_class
+from planner_core.solvers import solver_class
 from planner_core.solvers.base import Budget, Solver
 from service.documents import Documents
 from service.translate import scenario_from_content
@@ -118,36 +108,3 @@ def run_plan_job(request: PlanRequest, budget: Budget) -> PlanAnswer:
         proof=proofs.to_json(judged.bound) if judged.bound else None,
         opportunity_block=judged.opportunities.to_bytes() if block is None else None,
     )
-
-
-def warm_up() -> None:
-    """Plan a tiny mission with every solver, so that all kernels are compiled and loaded."""
-    start = datetime(2026, 1, 1, tzinfo=UTC)
-    orbit = OrbitElements(
-        name="WARM-UP",
-        norad_cat_id=1,
-        object_id="",
-        epoch=start,
-        mean_motion_rev_day=15.2,
-        eccentricity=0.001,
-        inclination_deg=90.0,
-        raan_deg=0.0,
-        arg_perigee_deg=0.0,
-        mean_anomaly_deg=0.0,
-    )
-    resources = Resources.paper(orbit.period_s)
-    scenario = Scenario(
-        horizon=Horizon(start=start, end=start + timedelta(hours=6)),
-        satellites=(Satellite(id="warm-up", name="WARM-UP", orbit=orbit, resources=resources),),
-        targets=tuple(
-            Target(id=f"{lat}/{lon}", lat_deg=float(lat), lon_deg=float(lon))
-            for lat in range(-80, 81, 20)
-            for lon in range(-180, 180, 30)
-        ),
-        ground_stations=(GroundStation(id="pole", name="Pole", lat_deg=85.0, lon_deg=0.0),),
-    )
-    opportunities = None
-    for solver in SOLVERS.values():
-        budget = Budget()
-        judged = plan_scenario(scenario, solver(), 0, budget, opportunities)
-        opportunities = judged.opportunities

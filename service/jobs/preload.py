@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import logging
 
-from service.jobs.plan_job import warm_up
+from service.jobs.warm import warm_up
 
 try:
     warm_up()

@@ -6,8 +6,26 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable
+from datetime import UTC, datetime, timedelta
+from typing import Final
 
-from service.jobs.plan_job import warm_up
+import numpy as np
+
+from planner_core.domain import (
+    GroundStation,
+    Horizon,
+    OrbitElements,
+    Resources,
+    Satellite,
+    Scenario,
+    Target,
+)
+from planner_core.run import plan_scenario
+from planner_core.solvers import SOLVERS, Certified, Graph
+from planner_core.solvers.base import Budget, Solver
+
+_START: Final = datetime(2026, 1, 1, tzinfo=UTC)
 
 
 def main() -> None:
@@ -15,6 +33,49 @@ def main() -> None:
     began_s = time.monotonic()
     warm_up()
     print(f"Kernels are ready ({time.monotonic() - began_s:.1f} s).")
+
+
+def warm_up() -> None:
+    """Plan tiny missions with every solver, so that all kernels are compiled and loaded."""
+    over_the_globe = [(lat, lon) for lat in range(-80, 81, 20) for lon in range(-180, 180, 30)]
+    _plan(_mission(over_the_globe, use_resources=True), [solver() for solver in SOLVERS.values()])
+    # Near the pole targets are in each other's way: proofs need all there is to prove with.
+    random = np.random.default_rng(0)
+    crowd = zip(random.uniform(60, 85, 120), random.uniform(-180, 180, 120), strict=True)
+    crowded = _mission(crowd, use_resources=False)
+    _plan(crowded, [Certified(), Graph(path="longest")])
+
+
+def _plan(scenario: Scenario, solvers: Iterable[Solver]) -> None:
+    opportunities = None
+    for solver in solvers:
+        opportunities = plan_scenario(scenario, solver, 0, Budget(), opportunities).opportunities
+
+
+def _mission(points: Iterable[tuple[float, float]], *, use_resources: bool) -> Scenario:
+    orbit = OrbitElements(
+        name="WARM-UP",
+        norad_cat_id=1,
+        object_id="",
+        epoch=_START,
+        mean_motion_rev_day=15.2,
+        eccentricity=0.001,
+        inclination_deg=90.0,
+        raan_deg=0.0,
+        arg_perigee_deg=0.0,
+        mean_anomaly_deg=0.0,
+    )
+    resources = Resources.paper(orbit.period_s)
+    return Scenario(
+        horizon=Horizon(start=_START, end=_START + timedelta(hours=6)),
+        satellites=(Satellite(id="warm-up", name="WARM-UP", orbit=orbit, resources=resources),),
+        targets=tuple(
+            Target(id=str(i), lat_deg=float(lat), lon_deg=float(lon))
+            for i, (lat, lon) in enumerate(points)
+        ),
+        ground_stations=(GroundStation(id="pole", name="Pole", lat_deg=85.0, lon_deg=0.0),),
+        use_resources=use_resources,
+    )
 
 
 if __name__ == "__main__":
