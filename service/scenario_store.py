@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from typing import Any, TypeVar
 
 import sqlalchemy as sa
+from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
 from planner_core.build import check_element_age, check_propagation, orbit_warnings
@@ -90,17 +91,20 @@ def save(session: Session, frozen: FrozenScenario) -> tuple[ScenarioRow, bool]:
     stored = session.scalar(same)
     if stored is not None:
         return stored, False
-    row = ScenarioRow(
-        id=new_id(),
-        sha256=frozen.sha256,
-        name=frozen.name,
-        summary=frozen.summary,
-        content=frozen.content,
-        created_at=datetime.now(UTC),
-    )
-    session.add(row)
-    session.flush()
-    return row, True
+    own_id = new_id()
+    row = {
+        "id": own_id,
+        "sha256": frozen.sha256,
+        "name": frozen.name,
+        "summary": frozen.summary,
+        "content": frozen.content,
+        "created_at": datetime.now(UTC),
+    }
+    # Somebody else may store the same content at this moment; then both get that one.
+    with suppress(IntegrityError), session.begin_nested():
+        session.execute(sa.insert(ScenarioRow).values(**row))
+    kept = session.scalars(same).one()
+    return kept, kept.id == own_id
 
 
 @contextmanager
