@@ -10,7 +10,7 @@ from planner_core.bounds.resource_network import Network
 from planner_core.jit import kernel
 from planner_core.problem import Floats, Ints
 
-_MAX_LEVELS: Final = 256
+_MAX_LEVELS: Final = 1200
 _ROUNDING: Final = 1e-6  # of a level: tasks of "the same" length differ by as much
 
 
@@ -39,9 +39,11 @@ def data_levels(network: Network, per_collect: int, *, is_optimistic: bool) -> D
     highest = max(
         float(network.data_before.max(initial=0.0)), float(network.data_after.max(initial=0.0))
     )
-    unit = (highest - lowest) / (_MAX_LEVELS - 4)
+    unit = (highest - lowest) / (_MAX_LEVELS - 4) or 1.0
     if is_filling.any():
-        unit = max(unit, float(network.data_gain[is_filling].min()) / per_collect)
+        # Halves of halves: what coarse levels prove, finer ones prove as well.
+        finest = float(network.data_gain[is_filling].min()) / per_collect
+        unit = finest * 2.0 ** np.ceil(np.log2(max(1.0, unit / finest)))
     sign = 1.0 if is_optimistic else -1.0
     room = sign * (m + 1) * _ROUNDING
     base = int(np.floor(lowest / unit - abs(room)))

@@ -27,6 +27,10 @@ _MAX_CELLS: Final = 30_000_000  # of one table of least energy
 _MAX_UNITS: Final = 2000
 _FIRST_STEP: Final = 0.01
 _ROUNDING: Final = 1e-9  # of a unit
+FINE: Final = 8
+"""Levels of the recorder that the smallest collect fills, where a proof counts."""
+COARSE: Final = 1
+"""The same where many prices are tried."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -38,12 +42,13 @@ class SatelliteRelaxation:
     levels: DataLevels
 
     @classmethod
-    def of(cls, problem: Problem, satellite: SatelliteProblem) -> SatelliteRelaxation:
+    def of(
+        cls, problem: Problem, satellite: SatelliteProblem, levels_per_collect: int
+    ) -> SatelliteRelaxation:
         """Return the relaxation of a satellite that has opportunities."""
         network = network_of(problem, satellite)
-        return cls(
-            satellite=satellite, network=network, levels=data_levels(network, 1, is_optimistic=True)
-        )
+        levels = data_levels(network, levels_per_collect, is_optimistic=True)
+        return cls(satellite=satellite, network=network, levels=levels)
 
     def weights(self, worth: Ints) -> Ints:
         """Return the worth of each task, from that of each target."""
@@ -106,9 +111,15 @@ class SatelliteRelaxation:
             limit = 4 * limit if near is None else int(1.1 * limit)
 
 
-def relaxations(problem: Problem) -> tuple[SatelliteRelaxation, ...]:
+def relaxations(
+    problem: Problem, levels_per_collect: int = FINE
+) -> tuple[SatelliteRelaxation, ...]:
     """Return the programmes of all satellites that have anything to do."""
-    return tuple(SatelliteRelaxation.of(problem, s) for s in problem.satellites if len(s))
+    return tuple(
+        SatelliteRelaxation.of(problem, satellite, levels_per_collect)
+        for satellite in problem.satellites
+        if len(satellite)
+    )
 
 
 def whole_worth(problem: Problem, prices: Floats, unit: float) -> Ints:

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from planner_core.bounds.resource_bound import (
+    COARSE,
     SatelliteRelaxation,
     leaving_whole_units,
     relaxations,
@@ -42,7 +43,7 @@ class PriceSearch:
 
     def __init__(self, problem: Problem, value: float, prices: Floats, stop: Bytes) -> None:
         self._problem, self._stop = problem, stop
-        self._satellites: tuple[SatelliteRelaxation, ...] = relaxations(problem)
+        self._satellites: tuple[SatelliteRelaxation, ...] = relaxations(problem, COARSE)
         self._is_reachable = np.diff(problem.target_opportunities[1]) > 0
         self._now = np.where(self._is_reachable, prices, 0.0)
         self._direction = np.zeros(len(prices))
@@ -109,7 +110,7 @@ class PriceSearch:
         prices[~self._is_reachable] = 0.0
         worth = whole_worth(self._problem, prices, unit)
         units = 0
-        for i, relaxation in enumerate(self._satellites):
+        for i, relaxation in enumerate(relaxations(self._problem)):
             known = self._guess[i]
             near = None if known is None else known * _FINER
             most, _ = relaxation.most(worth, 0, self._stop, near=near)
