@@ -48,8 +48,9 @@ demo: setup
 serve: setup
 	@$(BIN)/slewline demo --serve
 
+# The service's tests in one process, all others beside them in the other.
 test: check
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n 2 --dist loadgroup
 
 check: setup
 	$(BIN)/ruff check .

@@ -58,7 +58,7 @@ def test_with_resources_the_improved_search_leads_the_papers_methods(dynamics: D
 def test_with_resources_the_bound_of_the_program_is_true(dynamics: Dynamics) -> None:
     """Cut short it has proven something all the same, and no plan of anyone contradicts it."""
     problem = day(use_resources=True, dynamics=dynamics)
-    solution = Milp().solve(problem, Budget(15.0), 0)
+    solution = Milp().solve(problem, Budget(8.0), 0)
     own = replay(problem, solution.plan)
     assert own.is_valid
     assert solution.bound is not None
