@@ -39,7 +39,8 @@ def main() -> None:
     store = Store(work / f"runs-{code_id()}.csv")
     run(study, store, began + hours * 3600.0 - _REPORT_S, options.workers)
     took_min = (time.time() - began) / 60.0
-    page = write_report(study, store.done, docs, took_min=took_min, command=command)
+    in_all_min = store.minutes_in_all(took_min)
+    page = write_report(study, store.done, docs, took_min=in_all_min, command=command)
     print(f"Wrote {page} after {took_min:.1f} minutes; finished runs are kept in {work}.")
 
 

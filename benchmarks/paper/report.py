@@ -58,8 +58,8 @@ def _opening(study: Study, done: Done, took_min: float, command: str) -> str:
 Eddy and Kochenderfer, *Markov Decision Processes For Multi-Objective Satellite Task Planning*.
 Written by `{command}` on {datetime.now(UTC).date().isoformat()}; do not edit by hand.
 
-Machine: {machine.description()}. The last run of the command took {took_min:.0f} minutes,
-one solver at a time on each core. {state}
+Machine: {machine.description()}.
+All runs together took {took_min:.0f} minutes, one solver at a time on each core. {state}
 
 The referee scores every plan: an image earns 1 once per target, and nothing when its action
 breaks a rule. "Images" counts distinct targets imaged whatever is broken, which is what the

@@ -57,6 +57,13 @@ class Store:
         with self._path.open("a", encoding="utf-8") as file:
             file.write(line.getvalue())
 
+    def minutes_in_all(self, took_min: float) -> float:
+        """Note the minutes of one more call and return those of all that filled this store."""
+        path = self._path.with_suffix(".minutes")
+        before = float(path.read_text(encoding="utf-8")) if path.exists() else 0.0
+        path.write_text(f"{before + took_min:.3f}", encoding="utf-8")
+        return before + took_min
+
     def missing(self, tasks: Iterable[Task]) -> list[Task]:
         """Return those of ``tasks`` that are still to be run, in their order."""
         return [task for task in dict.fromkeys(tasks) if task not in self.done]

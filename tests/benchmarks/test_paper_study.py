@@ -215,3 +215,9 @@ def test_each_figure_has_its_numbers_with_a_bound_beside_every_bar(page: Path) -
         solvers = {(line["solver"], line["kind"]) for line in lines}
         assert {("rule", "paper"), ("forward_search", "paper"), ("mcts", "paper")} <= solvers
         assert all(float(line["bound"]) >= float(line["reward"]) > 0.0 for line in lines)
+
+
+def test_minutes_add_up_over_calls(tmp_path: Path) -> None:
+    for took_min, in_all_min in ((3.0, 3.0), (1.5, 4.5)):
+        store = Store(tmp_path / "runs.csv")
+        assert store.minutes_in_all(took_min) == pytest.approx(in_all_min)
