@@ -362,12 +362,32 @@ class Guidance(NamedTuple):
     """Table 2: what guides a search. It is never a plan's reward.
 
     Per second of contact and of sun-pointing, and for each limit that is broken.
+    ``is_contact_by_wait`` counts a contact by the time until it starts, not by its own.
+    ``image_needs`` is what an image needs to count as made, one of ``IMAGE_NEEDS``.
     """
 
     gamma: float
     contact_reward_per_s: float
     sunpoint_reward_per_s: float
     penalty: float
+    is_contact_by_wait: bool = False
+    image_needs: int = 0
+
+
+IMAGE_NEEDS: Final = ("nothing", "limits", "room")
+"""Nothing; battery and recorder within their limits (the text); room on board (the code)."""
+
+
+@inlined
+def counts_as_made(
+    track: Track, guidance: Guidance, battery_after: float, recorder_after: float
+) -> bool:
+    """Return whether an image that leaves these levels enters the images of eq. 2."""
+    if guidance.image_needs == 0 or not track.use_resources:
+        return True
+    if guidance.image_needs == 1:
+        return battery_after > track.battery_min and recorder_after < track.recorder_max
+    return recorder_after < 1.0
 
 
 @inlined
@@ -376,15 +396,22 @@ def task_reward(
     guidance: Guidance,
     target_reward: Floats,
     collected: Bytes,
+    waited_s: float,
     discount: float,
     row: int,
     battery_after: float,
     recorder_after: float,
 ) -> float:
-    """Return R(s, a) of Table 2 for a collect or a contact; ``discount`` is gamma^(t_s - t)."""
+    """Return R(s, a) of Table 2 for a collect or a contact.
+
+    ``waited_s`` is t_s - t, ``discount`` is gamma to it.
+    """
     reward = 0.0
     if track.is_contact[row]:
-        reward += guidance.contact_reward_per_s * (track.end_s[row] - track.start_s[row])
+        counted_s = track.end_s[row] - track.start_s[row]
+        if guidance.is_contact_by_wait:
+            counted_s = waited_s
+        reward += guidance.contact_reward_per_s * counted_s
     elif not collected[track.place[row]]:
         reward += discount * target_reward[track.place[row]]
     if track.use_resources:
@@ -482,10 +509,11 @@ class Model:
         battery, recorder, _ = take(self.track, state.last, row, state.battery, state.recorder)
         reward = task_reward(
             self.track, self.guidance, self.target_reward, self._mask(state),
-            self.guidance.gamma**sojourn_s, row, battery, recorder,
+            sojourn_s, self.guidance.gamma**sojourn_s, row, battery, recorder,
         )  # fmt: skip
         images = state.collected
-        if not self.track.is_contact[row]:
+        is_image = not self.track.is_contact[row]
+        if is_image and counts_as_made(self.track, self.guidance, battery, recorder):
             images = images | {int(self.track.place[row])}
         taken = State(cursor=row, last=row, battery=battery, recorder=recorder, collected=images)
         return Step(state=taken, reward=float(reward), sojourn_s=sojourn_s)

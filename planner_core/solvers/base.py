@@ -16,6 +16,8 @@ from planner_core.problem import Bytes, Problem
 
 Feasibility = Literal["hard", "penalty"]
 BreadthCounts = Literal["tasks", "one_more"]
+ContactCounts = Literal["duration", "wait"]
+ImageNeeds = Literal["nothing", "limits", "room"]
 
 
 class Constraint(StrEnum):

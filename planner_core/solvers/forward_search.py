@@ -13,12 +13,14 @@ import numpy as np
 
 from planner_core.jit import borrowing
 from planner_core.model import (
+    IMAGE_NEEDS,
     NO_TASK,
     WAIT,
     Guidance,
     Model,
     State,
     Track,
+    counts_as_made,
     is_repeated,
     may_wait,
     next_action,
@@ -26,7 +28,15 @@ from planner_core.model import (
     task_reward,
 )
 from planner_core.problem import Bytes, Floats, Ints, Problem
-from planner_core.solvers.base import BreadthCounts, Budget, Constraint, Feasibility, Solution
+from planner_core.solvers.base import (
+    BreadthCounts,
+    Budget,
+    Constraint,
+    ContactCounts,
+    Feasibility,
+    ImageNeeds,
+    Solution,
+)
 from planner_core.solvers.sequential import Turn, plan_in_turn
 
 Discount = Literal["action", "next_action"]
@@ -111,13 +121,19 @@ def _select_action(
         battery_after, recorder_after = battery, recorder
         if track.use_resources:
             battery_after, recorder_after, _ = take(track, last, row, battery, recorder)
-        discount = guidance.gamma ** (track.start_s[row] - now_s)
+        waited_s = track.start_s[row] - now_s
+        discount = guidance.gamma**waited_s
         v = task_reward(
-            track, guidance, target_reward, collected, discount, row, battery_after, recorder_after
-        )
+            track, guidance, target_reward, collected, waited_s, discount,
+            row, battery_after, recorder_after,
+        )  # fmt: skip
         if depth > 1:
             place = track.place[row]
-            is_new = not track.is_contact[row] and not collected[place]
+            is_new = (
+                not track.is_contact[row]
+                and not collected[place]
+                and counts_as_made(track, guidance, battery_after, recorder_after)
+            )
             if is_new:
                 collected[place] = 1
             a_next, v_next, first_next = _select_action(
@@ -215,6 +231,21 @@ class ForwardSearch:
             "action (the paper); next_action: the best action after it (the authors' code)."
         },
     )
+    contact_counts: ContactCounts = field(
+        default="duration",
+        metadata={
+            "description": "What a second of contact_reward_per_s is. duration: of the contact "
+            "(the authors' code); wait: of the time until it starts (the paper's equation)."
+        },
+    )
+    image_needs: ImageNeeds = field(
+        default="nothing",
+        metadata={
+            "description": "What an image needs to count as made. limits: battery and recorder "
+            "within theirs (the paper); room: room on board (the authors' code); nothing. "
+            "Matters where feasibility is penalty."
+        },
+    )
     contact_reward_per_s: float = field(
         default=1e-3,
         metadata={
@@ -249,6 +280,8 @@ class ForwardSearch:
             contact_reward_per_s=self.contact_reward_per_s,
             sunpoint_reward_per_s=self.sunpoint_reward_per_s,
             penalty=self.penalty,
+            is_contact_by_wait=self.contact_counts == "wait",
+            image_needs=IMAGE_NEEDS.index(self.image_needs),
         )
 
     def _plan_turn(
@@ -283,7 +316,14 @@ class ForwardSearch:
             cursor = last = action
             taken.append(action)
             place = track.place[action]
-            if not track.is_contact[action] and not collected[place]:
+            if (
+                not track.is_contact[action]
+                and not collected[place]
+                and (
+                    self.image_needs == "nothing"
+                    or counts_as_made(track, guidance, battery, recorder)
+                )
+            ):
                 collected[place] = 1
                 reward += float(target_reward[place])
             turn.report((action + 1) / len(track.start_s), reward)

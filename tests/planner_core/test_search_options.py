@@ -12,13 +12,13 @@ from hypothesis import strategies as st
 
 from planner_core.domain import Dynamics
 from planner_core.model import WAIT, Model, Track, compile_track
-from planner_core.problem import COLLECT, Problem
+from planner_core.problem import COLLECT, CONTACT, Problem
 from planner_core.solvers import ForwardSearch, Mcts, Rule
 from planner_core.solvers.base import Budget, Solver
 from planner_core.solvers.mcts.simulate import Rules, expand
 from planner_core.solvers.mcts.tree import empty_tree, new_node
 from planner_core.timeline import replay
-from tests.planner_core.problems import Task, make_problem, random_problem
+from tests.planner_core.problems import TIGHT, Task, make_problem, random_problem
 
 
 def rows_of(problem: Problem, solver: Solver) -> list[int]:
@@ -152,3 +152,26 @@ def test_the_code_sunpoints_rather_than_image_a_target_again() -> None:
             again[worthless] += len(images) - len(set(images))
     assert again["take"] > 0
     assert again["sunpoint"] == 0
+
+
+@pytest.mark.parametrize("make", [ForwardSearch, Mcts], ids=["forward_search", "mcts"])
+def test_a_contact_may_count_by_the_wait_for_it(make: Any) -> None:
+    """A long contact soon or a short one later, which exclude each other."""
+    soon = Task(kind=CONTACT, place=0, start_s=10.0, end_s=310.0)
+    late = Task(kind=CONTACT, place=0, start_s=300.0, end_s=360.0)
+    problem = make_problem([soon, late], num_targets=0)
+    weights = {"contact_reward_per_s": 1.0, "sunpoint_reward_per_s": 0.0, "gamma": 1.0, "depth": 2}
+    assert rows_of(problem, make(**weights)) == [0]
+    assert rows_of(problem, make(contact_counts="wait", **weights)) == [1]
+
+
+@pytest.mark.parametrize("make", [ForwardSearch, Mcts], ids=["forward_search", "mcts"])
+def test_an_image_may_need_limits_to_count_as_made(make: Any) -> None:
+    """The battery is at its end: by the text the target is still to be imaged, and is again."""
+    flat = replace(TIGHT, initial_battery_fraction=0.31, sunpoint_charge_per_s=0.0)
+    tasks = [Task(kind=COLLECT, place=0, start_s=t, end_s=t + 30.0) for t in (100.0, 300.0)]
+    problem = make_problem(tasks, num_targets=1, resources=flat)
+    soft = {"feasibility": "penalty", "penalty": 0.0, "depth": 2}
+    assert rows_of(problem, make(**soft)) == [0]
+    assert rows_of(problem, make(image_needs="room", **soft)) == [0]
+    assert rows_of(problem, make(image_needs="limits", **soft)) == [0, 1]

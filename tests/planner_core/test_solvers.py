@@ -127,6 +127,8 @@ def test_forward_search_at_full_depth_and_breadth_equals_brute_force(
     depth=st.integers(1, 4),
     breadth=st.integers(1, 3),
     discount=st.sampled_from(["action", "next_action"]),
+    contact_counts=st.sampled_from(["duration", "wait"]),
+    image_needs=st.sampled_from(["nothing", "limits", "room"]),
     num_offers=st.integers(1, 3),
 )
 def test_the_compiled_forward_search_plans_what_the_listing_plans(
@@ -138,6 +140,8 @@ def test_the_compiled_forward_search_plans_what_the_listing_plans(
     depth: int,
     breadth: int,
     discount: Any,
+    contact_counts: Any,
+    image_needs: Any,
     num_offers: int,
 ) -> None:
     problem = problems(
@@ -145,7 +149,7 @@ def test_the_compiled_forward_search_plans_what_the_listing_plans(
     )
     solver = ForwardSearch(
         depth=depth, breadth=breadth, feasibility=feasibility, unimaged_only=unimaged_only,
-        gamma=0.99, discount=discount,
+        gamma=0.99, discount=discount, contact_counts=contact_counts, image_needs=image_needs,
     )  # fmt: skip
     satellite = problem.satellites[0]
     model = Model(

@@ -10,6 +10,7 @@ from planner_core.model import (
     WAIT,
     Guidance,
     Track,
+    counts_as_made,
     is_repeated,
     may_wait,
     next_action,
@@ -162,11 +163,16 @@ def _simulate(
             if track.use_resources:
                 battery, recorder, _ = take(track, last, row, battery, recorder)
             path.reward[d] = task_reward(
-                track, guidance, target_reward, collected, discount, row, battery, recorder
-            )
+                track, guidance, target_reward, collected, sojourn_s, discount,
+                row, battery, recorder,
+            )  # fmt: skip
             last = row
             place = track.place[row]
-            if not track.is_contact[row] and not collected[place]:
+            if (
+                not track.is_contact[row]
+                and not collected[place]
+                and counts_as_made(track, guidance, battery, recorder)
+            ):
                 collected[place] = 1
                 path.image[d] = place
         path.action[d] = action
@@ -267,9 +273,11 @@ def sunpoint_instead(
     battery_after, recorder_after = battery, recorder
     if track.use_resources:
         battery_after, recorder_after, _ = take(track, last, row, battery, recorder)
+    now_s = track.start_s[tree.cursor[0]] if tree.cursor[0] >= 0 else 0.0
     reward = task_reward(
-        track, guidance, target_reward, collected, 1.0, row, battery_after, recorder_after
-    )
+        track, guidance, target_reward, collected, track.start_s[row] - now_s, 1.0,
+        row, battery_after, recorder_after,
+    )  # fmt: skip
     end = tree.first_edge[0] + tree.num_edges[0]
     first = tree.action[tree.first_edge[0]]
     if reward > 0.0 or not may_wait(track, last, first, battery, recorder, rules.is_hard):

@@ -8,9 +8,17 @@ from typing import ClassVar, Final, Literal
 import numpy as np
 
 from planner_core.draws import draws_of
-from planner_core.model import NO_TASK, WAIT, Guidance
+from planner_core.model import IMAGE_NEEDS, NO_TASK, WAIT, Guidance, counts_as_made
 from planner_core.problem import Floats, Problem
-from planner_core.solvers.base import BreadthCounts, Budget, Constraint, Feasibility, Solution
+from planner_core.solvers.base import (
+    BreadthCounts,
+    Budget,
+    Constraint,
+    ContactCounts,
+    Feasibility,
+    ImageNeeds,
+    Solution,
+)
 from planner_core.solvers.mcts.simulate import Path, Rules, search, sunpoint_instead
 from planner_core.solvers.mcts.tree import UNSEEN, Tree, copy_branch, empty_tree, new_node
 from planner_core.solvers.sequential import Turn, plan_in_turn
@@ -105,6 +113,21 @@ class Mcts:
             "(the paper); sunpoint: let it pass (the authors' code)."
         ),
     )
+    contact_counts: ContactCounts = field(
+        default="duration",
+        metadata=_described(
+            "What a second of contact_reward_per_s is. duration: of the contact "
+            "(the authors' code); wait: of the time until it starts (the paper's equation)."
+        ),
+    )
+    image_needs: ImageNeeds = field(
+        default="nothing",
+        metadata=_described(
+            "What an image needs to count as made. limits: battery and recorder "
+            "within theirs (the paper); room: room on board (the authors' code); nothing. "
+            "Matters where feasibility is penalty."
+        ),
+    )
     contact_reward_per_s: float = field(
         default=1e-3,
         metadata=_described("Guidance per second of contact (Table 2: 0.1).", minimum=0),
@@ -133,6 +156,8 @@ class Mcts:
             contact_reward_per_s=self.contact_reward_per_s,
             sunpoint_reward_per_s=self.sunpoint_reward_per_s,
             penalty=self.penalty,
+            is_contact_by_wait=self.contact_counts == "wait",
+            image_needs=IMAGE_NEEDS.index(self.image_needs),
         )
         rules = Rules(
             depth=self.depth,
@@ -185,7 +210,12 @@ class Mcts:
             if action != WAIT:
                 taken.append(action)
                 place = track.place[action]
-                if not track.is_contact[action] and not collected[place]:
+                levels = float(tree.battery[child]), float(tree.recorder[child])
+                if (
+                    not track.is_contact[action]
+                    and not collected[place]
+                    and (self.image_needs == "nothing" or counts_as_made(track, guidance, *levels))
+                ):
                     collected[place] = 1
                     reward += float(target_reward[place])
             best[0] = -np.inf
