@@ -25,6 +25,7 @@ from planner_core.solvers.certified.choices import ChoiceSearch
 from planner_core.solvers.certified.contact_sets import FixedContacts, Relaxation
 from planner_core.solvers.certified.free import TOLERANCE, solve_free
 from planner_core.solvers.certified.resource_prices import PriceSearch
+from planner_core.solvers.milp import Milp
 from planner_core.solvers.rule import Rule
 from planner_core.timeline import replay
 
@@ -118,6 +119,17 @@ class ResourceSearch:
             self.lower(solution.proven)
         self.report("without resources")
         return self.mask(action.opportunity for action in solution.plan.actions)
+
+    def exhaust(self) -> None:
+        """Leave what remains to the whole program, which ends with a proof if time suffices."""
+        self.report("HiGHS")
+        quiet = Budget(self.budget.remaining_s())
+        quiet.stop = self.budget.stop
+        solution = Milp(gap=self.gap).solve(self.problem, quiet, self.seed)
+        self.offer(solution.plan)
+        if solution.proven is not None:
+            self.lower(solution.proven)
+        self.report("HiGHS")
 
     def mask(self, rows: Iterable[int]) -> Bools:
         """Return which opportunities these are."""
@@ -239,6 +251,8 @@ def solve_with_resources(problem: Problem, budget: Budget, seed: int, gap: float
     for _ in range(_FIRST_ROUNDS):
         search.search(choices, _MOVES)
     _close_in(search, choices)
+    if not search.is_done:
+        search.exhaust()
     return search.solution()
 
 
