@@ -20,6 +20,7 @@ from service.jobs.supervisor import Supervisor
 from service.logs import configure_logging
 from service.main import create_app
 from service.settings import Settings
+from service.stopping import StopRequest
 
 _READY_WITHIN_S: Final = 300.0  # a first start may have kernels to compile
 _LOOK_EVERY_S: Final = 0.1
@@ -67,9 +68,9 @@ def address_of(listener: socket.socket) -> str:
 
 def serve(settings: Settings, *, with_workers: bool) -> int:
     """Serve until SIGTERM or SIGINT, then end all that was started. Return the exit status."""
-    stop = threading.Event()
+    stop = StopRequest()
     for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: stop.set())
+        signal.signal(number, lambda *_: stop.ask())
     with ExitStack() as stack:
         listener = stack.enter_context(listen(settings.host, settings.port))
         configure_logging()
@@ -80,11 +81,11 @@ def serve(settings: Settings, *, with_workers: bool) -> int:
             stack.enter_context(_running_workers(settings))
             health = "ready"
         url = address_of(listener)
-        if _wait_for(f"{url}/health/{health}", lambda: stop.is_set() or not api.is_alive()):
+        if _wait_for(f"{url}/health/{health}", lambda: stop.is_asked() or not api.is_alive()):
             print(f"Slewline is ready at {url}", flush=True)
         while api.is_alive() and not stop.wait(_LOOK_EVERY_S):
             pass
-    return 0 if stop.is_set() else 1
+    return 0 if stop.is_asked() else 1
 
 
 @contextmanager

@@ -28,6 +28,7 @@ from service.jobs.queue import DbosConsumer, DbosQueue
 from service.jobs.reconcile import Reconciler
 from service.jobs.runner import Abandoned, Limits, Order, Runner, Work
 from service.settings import Settings
+from service.stopping import StopRequest
 
 log = logging.getLogger(__name__)
 T = TypeVar("T")
@@ -61,28 +62,32 @@ class Worker:
             max_attempts=settings.max_attempts,
         )
         self._stopping = threading.Event()
+        self._stop_request = StopRequest()
         self._idle = threading.Event()
         self._idle.set()
 
     def stop(self) -> None:
         """Hand the running job back and let ``run`` return; safe in a signal handler."""
-        self._stopping.set()
+        self._stop_request.ask()
 
     def run(self, is_wanted: Callable[[], bool] = lambda: True) -> None:
         """Work until ``stop`` is called or ``is_wanted`` says no."""
-        if not self._runner.warm_up(lambda: is_wanted() and not self._stopping.is_set()):
+        if not self._runner.warm_up(lambda: is_wanted() and not self._is_stopping()):
             return
         consumer = DbosConsumer(self._settings.database_url, self.id, self.handle)
         self._enrol()
         consumer.start()
         try:
-            while is_wanted() and not self._stopping.wait(self._settings.reconcile_s):
+            while is_wanted() and not self._stop_request.wait(self._settings.reconcile_s):
                 self._look_after_others()
         finally:
             self._stopping.set()
             self._idle.wait(_STOP_WITHIN_S)
             consumer.stop()
             self._leave()
+
+    def _is_stopping(self) -> bool:
+        return self._stopping.is_set() or self._stop_request.is_asked()
 
     def handle(self, job_id: str, dispatch: int) -> None:
         """Run one dispatch from the queue; the queue learns nothing of how it ended."""
@@ -96,7 +101,7 @@ class Worker:
             self._idle.set()
 
     def _handle(self, job_id: str, dispatch: int) -> None:
-        if self._stopping.is_set():
+        if self._is_stopping():
             with self._database.transaction() as session:
                 lease.return_unstarted(session, self._queue, job_id, dispatch)
             return
@@ -137,7 +142,7 @@ class Worker:
             )
 
     def _tick(self, held: Lease, progress: Progress | None) -> Order:
-        if self._stopping.is_set():
+        if self._is_stopping():
             return Order.ABANDON
         report = None if progress is None else dataclasses.asdict(progress)
         try:
@@ -176,7 +181,7 @@ class Worker:
                 with self._database.transaction() as session:
                     return write(session)
             except OperationalError:
-                if self._stopping.is_set():
+                if self._is_stopping():
                     raise
                 log.warning("the database is away; trying again", exc_info=True)
                 self._stopping.wait(_RETRY_S)

@@ -141,3 +141,12 @@ def test_one_worker_serves_cancels_and_failures_by_priority(jobs: Jobs, workers:
     worker.terminate()
     assert worker.wait(30) == 0
     assert jobs.workers() == []
+
+
+def test_a_worker_ends_however_many_signals_come(jobs: Jobs, workers: Workers) -> None:
+    """One signal in the middle of the handling of another must not lock it up."""
+    for _ in range(2):
+        process = workers.start()
+        for _ in range(300):
+            process.send_signal(signal.SIGTERM)
+        assert process.wait(30) == 0
