@@ -24,6 +24,8 @@ def save(session: Session, sha256: str, value: float, proof: str) -> None:
     own = BoundRow.scenario_sha256 == sha256
     is_beaten = sa.or_(BoundRow.version != VERSION, BoundRow.value > value)
     row = {"version": VERSION, "value": value, "proof": proof, "created_at": utc_now()}
-    session.execute(sa.update(BoundRow).where(own, is_beaten).values(**row))
+    # First the insert: where somebody else's comes between, it is there to be beaten.
     with contextlib.suppress(IntegrityError), session.begin_nested():
         session.execute(sa.insert(BoundRow).values(scenario_sha256=sha256, **row))
+        return
+    session.execute(sa.update(BoundRow).where(own, is_beaten).values(**row))

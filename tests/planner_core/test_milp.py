@@ -259,11 +259,16 @@ def test_a_wanted_gap_is_enough() -> None:
     assert solution.termination in (Termination.GAP_REACHED, Termination.OPTIMAL)
 
 
-def test_a_solve_leaves_no_thread_behind() -> None:
-    """Workers fork from a process that has planned with every solver.
+def test_a_solve_that_ends_by_itself_leaves_no_thread_behind() -> None:
+    """Workers fork from a process that has planned with every solver."""
+    before = len(os.listdir("/proc/self/task"))
+    solution = Milp().solve(random_problem(5), Budget(), 0)
+    assert len(os.listdir("/proc/self/task")) == before
+    assert solution.termination is Termination.OPTIMAL
 
-    A solve that was cut short has answered before HiGHS comes to ask whether to go on.
-    """
+
+def test_the_thread_of_a_solve_that_was_cut_short_ends_soon() -> None:
+    """It has answered before HiGHS comes to ask whether to go on."""
     before = len(os.listdir("/proc/self/task"))
     Milp().solve(crowded(2), Budget(1.0), 0)
     patience_s = time.monotonic() + 60.0
