@@ -32,23 +32,24 @@ from planner_core.solvers.certified.prover import Prover
 from planner_core.solvers.graph import Graph
 from planner_core.solvers.lns import improved
 from planner_core.solvers.milp.model import plan_program
+from planner_core.solvers.milp.program import Program
 from planner_core.solvers.rule import Rule
 from planner_core.timeline import replay
 
 TOLERANCE: Final = 1e-6
 """Share of the reward to which a plan is optimal where rewards are not whole."""
 
-_MAX_ROUNDS: Final = 60
-_STALLED: Final = 0.04  # of the gap, in _PATIENCE rounds of cuts
-_PATIENCE: Final = 4
+_MAX_ROUNDS: Final = 200
+_STALLED: Final = 0.02  # of the gap, in _PATIENCE rounds of cuts
+_PATIENCE: Final = 12
 _WANTED: Final = 1e-3
-_NODE_ROUNDS: Final = 5
-_MAX_PARTS: Final = 4  # beyond that HiGHS is faster
+_NODE_ROUNDS: Final = 12
+_MAX_PARTS: Final = 10  # beyond that HiGHS is faster
+_MAX_NODES: Final = 50  # of HiGHS, among the tasks that a relaxation takes
 _POLISH: Final = 50.0
-_POLISHED: Final = (1, 2, 4, 8, 16, 32)  # rounds
+_POLISHED: Final = (1, 4)  # rounds
+_ROUNDED_OFF: Final = 8  # this round, and when cutting planes lead no further
 _REPORT_EVERY_S: Final = 0.25
-_LAST_SEARCHES: Final = 2  # among what a plan as good as the bound can hold
-_LAST_MOVES: Final = 15.0
 
 
 class FreeSearch:
@@ -176,57 +177,77 @@ class FreeSearch:
         priced = self.bound + self.unit
         master = Master(self._rest, self._rows, self.budget, self.seed)
         bounds: list[float] = []
-        for _ in range(_MAX_ROUNDS):
+        for number in range(1, _MAX_ROUNDS + 1):
             taken = master.relaxed()
             if taken is None:
                 break
             self.step(master.multipliers())
             self.report("cutting planes")
             bounds.append(master.value)
-            if len(bounds) in _POLISHED and not self.is_done:
+            if number in _POLISHED and not self.is_done:
                 self.polish(taken)
                 self.report("window search")
+            if number == _ROUNDED_OFF and not self.is_done:
+                self.round_off(master, taken)
             if self.is_done:
                 break
             master.allow(~self.is_struck)
-            gap = max(bounds[-1] - self.reward, 1e-9)
+            gap = max(bounds[-1] - self.better, 1e-9)
             # Until paths are priced nearly as well as by the subgradient, odd sets lead astray.
             num_added = master.cut(taken, with_odd_sets=bounds[-1] <= priced + 0.2 * gap)
             is_stalled = (
                 len(bounds) > _PATIENCE and bounds[-1 - _PATIENCE] - bounds[-1] < _STALLED * gap
             )
             if num_added == 0 or is_stalled:
-                break
+                if not self.round_off(master, taken) or self.is_done:
+                    break
+                bounds.clear()
         return master
+
+    def round_off(self, master: Master, taken: Floats) -> bool:
+        """Let HiGHS search among what a relaxation takes, in part; return whether that helped."""
+        is_own = np.isin(self._rows, [a.opportunity for a in self.plan.actions])
+        is_offered = is_own | (taken > _WANTED)
+        plan, _ = self._prover(master.program(is_offered), is_offered, self.better).prove(
+            0.0, self._watch, _MAX_NODES
+        )
+        return plan is not None and self.offer(self._whole(plan, is_offered))
 
     def prove(self, master: Master, amount: float) -> None:
         """Let HiGHS find a plan worth this much, or prove that there is none."""
         is_open = ~is_below(self.through, amount)
-        rows = self._rows[is_open]
-        part = restricted(self.problem, rows)
         if self.is_transitive:
             program = master.program(is_open)
         else:
             # Then a plan may need tasks that it is not paid for.
+            part = restricted(self.problem, self._rows[is_open])
             program = plan_program(part, "antichain", 0.0).program
             scale = float(self.problem.target_reward.max())
             program.worth = [worth / scale for worth in program.worth]
-        prover = Prover(part, program, amount, self.bound, self.budget, self.seed)
-
-        def watch(_reward: float, _bound: float) -> None:
-            now_s = time.monotonic()
-            if now_s - self._reported_s > _REPORT_EVERY_S:
-                self._reported_s = now_s
-                self.report("HiGHS searches")
-
-        plan, bound = prover.prove(0.0, watch)
+        prover = self._prover(program, is_open, amount)
+        plan, bound = prover.prove(0.0, self._watch)
         if plan is not None:
-            self.offer(Plan.of(self.problem, rows[[a.opportunity for a in plan.actions]]))
+            self.offer(self._whole(plan, is_open))
         if bound < self.bound:
             # Whatever is worth the amount is among these tasks.
             below = amount - self.unit if self.unit else amount
             self.log = prover.log
             self.lower(max(bound, below, self.reward))
+
+    def _prover(self, program: Program, is_offered: Bools, amount: float) -> Prover:
+        part = restricted(self.problem, self._rows[is_offered])
+        return Prover(part, program, amount, self.bound, self.budget, self.seed)
+
+    def _whole(self, plan: Plan, is_offered: Bools) -> Plan:
+        """Return a plan of some of the open tasks as one of the whole problem."""
+        rows = self._rows[is_offered]
+        return Plan.of(self.problem, rows[[a.opportunity for a in plan.actions]])
+
+    def _watch(self, _reward: float, _bound: float) -> None:
+        now_s = time.monotonic()
+        if now_s - self._reported_s > _REPORT_EVERY_S:
+            self._reported_s = now_s
+            self.report("HiGHS searches")
 
     def refutation(self) -> Refutation:
         """Return why no plan is worth more than the bound."""
@@ -267,7 +288,6 @@ class FreeSearch:
                 break
         at = master.decisive(taken)
         self.num_parts += 1
-        self.polish(taken)
         if self.is_done or self.num_parts == _MAX_PARTS:
             return None
         self.report(f"{self.num_parts} parts")
@@ -330,12 +350,7 @@ def _close_in(search: FreeSearch) -> None:
     """Cut, search and branch until plan and bound meet or the budget is spent."""
     search.price()
     master = search.cut()
-    for _ in range(_LAST_SEARCHES):
-        if search.is_done:
-            return
-        search.search(_LAST_MOVES, search.open_rows(search.bound))
-        search.report("window search")
-    if search.is_transitive:
+    if search.is_transitive and not search.is_done:
         search.branch(master)
     while not search.is_done:
         before = (search.bound, search.reward)

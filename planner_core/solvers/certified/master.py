@@ -173,6 +173,8 @@ class Master(Engine):
             cut = Cut(sets=tuple(self._members(i) for i in picked))
             members, weights = cut.weights()
             kept = is_open[members]
+            if kept.sum() < 2:
+                continue
             offsets.append(offsets[-1] + int(kept.sum()))
             columns.append(number[members[kept]])
             values.append(weights[kept].astype(np.float64))

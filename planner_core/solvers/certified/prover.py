@@ -33,12 +33,14 @@ class Prover(Engine):
         for option, limit in (("objective_bound", amount), ("objective_target", enough)):
             highs.setOptionValue(option, (limit - 1e-6 * max(1.0, limit)) / self._scale)
 
-    def prove(self, heuristic_effort: float, watch: Watch) -> tuple[Plan | None, float]:
+    def prove(
+        self, heuristic_effort: float, watch: Watch, max_nodes: int | None = None
+    ) -> tuple[Plan | None, float]:
         """Return a plan worth the amount, if there is one, and what no plan exceeds.
 
         The bound is infinite where the budget did not suffice for any.
         """
-        outcome = self.search(None, 0.0, heuristic_effort, watch)
+        outcome = self.search(None, 0.0, heuristic_effort, watch, max_nodes)
         plan = None
         if outcome.columns is not None:
             taken = outcome.columns[: len(self._problem.opportunities)]
