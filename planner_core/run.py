@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import itertools
+import logging
 import time
 from dataclasses import dataclass, replace
+from typing import Final
 
 from planner_core.bounds.bound import Bound
 from planner_core.bounds.lagrangian import lagrangian_bound
@@ -15,6 +17,10 @@ from planner_core.problem import Problem
 from planner_core.reasons import TargetOutcome, explain
 from planner_core.solvers.base import Budget, Progress, Solution, Solver
 from planner_core.timeline import Timeline, replay
+
+log = logging.getLogger(__name__)
+
+_ROUNDING: Final = 1e-6  # relative; rewards to which bounds are stated
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -34,7 +40,8 @@ class Judged:
     Attributes
     ----------
     bound
-        None where no bound covers the freedom that the plan had (continuous starts).
+        None where no bound covers the freedom that the plan had (continuous starts), or where
+        this plan has refuted all there were.
     outcomes
         Every target once, in the scenario's order.
     """
@@ -84,7 +91,7 @@ def plan_scenario(
     timeline = replay(problem, solution.plan)
     bound = None
     if not problem.continuous_starts:
-        bound = _best_bound(problem, solution, timeline.reward, budget, known_bound)
+        bound = _best_bound(problem, solution, timeline, budget, known_bound)
     budget.report(
         Progress(
             phase="verify",
@@ -109,18 +116,32 @@ def plan_scenario(
 
 
 def _best_bound(
-    problem: Problem, solution: Solution, reward: float, budget: Budget, known: Bound | None
-) -> Bound:
-    """Return the lowest of what is known, what the solver has proven and a quick bound."""
-    proven = None if known is None else replace(known, value=max(known.value, reward))
-    if solution.proven is not None:
-        own = replace(solution.proven, value=max(solution.proven.value, reward))
-        proven = own if proven is None or own.value < proven.value else proven
-    if proven is not None and (known is not None or proven.value <= reward):
-        return proven
-    if budget.is_cancelled:
-        # Someone who cancels wants the answer now: prices stay rough.
-        quick = lagrangian_bound(problem, reward, 0)
-    else:
-        quick = quick_bound(problem, reward)
-    return proven if proven is not None and proven.value < quick.value else quick
+    problem: Problem, solution: Solution, timeline: Timeline, budget: Budget, known: Bound | None
+) -> Bound | None:
+    """Return the lowest of what is known, what the solver has proven and a quick bound.
+
+    A plan that may not be flown can earn more than any that may: no bound is below its reward.
+    A valid plan that does shows a fault in the bound, which is then not repeated.
+    """
+    reward = timeline.reward
+    claimed = (bound for bound in (known, solution.proven) if bound is not None)
+    sound = [bound for bound in claimed if not _is_beaten(bound, timeline)]
+    if known not in sound and all(bound.value > reward for bound in sound):
+        # Someone who cancels wants the answer now: prices stay rough then.
+        quick = lagrangian_bound(problem, reward, 0) if budget.is_cancelled else None
+        sound = [b for b in (*sound, quick or quick_bound(problem, reward))
+                 if not _is_beaten(b, timeline)]  # fmt: skip
+    if not sound:
+        return None
+    best = min(sound, key=lambda bound: bound.value)
+    return replace(best, value=max(best.value, reward))
+
+
+def _is_beaten(bound: Bound, timeline: Timeline) -> bool:
+    """Return whether a valid plan earns more than the bound allows, and say so if it does."""
+    allowed = bound.value + _ROUNDING * max(1.0, abs(bound.value))
+    is_beaten = timeline.is_valid and timeline.reward > allowed
+    if is_beaten:
+        log.error("the %s bound %r is below %r, which a valid plan earns", bound.proof,
+                  bound.value, timeline.reward)  # fmt: skip
+    return is_beaten
