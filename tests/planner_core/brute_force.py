@@ -2,28 +2,49 @@
 
 from __future__ import annotations
 
-import itertools
+from collections.abc import Iterator
+from dataclasses import replace
 
 from planner_core.plan import Plan
-from planner_core.problem import Problem
+from planner_core.problem import COLLECT, Problem
 from planner_core.timeline import replay
 
 
 def best_reward(problem: Problem) -> float:
-    """Return the highest reward of any valid plan: all subsets, judged by the referee.
+    """Return the highest reward of any valid plan, judged by the referee.
 
-    Subsets of opportunities of one satellite that overlap are skipped before judging.
+    The referee first says which two tasks a satellite cannot do one right after the other.
+    Plans without such a pair are judged from the one that would earn most downwards.
     """
     table = problem.opportunities
-    best = 0.0
-    for size in range(len(table) + 1):
-        for rows in itertools.combinations(range(len(table)), size):
-            if any(
-                table.satellite[a] == table.satellite[b] and table.start_s[b] < table.end_s[a]
-                for a, b in itertools.combinations(rows, 2)
-            ):
-                continue
-            timeline = replay(problem, Plan.of(problem, rows))
-            if timeline.is_valid:
-                best = max(best, timeline.reward)
-    return best
+    free = replace(problem, use_resources=False)
+    may_follow = {
+        (a, b)
+        for a in range(len(table))
+        for b in range(a + 1, len(table))
+        if table.satellite[a] != table.satellite[b]
+        or replay(free, Plan.of(problem, (a, b))).is_valid
+    }
+
+    def worth(rows: tuple[int, ...]) -> float:
+        targets = {int(table.place[row]) for row in rows if table.kind[row] == COLLECT}
+        return sum(float(problem.target_reward[target]) for target in targets)
+
+    plans = sorted(_chains(problem, may_follow, (), 0), key=worth, reverse=True)
+    for rows in plans:
+        timeline = replay(problem, Plan.of(problem, rows))
+        if timeline.is_valid:
+            return timeline.reward
+    raise AssertionError("not even the empty plan is valid")
+
+
+def _chains(
+    problem: Problem, may_follow: set[tuple[int, int]], rows: tuple[int, ...], first: int
+) -> Iterator[tuple[int, ...]]:
+    """Yield a plan and all that go on from it, each task right after one that it may follow."""
+    yield rows
+    satellite = problem.opportunities.satellite
+    for row in range(first, len(satellite)):
+        before = next((r for r in reversed(rows) if satellite[r] == satellite[row]), None)
+        if before is None or (before, row) in may_follow:
+            yield from _chains(problem, may_follow, (*rows, row), row + 1)

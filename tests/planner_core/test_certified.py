@@ -69,7 +69,7 @@ def assert_proven(problem: Problem, solution: Solution, best: float) -> None:
         assert solution.proven.log
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=1500, deadline=None)
 @given(
     seed=SEEDS, spread=SPREADS, num_satellites=st.integers(1, 3), agility=AGILITY,
     max_turn_deg=st.sampled_from([0.0, 25.0]), num_targets=st.integers(2, 6),

@@ -36,7 +36,7 @@ def _problem(seed: int, dynamics: Literal["physical", "paper"], num_satellites: 
 
 
 @pytest.mark.parametrize("dynamics", ["physical", "paper"])
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=500, deadline=None)
 @given(seed=SEEDS, num_satellites=st.integers(1, 3))
 def test_bound_and_plan_enclose_the_optimum(
     dynamics: Literal["physical", "paper"], seed: int, num_satellites: int

@@ -44,7 +44,7 @@ def _problem(
 
 
 @pytest.mark.parametrize("dynamics", ["physical", "paper"])
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=500, deadline=None)
 @example(seed=0, num_satellites=1)
 @given(seed=SEEDS, num_satellites=st.integers(1, 3))
 def test_no_plan_beats_the_bound(

@@ -101,10 +101,10 @@ class FreeSearch:
 
     def offer(self, plan: Plan) -> bool:
         """Take a plan if it is better; return whether it is."""
-        reward = replay(self.problem, plan).reward
-        if reward <= self.reward:
+        timeline = replay(self.problem, plan)
+        if not timeline.is_valid or timeline.reward <= self.reward:
             return False
-        self.plan, self.reward = plan, reward
+        self.plan, self.reward = plan, timeline.reward
         return True
 
     def lower(self, value: float) -> None:
@@ -206,6 +206,8 @@ class FreeSearch:
 
     def round_off(self, master: Master, taken: Floats) -> bool:
         """Let HiGHS search among what a relaxation takes, in part; return whether that helped."""
+        if not self.is_transitive:
+            return False
         is_own = np.isin(self._rows, [a.opportunity for a in self.plan.actions])
         is_offered = is_own | (taken > _WANTED)
         plan, _ = self._prover(master.program(is_offered), is_offered, self.better).prove(

@@ -179,12 +179,13 @@ class Master(Engine):
             columns.append(number[members[kept]])
             values.append(weights[kept].astype(np.float64))
             limits.append(float(cut.limit))
-        program.add_rows(
-            Rows.of(
-                np.array(offsets, dtype=np.int64), np.concatenate(columns),
-                np.concatenate(values), upper=np.array(limits),
-            )
-        )  # fmt: skip
+        if columns:
+            program.add_rows(
+                Rows.of(
+                    np.array(offsets, dtype=np.int64), np.concatenate(columns),
+                    np.concatenate(values), upper=np.array(limits),
+                )
+            )  # fmt: skip
         return program
 
     def _members(self, i: int) -> Ints:
