@@ -51,8 +51,8 @@ def certified(problem: Problem) -> tuple[float, float]:
 
 def pairwise(problem: Problem) -> tuple[float, float]:
     """Return reward and bound of HiGHS on the paper's program, as it comes."""
-    from planner_core.solvers.milp.highs import Engine
-    from planner_core.solvers.milp.model import plan_program
+    from planner_core.solvers.programs.highs import Engine
+    from planner_core.solvers.programs.model import plan_program
 
     program = plan_program(problem, "pairwise", 0.0).program
     engine = Engine(program, Budget(LIMIT_S), 0, is_chained=False)
@@ -70,7 +70,7 @@ def cp_sat(problem: Problem) -> tuple[float, float]:
     from ortools.sat.python import cp_model
 
     from planner_core.comparable import order_of
-    from planner_core.solvers.milp.antichains import antichain_cover
+    from planner_core.solvers.programs.antichains import antichain_cover
 
     table = problem.opportunities
     model = cp_model.CpModel()

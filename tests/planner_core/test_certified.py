@@ -17,7 +17,7 @@ from planner_core.domain import Agility
 from planner_core.problem import COLLECT, Problem
 from planner_core.solvers import Certified, Rule
 from planner_core.solvers.base import Budget, Progress, Solution, Termination
-from planner_core.solvers.certified.free import TOLERANCE
+from planner_core.solvers.free.search import TOLERANCE
 from planner_core.timeline import replay
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import Task, make_problem, random_problem

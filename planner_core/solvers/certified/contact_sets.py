@@ -14,10 +14,10 @@ import numpy as np
 from planner_core.plan import Plan
 from planner_core.problem import CONTACT, Bools, Floats, Ints, Problem
 from planner_core.solvers.base import Budget
-from planner_core.solvers.milp.antichains import violated_antichains
-from planner_core.solvers.milp.highs import Engine
-from planner_core.solvers.milp.model import PlanProgram, plan_program
-from planner_core.solvers.milp.program import Rows
+from planner_core.solvers.programs.antichains import violated_antichains
+from planner_core.solvers.programs.highs import Engine
+from planner_core.solvers.programs.model import PlanProgram, plan_program
+from planner_core.solvers.programs.program import Rows
 
 _CLEAR: Final = 1e-7  # from the limits, so that the referee accepts the plan
 _CUT_ROUNDS: Final = 5

@@ -7,8 +7,8 @@ from typing import ClassVar
 
 from planner_core.problem import Problem
 from planner_core.solvers.base import Budget, Constraint, Solution
-from planner_core.solvers.certified.free import solve_free
 from planner_core.solvers.certified.resources import solve_with_resources
+from planner_core.solvers.free.search import Effort, solve_free
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,4 +42,6 @@ class Certified:
         """Return the best plan and its bound; the same for the same seed if time suffices."""
         if problem.use_resources:
             return solve_with_resources(problem, budget, seed, self.gap)
-        return solve_free(problem, budget, seed, self.gap, self.moves_per_task)
+        return solve_free(
+            problem, budget, seed, self.gap, Effort(moves_per_task=self.moves_per_task)
+        )

@@ -8,6 +8,7 @@ smaller, for the search as well as for the proof.
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -27,29 +28,46 @@ from planner_core.plan import Plan
 from planner_core.problem import Bools, Floats, Ints, Problem
 from planner_core.restrict import restricted
 from planner_core.solvers.base import Budget, Progress, Solution, Termination
-from planner_core.solvers.certified.master import Master
-from planner_core.solvers.certified.prover import Prover
+from planner_core.solvers.free.master import Master
+from planner_core.solvers.free.prover import Prover
 from planner_core.solvers.graph import Graph
 from planner_core.solvers.lns import improved
-from planner_core.solvers.milp.model import plan_program
-from planner_core.solvers.milp.program import Program
+from planner_core.solvers.programs.model import plan_program
+from planner_core.solvers.programs.program import Program
 from planner_core.solvers.rule import Rule
 from planner_core.timeline import replay
 
 TOLERANCE: Final = 1e-6
 """Share of the reward to which a plan is optimal where rewards are not whole."""
 
-_MAX_ROUNDS: Final = 200
 _STALLED: Final = 0.02  # of the gap, in _PATIENCE rounds of cuts
 _PATIENCE: Final = 12
 _WANTED: Final = 1e-3
 _NODE_ROUNDS: Final = 12
-_MAX_PARTS: Final = 10  # beyond that HiGHS is faster
 _MAX_NODES: Final = 50  # of HiGHS, among the tasks that a relaxation takes
 _POLISH: Final = 50.0
 _POLISHED: Final = (1, 4)  # rounds
 _ROUNDED_OFF: Final = 8  # this round, and when cutting planes lead no further
 _REPORT_EVERY_S: Final = 0.25
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Effort:
+    """How much is done before HiGHS is asked for the rest.
+
+    Attributes
+    ----------
+    moves_per_task
+        Moves of the window search for each opportunity.
+    max_rounds
+        Rounds of cutting planes.
+    max_parts
+        Parts into which the plans are split for the proof; beyond ten HiGHS is faster.
+    """
+
+    moves_per_task: float = 30.0
+    max_rounds: int = 200
+    max_parts: int = 10
 
 
 class FreeSearch:
@@ -171,13 +189,13 @@ class FreeSearch:
         while self.search(_POLISH, rows) and not self.is_done:
             pass
 
-    def cut(self) -> Master:
+    def cut(self, max_rounds: int) -> Master:
         """Price with cutting planes until that leads no further; return the relaxation."""
         self.shrink()
         priced = self.bound + self.unit
         master = Master(self._rest, self._rows, self.budget, self.seed)
         bounds: list[float] = []
-        for number in range(1, _MAX_ROUNDS + 1):
+        for number in range(1, max_rounds + 1):
             taken = master.relaxed()
             if taken is None:
                 break
@@ -257,14 +275,14 @@ class FreeSearch:
             return Refutation(steps=tuple(self.steps))
         return Refutation(steps=(*self.steps, *self.tree.steps), branch=self.tree.branch)
 
-    def branch(self, master: Master) -> None:
+    def branch(self, master: Master, max_parts: int) -> None:
         """Split the plans by what they take until all parts are refuted."""
-        tree = self._part(master, ~self.is_struck)
+        tree = self._part(master, ~self.is_struck, max_parts)
         if tree is not None:
             self.tree = tree
             self.lower(self.reward)
 
-    def _part(self, master: Master, is_open: Bools) -> Refutation | None:
+    def _part(self, master: Master, is_open: Bools, max_parts: int) -> Refutation | None:
         """Return why no plan of the open tasks is better; None where that takes too long."""
         steps, values = [], []
         while True:
@@ -290,15 +308,15 @@ class FreeSearch:
                 break
         at = master.decisive(taken)
         self.num_parts += 1
-        if self.is_done or self.num_parts == _MAX_PARTS:
+        if self.is_done or self.num_parts == max_parts:
             return None
         self.report(f"{self.num_parts} parts")
-        first = self._part(master, is_open & ~master.excluded_by(at))
+        first = self._part(master, is_open & ~master.excluded_by(at), max_parts)
         if first is None or self.is_done:
             return None
         others = is_open.copy()
         others[at] = False
-        second = self._part(master, others)
+        second = self._part(master, others, max_parts)
         if second is None:
             return None
         return Refutation(steps=tuple(steps), branch=(int(self._rows[at]), first, second))
@@ -327,9 +345,7 @@ class FreeSearch:
         return Solution(plan=self.plan, termination=termination, proven=proven)
 
 
-def solve_free(
-    problem: Problem, budget: Budget, seed: int, gap: float, moves_per_task: float
-) -> Solution:
+def solve_free(problem: Problem, budget: Budget, seed: int, gap: float, effort: Effort) -> Solution:
     """Return the best plan of a problem without resources, and its proof."""
     search = FreeSearch(problem, budget, seed, gap)
     for solver in (Rule(), Graph()):
@@ -337,23 +353,23 @@ def solve_free(
     if not search.is_done:
         search.price()
         search.report("prices")
-    left, num_idle = moves_per_task, 0
+    left, num_idle = effort.moves_per_task, 0
     while left > 0 and num_idle < 2 and not search.is_done:
         left -= 5.0
         is_better = search.search(5.0, search.open_rows(search.reward))
         num_idle = 0 if is_better else num_idle + 1
         search.report("window search")
     if not search.is_done:
-        _close_in(search)
+        _close_in(search, effort)
     return search.solution()
 
 
-def _close_in(search: FreeSearch) -> None:
+def _close_in(search: FreeSearch, effort: Effort) -> None:
     """Cut, search and branch until plan and bound meet or the budget is spent."""
     search.price()
-    master = search.cut()
-    if search.is_transitive and not search.is_done:
-        search.branch(master)
+    master = search.cut(effort.max_rounds)
+    if search.is_transitive and effort.max_parts and not search.is_done:
+        search.branch(master, effort.max_parts)
     while not search.is_done:
         before = (search.bound, search.reward)
         search.prove(master, search.better)

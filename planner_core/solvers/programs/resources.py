@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner_core.problem import CONTACT, Floats, Ints, Problem, SatelliteProblem
-from planner_core.solvers.milp.program import Program, Rows
+from planner_core.solvers.programs.program import Program, Rows
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

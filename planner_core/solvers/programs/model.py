@@ -10,9 +10,9 @@ import numpy as np
 from planner_core.comparable import Order, order_of, transitive_closure
 from planner_core.problem import COLLECT, CONTACT, Floats, Ints, Problem, SatelliteProblem
 from planner_core.slew import TIME_TOLERANCE_S
-from planner_core.solvers.milp.antichains import antichain_cover, detours, excluding_pairs
-from planner_core.solvers.milp.program import Program, Rows
-from planner_core.solvers.milp.resources import add_resources
+from planner_core.solvers.programs.antichains import antichain_cover, detours, excluding_pairs
+from planner_core.solvers.programs.program import Program, Rows
+from planner_core.solvers.programs.resources import add_resources
 
 Formulation = Literal["antichain", "pairwise"]
 

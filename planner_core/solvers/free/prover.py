@@ -7,8 +7,8 @@ import numpy as np
 from planner_core.plan import Plan
 from planner_core.problem import Problem
 from planner_core.solvers.base import Budget
-from planner_core.solvers.milp.highs import Engine, Watch
-from planner_core.solvers.milp.program import Program
+from planner_core.solvers.programs.highs import Engine, Watch
+from planner_core.solvers.programs.program import Program
 
 
 class Prover(Engine):

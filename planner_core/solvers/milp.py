@@ -17,12 +17,13 @@ from planner_core.plan import Plan
 from planner_core.problem import COLLECT, Floats, Problem
 from planner_core.solvers.base import Budget, Constraint, Progress, Solution, Termination
 from planner_core.solvers.forward_search import ForwardSearch
+from planner_core.solvers.free.search import Effort, solve_free
 from planner_core.solvers.graph import Graph
 from planner_core.solvers.lns import improved
-from planner_core.solvers.milp.antichains import violated_antichains
-from planner_core.solvers.milp.highs import Engine, Outcome, Watch
-from planner_core.solvers.milp.model import Formulation, PlanProgram, plan_program
-from planner_core.solvers.milp.program import Rows
+from planner_core.solvers.programs.antichains import violated_antichains
+from planner_core.solvers.programs.highs import Engine, Outcome, Watch
+from planner_core.solvers.programs.model import Formulation, PlanProgram, plan_program
+from planner_core.solvers.programs.program import Rows
 from planner_core.solvers.rule import Rule
 from planner_core.timeline import replay
 
@@ -31,6 +32,9 @@ from planner_core.timeline import replay
 _TOUCHING: Final = -1e-9
 _CLEAR: Final = 1e-7
 _REPORT_EVERY_S: Final = 0.25
+_STALLED: Final = 1e-4  # of the bound, in _PATIENCE rounds of cuts
+_PATIENCE: Final = 5
+_HEURISTIC_EFFORT: Final = 0.05  # what HiGHS does by default
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,7 +51,8 @@ class Milp:
         default="antichain",
         metadata={
             "description": "antichain: one row for each set of tasks that exclude each other, "
-            "and cutting planes; pairwise: the paper's, one row for each such pair."
+            "and cutting planes; without resources HiGHS then only proves what is left. "
+            "pairwise: the paper's, one row for each such pair."
         },
     )
     gap: float = field(
@@ -59,11 +64,11 @@ class Milp:
         },
     )
     cut_rounds: int = field(
-        default=20,
+        default=200,
         metadata={
             "minimum": 0,
             "maximum": 1000,
-            "description": "Rounds of cutting planes before the search (antichain only).",
+            "description": "Rounds of cutting planes before the search, at most (antichain only).",
         },
     )
 
@@ -79,6 +84,11 @@ class Milp:
 
     def solve(self, problem: Problem, budget: Budget, seed: int) -> Solution:
         """Return the best plan; the same one for the same seed where the budget suffices."""
+        if self.formulation == "antichain" and not problem.use_resources:
+            effort = Effort(
+                moves_per_task=self.moves_per_task, max_rounds=self.cut_rounds, max_parts=0
+            )
+            return solve_free(problem, budget, seed, self.gap, effort)
         best = _Best(problem)
         best.offer(*_starts(problem, budget))
         if not problem.use_resources:
@@ -108,11 +118,7 @@ class Milp:
 
         if self.formulation == "antichain":
             _cut(engine, problem, model, self.cut_rounds, watch)
-        # A good plan is known where resources do not count: all that is left is the proof.
-        # The pairwise form is there to compare with, and gets what HiGHS does by default.
-        is_known = self.formulation == "antichain" and not problem.use_resources
-        effort = 0.0 if is_known else 0.05
-        return engine.search(best.columns(problem), self.gap, effort, watch)
+        return engine.search(best.columns(problem), self.gap, _HEURISTIC_EFFORT, watch)
 
 
 def _starts(problem: Problem, budget: Budget) -> list[Plan]:
@@ -127,12 +133,16 @@ def _starts(problem: Problem, budget: Budget) -> list[Plan]:
 
 
 def _cut(engine: Engine, problem: Problem, model: PlanProgram, rounds: int, watch: Watch) -> None:
-    """Add the antichains that the fractional optimum breaks, until there are none."""
+    """Add the antichains that the fractional optimum breaks, while that leads anywhere."""
+    bounds: list[float] = []
     for _ in range(rounds):
         taken = engine.relaxed()
         if taken is None:
             return
         watch(-np.inf, engine.bound)
+        bounds.append(engine.bound)
+        if len(bounds) > _PATIENCE and bounds[-1 - _PATIENCE] - bounds[-1] < _STALLED * bounds[-1]:
+            return
         num_added = 0
         for satellite, order in zip(problem.satellites, model.orders, strict=True):
             own = model.taken[satellite.rows]

@@ -12,7 +12,7 @@ import numpy as np
 
 from planner_core.problem import Floats
 from planner_core.solvers.base import Budget
-from planner_core.solvers.milp.program import Program, Rows
+from planner_core.solvers.programs.program import Program, Rows
 
 # Sums of zeros and ones bear HiGHS's usual tolerance. In a long chain of levels each row may
 # be off by as much, so there it must be far below one task.

@@ -18,10 +18,10 @@ from planner_core.draws import draws_of
 from planner_core.jit import kernel
 from planner_core.problem import COLLECT, Bools, Bytes, Floats, Ints, Problem
 from planner_core.solvers.base import Budget
-from planner_core.solvers.certified.odd_sets import Sets, deepest, odd_sets
-from planner_core.solvers.milp.antichains import antichain_cover, violated_antichains
-from planner_core.solvers.milp.highs import Engine
-from planner_core.solvers.milp.program import Program, Rows
+from planner_core.solvers.free.odd_sets import Sets, deepest, odd_sets
+from planner_core.solvers.programs.antichains import antichain_cover, violated_antichains
+from planner_core.solvers.programs.highs import Engine
+from planner_core.solvers.programs.program import Program, Rows
 
 _TRIALS: Final = 4  # orders of elimination that are tried for odd sets
 _MAX_CUTS: Final = 150  # in a round

@@ -1,0 +1,1 @@
+"""Planning without resources: prices, window search, cutting planes and the proof."""
