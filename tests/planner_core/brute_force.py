@@ -35,7 +35,7 @@ def best_reward(problem: Problem) -> float:
         timeline = replay(problem, Plan.of(problem, rows))
         if timeline.is_valid:
             return timeline.reward
-    raise AssertionError("not even the empty plan is valid")
+    return 0.0  # not even the empty plan is valid
 
 
 def _chains(
