@@ -12,11 +12,11 @@ from typing import Final
 import numpy as np
 
 from planner_core.plan import Plan
-from planner_core.problem import CONTACT, Bools, Floats, Ints, Problem
+from planner_core.problem import COLLECT, Bools, Floats, Problem
 from planner_core.solvers.base import Budget
 from planner_core.solvers.milp.antichains import violated_antichains
 from planner_core.solvers.milp.highs import Engine
-from planner_core.solvers.milp.model import PlanProgram, plan_program
+from planner_core.solvers.milp.model import plan_program
 from planner_core.solvers.milp.program import Rows
 
 _CLEAR: Final = 1e-7  # from the limits, so that the referee accepts the plan
@@ -44,18 +44,15 @@ class Relaxation:
     ----------
     value
         With antichain cuts; minus infinity where there is no point.
-    offered
-        The collects that it may take. Shape ``(n,)``.
     prices
         What it says that each target is worth by itself. Shape ``(num_targets,)``.
-    reduced_costs
-        What taking an opportunity would change; 0 where it hardly matters. Shape ``(n,)``.
+    losses
+        What taking an opportunity would cost; infinite where it may not. Shape ``(n,)``.
     """
 
     value: float
-    offered: Bools
     prices: Floats
-    reduced_costs: Floats
+    losses: Floats
 
 
 class FixedContacts:
@@ -64,26 +61,40 @@ class FixedContacts:
     def __init__(
         self, problem: Problem, offered: Bools, contacts: tuple[int, ...], budget: Budget, seed: int
     ) -> None:
-        self._problem, self.offered = problem, offered
-        self._model = plan_program(problem, "antichain", _CLEAR)
-        _fix(self._model, problem, offered, np.array(contacts, dtype=np.int32))
+        self._problem = problem
+        kept = offered & (problem.opportunities.kind == COLLECT)
+        kept[list(contacts)] = True
+        self._rows = np.flatnonzero(kept).astype(np.int32)
+        self._model = plan_program(problem, "antichain", _CLEAR, self._rows)
+        self._fix(np.isin(self._rows, contacts))
         self._engine = _Engine(self._model.program, budget, seed, is_chained=True)
         self.relaxed = self._cut()
 
     def relaxation(self) -> Relaxation:
         """Return what the relaxation tells, without the program, which takes much memory."""
         reward = self._problem.target_reward
-        prices, costs = np.zeros(len(reward)), np.zeros(len(self.offered))
+        prices, losses = np.zeros(len(reward)), np.full(len(self._problem.opportunities), np.inf)
         if np.isfinite(self.relaxed):
             # The rows of the targets come first in the program.
             rows, columns = self._engine.duals()
             worth = np.abs(rows[: len(reward)])
-            has_own_columns = bool(np.any(self._model.program.worth[0] > 0.0))
-            prices = np.clip(worth if has_own_columns else reward - worth, 0.0, reward)
-            costs = np.abs(columns[: len(costs)])
-        return Relaxation(
-            value=self.relaxed, offered=self.offered, prices=prices, reduced_costs=costs
-        )
+            prices = np.clip(worth if self._is_plain else reward - worth, 0.0, reward)
+            losses[self._rows] = np.abs(columns[: len(self._rows)])
+        return Relaxation(value=self.relaxed, prices=prices, losses=losses)
+
+    @property
+    def _is_plain(self) -> bool:
+        """Whether tasks earn what their targets are worth, in a row for each target."""
+        return bool(np.any(self._model.program.worth[0] > 0.0))
+
+    def _fix(self, is_fixed: Bools) -> None:
+        """Fix the contacts, and let rows alone limit the collects, so that they get all prices."""
+        program, m = self._model.program, len(is_fixed)
+        lower, upper = np.concatenate(program.lower), np.concatenate(program.upper)
+        if self._is_plain:
+            upper[:m][upper[:m] > 0.0] = np.inf
+        lower[:m][is_fixed] = upper[:m][is_fixed] = 1.0
+        program.lower, program.upper = [lower], [upper]
 
     def _cut(self) -> float:
         """Return the value of the relaxation with antichain cuts; minus infinity if none."""
@@ -97,8 +108,7 @@ class FixedContacts:
 
     def _add_cuts(self, taken: Floats) -> bool:
         is_cut = False
-        satellites = zip(self._problem.satellites, self._model.orders, strict=True)
-        for satellite, order in satellites:
+        for satellite, order in zip(self._model.problem.satellites, self._model.orders, strict=True):
             if len(satellite) == 0:
                 continue
             own = self._model.taken[satellite.rows]
@@ -113,20 +123,8 @@ class FixedContacts:
         outcome = self._engine.search(None, 0.0, _EFFORT, _unwatched, _MAX_NODES)
         if outcome.columns is None:
             return None
-        taken = outcome.columns[: len(self._problem.opportunities)]
-        return Plan.of(self._problem, np.flatnonzero(taken > 0.5))
+        return Plan.of(self._problem, self._rows[outcome.columns[: len(self._rows)] > 0.5])
 
 
 def _unwatched(_reward: float, _bound: float) -> None:
     pass
-
-
-def _fix(model: PlanProgram, problem: Problem, offered: Bools, contacts: Ints) -> None:
-    """Set the bounds of x: contacts fixed, of the other tasks only those offered."""
-    program = model.program
-    n = len(problem.opportunities)
-    lower, upper = np.concatenate(program.lower), np.concatenate(program.upper)
-    is_contact = problem.opportunities.kind == CONTACT
-    upper[:n][is_contact | ~offered] = 0.0
-    lower[contacts] = upper[contacts] = 1.0
-    program.lower, program.upper = [lower], [upper]

@@ -37,7 +37,7 @@ _STEPS: Final = 5  # of the search for prices, in a round
 _PATIENCE: Final = 6  # rounds without a new set of contacts or a better plan
 _SETS_AT_A_TIME: Final = 2
 _AS_GOOD: Final = 0.75  # of a target: sets whose prices count
-_OFFERED: Final = (800, 500)  # tasks in a search with fixed contacts
+_OFFERED: Final = (1000, 600)  # tasks in a search with fixed contacts
 _LESS_LIKELY: Final = 0.15  # of a target: what a set is worth less at each further attempt
 _MOST_ROWS: Final = 3000  # of a relaxation
 
@@ -203,10 +203,10 @@ class ResourceSearch:
 
     def promising(self, relaxation: Relaxation, size: int) -> Bools:
         """Return the tasks that the relaxation would take at the least loss."""
-        costs = relaxation.reduced_costs
-        cut_off = np.sort(costs[relaxation.offered])[:size][-1]
+        losses = relaxation.losses
+        cut_off = np.sort(losses[np.isfinite(losses)])[:size][-1]
         own = self.mask(action.opportunity for action in self.plan.actions)
-        promising: Bools = ((costs <= cut_off) & relaxation.offered) | own
+        promising: Bools = (losses <= cut_off) | own
         return promising
 
     @property
