@@ -27,8 +27,9 @@ _MAX_NODES: Final = 200
 
 class _Engine(Engine):
     def require(self, amount: float) -> None:
-        """Look only for points worth this much."""
-        self._highs.setOptionValue("objective_bound", amount - 1e-6 * max(1.0, amount))
+        """Look only for points worth this much, until there is one."""
+        for option in ("objective_bound", "objective_target"):
+            self._highs.setOptionValue(option, amount - 1e-6 * max(1.0, amount))
 
     def duals(self) -> tuple[Floats, Floats]:
         """Return what the last relaxation says rows and columns are worth."""
@@ -118,7 +119,7 @@ class FixedContacts:
         return is_cut
 
     def plan(self, at_least: float) -> Plan | None:
-        """Return the best plan worth ``at_least``, or None where none turns up soon."""
+        """Return a plan worth ``at_least``, or None where none turns up soon."""
         self._engine.require(at_least)
         outcome = self._engine.search(None, 0.0, _EFFORT, _unwatched, _MAX_NODES)
         if outcome.columns is None:

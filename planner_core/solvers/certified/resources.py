@@ -19,7 +19,7 @@ from planner_core.bounds.bound import Bound, reward_unit, rounded_bound
 from planner_core.bounds.lagrangian import lagrangian_bound
 from planner_core.bounds.resource_bound import quick_bound
 from planner_core.plan import Plan
-from planner_core.problem import CONTACT, Bools, Floats, Problem
+from planner_core.problem import CONTACT, Bools, Problem
 from planner_core.solvers.base import Budget, Progress, Solution, Termination
 from planner_core.solvers.certified.choices import ChoiceSearch
 from planner_core.solvers.certified.contact_sets import FixedContacts, Relaxation
@@ -32,14 +32,14 @@ from planner_core.timeline import replay
 _MAX_UNITS: Final = 2000
 _FIRST_GOAL: Final = 0.95
 _MOVES: Final = 40  # of the search for plans, between two looks at the bound
-_FIRST_ROUNDS: Final = 2
-_STEPS: Final = 5  # of the search for prices, in a round
+_STEPS: Final = 4  # of the search for prices, in a round
 _PATIENCE: Final = 6  # rounds without a new set of contacts or a better plan
 _SETS_AT_A_TIME: Final = 2
 _AS_GOOD: Final = 0.75  # of a target: sets whose prices count
 _OFFERED: Final = (1000, 600)  # tasks in a search with fixed contacts
 _LESS_LIKELY: Final = 0.15  # of a target: what a set is worth less at each further attempt
 _MOST_ROWS: Final = 3000  # of a relaxation
+_FINER: Final = 0.3  # of a target: what smaller units gain at most
 
 
 class ResourceSearch:
@@ -169,17 +169,19 @@ class ResourceSearch:
         if not new or not np.isfinite(best):
             return False
         near = [p.prices for p in self._relaxed.values() if p.value >= best - _AS_GOOD * self._one]
-        mean = np.mean(near, axis=0)
-        prices.restart(mean)
-        self.refine(prices, mean)
+        prices.restart(np.mean(near, axis=0))
         self.report("contacts fixed")
         return True
 
-    def refine(self, prices: PriceSearch, start: Floats) -> None:
-        """See what prices prove in smaller units."""
-        value, finer, unit = prices.refined(start)
+    def refine(self, prices: PriceSearch) -> None:
+        """See what the best prices prove in smaller units, where that may help."""
+        hoped = rounded_bound(self.problem, prices.value - _FINER * self._one, self.reward)
+        if hoped >= self.bound.value or self.is_done:
+            return
+        value, finer, unit = prices.refined(prices.prices)
         if not self.budget.is_spent():
             self.lower(Bound(value=value, proof="dp", prices=finer, unit=unit))
+        self.report("prices")
 
     def fix_contacts(self) -> bool:
         """Search for a better plan with the most promising contacts; return whether it is."""
@@ -198,7 +200,8 @@ class ResourceSearch:
         if part.relaxed < self.better - 1e-6:
             return False
         self.report("contacts fixed")
-        plan = part.plan(self.better)
+        # The last image is the hardest; while it is left the rest may suffice.
+        plan = part.plan(max(self.better, part.relaxed - self._one))
         return plan is not None and self.offer(plan)
 
     def promising(self, relaxation: Relaxation, size: int) -> Bools:
@@ -248,8 +251,7 @@ def solve_with_resources(problem: Problem, budget: Budget, seed: int, gap: float
         preferred = search.without_resources()
         choices.start(preferred, 1.0)
         search.offer(choices.plan)
-    for _ in range(_FIRST_ROUNDS):
-        search.search(choices, _MOVES)
+    search.search(choices, _MOVES)
     _close_in(search, choices)
     if not search.is_done:
         search.exhaust()
@@ -271,13 +273,17 @@ def _close_in(search: ResourceSearch, choices: ChoiceSearch) -> None:
         start,
         search.budget.stop,
     )
+    prices.learn(search.plan)
     idle_rounds = 0
     while idle_rounds < _PATIENCE and not search.is_done:
-        search.price(prices)
-        search.refine(prices, prices.prices)
         is_new = search.relax_sets(prices, choices)
-        search.search(choices, 2 * _MOVES)
+        search.price(prices)
         is_better = search.fix_contacts()
         if is_better:
             choices.adopt(search.plan)
-        idle_rounds = 0 if is_new or is_better else idle_rounds + 1
+        if is_new or is_better:
+            idle_rounds = 0
+            continue
+        idle_rounds += 1
+        search.refine(prices)
+        search.search(choices, 2 * _MOVES)
