@@ -23,7 +23,7 @@ _DEFLECTION: Final = 0.3
 _PATIENCE: Final = 7
 _SHORTER: Final = 0.6
 _NEAR: Final = 0.99
-_AFRESH: Final = 0.4  # length of the steps from given prices
+_AFRESH: Final = 1.0  # length of the steps from given prices
 _FINER: Final = 2
 _KEPT_PATHS: Final = 30
 
@@ -67,8 +67,14 @@ class PriceSearch:
             unit *= 2.0
         return float(unit)
 
-    def step(self, reward: float) -> bool:
-        """Evaluate the current prices and step on; return False once the work must stop."""
+    def step(self, level: float) -> bool:
+        """Evaluate the current prices and step on; return False once the work must stop.
+
+        Parameters
+        ----------
+        level
+            Where the best prices are expected.
+        """
         reward_of = self._problem.target_reward
         prices = leaving_whole_units(self._problem, self._now, self.unit)
         prices[~self._is_reachable] = 0.0
@@ -92,7 +98,7 @@ class PriceSearch:
         norm = float(self._direction @ (scale * self._direction))
         if norm == 0.0:
             return False
-        length = self.theta * (value - max(reward, _NEAR * self.value)) / norm
+        length = self.theta * (value - max(level, _NEAR * self.value)) / norm
         self._now = np.clip(self._now + length * scale * self._direction, 0.0, reward_of)
         return True
 

@@ -32,7 +32,8 @@ from planner_core.timeline import replay
 _MAX_UNITS: Final = 2000
 _FIRST_GOAL: Final = 0.95
 _MOVES: Final = 40  # of the search for plans, between two looks at the bound
-_STEPS: Final = 4  # of the search for prices, in a round
+_FIRST_STEPS: Final = 2  # of the search for prices, where sets of contacts gave new ones
+_STEPS: Final = 8
 _PATIENCE: Final = 6  # rounds without a new set of contacts or a better plan
 _SETS_AT_A_TIME: Final = 2
 _AS_GOOD: Final = 0.75  # of a target: sets whose prices count
@@ -137,10 +138,12 @@ class ResourceSearch:
         mask[list(rows)] = True
         return mask
 
-    def price(self, prices: PriceSearch) -> None:
+    def price(self, prices: PriceSearch, num_steps: int) -> None:
         """Make steps towards better prices."""
-        for _ in range(_STEPS):
-            if self.is_done or not prices.step(self.reward):
+        # What a relaxation with fixed contacts is worth, prices hardly get below.
+        relaxed = max((r.value for r in self._relaxed.values()), default=-np.inf)
+        for _ in range(num_steps):
+            if self.is_done or not prices.step(max(self.reward, relaxed)):
                 return
             self.lower(
                 Bound(value=prices.value, proof="dp", prices=prices.prices, unit=prices.unit)
@@ -200,8 +203,9 @@ class ResourceSearch:
         if part.relaxed < self.better - 1e-6:
             return False
         self.report("contacts fixed")
-        # The last image is the hardest; while it is left the rest may suffice.
-        plan = part.plan(max(self.better, part.relaxed - self._one))
+        # The last image is the hardest, and may be none: whoever wants it asks again.
+        likely = rounded_bound(self.problem, part.relaxed - self._one, self.better)
+        plan = part.plan(likely)
         return plan is not None and self.offer(plan)
 
     def promising(self, relaxation: Relaxation, size: int) -> Bools:
@@ -277,7 +281,7 @@ def _close_in(search: ResourceSearch, choices: ChoiceSearch) -> None:
     idle_rounds = 0
     while idle_rounds < _PATIENCE and not search.is_done:
         is_new = search.relax_sets(prices, choices)
-        search.price(prices)
+        search.price(prices, _FIRST_STEPS if is_new else _STEPS)
         is_better = search.fix_contacts()
         if is_better:
             choices.adopt(search.plan)
