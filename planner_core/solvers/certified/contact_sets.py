@@ -6,23 +6,44 @@ tasks that relaxed plans have taken on the way to good prices are few, and hold 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
+import highspy
 import numpy as np
 
 from planner_core.plan import Plan
 from planner_core.problem import COLLECT, Bools, Floats, Problem
 from planner_core.solvers.base import Budget
 from planner_core.solvers.milp.antichains import violated_antichains
-from planner_core.solvers.milp.highs import Engine
+from planner_core.solvers.milp.highs import CHAIN_TOLERANCE, Engine
 from planner_core.solvers.milp.model import plan_program
 from planner_core.solvers.milp.program import Rows
 
 _CLEAR: Final = 1e-7  # from the limits, so that the referee accepts the plan
-_CUT_ROUNDS: Final = 5
+_CUT_ROUNDS: Final = 2
 _EFFORT: Final = 0.2
 _MAX_NODES: Final = 200
+_INTERIOR: Final = {
+    "solver": "ipm",
+    "run_crossover": "off",
+    "primal_feasibility_tolerance": 1e-7,
+}
+_CORNER: Final = {
+    "solver": "choose",
+    "run_crossover": "on",
+    "primal_feasibility_tolerance": CHAIN_TOLERANCE,
+}
+
+
+class _Point(NamedTuple):
+    """An optimum of a relaxation, and what its rows and columns are worth."""
+
+    value: float
+    columns: Floats
+    row_prices: Floats
+    losses: Floats
 
 
 class _Engine(Engine):
@@ -31,10 +52,41 @@ class _Engine(Engine):
         for option in ("objective_bound", "objective_target"):
             self._highs.setOptionValue(option, amount - 1e-6 * max(1.0, amount))
 
-    def duals(self) -> tuple[Floats, Floats]:
-        """Return what the last relaxation says rows and columns are worth."""
+    def central(self) -> _Point | None:
+        """Return a point amid all optima, with prices that are amid all that prove them.
+
+        Such prices hold for other contacts as well, better than those of a corner. HiGHS has
+        the sign of them right where it minimizes.
+        """
+        highs = self._highs
+        self._optimize(-1.0, highspy.ObjSense.kMinimize, _INTERIOR)
+        if not self._run():
+            return None
+        point = None
+        if highs.getModelStatus() == highspy.HighsModelStatus.kOptimal:
+            point = self._point(-float(highs.getInfo().objective_function_value))
+        self._optimize(-1.0, highspy.ObjSense.kMaximize, _CORNER)
+        if point is None and self.relaxed() is not None:
+            point = self._point(float(highs.getInfo().objective_function_value))
+        return point
+
+    def _optimize(
+        self, sign: float, sense: highspy.ObjSense, options: Mapping[str, str | float]
+    ) -> None:
+        worth = sign * np.array(self._highs.getLp().col_cost_)
+        self._highs.changeColsCost(len(worth), np.arange(len(worth), dtype=np.int32), worth)
+        self._highs.changeObjectiveSense(sense)
+        for option, value in options.items():
+            self._highs.setOptionValue(option, value)
+
+    def _point(self, value: float) -> _Point:
         solution = self._highs.getSolution()
-        return np.array(solution.row_dual), np.array(solution.col_dual)
+        return _Point(
+            value=value,
+            columns=np.array(solution.col_value),
+            row_prices=np.abs(np.array(solution.row_dual)),
+            losses=np.abs(np.array(solution.col_dual)),
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -69,18 +121,18 @@ class FixedContacts:
         self._model = plan_program(problem, "antichain", _CLEAR, self._rows)
         self._fix(np.isin(self._rows, contacts))
         self._engine = _Engine(self._model.program, budget, seed, is_chained=True)
-        self.relaxed = self._cut()
+        self._point = self._cut()
+        self.relaxed = -np.inf if self._point is None else self._point.value
 
     def relaxation(self) -> Relaxation:
         """Return what the relaxation tells, without the program, which takes much memory."""
         reward = self._problem.target_reward
         prices, losses = np.zeros(len(reward)), np.full(len(self._problem.opportunities), np.inf)
-        if np.isfinite(self.relaxed):
+        if self._point is not None:
             # The rows of the targets come first in the program.
-            rows, columns = self._engine.duals()
-            worth = np.abs(rows[: len(reward)])
+            worth = self._point.row_prices[: len(reward)]
             prices = np.clip(worth if self._is_plain else reward - worth, 0.0, reward)
-            losses[self._rows] = np.abs(columns[: len(self._rows)])
+            losses[self._rows] = self._point.losses[: len(self._rows)]
         return Relaxation(value=self.relaxed, prices=prices, losses=losses)
 
     @property
@@ -97,15 +149,13 @@ class FixedContacts:
         lower[:m][is_fixed] = upper[:m][is_fixed] = 1.0
         program.lower, program.upper = [lower], [upper]
 
-    def _cut(self) -> float:
-        """Return the value of the relaxation with antichain cuts; minus infinity if none."""
+    def _cut(self) -> _Point | None:
+        """Return the optimum of the relaxation with antichain cuts, if there is one."""
         for left in range(_CUT_ROUNDS, -1, -1):
-            taken = self._engine.relaxed()
-            if taken is None:
-                return -np.inf
-            if left == 0 or not self._add_cuts(taken):
+            point = self._engine.central()
+            if point is None or left == 0 or not self._add_cuts(point.columns):
                 break
-        return self._engine.bound
+        return point
 
     def _add_cuts(self, taken: Floats) -> bool:
         is_cut = False

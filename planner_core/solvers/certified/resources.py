@@ -39,6 +39,7 @@ _SETS_AT_A_TIME: Final = 2
 _AS_GOOD: Final = 0.75  # of a target: sets whose prices count
 _OFFERED: Final = (1000, 600)  # tasks in a search with fixed contacts
 _LESS_LIKELY: Final = 0.15  # of a target: what a set is worth less at each further attempt
+_ROOM: Final = 0.5  # of a target: below that the search for a better plan takes long
 _MOST_ROWS: Final = 3000  # of a relaxation
 _FINER: Final = 0.3  # of a target: what smaller units gain at most
 
@@ -186,13 +187,19 @@ class ResourceSearch:
             self.lower(Bound(value=value, proof="dp", prices=finer, unit=unit))
         self.report("prices")
 
-    def fix_contacts(self) -> bool:
-        """Search for a better plan with the most promising contacts; return whether it is."""
+    def fix_contacts(self, room: float) -> bool:
+        """Search for a better plan with the most promising contacts; return whether it is.
+
+        Parameters
+        ----------
+        room
+            How far above a better plan the relaxation must be, in targets.
+        """
         hopeful = [
             (relaxation.value - _LESS_LIKELY * attempt * self._one, contacts, size)
             for contacts, relaxation in self._relaxed.items()
             for attempt, size in enumerate(_OFFERED)
-            if (contacts, size) not in self._tried and relaxation.value >= self.better - 1e-6
+            if (contacts, size) not in self._tried and relaxation.value >= self.better + room * self._one - 1e-6
         ]
         if not hopeful or self.is_done:
             return False
@@ -282,12 +289,11 @@ def _close_in(search: ResourceSearch, choices: ChoiceSearch) -> None:
     while idle_rounds < _PATIENCE and not search.is_done:
         is_new = search.relax_sets(prices, choices)
         search.price(prices, _FIRST_STEPS if is_new else _STEPS)
-        is_better = search.fix_contacts()
+        is_better = search.fix_contacts(_ROOM)
+        if not is_new and not is_better:
+            search.refine(prices)
+            is_better = search.fix_contacts(0.0)
+            search.search(choices, 2 * _MOVES)
         if is_better:
             choices.adopt(search.plan)
-        if is_new or is_better:
-            idle_rounds = 0
-            continue
-        idle_rounds += 1
-        search.refine(prices)
-        search.search(choices, 2 * _MOVES)
+        idle_rounds = 0 if is_new or is_better else idle_rounds + 1
