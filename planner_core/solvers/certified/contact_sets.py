@@ -6,7 +6,7 @@ tasks that relaxed plans have taken on the way to good prices are few, and hold 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
@@ -22,7 +22,8 @@ from planner_core.solvers.milp.model import plan_program
 from planner_core.solvers.milp.program import Rows
 
 _CLEAR: Final = 1e-7  # from the limits, so that the referee accepts the plan
-_CUT_ROUNDS: Final = 2
+_CENTRAL_ROUNDS: Final = 2
+_CORNER_ROUNDS: Final = 5
 _EFFORT: Final = 0.2
 _MAX_NODES: Final = 200
 _INTERIOR: Final = {
@@ -66,9 +67,13 @@ class _Engine(Engine):
         if highs.getModelStatus() == highspy.HighsModelStatus.kOptimal:
             point = self._point(-float(highs.getInfo().objective_function_value))
         self._optimize(-1.0, highspy.ObjSense.kMaximize, _CORNER)
-        if point is None and self.relaxed() is not None:
-            point = self._point(float(highs.getInfo().objective_function_value))
-        return point
+        return point or self.corner()
+
+    def corner(self) -> _Point | None:
+        """Return a corner of the relaxation."""
+        if self.relaxed() is None:
+            return None
+        return self._point(float(self._highs.getInfo().objective_function_value))
 
     def _optimize(
         self, sign: float, sense: highspy.ObjSense, options: Mapping[str, str | float]
@@ -121,19 +126,24 @@ class FixedContacts:
         self._model = plan_program(problem, "antichain", _CLEAR, self._rows)
         self._fix(np.isin(self._rows, contacts))
         self._engine = _Engine(self._model.program, budget, seed, is_chained=True)
-        self._point = self._cut()
-        self.relaxed = -np.inf if self._point is None else self._point.value
 
     def relaxation(self) -> Relaxation:
-        """Return what the relaxation tells, without the program, which takes much memory."""
+        """Return what the relaxation tells, with prices amid all that prove it."""
         reward = self._problem.target_reward
         prices, losses = np.zeros(len(reward)), np.full(len(self._problem.opportunities), np.inf)
-        if self._point is not None:
+        point = self._cut(_CENTRAL_ROUNDS, self._engine.central)
+        if point is not None:
             # The rows of the targets come first in the program.
-            worth = self._point.row_prices[: len(reward)]
+            worth = point.row_prices[: len(reward)]
             prices = np.clip(worth if self._is_plain else reward - worth, 0.0, reward)
-            losses[self._rows] = self._point.losses[: len(self._rows)]
-        return Relaxation(value=self.relaxed, prices=prices, losses=losses)
+            losses[self._rows] = point.losses[: len(self._rows)]
+        value = -np.inf if point is None else point.value
+        return Relaxation(value=value, prices=prices, losses=losses)
+
+    def relaxed(self) -> float:
+        """Return what the relaxation is worth: a corner, from which the search sets out."""
+        point = self._cut(_CORNER_ROUNDS, self._engine.corner)
+        return -np.inf if point is None else point.value
 
     @property
     def _is_plain(self) -> bool:
@@ -149,10 +159,10 @@ class FixedContacts:
         lower[:m][is_fixed] = upper[:m][is_fixed] = 1.0
         program.lower, program.upper = [lower], [upper]
 
-    def _cut(self) -> _Point | None:
+    def _cut(self, rounds: int, solve: Callable[[], _Point | None]) -> _Point | None:
         """Return the optimum of the relaxation with antichain cuts, if there is one."""
-        for left in range(_CUT_ROUNDS, -1, -1):
-            point = self._engine.central()
+        for left in range(rounds, -1, -1):
+            point = solve()
             if point is None or left == 0 or not self._add_cuts(point.columns):
                 break
         return point

@@ -37,7 +37,7 @@ _STEPS: Final = 8
 _PATIENCE: Final = 6  # rounds without a new set of contacts or a better plan
 _SETS_AT_A_TIME: Final = 2
 _AS_GOOD: Final = 0.75  # of a target: sets whose prices count
-_OFFERED: Final = (1000, 600)  # tasks in a search with fixed contacts
+_OFFERED: Final = (700, 1000)  # tasks in a search with fixed contacts
 _LESS_LIKELY: Final = 0.15  # of a target: what a set is worth less at each further attempt
 _ROOM: Final = 0.5  # of a target: below that the search for a better plan takes long
 _MOST_ROWS: Final = 3000  # of a relaxation
@@ -207,11 +207,12 @@ class ResourceSearch:
         self._tried.add((contacts, size))
         offered = self.promising(self._relaxed[contacts], size)
         part = FixedContacts(self.problem, offered, contacts, self.budget, self.seed)
-        if part.relaxed < self.better - 1e-6:
+        relaxed = part.relaxed()
+        if relaxed < self.better - 1e-6:
             return False
         self.report("contacts fixed")
         # The last image is the hardest, and may be none: whoever wants it asks again.
-        likely = rounded_bound(self.problem, part.relaxed - self._one, self.better)
+        likely = rounded_bound(self.problem, relaxed - self._one, self.better)
         plan = part.plan(likely)
         return plan is not None and self.offer(plan)
 
