@@ -26,12 +26,12 @@ _CENTRAL_ROUNDS: Final = 2
 _CORNER_ROUNDS: Final = 5
 _EFFORT: Final = 0.2
 _MAX_NODES: Final = 200
-_INTERIOR: Final = {
+_INTERIOR: Final[Mapping[str, str | float]] = {
     "solver": "ipm",
     "run_crossover": "off",
     "primal_feasibility_tolerance": 1e-7,
 }
-_CORNER: Final = {
+_CORNER: Final[Mapping[str, str | float]] = {
     "solver": "choose",
     "run_crossover": "on",
     "primal_feasibility_tolerance": CHAIN_TOLERANCE,
@@ -169,7 +169,8 @@ class FixedContacts:
 
     def _add_cuts(self, taken: Floats) -> bool:
         is_cut = False
-        for satellite, order in zip(self._model.problem.satellites, self._model.orders, strict=True):
+        satellites = zip(self._model.problem.satellites, self._model.orders, strict=True)
+        for satellite, order in satellites:
             if len(satellite) == 0:
                 continue
             own = self._model.taken[satellite.rows]

@@ -199,7 +199,8 @@ class ResourceSearch:
             (relaxation.value - _LESS_LIKELY * attempt * self._one, contacts, size)
             for contacts, relaxation in self._relaxed.items()
             for attempt, size in enumerate(_OFFERED)
-            if (contacts, size) not in self._tried and relaxation.value >= self.better + room * self._one - 1e-6
+            if (contacts, size) not in self._tried
+            and relaxation.value >= self.better + room * self._one - 1e-6
         ]
         if not hopeful or self.is_done:
             return False
