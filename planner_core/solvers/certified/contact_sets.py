@@ -180,7 +180,7 @@ class FixedContacts:
         return is_cut
 
     def plan(self, at_least: float) -> Plan | None:
-        """Return a plan worth ``at_least``, or None where none turns up soon."""
+        """Return a plan worth ``at_least`` if one turns up soon, or else any, or None."""
         self._engine.require(at_least)
         outcome = self._engine.search(None, 0.0, _EFFORT, _unwatched, _MAX_NODES)
         if outcome.columns is None:

@@ -34,7 +34,7 @@ _FIRST_GOAL: Final = 0.95
 _MOVES: Final = 40  # of the search for plans, between two looks at the bound
 _FIRST_STEPS: Final = 2  # of the search for prices, where sets of contacts gave new ones
 _STEPS: Final = 8
-_PATIENCE: Final = 6  # rounds without a new set of contacts or a better plan
+_PATIENCE: Final = 3  # rounds without a new set of contacts or a better plan
 _SETS_AT_A_TIME: Final = 2
 _AS_GOOD: Final = 0.75  # of a target: sets whose prices count
 _OFFERED: Final = (700, 1000)  # tasks in a search with fixed contacts
@@ -55,7 +55,9 @@ class ResourceSearch:
         self.is_valid, self.reward = timeline.is_valid, timeline.reward
         self.bound = Bound(value=float(problem.target_reward.sum()), proof="lagrangian")
         self._relaxed: dict[tuple[int, ...], Relaxation] = {}
-        self._tried: set[tuple[tuple[int, ...], int]] = set()
+        # By contacts and number of tasks offered: what no plan was found to be worth.
+        self._missed: dict[tuple[tuple[int, ...], int], float] = {}
+        self._refined = np.inf
         self._one = float(problem.target_reward.mean()) if len(problem.target_ids) else 1.0
 
     @property
@@ -180,8 +182,9 @@ class ResourceSearch:
     def refine(self, prices: PriceSearch) -> None:
         """See what the best prices prove in smaller units, where that may help."""
         hoped = rounded_bound(self.problem, prices.value - _FINER * self._one, self.reward)
-        if hoped >= self.bound.value or self.is_done:
+        if hoped >= self.bound.value or prices.value >= self._refined or self.is_done:
             return
+        self._refined = prices.value
         value, finer, unit = prices.refined(prices.prices)
         if not self.budget.is_spent():
             self.lower(Bound(value=value, proof="dp", prices=finer, unit=unit))
@@ -199,23 +202,24 @@ class ResourceSearch:
             (relaxation.value - _LESS_LIKELY * attempt * self._one, contacts, size)
             for contacts, relaxation in self._relaxed.items()
             for attempt, size in enumerate(_OFFERED)
-            if (contacts, size) not in self._tried
-            and relaxation.value >= self.better + room * self._one - 1e-6
+            if relaxation.value >= self.better + room * self._one - 1e-6
+            and self.better < self._missed.get((contacts, size), np.inf)
         ]
         if not hopeful or self.is_done:
             return False
         _, contacts, size = max(hopeful)
-        self._tried.add((contacts, size))
         offered = self.promising(self._relaxed[contacts], size)
         part = FixedContacts(self.problem, offered, contacts, self.budget, self.seed)
-        relaxed = part.relaxed()
-        if relaxed < self.better - 1e-6:
-            return False
-        self.report("contacts fixed")
         # The last image is the hardest, and may be none: whoever wants it asks again.
-        likely = rounded_bound(self.problem, relaxed - self._one, self.better)
-        plan = part.plan(likely)
-        return plan is not None and self.offer(plan)
+        wanted = rounded_bound(self.problem, part.relaxed() - self._one, self.better)
+        if wanted >= self._missed.get((contacts, size), np.inf):
+            wanted = self.better
+        self.report("contacts fixed")
+        plan = part.plan(wanted)
+        is_better = plan is not None and self.offer(plan)
+        if self.reward < wanted - 1e-6:
+            self._missed[contacts, size] = wanted
+        return is_better
 
     def promising(self, relaxation: Relaxation, size: int) -> Bools:
         """Return the tasks that the relaxation would take at the least loss."""
