@@ -39,7 +39,8 @@ _SETS_AT_A_TIME: Final = 2
 _AS_GOOD: Final = 0.75  # of a target: sets whose prices count
 _OFFERED: Final = (700, 1000)  # tasks in a search with fixed contacts
 _LESS_LIKELY: Final = 0.15  # of a target: what a set is worth less at each further attempt
-_ROOM: Final = 0.5  # of a target: below that the search for a better plan takes long
+_ROOM: Final = 0.5  # of a target: with less the search for a better plan takes long
+_TIGHT: Final = 0.05  # of a target: prices that near to a relaxation are the best
 _MOST_ROWS: Final = 3000  # of a relaxation
 _FINER: Final = 0.3  # of a target: what smaller units gain at most
 
@@ -57,7 +58,7 @@ class ResourceSearch:
         self._relaxed: dict[tuple[int, ...], Relaxation] = {}
         # By contacts and number of tasks offered: what no plan was found to be worth.
         self._missed: dict[tuple[tuple[int, ...], int], float] = {}
-        self._refined = np.inf
+        self._priced, self._refined = np.inf, np.inf  # bounds before they were rounded
         self._one = float(problem.target_reward.mean()) if len(problem.target_ids) else 1.0
 
     @property
@@ -143,11 +144,10 @@ class ResourceSearch:
 
     def price(self, prices: PriceSearch, num_steps: int) -> None:
         """Make steps towards better prices."""
-        # What a relaxation with fixed contacts is worth, prices hardly get below.
-        relaxed = max((r.value for r in self._relaxed.values()), default=-np.inf)
         for _ in range(num_steps):
-            if self.is_done or not prices.step(max(self.reward, relaxed)):
+            if self.is_done or not prices.step(max(self.reward, self.relaxed)):
                 return
+            self._priced = min(self._priced, prices.value)
             self.lower(
                 Bound(value=prices.value, proof="dp", prices=prices.prices, unit=prices.unit)
             )
@@ -156,9 +156,9 @@ class ResourceSearch:
     def relax_sets(self, prices: PriceSearch, choices: ChoiceSearch) -> bool:
         """Learn prices from the relaxations of sets of contacts; return whether any is new."""
         table = self.problem.opportunities
-        own = (a.opportunity for a in self.plan.actions)
+        plans = [self.mask(a.opportunity for a in self.plan.actions), choices.taken]
         sets = [
-            tuple(row for row in own if table.kind[row] == CONTACT),
+            *(tuple(np.flatnonzero(p & (table.kind == CONTACT)).tolist()) for p in plans),
             *(key for key, _ in prices.contact_sets.most_common()),
         ]
         new = [key for key in dict.fromkeys(sets) if key not in self._relaxed][:_SETS_AT_A_TIME]
@@ -171,10 +171,10 @@ class ResourceSearch:
                 return False
             program = FixedContacts(self.problem, offered, contacts, self.budget, self.seed)
             self._relaxed[contacts] = program.relaxation()
-        best = max(relaxation.value for relaxation in self._relaxed.values())
-        if not new or not np.isfinite(best):
+        if not new or not np.isfinite(self.relaxed):
             return False
-        near = [p.prices for p in self._relaxed.values() if p.value >= best - _AS_GOOD * self._one]
+        least = self.relaxed - _AS_GOOD * self._one
+        near = [r.prices for r in self._relaxed.values() if r.value >= least]
         prices.restart(np.mean(near, axis=0))
         self.report("contacts fixed")
         return True
@@ -190,14 +190,14 @@ class ResourceSearch:
             self.lower(Bound(value=value, proof="dp", prices=finer, unit=unit))
         self.report("prices")
 
-    def fix_contacts(self, room: float) -> bool:
+    def fix_contacts(self, *, is_last: bool) -> bool:
         """Search for a better plan with the most promising contacts; return whether it is.
 
-        Parameters
-        ----------
-        room
-            How far above a better plan the relaxation must be, in targets.
+        Where a relaxation leaves little room above a better plan that takes long. Unless this
+        is the last resort it waits for prices, which may show that there is none.
         """
+        can_sink = self._priced - self.relaxed > _TIGHT * self._one
+        room = _ROOM if can_sink and not is_last else 0.0
         hopeful = [
             (relaxation.value - _LESS_LIKELY * attempt * self._one, contacts, size)
             for contacts, relaxation in self._relaxed.items()
@@ -228,6 +228,11 @@ class ResourceSearch:
         own = self.mask(action.opportunity for action in self.plan.actions)
         promising: Bools = (losses <= cut_off) | own
         return promising
+
+    @property
+    def relaxed(self) -> float:
+        """What the best relaxation with fixed contacts is worth: prices hardly get below."""
+        return max((r.value for r in self._relaxed.values()), default=-np.inf)
 
     @property
     def better(self) -> float:
@@ -295,10 +300,10 @@ def _close_in(search: ResourceSearch, choices: ChoiceSearch) -> None:
     while idle_rounds < _PATIENCE and not search.is_done:
         is_new = search.relax_sets(prices, choices)
         search.price(prices, _FIRST_STEPS if is_new else _STEPS)
-        is_better = search.fix_contacts(_ROOM)
+        is_better = search.fix_contacts(is_last=False)
         if not is_new and not is_better:
             search.refine(prices)
-            is_better = search.fix_contacts(0.0)
+            is_better = search.fix_contacts(is_last=True)
             search.search(choices, 2 * _MOVES)
         if is_better:
             choices.adopt(search.plan)
