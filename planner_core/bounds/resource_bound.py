@@ -58,16 +58,26 @@ class SatelliteRelaxation:
         levels = data_levels(network, levels_per_collect, is_optimistic=True)
         return cls(satellite=satellite, network=network, levels=levels)
 
-    def with_data_price(self) -> SatelliteRelaxation:
-        """Return the same with the price of data at which the battery alone allows least."""
-        weight = np.where(self.satellite.kind == COLLECT, _TRIAL_UNITS, 0).astype(np.int32)
+    def with_data_price(self, num_images: int) -> SatelliteRelaxation:
+        """Return the same with the price of data at which the battery alone allows least.
+
+        Parameters
+        ----------
+        num_images
+            How many are expected, about.
+        """
+        num_units = _TRIAL_UNITS
+        while num_units * num_images * len(self.satellite) > _MAX_CELLS:
+            num_units //= 2
+        weight = np.where(self.satellite.kind == COLLECT, num_units, 0).astype(np.int32)
         best, least = self, np.inf
-        for units in range(_TRIAL_UNITS):
-            trial = replace(self, data_price=units / _TRIAL_UNITS)
-            top = _Needs.of(self.network, self.levels, weight, trial._price_in(weight), None).top
-            if top >= least:
+        for units in range(num_units):
+            trial = replace(self, data_price=units / num_units)
+            price = trial._price_in(weight)
+            needs = _Needs.of(self.network, self.levels, weight, price, num_units * num_images)
+            if needs.top >= least:
                 break
-            best, least = trial, top
+            best, least = trial, needs.top
         return best
 
     def weights(self, worth: Ints) -> Ints:

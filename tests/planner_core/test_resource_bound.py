@@ -110,7 +110,7 @@ def test_a_price_of_data_changes_nothing_but_the_time(
     for relaxation in relaxations(problem, 2):
         most, _ = replace(relaxation, data_price=0.0).most(worth, 0, stop)
         expected = None if near is None else int(near * most)
-        for data_price in (relaxation.with_data_price().data_price, 0.1, 0.5, 2.0):
+        for data_price in (relaxation.with_data_price(10).data_price, 0.1, 0.5, 2.0):
             priced = replace(relaxation, data_price=data_price)
             found, path = priced.most(worth, 0, stop, near=expected, keeps_path=True)
             assert found == most

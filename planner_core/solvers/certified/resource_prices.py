@@ -45,8 +45,11 @@ class PriceSearch:
 
     def __init__(self, problem: Problem, value: float, prices: Floats, stop: Bytes) -> None:
         self._problem, self._stop = problem, stop
-        self._satellites = tuple(s.with_data_price() for s in relaxations(problem, COARSE))
         self._is_reachable = np.diff(problem.target_opportunities[1]) > 0
+        self._typical = float(problem.target_reward[self._is_reachable].mean()) or 1.0
+        coarse = relaxations(problem, COARSE)
+        num_images = int(value / self._typical / len(coarse))
+        self._satellites = tuple(s.with_data_price(num_images) for s in coarse)
         self._now = np.where(self._is_reachable, prices, 0.0)
         self._direction = np.zeros(len(prices))
         # Rows of relaxed plans of each satellite: at any prices the best is no worse than they.
@@ -60,9 +63,7 @@ class PriceSearch:
 
     def _unit(self, value: float) -> float:
         largest = max(len(s.satellite) for s in self._satellites)
-        reward = self._problem.target_reward
-        typical = float(reward[self._is_reachable].mean()) or 1.0
-        unit = 2.0 ** np.floor(np.log2(typical)) / _UNITS_PER_REWARD
+        unit = 2.0 ** np.floor(np.log2(self._typical)) / _UNITS_PER_REWARD
         while value / unit > _MAX_CELLS / largest:
             unit *= 2.0
         return float(unit)
