@@ -301,11 +301,14 @@ def _tidy(
             continue
         values = labels[y, low[y] - first : high[y] - first + 1]
         best = best_so_far[low[y] : high[y] + 1]
+        # What the first value still wants; more than the table holds is out of reach.
         wanted = goal - credit[y] - low[y]
-        short = max(0, min(len(values), wanted))
+        lost = min(len(values), max(0, wanted + 1 - len(need)))
+        short = min(len(values), max(0, wanted))
+        values[:lost] = -np.inf
         # needed[i] belongs to value low + short - 1 - i
-        needed = need[max(0, wanted - short + 1) : max(0, wanted + 1)]
-        for i in range(short):
+        needed = need[max(0, wanted - short + 1) : max(0, wanted - lost + 1)]
+        for i in range(short - lost):
             at = short - 1 - i
             values[at] = values[at] if values[at] >= needed[i] else -np.inf
         for i in range(len(values)):

@@ -1,7 +1,8 @@
 """The best plan with given contacts, by mixed-integer programming over promising tasks.
 
-With its contacts fixed the linear relaxation is nearly tight; with contacts free it is not. The
-tasks that relaxed plans have taken on the way to good prices are few, and hold good plans.
+With its contacts fixed the linear relaxation is nearly tight; with contacts free it is not. Its
+prices are nearly the best for all plans, and the tasks that it takes at no or little loss hold
+good plans.
 """
 
 from __future__ import annotations

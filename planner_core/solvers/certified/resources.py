@@ -2,8 +2,8 @@
 
 Where energy is short the programme without prices bounds the best plan within an image or two,
 and the same programme over choices of tasks finds one. Where targets are few as well, prices
-lower the bound, and the tasks of the relaxed plans on the way make a small mixed-integer
-program for each promising set of contacts. Where agility alone decides, so does the proof
+lower the bound. The relaxations of promising sets of contacts tell prices and, for each set, the
+few tasks that make a small mixed-integer program. Where agility alone decides, so does the proof
 without resources.
 """
 
@@ -210,8 +210,12 @@ class ResourceSearch:
         _, contacts, size = max(hopeful)
         offered = self.promising(self._relaxed[contacts], size)
         part = FixedContacts(self.problem, offered, contacts, self.budget, self.seed)
+        relaxed = part.relaxed()
+        if relaxed < self.better - 1e-6:
+            self._missed[contacts, size] = self.better
+            return False
         # The last image is the hardest, and may be none: whoever wants it asks again.
-        wanted = rounded_bound(self.problem, part.relaxed() - self._one, self.better)
+        wanted = rounded_bound(self.problem, relaxed - self._one, self.better)
         if wanted >= self._missed.get((contacts, size), np.inf):
             wanted = self.better
         self.report("contacts fixed")
