@@ -39,6 +39,8 @@ def most_value(
     weight: Ints,
     idle_need: Singles,
     after_need: Singles,
+    credit: Ints,
+    top: int,
     goal: int,
     keeps_labels: bool,
     stop: Bytes,
@@ -52,11 +54,15 @@ def most_value(
     idle_need, after_need
         What ``least_energy`` answered for at least ``goal``: labels that cannot reach the goal
         are dropped.
+    credit
+        How much less than these weights count there can be left to gain from each data level,
+        where data is priced there. Shape ``(num_levels,)``.
+    top
+        No path gains more.
     keeps_labels
         Whether to answer the labels as well, for ``path_of``; none otherwise.
     """
     m = len(weight)
-    top = idle_need.shape[1] - 1
     none = -np.inf
     num_levels = levels.num_levels
     idle = np.full((num_levels, top + 1), none)
@@ -86,7 +92,7 @@ def most_value(
             labels[i] = np.empty((0, 0))
             merged += 1
         if k % _TIDY_EVERY == 0:
-            _tidy(idle, 0, low, high, idle_need[k], goal, best_so_far)
+            _tidy(idle, 0, low, high, idle_need[k], credit, goal, best_so_far)
         kept_first[k + 1] = num_kept
         # The values that any label of this task can have.
         before, gained = levels.before[k], weight[k]
@@ -112,7 +118,7 @@ def most_value(
                 network, levels, k, gained, labels[i], first_value[i], own_low[i], own_high[i],
                 own, lowest, own_low[k], own_high[k],
             )  # fmt: skip
-        _tidy(own, lowest, own_low[k], own_high[k], after_need[k], goal, best_so_far)
+        _tidy(own, lowest, own_low[k], own_high[k], after_need[k], credit, goal, best_so_far)
         if not keeps_labels:
             continue
         for y in range(num_levels):
@@ -280,11 +286,12 @@ def _tidy(
     low: Ints,
     high: Ints,
     need: Singles,
+    credit: Ints,
     goal: int,
     best_so_far: Floats,
 ) -> None:
     """Drop what cannot reach the goal, and what has less energy than a label with less data."""
-    lowest, highest = len(need), -1
+    lowest, highest = len(best_so_far), -1
     for y in range(len(low)):
         if low[y] <= high[y]:
             lowest, highest = min(lowest, low[y]), max(highest, high[y])
@@ -294,10 +301,14 @@ def _tidy(
             continue
         values = labels[y, low[y] - first : high[y] - first + 1]
         best = best_so_far[low[y] : high[y] + 1]
-        short = max(0, min(len(values), goal - low[y]))
+        # What the first value still wants; more than the table holds is out of reach.
+        wanted = goal - credit[y] - low[y]
+        lost = min(len(values), max(0, wanted + 1 - len(need)))
+        short = min(len(values), max(0, wanted))
+        values[:lost] = -np.inf
         # needed[i] belongs to value low + short - 1 - i
-        needed = need[goal - low[y] - short + 1 : goal - low[y] + 1]
-        for i in range(short):
+        needed = need[max(0, wanted - short + 1) : max(0, wanted - lost + 1)]
+        for i in range(short - lost):
             at = short - 1 - i
             values[at] = values[at] if values[at] >= needed[i] else -np.inf
         for i in range(len(values)):
@@ -311,4 +322,4 @@ def _tidy(
             end -= 1
         low[y], high[y] = start, end
         if start > end:
-            low[y], high[y] = len(need), -1
+            low[y], high[y] = len(best_so_far), -1

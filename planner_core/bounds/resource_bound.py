@@ -10,8 +10,8 @@ left out.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import dataclass, replace
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -26,20 +26,28 @@ from planner_core.problem import COLLECT, Bytes, Floats, Ints, Problem, Satellit
 _MAX_CELLS: Final = 30_000_000  # of one table of least energy
 _MAX_UNITS: Final = 2000
 _FIRST_STEP: Final = 0.01
+_TRIAL_UNITS: Final = 24  # of an image, in the search for a price of data
 _ROUNDING: Final = 1e-9  # of a unit
 FINE: Final = 8
 """Levels of the recorder that the smallest collect fills, where a proof counts."""
-COARSE: Final = 1
+COARSE: Final = 2
 """The same where many prices are tried."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SatelliteRelaxation:
-    """One satellite's programme: its network, and its recorder in levels."""
+    """One satellite's programme: its network, and its recorder in levels.
+
+    Attributes
+    ----------
+    data_price
+        What the data of a collect is worth, about, in typical collects.
+    """
 
     satellite: SatelliteProblem
     network: Network
     levels: DataLevels
+    data_price: float = 0.0
 
     @classmethod
     def of(
@@ -49,6 +57,28 @@ class SatelliteRelaxation:
         network = network_of(problem, satellite)
         levels = data_levels(network, levels_per_collect, is_optimistic=True)
         return cls(satellite=satellite, network=network, levels=levels)
+
+    def with_data_price(self, num_images: int) -> SatelliteRelaxation:
+        """Return the same with the price of data at which the battery alone allows least.
+
+        Parameters
+        ----------
+        num_images
+            How many are expected, about.
+        """
+        num_units = _TRIAL_UNITS
+        while num_units * num_images * len(self.satellite) > _MAX_CELLS:
+            num_units //= 2
+        weight = np.where(self.satellite.kind == COLLECT, num_units, 0).astype(np.int32)
+        best, least = self, np.inf
+        for units in range(num_units):
+            trial = replace(self, data_price=units / num_units)
+            price = trial._price_in(weight)
+            needs = _Needs.of(self.network, self.levels, weight, price, num_units * num_images)
+            if needs.top >= least:
+                break
+            best, least = trial, needs.top
+        return best
 
     def weights(self, worth: Ints) -> Ints:
         """Return the worth of each task, from that of each target."""
@@ -74,12 +104,13 @@ class SatelliteRelaxation:
         Parameters
         ----------
         near
-            What is expected, if anything.
+            What is expected at least, if anything.
         keeps_path
             Whether to answer the path.
         """
         weight = self.weights(worth)
-        idle, after, top = self._needs(weight, near)
+        needs = _Needs.of(self.network, self.levels, weight, self._price_in(weight), near)
+        top = needs.top
         step = max(1, int(_FIRST_STEP * top))
         goal = top
         if near is not None and near < top:
@@ -88,8 +119,9 @@ class SatelliteRelaxation:
             # Labels that cannot reach the goal are dropped: the higher, the quicker.
             goal, ceiling = max(enough, goal - step, 0), goal
             most, labels = most_value(
-                self.network, self.levels, weight, idle, after, goal, keeps_path, stop
-            )
+                self.network, self.levels, weight, needs.idle, needs.after, needs.credit,
+                top, goal, keeps_path, stop,
+            )  # fmt: skip
             if most == STOPPED:
                 return min(ceiling, top), None
             if most != UNREACHED:
@@ -99,16 +131,55 @@ class SatelliteRelaxation:
             goal, step = goal - 1, 2 * step
         return max(enough, 0), None
 
-    def _needs(self, weight: Ints, near: int | None) -> tuple[Singles, Singles, int]:
-        """Return the tables of least energy, and what the battery alone allows."""
+    def _price_in(self, weight: Ints) -> float:
+        """Return the price of a level in units, at which the least collect costs whole units."""
+        typical = float(weight[weight > 0].mean()) if np.any(weight > 0) else 0.0
+        filled = self.levels.gain[self.levels.gain > 0]
+        least = int(filled.min()) if len(filled) else 1
+        return float(np.round(self.data_price * typical)) / least
+
+
+class _Needs(NamedTuple):
+    """The least energy to gain so much from each task on, where data has a price.
+
+    At a price for each level of the recorder images are worth less, and contacts what they take
+    down at most. That leaves the limits of the recorder out, and yet not for nothing: what is
+    gained from a level on is no more than that worth, and the price of the levels that are free.
+
+    Attributes
+    ----------
+    idle, after
+        Tables of ``least_energy``.
+    credit
+        What levels that are free add, for each level. Shape ``(num_levels,)``.
+    top
+        No path gains more.
+    """
+
+    idle: Singles
+    after: Singles
+    credit: Ints
+    top: int
+
+    @classmethod
+    def of(
+        cls, network: Network, levels: DataLevels, weight: Ints, price: float, near: int | None
+    ) -> _Needs:
+        change = np.maximum(levels.gain, levels.floor - levels.before)
+        priced = np.ceil(weight - price * change - _ROUNDING)
+        priced = np.maximum(priced, 0.0).astype(np.int32)
+        free = np.maximum(levels.end - np.arange(levels.num_levels), 0)
+        credit = np.ceil(price * free - _ROUNDING).astype(np.int32)
+        at_start = int(credit[min(levels.start, levels.num_levels - 1)])
         limit = int(1.07 * near) if near is not None else 0
-        limit += 128 + int(weight.max(initial=0))
+        limit += 128 + int(priced.max(initial=0))
         while True:
-            idle, after = least_energy(self.network, weight, limit)
-            most = int(np.flatnonzero(idle[0] <= self.network.energy_start)[-1])
+            idle, after = least_energy(network, priced, limit)
+            most = int(np.flatnonzero(idle[0] <= network.energy_start)[-1])
             if most < limit:
-                return idle, after, most
+                break
             limit = 4 * limit if near is None else int(1.1 * limit)
+        return cls(idle=idle, after=after, credit=credit, top=most + at_start)
 
 
 def relaxations(

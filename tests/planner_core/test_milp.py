@@ -20,6 +20,8 @@ from planner_core.problem import COLLECT, CONTACT, Problem, Sunlight
 from planner_core.solvers import Milp
 from planner_core.solvers.base import Budget, Progress, Termination
 from planner_core.solvers.programs.highs import Engine
+from planner_core.solvers.programs.model import plan_program
+from planner_core.solvers.programs.program import Program
 from planner_core.timeline import replay
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import TIGHT, Task, make_problem, random_problem
@@ -288,3 +290,43 @@ def test_the_thread_of_a_solve_that_was_cut_short_ends_soon() -> None:
     before = len(os.listdir("/proc/self/task"))
     Milp().solve(crowded(2), Budget(1.0), 0)
     assert wait_for_threads(before) <= before
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    seed=SEEDS,
+    dynamics=DYNAMICS,
+    telemetry_per_s=st.sampled_from([0.0, 3e-4]),
+    num_satellites=st.integers(1, 2),
+    is_slow=st.booleans(),
+)
+def test_a_program_of_some_tasks_is_the_whole_one_without_the_others(
+    seed: int, dynamics: Dynamics, telemetry_per_s: float, num_satellites: int, is_slow: bool
+) -> None:
+    """What a task costs in the paper's dynamics depends on the tasks around, taken or not."""
+    resources = replace(
+        TIGHT, telemetry_per_s=telemetry_per_s, initial_recorder_fraction=0.3,
+        initial_battery_fraction=0.6,
+    )  # fmt: skip
+    problem = random_problem(
+        seed, dynamics=dynamics, num_collects=12, num_contacts=4, num_satellites=num_satellites,
+        resources=resources, agility=SLOW if is_slow else Agility(),
+        max_turn_deg=20.0 if is_slow else 0.0,
+    )  # fmt: skip
+    is_kept = np.random.default_rng(seed).random(len(problem.opportunities)) < 0.6
+    rows = np.flatnonzero(is_kept).astype(np.int32)
+    whole = plan_program(problem, "antichain", 1e-7).program
+    upper = np.concatenate(whole.upper)
+    upper[: len(is_kept)] *= is_kept
+    whole.upper = [upper]
+    part = plan_program(problem, "antichain", 1e-7, rows).program
+    assert _optimum(part) == _optimum(whole)
+
+
+def _optimum(program: Program) -> float | None:
+    outcome = Engine(program, Budget(), 0, is_chained=True).search(
+        None, 0.0, 0.05, lambda _reward, _bound: None
+    )
+    if outcome.columns is None:
+        return None
+    return round(float(np.concatenate(program.worth) @ outcome.columns), 6)

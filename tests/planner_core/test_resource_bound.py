@@ -10,7 +10,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from planner_core.bounds.resource_bound import quick_bound, resource_value
+from planner_core.bounds.resource_bound import quick_bound, relaxations, resource_value
 from planner_core.problem import Problem, Sunlight
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import TIGHT, Task, make_problem, random_problem
@@ -96,3 +96,23 @@ def test_the_stored_prices_prove_the_bound_again(seed: int) -> None:
         assert bound.unit is not None
         proven = resource_value(problem, bound.prices, bound.unit)
         assert bound.value <= proven + 1e-6
+
+
+@pytest.mark.parametrize("dynamics", ["physical", "paper"])
+@settings(max_examples=40, deadline=None)
+@given(seed=SEEDS, near=st.sampled_from([None, 0.5, 1.0, 1.5]))
+def test_a_price_of_data_changes_nothing_but_the_time(
+    dynamics: Literal["physical", "paper"], seed: int, near: float | None
+) -> None:
+    problem = _problem(seed, dynamics, num_collects=20, num_targets=15, num_contacts=4)
+    worth = np.random.default_rng(seed).integers(0, 30, len(problem.target_ids)).astype(np.int32)
+    stop = np.zeros(1, dtype=np.uint8)
+    for relaxation in relaxations(problem, 2):
+        most, _ = replace(relaxation, data_price=0.0).most(worth, 0, stop)
+        expected = None if near is None else int(near * most)
+        for data_price in (relaxation.with_data_price(10).data_price, 0.1, 0.5, 2.0):
+            priced = replace(relaxation, data_price=data_price)
+            found, path = priced.most(worth, 0, stop, near=expected, keeps_path=True)
+            assert found == most
+            assert path is not None
+            assert relaxation.weights(worth)[path].sum() == most

@@ -77,7 +77,10 @@ class SatelliteChoices:
         if top < goal:
             return -1, nothing
         idle, after = idle[:, : top + 1].copy(), after[:, : top + 1].copy()
-        value, labels = most_value(network, levels, weight, idle, after, max(goal, 0), True, stop)
+        credit = np.zeros(levels.num_levels, dtype=np.int32)
+        value, labels = most_value(
+            network, levels, weight, idle, after, credit, top, max(goal, 0), True, stop
+        )
         if value < 0:
             return -1, nothing
         return value, rows[path_of(network, levels, weight, labels, value)]

@@ -2,28 +2,30 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, deque
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from planner_core.bounds.resource_bound import (
     COARSE,
-    SatelliteRelaxation,
     leaving_whole_units,
     relaxations,
     whole_worth,
 )
-from planner_core.problem import COLLECT, CONTACT, Bytes, Floats, Problem
+from planner_core.plan import Plan
+from planner_core.problem import COLLECT, CONTACT, Bytes, Floats, Ints, Problem
 
-_MAX_CELLS: Final = 12_000_000
-_UNITS_PER_REWARD: Final = 16
+_MAX_CELLS: Final = 36_000_000
+_UNITS_PER_REWARD: Final = 48
 _DEFLECTION: Final = 0.3
 _PATIENCE: Final = 7
 _SHORTER: Final = 0.6
 _NEAR: Final = 0.99
-_AFRESH: Final = 0.4  # length of the steps from given prices
-_FINER: Final = 3
+_AFRESH: Final = 1.0  # length of the steps from given prices
+_FINER: Final = 2
+_KEPT_PATHS: Final = 30
 
 
 class PriceSearch:
@@ -43,11 +45,15 @@ class PriceSearch:
 
     def __init__(self, problem: Problem, value: float, prices: Floats, stop: Bytes) -> None:
         self._problem, self._stop = problem, stop
-        self._satellites: tuple[SatelliteRelaxation, ...] = relaxations(problem, COARSE)
         self._is_reachable = np.diff(problem.target_opportunities[1]) > 0
+        self._typical = float(problem.target_reward[self._is_reachable].mean()) or 1.0
+        coarse = relaxations(problem, COARSE)
+        num_images = int(value / self._typical / len(coarse))
+        self._satellites = tuple(s.with_data_price(num_images) for s in coarse)
         self._now = np.where(self._is_reachable, prices, 0.0)
         self._direction = np.zeros(len(prices))
-        self._guess: list[int | None] = [None] * len(self._satellites)
+        # Rows of relaxed plans of each satellite: at any prices the best is no worse than they.
+        self._paths: list[deque[Ints]] = [deque(maxlen=_KEPT_PATHS) for _ in self._satellites]
         self._stalled = 0
         self.unit = self._unit(value)
         self.value, self.prices = np.inf, self._now
@@ -57,15 +63,19 @@ class PriceSearch:
 
     def _unit(self, value: float) -> float:
         largest = max(len(s.satellite) for s in self._satellites)
-        reward = self._problem.target_reward
-        typical = float(reward[self._is_reachable].mean()) or 1.0
-        unit = 2.0 ** np.floor(np.log2(typical)) / _UNITS_PER_REWARD
+        unit = 2.0 ** np.floor(np.log2(self._typical)) / _UNITS_PER_REWARD
         while value / unit > _MAX_CELLS / largest:
             unit *= 2.0
         return float(unit)
 
-    def step(self, reward: float) -> bool:
-        """Evaluate the current prices and step on; return False once the work must stop."""
+    def step(self, level: float) -> bool:
+        """Evaluate the current prices and step on; return False once the work must stop.
+
+        Parameters
+        ----------
+        level
+            Where the best prices are expected.
+        """
         reward_of = self._problem.target_reward
         prices = leaving_whole_units(self._problem, self._now, self.unit)
         prices[~self._is_reachable] = 0.0
@@ -89,9 +99,16 @@ class PriceSearch:
         norm = float(self._direction @ (scale * self._direction))
         if norm == 0.0:
             return False
-        length = self.theta * (value - max(reward, _NEAR * self.value)) / norm
+        length = self.theta * (value - max(level, _NEAR * self.value)) / norm
         self._now = np.clip(self._now + length * scale * self._direction, 0.0, reward_of)
         return True
+
+    def learn(self, plan: Plan) -> None:
+        """Note a plan that is known."""
+        taken = np.zeros(len(self._problem.opportunities), dtype=np.bool_)
+        taken[[action.opportunity for action in plan.actions]] = True
+        for relaxation, paths in zip(self._satellites, self._paths, strict=True):
+            paths.append(np.flatnonzero(taken[relaxation.satellite.rows]).astype(np.int32))
 
     def restart(self, prices: Floats) -> None:
         """Go on from other prices, in shorter steps."""
@@ -110,12 +127,16 @@ class PriceSearch:
         prices[~self._is_reachable] = 0.0
         worth = whole_worth(self._problem, prices, unit)
         units = 0
-        for i, relaxation in enumerate(relaxations(self._problem)):
-            known = self._guess[i]
-            near = None if known is None else known * _FINER
-            most, _ = relaxation.most(worth, 0, self._stop, near=near)
+        for i, finer in enumerate(relaxations(self._problem)):
+            relaxation = replace(finer, data_price=self._satellites[i].data_price)
+            most, _ = relaxation.most(worth, 0, self._stop, near=self._known(i, worth))
             units += most
         return self._total(prices, units, unit), prices, unit
+
+    def _known(self, i: int, worth: Ints) -> int | None:
+        """Return what a satellite gains on one of the paths that are known, if there are any."""
+        weight = self._satellites[i].weights(worth)
+        return max((int(weight[path].sum()) for path in self._paths[i]), default=None)
 
     def _total(self, prices: Floats, units: int, unit: float) -> float:
         rounded_away = 1e-9 * len(self._problem.opportunities) * unit
@@ -129,14 +150,14 @@ class PriceSearch:
         contacts: list[int] = []
         units = 0
         for i, relaxation in enumerate(self._satellites):
-            guess = self._guess[i]
-            if guess is None:
-                guess, _ = relaxation.most(worth, 0, self._stop)
-            most, path = relaxation.most(worth, 0, self._stop, near=guess, keeps_path=True)
+            near = self._known(i, worth)
+            if near is None:
+                near, _ = relaxation.most(worth, 0, self._stop)
+            most, path = relaxation.most(worth, 0, self._stop, near=near, keeps_path=True)
             if path is None:
                 return None
             units += most
-            self._guess[i] = most
+            self._paths[i].append(path)
             rows = relaxation.satellite.rows[path]
             self.usage[rows] += 1.0
             images = rows[problem.opportunities.kind[rows] == COLLECT]

@@ -2,8 +2,8 @@
 
 Where energy is short the programme without prices bounds the best plan within an image or two,
 and the same programme over choices of tasks finds one. Where targets are few as well, prices
-lower the bound, and the tasks of the relaxed plans on the way make a small mixed-integer
-program for each promising set of contacts. Where agility alone decides, so does the proof
+lower the bound. The relaxations of promising sets of contacts tell prices and, for each set, the
+few tasks that make a small mixed-integer program. Where agility alone decides, so does the proof
 without resources.
 """
 
@@ -19,7 +19,7 @@ from planner_core.bounds.bound import Bound, reward_unit, rounded_bound
 from planner_core.bounds.lagrangian import lagrangian_bound
 from planner_core.bounds.resource_bound import quick_bound
 from planner_core.plan import Plan
-from planner_core.problem import CONTACT, Bools, Floats, Problem
+from planner_core.problem import CONTACT, Bools, Problem
 from planner_core.solvers.base import Budget, Progress, Solution, Termination
 from planner_core.solvers.certified.choices import ChoiceSearch
 from planner_core.solvers.certified.contact_sets import FixedContacts, Relaxation
@@ -32,14 +32,17 @@ from planner_core.timeline import replay
 _MAX_UNITS: Final = 2000
 _FIRST_GOAL: Final = 0.95
 _MOVES: Final = 40  # of the search for plans, between two looks at the bound
-_FIRST_ROUNDS: Final = 2
-_STEPS: Final = 5  # of the search for prices, in a round
-_PATIENCE: Final = 6  # rounds without a new set of contacts or a better plan
+_FIRST_STEPS: Final = 2  # of the search for prices, where sets of contacts gave new ones
+_STEPS: Final = 8
+_PATIENCE: Final = 3  # rounds without a new set of contacts or a better plan
 _SETS_AT_A_TIME: Final = 2
 _AS_GOOD: Final = 0.75  # of a target: sets whose prices count
-_OFFERED: Final = (800, 500)  # tasks in a search with fixed contacts
+_OFFERED: Final = (700, 1000)  # tasks in a search with fixed contacts
 _LESS_LIKELY: Final = 0.15  # of a target: what a set is worth less at each further attempt
+_ROOM: Final = 0.5  # of a target: with less the search for a better plan takes long
+_TIGHT: Final = 0.05  # of a target: prices that near to a relaxation are the best
 _MOST_ROWS: Final = 3000  # of a relaxation
+_FINER: Final = 0.3  # of a target: what smaller units gain at most
 
 
 class ResourceSearch:
@@ -53,7 +56,9 @@ class ResourceSearch:
         self.is_valid, self.reward = timeline.is_valid, timeline.reward
         self.bound = Bound(value=float(problem.target_reward.sum()), proof="lagrangian")
         self._relaxed: dict[tuple[int, ...], Relaxation] = {}
-        self._tried: set[tuple[tuple[int, ...], int]] = set()
+        # By contacts and number of tasks offered: what no plan was found to be worth.
+        self._missed: dict[tuple[tuple[int, ...], int], float] = {}
+        self._priced, self._refined = np.inf, np.inf  # bounds before they were rounded
         self._one = float(problem.target_reward.mean()) if len(problem.target_ids) else 1.0
 
     @property
@@ -137,11 +142,12 @@ class ResourceSearch:
         mask[list(rows)] = True
         return mask
 
-    def price(self, prices: PriceSearch) -> None:
+    def price(self, prices: PriceSearch, num_steps: int) -> None:
         """Make steps towards better prices."""
-        for _ in range(_STEPS):
-            if self.is_done or not prices.step(self.reward):
+        for _ in range(num_steps):
+            if self.is_done or not prices.step(max(self.reward, self.relaxed)):
                 return
+            self._priced = min(self._priced, prices.value)
             self.lower(
                 Bound(value=prices.value, proof="dp", prices=prices.prices, unit=prices.unit)
             )
@@ -150,9 +156,9 @@ class ResourceSearch:
     def relax_sets(self, prices: PriceSearch, choices: ChoiceSearch) -> bool:
         """Learn prices from the relaxations of sets of contacts; return whether any is new."""
         table = self.problem.opportunities
-        own = (a.opportunity for a in self.plan.actions)
+        plans = [self.mask(a.opportunity for a in self.plan.actions), choices.taken]
         sets = [
-            tuple(row for row in own if table.kind[row] == CONTACT),
+            *(tuple(np.flatnonzero(p & (table.kind == CONTACT)).tolist()) for p in plans),
             *(key for key, _ in prices.contact_sets.most_common()),
         ]
         new = [key for key in dict.fromkeys(sets) if key not in self._relaxed][:_SETS_AT_A_TIME]
@@ -165,49 +171,72 @@ class ResourceSearch:
                 return False
             program = FixedContacts(self.problem, offered, contacts, self.budget, self.seed)
             self._relaxed[contacts] = program.relaxation()
-        best = max(relaxation.value for relaxation in self._relaxed.values())
-        if not new or not np.isfinite(best):
+        if not new or not np.isfinite(self.relaxed):
             return False
-        near = [p.prices for p in self._relaxed.values() if p.value >= best - _AS_GOOD * self._one]
-        mean = np.mean(near, axis=0)
-        prices.restart(mean)
-        self.refine(prices, mean)
+        least = self.relaxed - _AS_GOOD * self._one
+        near = [r.prices for r in self._relaxed.values() if r.value >= least]
+        prices.restart(np.mean(near, axis=0))
         self.report("contacts fixed")
         return True
 
-    def refine(self, prices: PriceSearch, start: Floats) -> None:
-        """See what prices prove in smaller units."""
-        value, finer, unit = prices.refined(start)
+    def refine(self, prices: PriceSearch) -> None:
+        """See what the best prices prove in smaller units, where that may help."""
+        hoped = rounded_bound(self.problem, prices.value - _FINER * self._one, self.reward)
+        if hoped >= self.bound.value or prices.value >= self._refined or self.is_done:
+            return
+        self._refined = prices.value
+        value, finer, unit = prices.refined(prices.prices)
         if not self.budget.is_spent():
             self.lower(Bound(value=value, proof="dp", prices=finer, unit=unit))
+        self.report("prices")
 
-    def fix_contacts(self) -> bool:
-        """Search for a better plan with the most promising contacts; return whether it is."""
+    def fix_contacts(self, *, is_last: bool) -> bool:
+        """Search for a better plan with the most promising contacts; return whether it is.
+
+        Where a relaxation leaves little room above a better plan that takes long. Unless this
+        is the last resort it waits for prices, which may show that there is none.
+        """
+        can_sink = self._priced - self.relaxed > _TIGHT * self._one
+        room = _ROOM if can_sink and not is_last else 0.0
         hopeful = [
             (relaxation.value - _LESS_LIKELY * attempt * self._one, contacts, size)
             for contacts, relaxation in self._relaxed.items()
             for attempt, size in enumerate(_OFFERED)
-            if (contacts, size) not in self._tried and relaxation.value >= self.better - 1e-6
+            if relaxation.value >= self.better + room * self._one - 1e-6
+            and self.better < self._missed.get((contacts, size), np.inf)
         ]
         if not hopeful or self.is_done:
             return False
         _, contacts, size = max(hopeful)
-        self._tried.add((contacts, size))
         offered = self.promising(self._relaxed[contacts], size)
         part = FixedContacts(self.problem, offered, contacts, self.budget, self.seed)
-        if part.relaxed < self.better - 1e-6:
+        relaxed = part.relaxed()
+        if relaxed < self.better - 1e-6:
+            self._missed[contacts, size] = self.better
             return False
+        # The last image is the hardest, and may be none: whoever wants it asks again.
+        wanted = rounded_bound(self.problem, relaxed - self._one, self.better)
+        if wanted >= self._missed.get((contacts, size), np.inf):
+            wanted = self.better
         self.report("contacts fixed")
-        plan = part.plan(self.better)
-        return plan is not None and self.offer(plan)
+        plan = part.plan(wanted)
+        is_better = plan is not None and self.offer(plan)
+        if self.reward < wanted - 1e-6:
+            self._missed[contacts, size] = wanted
+        return is_better
 
     def promising(self, relaxation: Relaxation, size: int) -> Bools:
         """Return the tasks that the relaxation would take at the least loss."""
-        costs = relaxation.reduced_costs
-        cut_off = np.sort(costs[relaxation.offered])[:size][-1]
+        losses = relaxation.losses
+        cut_off = np.sort(losses[np.isfinite(losses)])[:size][-1]
         own = self.mask(action.opportunity for action in self.plan.actions)
-        promising: Bools = ((costs <= cut_off) & relaxation.offered) | own
+        promising: Bools = (losses <= cut_off) | own
         return promising
+
+    @property
+    def relaxed(self) -> float:
+        """What the best relaxation with fixed contacts is worth: prices hardly get below."""
+        return max((r.value for r in self._relaxed.values()), default=-np.inf)
 
     @property
     def better(self) -> float:
@@ -248,8 +277,7 @@ def solve_with_resources(problem: Problem, budget: Budget, seed: int, gap: float
         preferred = search.without_resources()
         choices.start(preferred, 1.0)
         search.offer(choices.plan)
-    for _ in range(_FIRST_ROUNDS):
-        search.search(choices, _MOVES)
+    search.search(choices, _MOVES)
     _close_in(search, choices)
     if not search.is_done:
         search.exhaust()
@@ -271,13 +299,16 @@ def _close_in(search: ResourceSearch, choices: ChoiceSearch) -> None:
         start,
         search.budget.stop,
     )
+    prices.learn(search.plan)
     idle_rounds = 0
     while idle_rounds < _PATIENCE and not search.is_done:
-        search.price(prices)
-        search.refine(prices, prices.prices)
         is_new = search.relax_sets(prices, choices)
-        search.search(choices, 2 * _MOVES)
-        is_better = search.fix_contacts()
+        search.price(prices, _FIRST_STEPS if is_new else _STEPS)
+        is_better = search.fix_contacts(is_last=False)
+        if not is_new and not is_better:
+            search.refine(prices)
+            is_better = search.fix_contacts(is_last=True)
+            search.search(choices, 2 * _MOVES)
         if is_better:
             choices.adopt(search.plan)
         idle_rounds = 0 if is_new or is_better else idle_rounds + 1

@@ -17,7 +17,7 @@ from planner_core.solvers.programs.program import Program, Rows
 # Sums of zeros and ones bear HiGHS's usual tolerance. In a long chain of levels each row may
 # be off by as much, so there it must be far below one task.
 _TOLERANCE: Final = 1e-6
-_CHAIN_TOLERANCE: Final = 1e-9
+CHAIN_TOLERANCE: Final = 1e-9
 
 _POLL_S: Final = 0.02
 _PATIENCE_S: Final = 0.25
@@ -60,7 +60,7 @@ class Engine:
     """
 
     def __init__(self, program: Program, budget: Budget, seed: int, *, is_chained: bool) -> None:
-        tolerance = _CHAIN_TOLERANCE if is_chained else _TOLERANCE
+        tolerance = CHAIN_TOLERANCE if is_chained else _TOLERANCE
         self._budget = budget
         self._bound = float("inf")
         self._incumbent: Floats | None = None

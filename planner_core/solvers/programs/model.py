@@ -9,31 +9,56 @@ import numpy as np
 
 from planner_core.comparable import Order, order_of, transitive_closure
 from planner_core.problem import COLLECT, CONTACT, Floats, Ints, Problem, SatelliteProblem
+from planner_core.restrict import restricted
 from planner_core.slew import TIME_TOLERANCE_S
 from planner_core.solvers.programs.antichains import antichain_cover, detours, excluding_pairs
 from planner_core.solvers.programs.program import Program, Rows
-from planner_core.solvers.programs.resources import add_resources
+from planner_core.solvers.programs.resources import ResourceTerms, add_resources, resource_terms
 
 Formulation = Literal["antichain", "pairwise"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PlanProgram:
-    """A program whose first columns are x: one for each row of the opportunity table.
+    """A program whose first columns are x: one for each opportunity.
 
     Attributes
     ----------
+    problem
+        The opportunities that a plan may take.
     orders
         For each satellite, which of its tasks can stand in one plan.
     """
 
+    problem: Problem
     program: Program
     taken: Ints
     orders: tuple[Order, ...]
 
 
-def plan_program(problem: Problem, formulation: Formulation, margin: float) -> PlanProgram:
-    """Return the program; ``margin`` is how far inside battery and recorder limits to stay."""
+def plan_program(
+    problem: Problem, formulation: Formulation, margin: float, rows: Ints | None = None
+) -> PlanProgram:
+    """Return the program of the plans that take some of the tasks.
+
+    Parameters
+    ----------
+    margin
+        How far inside battery and recorder limits to stay.
+    rows
+        The opportunities that a plan may take, ascending; all by default.
+    """
+    terms = [
+        resource_terms(problem, satellite) if problem.use_resources and len(satellite) else None
+        for satellite in problem.satellites
+    ]
+    if rows is not None:
+        # What a task costs depends on the tasks around it, taken or not.
+        is_kept = np.zeros(len(problem.opportunities), dtype=np.bool_)
+        is_kept[rows] = True
+        kept = [np.flatnonzero(is_kept[s.rows]).astype(np.int32) for s in problem.satellites]
+        terms = [own and own.of_part(part) for own, part in zip(terms, kept, strict=True)]
+        problem = restricted(problem, rows)
     closures = [transitive_closure(problem, satellite) for satellite in problem.satellites]
     is_transitive = all(
         closed is satellite.transitions
@@ -42,8 +67,8 @@ def plan_program(problem: Problem, formulation: Formulation, margin: float) -> P
     program = Program()
     taken = _variables(program, problem, is_transitive)
     orders = tuple(order_of(closed) for closed in closures)
-    _constraints(program, problem, taken, orders, formulation, margin)
-    return PlanProgram(program=program, taken=taken, orders=orders)
+    _constraints(program, problem, taken, orders, terms, formulation, margin)
+    return PlanProgram(problem=problem, program=program, taken=taken, orders=orders)
 
 
 def _variables(program: Program, problem: Problem, is_transitive: bool) -> Ints:
@@ -92,17 +117,18 @@ def _constraints(
     problem: Problem,
     taken: Ints,
     orders: tuple[Order, ...],
+    terms: list[ResourceTerms | None],
     formulation: Formulation,
     margin: float,
 ) -> None:
-    for satellite, order in zip(problem.satellites, orders, strict=True):
+    for satellite, order, own_terms in zip(problem.satellites, orders, terms, strict=True):
         own = taken[satellite.rows]
         if len(own) == 0:
             continue
         _agility(program, own, order, formulation)
         _detours(program, satellite, own, order)
-        if problem.use_resources:
-            add_resources(program, problem, satellite, own, margin)
+        if own_terms is not None:
+            add_resources(program, satellite, own_terms, own, margin)
     _stations(program, problem, taken)
 
 

@@ -17,7 +17,7 @@ sunlight and telemetry is yet to come. Where it begins the limits allow for that
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -43,6 +43,8 @@ class ResourceTerms:
         Level of an empty recorder; contacts cannot take down more than that.
     recorder_top
         Highest level until the next task begins.
+    recorder_top_first
+        Highest level before the first task.
     """
 
     energy_cost: Floats
@@ -54,6 +56,34 @@ class ResourceTerms:
     recorder_floor: Floats
     recorder_floor_taken: Floats
     recorder_top: Floats
+    recorder_top_first: float
+
+    def of_part(self, rows: Ints) -> ResourceTerms:
+        """Return the terms where only some of the tasks may be taken, in ascending order.
+
+        Limits of the others hold on: those of the battery loosen as time goes on, so that the
+        tasks before have the tighter ones, and those of the recorder tighten.
+        """
+        if len(rows) == 0:
+            return self._at(rows)
+        last = np.append(rows[1:], len(self.full)) - 1
+        top_first = self.recorder_top_first
+        if rows[0] > 0:
+            top_first = min(top_first, float(self.recorder_top[rows[0] - 1]))
+        return replace(
+            self._at(rows), recorder_top=self.recorder_top[last], recorder_top_first=top_first
+        )
+
+    def _at(self, rows: Ints) -> ResourceTerms:
+        names = [f.name for f in fields(self) if f.name != "recorder_top_first"]
+        return replace(self, **{name: getattr(self, name)[rows] for name in names})
+
+
+def resource_terms(problem: Problem, satellite: SatelliteProblem) -> ResourceTerms:
+    """Return the terms of a satellite that has opportunities."""
+    if problem.dynamics == "physical":
+        return physical_terms(problem, satellite)
+    return event_terms(satellite)
 
 
 def physical_terms(problem: Problem, satellite: SatelliteProblem) -> ResourceTerms:
@@ -80,6 +110,7 @@ def physical_terms(problem: Problem, satellite: SatelliteProblem) -> ResourceTer
         recorder_floor=np.minimum.accumulate(np.minimum(emptied, 0.0)),
         recorder_floor_taken=np.where(is_contact, emptied, -np.inf),
         recorder_top=r.recorder_max_fraction - r.telemetry_per_s * next_s,
+        recorder_top_first=r.recorder_max_fraction - r.telemetry_per_s * float(start_s[0]),
     )
 
 
@@ -100,6 +131,7 @@ def event_terms(satellite: SatelliteProblem) -> ResourceTerms:
         recorder_floor=-telemetry,
         recorder_floor_taken=-telemetry,
         recorder_top=r.recorder_max_fraction - telemetry,
+        recorder_top_first=r.recorder_max_fraction,
     )
 
 
@@ -126,8 +158,8 @@ def _latest_running(
 
 def add_resources(
     program: Program,
-    problem: Problem,
     satellite: SatelliteProblem,
+    terms: ResourceTerms,
     taken: Ints,
     margin: float,
 ) -> None:
@@ -135,17 +167,15 @@ def add_resources(
 
     Parameters
     ----------
+    terms
+        Of the tasks that may be taken.
     taken
-        The columns x of its tasks. Shape ``(m,)``.
+        Their columns x. Shape ``(m,)``.
     margin
         How far inside the strict limits to stay; negative to let them be touched.
     """
-    if problem.dynamics == "physical":
-        terms = physical_terms(problem, satellite)
-    else:
-        terms = event_terms(satellite)
     _add_battery(program, satellite, terms, taken, margin)
-    _add_recorder(program, problem, satellite, terms, taken, margin)
+    _add_recorder(program, satellite, terms, taken, margin)
 
 
 def _add_battery(
@@ -179,18 +209,11 @@ def _add_battery(
 
 
 def _add_recorder(
-    program: Program,
-    problem: Problem,
-    satellite: SatelliteProblem,
-    terms: ResourceTerms,
-    taken: Ints,
-    margin: float,
+    program: Program, satellite: SatelliteProblem, terms: ResourceTerms, taken: Ints, margin: float
 ) -> None:
     r = satellite.resources
     start = r.initial_recorder_fraction
-    top = r.recorder_max_fraction - margin
-    if problem.dynamics == "physical":
-        top -= r.telemetry_per_s * float(satellite.start_s[0])
+    top = terms.recorder_top_first - margin
     first = program.add_columns(np.zeros(1), lower=start, upper=min(start, top), is_integer=False)
     level = program.add_columns(
         np.zeros(len(taken)),
