@@ -2,10 +2,10 @@
 
 Prints, for each size of the paper's mission and its draws, how many plans are proven optimal,
 median and greatest CPU seconds, the greatest that a gap within ``NEAR`` took, and the greatest
-gap at the end. Without resources also the CPU seconds of
-HiGHS on the paper's pairwise program and of CP-SAT (extra ``peers``, left out where it is not
-installed) over those of ours. Each solve is one process on one core, warmed up on a small
-mission and given ``LIMIT_S`` seconds; a peer that ran out of them counts with what it used.
+gap at the end. Without resources also the CPU seconds of HiGHS on the paper's pairwise program
+and of CP-SAT (extra ``peers``, left out where it is not installed) over those of ours. Each solve
+is one process on one core, warmed up on a small mission and given ``LIMIT_S`` seconds; a peer
+that ran out of them counts with what it used.
 
 ``python -m benchmarks.certified 1000 2000 --families free --draws 3 --alone`` picks sizes, families
 and draws, and leaves out the peers.
@@ -146,7 +146,8 @@ def print_size(family: str, num_targets: int, num_draws: int, peers: list[str]) 
         for ratio in [[a / b for a, b in zip(times[peer], own, strict=True)]]
     ]
     print(f"{num_targets:7} {num_proven:3} of {num_draws:2} {statistics.median(own):8.2f} "
-          f"{max(own):8.2f} {max(near_s):8.2f} {100 * max(gaps):7.3f}%  {', '.join(ratios)}", flush=True)  # fmt: skip
+          f"{max(own):8.2f} {max(near_s):8.2f} {100 * max(gaps):7.3f}%  {', '.join(ratios)}",
+          flush=True)  # fmt: skip
 
 
 def main() -> None:
@@ -164,6 +165,7 @@ def main() -> None:
         return
     has_cp_sat = importlib.util.find_spec("ortools") is not None
     peers = [] if options.alone else ["pairwise", *(["cp_sat"] if has_cp_sat else [])]
+    apart("certified", "free", 500, 99)  # compiles what small missions do not need
     for family in options.families:
         print(f"Family {family}")
         print(f"{'targets':>7} {'proven':>9} {'median_s':>8} {'max_s':>8} {'near_s':>8} {'gap':>8}"
