@@ -26,6 +26,9 @@ from planner_core.problem import COLLECT, Bytes, Floats, Ints, Problem, Satellit
 _MAX_CELLS: Final = 30_000_000  # of one table of least energy
 _MAX_UNITS: Final = 2000
 _FIRST_STEP: Final = 0.01
+_SHARES: Final = (0.0, 0.25, 0.5, 0.75, 1.0)  # of prices that hold where agility alone counts
+_TRIED: Final = 2
+_FEW: Final = 1000  # opportunities whose programme takes no time
 _TRIAL_UNITS: Final = 24  # of an image, in the search for a price of data
 _ROUNDING: Final = 1e-9  # of a unit
 FINE: Final = 8
@@ -202,9 +205,14 @@ def whole_worth(problem: Problem, prices: Floats, unit: float) -> Ints:
 def resource_value(problem: Problem, prices: Floats, unit: float) -> float:
     """Return the bound that ``prices`` and ``unit`` prove.
 
-    This is the whole proof: it needs no search, only the problem.
+    This is the whole proof: it needs no search, only the problem. However finely the recorder is
+    counted the bound holds; as neither fineness is always better, the lower bound counts.
     """
-    return _value(problem, relaxations(problem), prices, unit, 0.0, np.zeros(1, dtype=np.uint8))
+    stop = np.zeros(1, dtype=np.uint8)
+    return min(
+        _value(problem, relaxations(problem, levels), prices, unit, 0.0, stop)
+        for levels in (FINE, COARSE)
+    )
 
 
 def _value(
@@ -236,22 +244,38 @@ def quick_bound(problem: Problem, reward: float) -> Bound:
         What a known plan earns: nothing below it needs proof.
     """
     best = lagrangian_bound(problem, reward)
-    satellites = relaxations(problem) if problem.use_resources else ()
+    # Where all targets are worth the same and energy is short, prices of zero are best.
+    is_plain = len(problem.satellites) == 1 and np.ptp(problem.target_reward) == 0.0
+    satellites: tuple[SatelliteRelaxation, ...] = ()
+    if problem.use_resources:
+        is_quick = is_plain or len(problem.opportunities) <= _FEW
+        satellites = relaxations(problem, FINE if is_quick else COARSE)
     if not satellites or best.value <= reward:
         return best
     stop = np.zeros(1, dtype=np.uint8)
     unit = _unit(problem, satellites, best.value)
-    # Where all targets are worth the same and energy is short, prices of zero are best.
-    is_plain = len(satellites) == 1 and np.ptp(problem.target_reward) == 0.0
-    shares = (0.0,) if is_plain else (0.0, 0.25, 0.75, 1.0)
-    for share in shares:
-        prices = share * (np.zeros(1) if best.prices is None else best.prices)
-        prices = leaving_whole_units(problem, prices, unit)
+    start = np.zeros(1) if best.prices is None else best.prices
+    offered = [leaving_whole_units(problem, share * start, unit) for share in _SHARES]
+    if is_plain:
+        offered = offered[:1]
+    else:
+        # What the battery alone allows takes a fraction of the time, and tells which are best.
+        offered.sort(key=lambda prices: _battery_value(problem, satellites, prices, unit))
+    for prices in offered[:_TRIED]:
         value = _value(problem, satellites, prices, unit, reward, stop)
         if value < best.value:
             rounded = rounded_bound(problem, value, reward)
             best = Bound(value=rounded, proof="dp", prices=prices, unit=unit)
     return best
+
+
+def _battery_value(
+    problem: Problem, satellites: tuple[SatelliteRelaxation, ...], prices: Floats, unit: float
+) -> float:
+    """Return what bounds all plans where recorders are left out."""
+    worth = whole_worth(problem, prices, unit)
+    needs = [_Needs.of(s.network, s.levels, s.weights(worth), 0.0, None) for s in satellites]
+    return float(prices.sum()) + unit * sum(n.top for n in needs)
 
 
 def _unit(problem: Problem, satellites: tuple[SatelliteRelaxation, ...], value: float) -> float:

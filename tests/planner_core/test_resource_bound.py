@@ -10,6 +10,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from planner_core.bounds.proofs import is_proven
 from planner_core.bounds.resource_bound import quick_bound, relaxations, resource_value
 from planner_core.problem import Problem, Sunlight
 from tests.planner_core.brute_force import best_reward
@@ -91,11 +92,8 @@ def test_it_lies_far_below_what_agility_allows_where_energy_is_short() -> None:
 def test_the_stored_prices_prove_the_bound_again(seed: int) -> None:
     problem = _problem(seed, "physical", 2, num_collects=60, num_targets=30, num_contacts=4)
     bound = quick_bound(problem, reward=0.0)
-    if bound.proof == "dp":
-        assert bound.prices is not None
-        assert bound.unit is not None
-        proven = resource_value(problem, bound.prices, bound.unit)
-        assert bound.value <= proven + 1e-6
+    assert is_proven(problem, bound)
+    assert not is_proven(problem, replace(bound, value=0.9 * bound.value))
 
 
 @pytest.mark.parametrize("dynamics", ["physical", "paper"])
