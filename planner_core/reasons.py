@@ -13,7 +13,6 @@ from typing import Literal
 import numpy as np
 
 from planner_core.jit import kernel
-from planner_core.model import NO_TASK, STRICT, Track, compile_track, take
 from planner_core.plan import Plan
 from planner_core.problem import (
     ACCESS_TOO_SHORT,
@@ -24,6 +23,7 @@ from planner_core.problem import (
     Problem,
 )
 from planner_core.timeline import Timeline
+from planner_core.track import NO_TASK, STRICT, Track, compile_track, take
 
 Outcome = Literal["downlinked", "collected", "unscheduled", "excluded"]
 ReasonCode = Literal["no_access", "slew_conflict", "battery", "recorder", "solver_limit"]

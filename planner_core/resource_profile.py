@@ -1,6 +1,6 @@
 """Battery and recorder of one satellite over a plan, integrated for the referee.
 
-Solvers step from task to task with the lumps of ``planner_core.model``. The referee does not
+Solvers step from task to task with the lumps of ``planner_core.track``. The referee does not
 trust them: it integrates every second here, piece by piece, in its own way.
 """
 

@@ -2,7 +2,7 @@ r"""One satellite's tasks as a network on which plans under battery and recorder
 
 Levels are held less what idle time adds up to: energy :math:`E = p - C(t)` with the charge
 :math:`C` of all sunlit seconds so far, data :math:`G = d - b\,t` with the telemetry rate
-:math:`b`. Idling is then free, and both dynamics of ``planner_core.model`` become one step:
+:math:`b`. Idling is then free, and both dynamics of ``planner_core.track`` become one step:
 task ``j`` may be taken from :math:`(E, G)` where :math:`G \le` ``data_before[j]``, and leaves
 
 * :math:`E' = \min(E,` ``energy_cap[j]`` :math:`) -` ``energy_cost[j]`` :math:`\ge`
@@ -23,9 +23,9 @@ import numpy as np
 from planner_core.arcs import Arcs, reversed_arcs
 from planner_core.comparable import Order, comes_before, order_of
 from planner_core.jit import kernel
-from planner_core.model import STRICT, compile_track
 from planner_core.problem import Floats, Ints, Longs, Problem, SatelliteProblem
 from planner_core.slew import TIME_TOLERANCE_S
+from planner_core.track import STRICT, compile_track
 
 _SLACK = 1e-9  # of capacity; above the referee's rounding, far below any task
 

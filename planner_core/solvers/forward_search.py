@@ -14,17 +14,11 @@ import numpy as np
 from planner_core.jit import borrowing
 from planner_core.model import (
     IMAGE_NEEDS,
-    NO_TASK,
     WAIT,
     Guidance,
     Model,
     State,
-    Track,
     counts_as_made,
-    is_repeated,
-    may_wait,
-    next_action,
-    take,
     task_reward,
 )
 from planner_core.problem import Bytes, Floats, Ints, Problem
@@ -38,6 +32,7 @@ from planner_core.solvers.base import (
     Solution,
 )
 from planner_core.solvers.sequential import Turn, plan_in_turn
+from planner_core.track import NO_TASK, Track, is_repeated, may_wait, next_action, take
 
 Discount = Literal["action", "next_action"]
 

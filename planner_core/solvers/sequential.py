@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner_core.model import Track, compile_track
 from planner_core.plan import Plan
 from planner_core.problem import CONTACT, Bytes, Ints, Problem, SatelliteProblem
 from planner_core.solvers.base import Budget, Progress, Solution, Termination
 from planner_core.solvers.walk import CONTACT_ABOVE, rule_plan
+from planner_core.track import Track, compile_track
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

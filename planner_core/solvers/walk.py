@@ -10,8 +10,8 @@ from typing import Final
 import numpy as np
 
 from planner_core.jit import borrowing, kernel
-from planner_core.model import NO_TASK, Track, is_safe, next_action, take
 from planner_core.problem import Bytes, Ints
+from planner_core.track import NO_TASK, Track, is_safe, next_action, take
 
 CONTACT_ABOVE: Final = 0.45
 """How full the recorder is before a contact is worth its power; between 0.35 and 0.45 the

@@ -11,13 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planner_core.domain import Dynamics
-from planner_core.model import WAIT, Model, Track, compile_track
+from planner_core.model import WAIT, Model
 from planner_core.problem import COLLECT, CONTACT, Problem
 from planner_core.solvers import ForwardSearch, Mcts, Rule
 from planner_core.solvers.base import Budget, Solver
 from planner_core.solvers.mcts.simulate import Rules, expand
 from planner_core.solvers.mcts.tree import empty_tree, new_node
 from planner_core.timeline import replay
+from planner_core.track import Track, compile_track
 from tests.planner_core.problems import TIGHT, Task, make_problem, random_problem
 
 

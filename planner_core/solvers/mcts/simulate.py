@@ -6,20 +6,11 @@ from typing import NamedTuple
 
 from planner_core.draws import Uint64s, next_draw
 from planner_core.jit import borrowing
-from planner_core.model import (
-    WAIT,
-    Guidance,
-    Track,
-    counts_as_made,
-    is_repeated,
-    may_wait,
-    next_action,
-    take,
-    task_reward,
-)
+from planner_core.model import WAIT, Guidance, counts_as_made, task_reward
 from planner_core.problem import Bytes, Floats, Ints
 from planner_core.solvers.mcts.tree import UNSEEN, Tree, choose, has_room, new_edge, new_node
 from planner_core.solvers.walk import CONTACT_ABOVE, naive_select_action
+from planner_core.track import Track, is_repeated, may_wait, next_action, take
 
 
 class Path(NamedTuple):

@@ -8,7 +8,7 @@ from typing import ClassVar, Final, Literal
 import numpy as np
 
 from planner_core.draws import draws_of
-from planner_core.model import IMAGE_NEEDS, NO_TASK, WAIT, Guidance, counts_as_made
+from planner_core.model import IMAGE_NEEDS, WAIT, Guidance, counts_as_made
 from planner_core.problem import Floats, Problem
 from planner_core.solvers.base import (
     BreadthCounts,
@@ -22,6 +22,7 @@ from planner_core.solvers.base import (
 from planner_core.solvers.mcts.simulate import Path, Rules, search, sunpoint_instead
 from planner_core.solvers.mcts.tree import UNSEEN, Tree, copy_branch, empty_tree, new_node
 from planner_core.solvers.sequential import Turn, plan_in_turn
+from planner_core.track import NO_TASK
 
 MAX_ACTIONS: Final = 10_000_000
 """Actions in a tree: 20 bytes each, and two trees."""

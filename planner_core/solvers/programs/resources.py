@@ -2,7 +2,7 @@
 
 More energy and less data never hurt a plan, so the end stops need no binary choice: the
 battery is *at most* what flows in allows and at most full, the recorder *at least* what
-flows in and at least empty. Each task is booked whole at its start, as in ``model``.
+flows in and at least empty. Each task is booked whole at its start, as in ``planner_core.track``.
 
 The columns hold levels less what idle time adds up to (charge of all sunlit seconds so far,
 telemetry of all seconds so far). Idling is then free, and a level changes at tasks only:

@@ -1,0 +1,353 @@
+"""One satellite's problem in plain arrays, and what a step on it does and may do.
+
+The readable model and the compiled search loops share it, so that the physics of a step
+stands here once.
+
+Both dynamics of the plan model become the same arithmetic. After task ``i`` its battery and
+recorder are known at two clocks; the next task ``j`` then costs a lump:
+
+==================  ============================  =====================================
+column              ``physical``                  ``paper`` (event model)
+==================  ============================  =====================================
+``charge_from[i]``  sunlit time at the end of i   sunlit time at the start of i
+``charge_to[j]``    sunlit time at the start of   sunlit time at the start of the event
+                    j                             before j (j's own segment is forgone)
+``data_from[i]``    end of i                      start of i
+``data_to[j]``      start of j                    start of j
+``data_peak[j]``    start of j                    start of the event before j
+``battery_cost``    draw over the task            the same, booked at its start
+``recorder_gain``   fill and telemetry, or        fill, or minus downlink (telemetry is
+                    telemetry minus downlink      booked for all elapsed time)
+``data_end``        end of the horizon            start of the last event
+==================  ============================  =====================================
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple, TypedDict
+
+import numpy as np
+
+from planner_core.jit import borrowing, inlined
+from planner_core.problem import (
+    CONTACT,
+    Bytes,
+    Floats,
+    Ints,
+    Longs,
+    Problem,
+    SatelliteProblem,
+    may_follow,
+)
+
+STRICT: Final = 1e-9
+"""How far inside its limits a planned state stays, so that rounding cannot cross them."""
+
+NO_TASK: Final = -1
+_SLACK: Final = 1e-12  # a fallback worked out backward must also hold when replayed forward
+_MAX_LABELS: Final = 8
+_MAX_CONTACTS_AHEAD: Final = 12
+
+
+class Track(NamedTuple):
+    """One satellite's problem as plain arrays; shape ``(m,)`` unless said otherwise.
+
+    ``first_offer`` is the first row of the same access: itself, unless the access offers several
+    collects to choose from. ``contacts`` lists the usable contact rows; ``contact_after[i]``
+    is the place in it of the first one after row ``i - 1`` (shape ``(m + 1,)``).
+    ``fallback_*`` hold, for each contact, up to eight pairs (battery needed, recorder
+    allowed) after it, from which the satellite can keep its limits to the end by contacts
+    alone; shape ``(num_contacts, 8)``.
+    """
+
+    start_s: Floats
+    end_s: Floats
+    is_contact: Bytes
+    place: Ints
+    first_offer: Ints
+    blocked: Bytes
+    near_from: Ints
+    far_from: Ints
+    offset: Longs
+    bits: Bytes
+    use_resources: bool
+    charge_from_s: Floats
+    charge_to_s: Floats
+    data_from_s: Floats
+    data_to_s: Floats
+    data_peak_s: Floats
+    battery_cost: Floats
+    recorder_gain: Floats
+    data_end_s: float
+    charge_per_s: float
+    telemetry_per_s: float
+    battery_min: float
+    recorder_max: float
+    battery_start: float
+    recorder_start: float
+    contacts: Ints
+    contact_after: Ints
+    fallback_battery: Floats
+    fallback_recorder: Floats
+    is_guarded: bool
+
+
+class _ResourceColumns(TypedDict):
+    charge_from_s: Floats
+    charge_to_s: Floats
+    data_from_s: Floats
+    data_to_s: Floats
+    data_peak_s: Floats
+    battery_cost: Floats
+    recorder_gain: Floats
+    data_end_s: float
+    charge_per_s: float
+    telemetry_per_s: float
+    battery_min: float
+    recorder_max: float
+    battery_start: float
+    recorder_start: float
+
+
+def compile_track(problem: Problem, satellite: SatelliteProblem, blocked: Bytes) -> Track:
+    """Return a satellite's arrays; ``blocked`` rows (shape ``(m,)``) may not be taken."""
+    m = len(satellite)
+    is_contact = (satellite.kind == CONTACT).astype(np.uint8)
+    contacts = np.flatnonzero((is_contact == 1) & (blocked == 0)).astype(np.int32)
+    access = problem.opportunities.access[satellite.rows]
+    _, first_offer, offer_of = np.unique(access, return_index=True, return_inverse=True)
+    track = Track(
+        start_s=satellite.start_s,
+        end_s=satellite.end_s,
+        is_contact=is_contact,
+        place=satellite.place,
+        first_offer=first_offer[offer_of].astype(np.int32),
+        blocked=blocked,
+        near_from=satellite.transitions.near_from,
+        far_from=satellite.transitions.far_from,
+        offset=satellite.transitions.offset,
+        bits=satellite.transitions.bits,
+        use_resources=problem.use_resources,
+        **_resource_columns(problem, satellite, is_contact),
+        contacts=contacts,
+        contact_after=np.searchsorted(contacts, np.arange(m + 1)).astype(np.int32),
+        fallback_battery=np.full((len(contacts), _MAX_LABELS), np.inf),
+        fallback_recorder=np.full((len(contacts), _MAX_LABELS), -np.inf),
+        is_guarded=problem.use_resources,
+    )
+    if not problem.use_resources:
+        return track
+    _fill_fallbacks(track)
+    # Where even contacts alone cannot keep the limits, plan task by task and let the referee
+    # say what breaks: there is no plan to protect.
+    safe = is_safe(track, NO_TASK, NO_TASK, track.battery_start, track.recorder_start)
+    return track._replace(is_guarded=bool(safe))
+
+
+def _resource_columns(
+    problem: Problem, satellite: SatelliteProblem, is_contact: Bytes
+) -> _ResourceColumns:
+    r = satellite.resources
+    start_s, end_s = satellite.start_s, satellite.end_s
+    duration_s = end_s - start_s
+    sunlit = satellite.sunlight.seconds_until
+    contact = is_contact == 1
+    previous_start_s = np.concatenate([[0.0], start_s[:-1]]) if len(start_s) else start_s
+    telemetry = r.telemetry_per_s * duration_s
+    physical = problem.dynamics == "physical"
+    return {
+        "charge_from_s": sunlit(end_s if physical else start_s),
+        "charge_to_s": sunlit(start_s if physical else previous_start_s),
+        "data_from_s": end_s if physical else start_s,
+        "data_to_s": start_s,
+        "data_peak_s": start_s if physical else previous_start_s,
+        "battery_cost": duration_s
+        * np.where(contact, r.contact_drain_per_s, r.collect_drain_per_s),
+        "recorder_gain": duration_s * np.where(contact, -r.downlink_per_s, r.collect_fill_per_s)
+        + (telemetry if physical else 0.0),
+        "data_end_s": problem.horizon_s
+        if physical
+        else float(start_s[-1])
+        if len(start_s)
+        else 0.0,
+        "charge_per_s": r.sunpoint_charge_per_s,
+        "telemetry_per_s": r.telemetry_per_s,
+        "battery_min": r.battery_min_fraction,
+        "recorder_max": r.recorder_max_fraction,
+        "battery_start": r.initial_battery_fraction,
+        "recorder_start": r.initial_recorder_fraction,
+    }
+
+
+@inlined
+def take(
+    track: Track, last: int, row: int, battery: float, recorder: float
+) -> tuple[float, float, bool]:
+    """Return battery, recorder and "within limits" after waiting from ``last`` and taking ``row``.
+
+    Eqs. 6 and 7, with the sun-pointing in between (Table 1). Fractions of capacity.
+    """
+    charge_from_s = track.charge_from_s[last] if last >= 0 else 0.0
+    data_from_s = track.data_from_s[last] if last >= 0 else 0.0
+    charge_s = max(0.0, track.charge_to_s[row] - charge_from_s)
+    peak = recorder + track.telemetry_per_s * max(0.0, track.data_peak_s[row] - data_from_s)
+    battery = min(1.0, battery + track.charge_per_s * charge_s) - track.battery_cost[row]
+    recorder = recorder + track.telemetry_per_s * max(0.0, track.data_to_s[row] - data_from_s)
+    recorder = max(0.0, recorder + track.recorder_gain[row])
+    is_within = (
+        battery > track.battery_min + STRICT
+        and recorder < track.recorder_max - STRICT
+        and peak < track.recorder_max - STRICT
+    )
+    return max(0.0, battery), min(1.0, recorder), is_within
+
+
+@borrowing
+def is_safe(track: Track, last: int, cursor: int, battery: float, recorder: float) -> bool:
+    """Return whether limits can be kept to the end from here by idling and contacts alone.
+
+    Idle time only ever charges the battery, so the recorder is what fills up: either it has
+    room for the telemetry to the end, or some contact after row ``cursor`` must be reached.
+    The check is sufficient, not necessary (it looks a limited number of contacts ahead).
+    """
+    data_from_s = track.data_from_s[last] if last >= 0 else 0.0
+    room = track.recorder_max - 2.0 * STRICT - recorder
+    if track.telemetry_per_s * max(0.0, track.data_end_s - data_from_s) <= room:
+        return True
+    first = track.contact_after[cursor + 1]
+    for at in range(first, min(first + _MAX_CONTACTS_AHEAD, len(track.contacts))):
+        row = track.contacts[at]
+        if track.telemetry_per_s * max(0.0, track.data_peak_s[row] - data_from_s) > room:
+            return False
+        if not may_follow(last, row, track.near_from, track.far_from, track.offset, track.bits):
+            continue
+        battery_after, recorder_after, is_within = take(track, last, row, battery, recorder)
+        if not is_within:
+            continue
+        for label in range(_MAX_LABELS):
+            if (
+                battery_after >= track.fallback_battery[at, label]
+                and recorder_after <= track.fallback_recorder[at, label]
+            ):
+                return True
+    return False
+
+
+@borrowing
+def _fill_fallbacks(track: Track) -> None:
+    """Work backward over the contacts: what each must leave so that the rest can be kept."""
+    for at in range(len(track.contacts) - 1, -1, -1):
+        row = track.contacts[at]
+        data_from_s = track.data_from_s[row]
+        top = track.recorder_max - 2.0 * STRICT
+        idle = top - track.telemetry_per_s * max(0.0, track.data_end_s - data_from_s)
+        num_labels = 0
+        if idle >= 0.0:
+            track.fallback_battery[at, 0] = 0.0
+            track.fallback_recorder[at, 0] = idle
+            num_labels = 1
+        for after in range(at + 1, min(at + 1 + _MAX_CONTACTS_AHEAD, len(track.contacts))):
+            following = track.contacts[after]
+            if not may_follow(
+                row, following, track.near_from, track.far_from, track.offset, track.bits
+            ):
+                continue
+            charge = track.charge_per_s * max(
+                0.0, track.charge_to_s[following] - track.charge_from_s[row]
+            )
+            waited_s = max(0.0, track.data_to_s[following] - data_from_s)
+            peak_s = max(0.0, track.data_peak_s[following] - data_from_s)
+            for label in range(_MAX_LABELS):
+                allowed_after = track.fallback_recorder[after, label]
+                if allowed_after < 0.0:
+                    continue
+                needed_after = max(
+                    track.fallback_battery[after, label], track.battery_min + 2.0 * STRICT
+                )
+                if 1.0 - track.battery_cost[following] < needed_after:
+                    continue
+                needed = max(0.0, needed_after + track.battery_cost[following] - charge) + _SLACK
+                allowed = (
+                    min(
+                        allowed_after
+                        - track.recorder_gain[following]
+                        - track.telemetry_per_s * waited_s,
+                        top - track.telemetry_per_s * peak_s,
+                    )
+                    - _SLACK
+                )
+                if allowed < 0.0 or num_labels == _MAX_LABELS:
+                    continue
+                is_dominated = False
+                for other in range(num_labels):
+                    if (
+                        track.fallback_battery[at, other] <= needed
+                        and track.fallback_recorder[at, other] >= allowed
+                    ):
+                        is_dominated = True
+                        break
+                if not is_dominated:
+                    track.fallback_battery[at, num_labels] = needed
+                    track.fallback_recorder[at, num_labels] = allowed
+                    num_labels += 1
+
+
+@inlined
+def next_action(
+    track: Track,
+    last: int,
+    from_row: int,
+    battery: float,
+    recorder: float,
+    is_hard: bool,
+    collected: Bytes,
+    unimaged_only: bool,
+) -> int:
+    """Return the first row from ``from_row`` on that may be taken after ``last``, or ``m``.
+
+    This is A(s) of eq. 4, in time order. With ``is_hard`` an action must also keep the limits,
+    now and (see ``is_safe``) to the end of the horizon.
+    """
+    # Rows that start before the last task ends need no look.
+    first = from_row if last < 0 else max(from_row, track.near_from[last])
+    for row in range(first, len(track.start_s)):
+        if track.blocked[row] or not may_follow(
+            last, row, track.near_from, track.far_from, track.offset, track.bits
+        ):
+            continue
+        if unimaged_only and not track.is_contact[row] and collected[track.place[row]]:
+            continue
+        if track.use_resources and is_hard:
+            battery_after, recorder_after, is_within = take(track, last, row, battery, recorder)
+            if not is_within or (
+                track.is_guarded and not is_safe(track, row, row, battery_after, recorder_after)
+            ):
+                continue
+        return row
+    return len(track.start_s)
+
+
+@inlined
+def is_repeated(track: Track, chosen: Ints, begin: int, end: int, row: int) -> bool:
+    """Return whether ``chosen[begin:end]``, in time order, has an earlier collect of its access.
+
+    A(s) holds the first feasible collect of each access: the later ones would push other
+    targets out of its ``breadth``, and are on offer again after the next action.
+    """
+    first = track.first_offer[row]
+    at = end - 1
+    while at >= begin and chosen[at] >= first:
+        if track.first_offer[chosen[at]] == first:
+            return True
+        at -= 1
+    return False
+
+
+@inlined
+def may_wait(
+    track: Track, last: int, cursor: int, battery: float, recorder: float, is_hard: bool
+) -> bool:
+    """Return whether sun-pointing past row ``cursor`` leaves a way to keep the limits."""
+    if not (track.use_resources and is_hard and track.is_guarded):
+        return True
+    return is_safe(track, last, cursor, battery, recorder)
