@@ -9,8 +9,8 @@ import statistics
 import time
 from dataclasses import dataclass
 
+from benchmarks.cpu_budget import CpuBudget
 from benchmarks.missions import problem_of
-from benchmarks.paper.cpu_budget import CpuBudget
 from benchmarks.paper.readings import Reading
 from benchmarks.paper.settings import make_solver
 from planner_core.bounds.resource_bound import quick_bound

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.cpu_budget import CpuBudget
 from benchmarks.paper.claims import claims
-from benchmarks.paper.cpu_budget import CpuBudget
 from benchmarks.paper.measure import Outcome, Task, run_task
 from benchmarks.paper.published import TABLE_6, TABLE_7, forward_grid, mcts_grid
 from benchmarks.paper.readings import BASE, Reading
