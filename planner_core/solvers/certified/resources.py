@@ -42,6 +42,7 @@ _LESS_LIKELY: Final = 0.15  # of a target: what a set is worth less at each furt
 _ROOM: Final = 0.5  # of a target: with less the search for a better plan takes long
 _TIGHT: Final = 0.05  # of a target: prices that near to a relaxation are the best
 _MOST_ROWS: Final = 3000  # of a relaxation
+_LARGE: Final = 3000  # opportunities
 _FINER: Final = 0.3  # of a target: what smaller units gain at most
 
 
@@ -300,11 +301,15 @@ def _close_in(search: ResourceSearch, choices: ChoiceSearch) -> None:
         search.budget.stop,
     )
     prices.learn(search.plan)
+    is_large = len(search.problem.opportunities) > _LARGE
     idle_rounds = 0
     while idle_rounds < _PATIENCE and not search.is_done:
         is_new = search.relax_sets(prices, choices)
-        search.price(prices, _FIRST_STEPS if is_new else _STEPS)
-        is_better = search.fix_contacts(is_last=False)
+        # Where steps take long, a search for the last image is tried before them.
+        is_better = is_large and not is_new and search.fix_contacts(is_last=True)
+        if not is_better:
+            search.price(prices, _FIRST_STEPS if is_new else _STEPS)
+            is_better = search.fix_contacts(is_last=False)
         if not is_new and not is_better:
             search.refine(prices)
             is_better = search.fix_contacts(is_last=True)
