@@ -198,3 +198,31 @@ def random_problem(
         agility=agility,
         sunlight=sunlight,
     )
+
+
+ECLIPSES = Sunlight(enter_s=np.array([0.0, 500.0]), exit_s=np.array([180.0, 760.0]))
+
+
+def varied_problem(
+    seed: int,
+    dynamics: Dynamics,
+    num_satellites: int = 1,
+    *,
+    scarce: Resources,
+    num_targets: int = 5,
+    num_collects: int = 8,
+    num_contacts: int = 2,
+) -> Problem:
+    """Return a problem with resources: rewards or none, eclipses or none, tight or scarce ones."""
+    rng = np.random.default_rng(seed)
+    return random_problem(
+        seed,
+        dynamics=dynamics,
+        num_satellites=num_satellites,
+        has_rewards=bool(rng.integers(2)),
+        sunlight=ECLIPSES if rng.integers(2) else None,
+        resources=scarce if rng.integers(3) == 0 else TIGHT,
+        num_targets=num_targets,
+        num_collects=num_collects,
+        num_contacts=num_contacts,
+    )

@@ -3,36 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Literal
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planner_core.bounds.resource_bound import resource_value
-from planner_core.problem import Problem, Sunlight
 from planner_core.solvers.base import Budget, Progress, Termination
 from planner_core.solvers.certified import Certified
 from planner_core.timeline import replay
 from tests.planner_core.brute_force import best_reward
-from tests.planner_core.problems import TIGHT, random_problem
+from tests.planner_core.problems import TIGHT, random_problem, varied_problem
 
 SEEDS = st.integers(0, 10**6)
-ECLIPSES = Sunlight(enter_s=np.array([0.0, 500.0]), exit_s=np.array([180.0, 760.0]))
 STARVED = replace(TIGHT, battery_min_fraction=0.5, initial_battery_fraction=0.62)
 
-
-def _problem(seed: int, dynamics: Literal["physical", "paper"], num_satellites: int = 1) -> Problem:
-    rng = np.random.default_rng(seed)
-    return random_problem(
-        seed,
-        dynamics=dynamics,
-        num_satellites=num_satellites,
-        has_rewards=bool(rng.integers(2)),
-        sunlight=ECLIPSES if rng.integers(2) else None,
-        resources=STARVED if rng.integers(3) == 0 else TIGHT,
-    )
+_problem = partial(varied_problem, scarce=STARVED)
 
 
 @pytest.mark.parametrize("dynamics", ["physical", "paper"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -12,12 +13,10 @@ from hypothesis import strategies as st
 
 from planner_core.bounds.proofs import is_proven
 from planner_core.bounds.resource_bound import quick_bound, relaxations, resource_value
-from planner_core.problem import Problem, Sunlight
 from tests.planner_core.brute_force import best_reward
-from tests.planner_core.problems import TIGHT, Task, make_problem, random_problem
+from tests.planner_core.problems import TIGHT, Task, make_problem, random_problem, varied_problem
 
 SEEDS = st.integers(0, 10**6)
-ECLIPSES = Sunlight(enter_s=np.array([0.0, 500.0]), exit_s=np.array([180.0, 760.0]))
 BATTERY_ONLY = replace(
     TIGHT,
     battery_min_fraction=0.5,
@@ -29,19 +28,7 @@ BATTERY_ONLY = replace(
 )
 
 
-def _problem(
-    seed: int, dynamics: Literal["physical", "paper"], num_satellites: int = 1, **more: object
-) -> Problem:
-    rng = np.random.default_rng(seed)
-    return random_problem(
-        seed,
-        dynamics=dynamics,
-        num_satellites=num_satellites,
-        has_rewards=bool(rng.integers(2)),
-        sunlight=ECLIPSES if rng.integers(2) else None,
-        resources=BATTERY_ONLY if rng.integers(3) == 0 else TIGHT,
-        **more,  # type: ignore[arg-type]
-    )
+_problem = partial(varied_problem, scarce=BATTERY_ONLY)
 
 
 @pytest.mark.parametrize("dynamics", ["physical", "paper"])
