@@ -21,6 +21,7 @@ KINDS: Final[Mapping[Kind, str]] = {
 
 PAPER_SEARCH: Final[Params] = {
     "unimaged_only": False,
+    "window_moves_per_task": 0.0,
     "contact_reward_per_s": 0.1,
     "sunpoint_reward_per_s": 1e-4,
     "penalty": 1e4,

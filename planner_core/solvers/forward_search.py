@@ -31,6 +31,7 @@ from planner_core.solvers.base import (
     ImageNeeds,
     Solution,
 )
+from planner_core.solvers.lns import polished
 from planner_core.solvers.sequential import Turn, plan_in_turn
 from planner_core.track import NO_TASK, Track, is_repeated, may_wait, next_action, take
 
@@ -258,6 +259,16 @@ class ForwardSearch:
         metadata={"minimum": 0, "description": "Guidance lost for each broken limit (Table 2)."},
     )
 
+    window_moves_per_task: float = field(
+        default=0.5,
+        metadata={
+            "minimum": 0,
+            "maximum": 1000,
+            "description": "Moves of a window search on the finished plan, for each opportunity; "
+            "without resources only. The paper has none.",
+        },
+    )
+
     def solve(self, problem: Problem, budget: Budget, seed: int) -> Solution:
         """Return the plan; the same one whatever the seed."""
         guidance = self.guidance
@@ -265,7 +276,8 @@ class ForwardSearch:
         def plan_turn(turn: Turn) -> list[int]:
             return self._plan_turn(turn, problem.target_reward, guidance, budget)
 
-        return plan_in_turn(problem, budget, plan_turn)
+        solution = plan_in_turn(problem, budget, plan_turn)
+        return polished(problem, solution, self.window_moves_per_task, budget)
 
     @property
     def guidance(self) -> Guidance:

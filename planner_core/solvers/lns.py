@@ -9,6 +9,7 @@ takes the place of what was there, if the plan is worth no less.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -18,7 +19,7 @@ from planner_core.draws import Uint64s, draws_of, next_draw
 from planner_core.jit import kernel
 from planner_core.plan import Plan
 from planner_core.problem import COLLECT, CONTACT, Bools, Bytes, Floats, Ints, Problem
-from planner_core.solvers.base import Budget
+from planner_core.solvers.base import Budget, Solution
 
 _FREE: Final = -1
 _ELSEWHERE: Final = -2
@@ -62,6 +63,16 @@ def improved(
             is_taken[satellite.rows] = own
             left -= _MOVES_AT_A_TIME
     return Plan.of(problem, _rows(is_taken))
+
+
+def polished(
+    problem: Problem, solution: Solution, moves_per_task: float, budget: Budget
+) -> Solution:
+    """Return a search's answer with its plan improved, where agility alone counts."""
+    if problem.use_resources or moves_per_task == 0.0 or budget.is_spent():
+        return solution
+    plan = improved(problem, solution.plan, moves_per_task, budget, 0)
+    return replace(solution, plan=plan)
 
 
 def _rows(is_taken: Bools) -> Iterable[int]:

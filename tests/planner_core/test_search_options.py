@@ -118,7 +118,7 @@ def test_the_codes_discount_reaches_to_the_next_action() -> None:
         Task(kind=COLLECT, place=2, start_s=50.0, end_s=80.0),
     ]
     problem = make_problem(tasks, num_targets=3, rewards=[1.0, 3.0, 50.0], use_resources=False)
-    paper = ForwardSearch(depth=2, breadth=3, gamma=0.9)
+    paper = ForwardSearch(depth=2, breadth=3, gamma=0.9, window_moves_per_task=0.0)
     assert rows_of(problem, paper) == [0, 2]
     assert rows_of(problem, replace(paper, discount="next_action")) == [1]
 

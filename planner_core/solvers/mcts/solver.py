@@ -19,6 +19,7 @@ from planner_core.solvers.base import (
     ImageNeeds,
     Solution,
 )
+from planner_core.solvers.lns import polished
 from planner_core.solvers.mcts.simulate import Path, Rules, search, sunpoint_instead
 from planner_core.solvers.mcts.tree import UNSEEN, Tree, copy_branch, empty_tree, new_node
 from planner_core.solvers.sequential import Turn, plan_in_turn
@@ -142,13 +143,24 @@ class Mcts:
         metadata=_described("Guidance lost for each broken limit (Table 2).", minimum=0),
     )
 
+    window_moves_per_task: float = field(
+        default=0.5,
+        metadata=_described(
+            "Moves of a window search on the finished plan, for each opportunity; without "
+            "resources only. The paper has none.",
+            minimum=0,
+            maximum=1000,
+        ),
+    )
+
     def solve(self, problem: Problem, budget: Budget, seed: int) -> Solution:
         """Return the plan; the same one for the same seed."""
 
         def plan_turn(turn: Turn) -> list[int]:
             return self._plan_turn(turn, problem.target_reward, budget, seed)
 
-        return plan_in_turn(problem, budget, plan_turn)
+        solution = plan_in_turn(problem, budget, plan_turn)
+        return polished(problem, solution, self.window_moves_per_task, budget)
 
     def _plan_turn(self, turn: Turn, target_reward: Floats, budget: Budget, seed: int) -> list[int]:
         track, collected = turn.track, turn.collected
