@@ -8,6 +8,8 @@ import signal
 import time
 from pathlib import Path
 
+import psutil
+
 from planner_core.errors import Cancelled, InvalidScenario
 from planner_core.solvers.base import Budget, Progress
 from service.jobs.plan_job import PlanAnswer, PlanRequest
@@ -44,6 +46,13 @@ def run(request: PlanRequest, budget: Budget) -> PlanAnswer:
             return answer(request, str(len(hoard)))
         case "crash":
             os.kill(os.getpid(), signal.SIGSEGV)
+        case "kill_worker":
+            fork_server = psutil.Process().parent()
+            assert fork_server is not None
+            worker = fork_server.parent()
+            assert worker is not None
+            worker.kill()
+            time.sleep(300)
         case "refuse":
             raise InvalidScenario("no_such_orbit", "The orbit is not one.", pointer="/satellites")
         case "bug":
