@@ -71,8 +71,13 @@ def search(request: PlanRequest, budget: Budget) -> PlanAnswer:
 
 
 def answer(request: PlanRequest, termination: str) -> PlanAnswer:
-    """Return a small answer that names its job."""
-    timeline = {"job": request.job_id, "termination": termination, "validity": "valid"}
+    """Return a small answer that names its job and its run."""
+    timeline = {
+        "job": request.job_id,
+        "run": request.run,
+        "termination": termination,
+        "validity": "valid",
+    }
     targets = [{"target_id": "t0", "outcome": "collected", "reason": None}]
     return PlanAnswer(
         timeline=json.dumps(timeline),
