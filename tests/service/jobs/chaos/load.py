@@ -15,7 +15,8 @@ from tests.service.jobs.conftest import Jobs
 
 GIANT = "giant"
 SMALL = ("small-1", "small-2", "small-3")
-_LONGEST_S = 1.2
+_SHORT_S = (0.2, 1.2)
+_LEASES_OF_A_LONG_JOB = 2.0
 _NEVER_ENDING_S = 3000.0
 
 
@@ -48,8 +49,10 @@ class Load:
             by_turns[place % len(by_turns)]()
 
     def _put(self, tenant: str) -> None:
-        solver = self._random.choice(("answer", "search", "search"))
-        time_s = self._random.uniform(0.2, _LONGEST_S)
+        """Submit a quick job, a short one or one that still runs when it has been taken over."""
+        long_s = _LEASES_OF_A_LONG_JOB * self._jobs.settings.lease_s
+        time_s = self._random.choice((self._random.uniform(*_SHORT_S), long_s))
+        solver = self._random.choice(("answer", "search"))
         limits = {"time_s": time_s, "memory_mb": 2048}
         job_id = new_id()
         while True:
@@ -66,7 +69,7 @@ class Load:
 
     def _post(self) -> None:
         solver = self._random.choice(("rule", "forward_search"))
-        limits = {"time_s": self._random.uniform(0.2, _LONGEST_S)}
+        limits = {"time_s": self._random.uniform(*_SHORT_S)}
         self.promised[self._post_job(solver, limits)] = "succeeded"
 
     def _post_and_cancel(self) -> None:

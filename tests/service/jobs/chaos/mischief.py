@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing
 from typing import Protocol
 
+import psutil
 from sqlalchemy.exc import SQLAlchemyError
 
 from tests.service.jobs.chaos.api import Api
@@ -58,7 +59,7 @@ class Mischief:
             of_database = [self.hold_lock, self.fill_disk]
         else:
             of_database = [self.crash_server, self.stop_server, self.forbid_writing]
-        kinds = [self.kill_worker, self.freeze_worker, self.kill_api, *of_database]
+        kinds = [self.kill_worker, *2 * [self.freeze_worker], self.kill_api, *of_database]
         for _ in range(rounds):
             for fault in self._random.sample(kinds, len(kinds)):
                 time.sleep(self._random.uniform(0.2, pause_s))
@@ -73,9 +74,11 @@ class Mischief:
 
     def freeze_worker(self) -> None:
         """SIGSTOP for longer than a lease, while other faults go on."""
-        pid = self._some_worker()
+        pid = self._busy_worker()
         os.kill(pid, signal.SIGSTOP)
-        timer = threading.Timer(self._too_long_s, _wake, [pid])
+        # It may wake while the next owner is still at work, or when all is over.
+        frozen_s = self._jobs.settings.lease_s * self._random.uniform(1.5, 3.0)
+        timer = threading.Timer(frozen_s, _wake, [pid])
         timer.start()
         self._frozen[pid] = timer
 
@@ -115,6 +118,17 @@ class Mischief:
         while not (pids := self._workers.pids()):
             time.sleep(0.1)
         return self._random.choice(pids)
+
+    def _busy_worker(self) -> int:
+        """Return a worker whose solver is at work, or any where none is."""
+        for start in reversed(self._jobs.starts()):
+            try:
+                _fork_server, worker, *_ = psutil.Process(int(start.split()[-1])).parents()
+            except (psutil.NoSuchProcess, ValueError):
+                continue
+            if worker.pid in self._workers.pids():
+                return worker.pid
+        return self._some_worker()
 
     @contextlib.contextmanager
     def _no_room(self) -> Iterator[None]:

@@ -24,7 +24,7 @@ from tests.service.jobs.work import WORK
 
 NUM_JOBS = int(os.environ.get("SLEWLINE_TEST_CHAOS_JOBS", "60"))
 SEED = int(os.environ.get("SLEWLINE_TEST_CHAOS_SEED", "1"))
-JOBS_A_ROUND = 40
+JOBS_A_ROUND = 30
 PATIENCE_S = 120.0 + 3.0 * NUM_JOBS
 
 
