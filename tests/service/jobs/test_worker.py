@@ -143,6 +143,19 @@ def test_one_worker_serves_cancels_and_failures_by_priority(jobs: Jobs, workers:
     assert jobs.workers() == []
 
 
+def test_a_tenant_leaves_room_for_others(jobs: Jobs, workers: Workers) -> None:
+    """Two workers, one place a tenant: one of them stays free for whoever else comes."""
+    jobs.queue.configure(tenant_limit=1, poll_s=0.05)
+    giants = [jobs.submit("search", tenant="giant", priority=9) for _ in range(3)]
+    for _ in range(2):
+        workers.start()
+    jobs.until(lambda: any(jobs.job(job_id).state == "running" for job_id in giants))
+    for _ in range(6):
+        jobs.until_state(jobs.submit("answer", tenant="small", priority=0), "succeeded")
+    states = sorted(jobs.job(job_id).state for job_id in giants)
+    assert states == ["queued", "queued", "running"]
+
+
 def test_jobs_that_go_too_far_fail_with_their_reason_and_others_live_on(jobs: Jobs) -> None:
     """Too much memory, too much time, and a job that takes its worker with it."""
     settings = jobs.settings.model_copy(update={"max_attempts": 2})

@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 import time
 from collections.abc import Callable
+from functools import partial
 
 from sqlalchemy.exc import IntegrityError, SQLAlchemyError
 
@@ -41,7 +42,7 @@ class Load:
         for _ in range(half):
             self._put(GIANT)
         by_turns: tuple[Callable[[], None], ...] = (
-            *(lambda tenant=tenant: self._put(tenant) for tenant in SMALL),  # type: ignore[misc]
+            *(partial(self._put, tenant) for tenant in SMALL),
             self._post,
             self._post_and_cancel,
         )
