@@ -8,12 +8,13 @@ WARM := .venv/.warm
 KERNELS := $(shell grep -rlE '^@(kernel|borrowing|inlined)' planner_core --include=*.py)
 PIP := $(BIN)/python -m pip -qq --disable-pip-version-check
 
-.PHONY: help setup demo serve test check format lock paper paper-quick clean
+.PHONY: help setup demo serve test chaos check format lock paper paper-quick clean
 
 help:
 	@echo "make demo     plan a real-size mission through the service's own API, and end"
 	@echo "make serve    the same, and keep serving"
 	@echo "make test     every check and every test"
+	@echo "make chaos    500 jobs while processes are killed and databases fail (needs Debian and root)"
 	@echo "make check    lint, format, types, import contracts, examples in docstrings"
 	@echo "make setup    the environment in .venv (the others call it)"
 	@echo "make format   rewrite the sources in the one layout"
@@ -51,6 +52,12 @@ serve: setup
 # The service's tests in one process, all others beside them in the other.
 test: check
 	$(BIN)/python -m pytest -n 2 --dist loadgroup
+
+# On a SQLite file, then on a PostgreSQL server that is killed as well.
+chaos: export SLEWLINE_TEST_CHAOS_JOBS ?= 500
+chaos: setup
+	$(BIN)/python -m pytest tests/service/jobs/chaos
+	.ci/postgresql $(BIN)/python -m pytest tests/service/jobs/chaos
 
 check: setup
 	$(BIN)/ruff check .

@@ -11,13 +11,16 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from pydantic import BaseModel, Field, ValidationError
+from sqlalchemy.exc import SQLAlchemyError
 from starlette.exceptions import HTTPException
 
 from planner_core.errors import Fault, PlannerError
 from service.api.problems import ServiceError, kind_of
+from service.db.failures import why_unavailable
 
 PROBLEM_JSON = "application/problem+json"
 MAX_FAULTS = 100
+DATABASE_RETRY_S = 5
 
 logger = logging.getLogger(__name__)
 
@@ -50,6 +53,7 @@ def install_error_handlers(app: FastAPI) -> None:
     app.add_exception_handler(PlannerError, _on_planner_error)
     app.add_exception_handler(RequestValidationError, _on_validation_error)
     app.add_exception_handler(HTTPException, _on_http_exception)
+    app.add_exception_handler(SQLAlchemyError, _on_database_error)
     app.add_exception_handler(Exception, _on_bug)
 
 
@@ -231,6 +235,16 @@ def _http_detail(request: Request, error: HTTPException) -> str:
         case 405:
             return f"{request.method} is not possible at {request.url.path}."
     return error.detail
+
+
+def _on_database_error(request: Request, error: Exception) -> JSONResponse:
+    why = why_unavailable(error)
+    if why is None:
+        raise error  # a fault of ours
+    # The driver's words alone: SQLAlchemy's would add the statement and its values.
+    logger.warning("the database did not serve a request: %s", getattr(error, "orig", error))
+    headers = {"Retry-After": str(DATABASE_RETRY_S)}
+    return problem(request, "database_unavailable", why, headers=headers)
 
 
 def _on_bug(request: Request, error: Exception) -> JSONResponse:

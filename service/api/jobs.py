@@ -7,7 +7,7 @@ import logging
 from typing import Annotated, Any, Final
 
 from fastapi import APIRouter, Path, Query, Request, Response
-from sqlalchemy.exc import OperationalError
+from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.orm import Session
 
 from planner_core.errors import Fault
@@ -286,7 +286,7 @@ def _spec(
 def _forget(queue: JobQueue, job: JobRow) -> None:
     try:
         queue.cancel(job.id, job.dispatch)
-    except OperationalError:
+    except SQLAlchemyError:
         # A worker that takes it will find the job cancelled.
         log.warning("a cancelled job is still in the queue", extra={"job_id": job.id})
 

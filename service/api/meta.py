@@ -73,7 +73,7 @@ def _recent_workers(database: Database) -> list[datetime]:
         with database.reading() as session:
             recent = sa.select(WorkerRow.seen_at).where(WorkerRow.seen_at >= oldest)
             return list(session.scalars(recent))
-    except sa.exc.DatabaseError as error:
+    except sa.exc.SQLAlchemyError as error:
         raise ServiceError("not_live", "The database does not answer.") from error
 
 

@@ -21,7 +21,7 @@ _FURTHER_SCHEMAS: dict[str, type[BaseModel]] = {
     "TargetCatalogIn": TargetCatalogIn,
 }
 
-_ALWAYS = (422, 500)
+_ALWAYS = (422, 500, 503)
 _WITH_BODY = (413, 415)
 _HEADERS = {
     "X-Request-ID": {

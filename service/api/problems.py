@@ -160,6 +160,12 @@ KINDS: dict[str, ProblemKind] = {
     "queue_full": ProblemKind(
         503, "Queue full", "Too many jobs are waiting; try again after Retry-After seconds."
     ),
+    "database_unavailable": ProblemKind(
+        503,
+        "Database unavailable",
+        "The database is away, full, read-only or too busy; the detail says which. Try again "
+        "after Retry-After seconds, and look at its disk if that does not help.",
+    ),
     "not_live": ProblemKind(
         503, "Not ready to serve", "The database or every worker is away; the detail says which."
     ),

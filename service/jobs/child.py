@@ -100,7 +100,7 @@ def _do(work: WorkFunction, request: PlanRequest, budget: Budget) -> Ending:
     except MemoryError:
         return Refused("memory_limit", "The solver ran out of memory.")
     except Exception:
-        log.exception("job failed", extra={"job_id": request.job_id})
+        log.exception("job failed", extra={"job_id": request.job_id, "run": request.run})
         return Refused("internal_error", "The planner failed. The log has the details.")
 
 

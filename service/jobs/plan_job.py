@@ -22,6 +22,8 @@ class PlanRequest:
 
     Attributes
     ----------
+    run
+        Which run of the job this is, from 1.
     content
         The canonical scenario file (JSON text).
     params
@@ -41,6 +43,7 @@ class PlanRequest:
     params: Mapping[str, Any]
     seed: int
     limits: Mapping[str, Any]
+    run: int = 1
     opportunity_block: bytes | None = None
     bound: str | None = None
 

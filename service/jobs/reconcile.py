@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterable, Sequence
-from datetime import timedelta
+from datetime import datetime, timedelta
 
 import sqlalchemy as sa
 
@@ -48,12 +48,16 @@ class Reconciler:
         self._max_attempts = max_attempts
         self._page = page
         self._checked_up_to = ""
+        self._looked_at: datetime | None = None
+        self._judges_from: datetime | None = None
 
     def run(self) -> None:
         """Look at everything once."""
-        for job_id in self._expired():
-            self._recover(job_id)
-        claims = self._old_claims()
+        now = self._now()
+        if self._may_judge(now):
+            for job_id in self._expired():
+                self._recover(job_id)
+        claims = self._old_claims(now)
         current = self._current(claim.job_id for claim in claims)
         for claim in claims:
             if current.get(claim.job_id) == (claim.dispatch, "queued"):
@@ -65,6 +69,26 @@ class Reconciler:
                 self._queue.cancel(claim.job_id, claim.dispatch)
         for job_id, dispatch in sorted(self._queue.lost(self._next_waiting())):
             self._return(job_id, dispatch)
+
+    def _now(self) -> datetime:
+        with self._database.reading() as session:
+            return session.execute(sa.select(utc_now())).scalar_one()
+
+    def _may_judge(self, now: datetime) -> bool:
+        """Say whether a lapsed lease means a dead worker.
+
+        Nobody can renew a lease while the database is away, full or locked, and a job must not
+        be blamed for that. Who could not look for long leaves the others the time of one lease.
+        """
+        lease_time = timedelta(seconds=self._lease_s)
+        was_blind = self._looked_at is not None and now - self._looked_at > lease_time / 2
+        self._looked_at = now
+        if self._judges_from is None and was_blind:
+            self._judges_from = now + lease_time
+        if self._judges_from is not None and now < self._judges_from:
+            return False
+        self._judges_from = None
+        return True
 
     def _expired(self) -> Sequence[str]:
         with self._database.reading() as session:
@@ -84,7 +108,7 @@ class Reconciler:
         running = expired & (JobRow.state == "running")
         last = running & (JobRow.lost_runs + 1 >= self._max_attempts)
         lost = JobRow.lost_runs + 1
-        detail = f"The worker died {self._max_attempts} times while it ran this job."
+        detail = f"The worker died or was cut off {self._max_attempts} times while it ran this job."
         too_many = lease.Outcome.failed("too_many_attempts", detail)
         with self._database.transaction() as session:
             done = (
@@ -95,14 +119,9 @@ class Reconciler:
         if done:
             log.warning("recovered a job whose worker is gone", extra={"job_id": job_id})
 
-    def _old_claims(self) -> list[Claim]:
-        claims = self._queue.claims()
-        if not claims:
-            return []
-        with self._database.reading() as session:
-            now = session.execute(sa.select(utc_now())).scalar_one()
+    def _old_claims(self, now: datetime) -> list[Claim]:
         oldest = now - timedelta(seconds=self._lease_s)
-        return [claim for claim in claims if claim.claimed_at < oldest]
+        return [claim for claim in self._queue.claims() if claim.claimed_at < oldest]
 
     def _current(self, job_ids: Iterable[str]) -> dict[str, tuple[int, str]]:
         wanted = sa.select(JobRow.id, JobRow.dispatch, JobRow.state).where(

@@ -9,15 +9,17 @@ import secrets
 import socket
 import threading
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from typing import Final, TypeVar
 
 import sqlalchemy as sa
-from sqlalchemy.exc import OperationalError
+from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.orm import Session
 
 from planner_core.solvers.base import Progress
 from service import bound_store, opportunity_store
 from service.db.clock import utc_now
+from service.db.failures import why_unavailable
 from service.db.rows import JobRow, ScenarioRow, WorkerRow
 from service.db.session import Database
 from service.jobs import lease
@@ -109,7 +111,9 @@ class Worker:
             held = lease.start(session, job_id, dispatch, lease_s=self._settings.lease_s)
         if held is None:
             return
-        request = self._request(job_id)
+        request = self._insist(
+            self._database.reading, lambda session: _request(session, job_id, held.run)
+        )
         limits = Limits(
             time_s=float(request.limits["time_s"]), memory_mb=int(request.limits["memory_mb"])
         )
@@ -121,26 +125,6 @@ class Worker:
         )
         self._conclude(held, request, ending)
 
-    def _request(self, job_id: str) -> PlanRequest:
-        wanted = (
-            sa.select(JobRow, ScenarioRow.sha256, ScenarioRow.content)
-            .join(ScenarioRow, ScenarioRow.id == JobRow.scenario_id)
-            .where(JobRow.id == job_id)
-        )
-        with self._database.reading() as session:
-            job, sha256, content = session.execute(wanted).one()._tuple()
-            return PlanRequest(
-                job_id=job.id,
-                scenario_sha256=sha256,
-                content=content,
-                solver=job.solver,
-                params=job.params,
-                seed=job.seed,
-                limits=job.limits,
-                opportunity_block=opportunity_store.load(session, sha256),
-                bound=bound_store.load(session, sha256),
-            )
-
     def _tick(self, held: Lease, progress: Progress | None) -> Order:
         if self._is_stopping():
             return Order.ABANDON
@@ -148,8 +132,8 @@ class Worker:
         try:
             with self._database.transaction() as session:
                 state = lease.renew(session, held, lease_s=self._settings.lease_s, progress=report)
-        except OperationalError:
-            log.warning("could not renew a lease", extra={"job_id": held.job_id}, exc_info=True)
+        except SQLAlchemyError as error:
+            _raise_unless_it_passes(error, "could not renew a lease")
             return Order.GO_ON
         if state is None:
             return Order.ABANDON
@@ -175,15 +159,21 @@ class Worker:
             self._persist(lambda session: bound_store.save(session, sha256, bound, proof))
 
     def _persist(self, write: Callable[[Session], T]) -> T:
-        """Write in one transaction, as often as it takes while the database is away."""
+        """Write in one transaction, as often as it takes."""
+        return self._insist(self._database.transaction, write)
+
+    def _insist(
+        self, begin: Callable[[], AbstractContextManager[Session]], work: Callable[[Session], T]
+    ) -> T:
+        """Do what one transaction does, as often as it takes while the database is away."""
         while True:
             try:
-                with self._database.transaction() as session:
-                    return write(session)
-            except OperationalError:
+                with begin() as session:
+                    return work(session)
+            except SQLAlchemyError as error:
                 if self._is_stopping():
                     raise
-                log.warning("the database is away; trying again", exc_info=True)
+                _raise_unless_it_passes(error, "a transaction failed; trying again")
                 self._stopping.wait(_RETRY_S)
 
     def _enrol(self) -> None:
@@ -226,3 +216,31 @@ def outcome_of(ending: Ending) -> Outcome:
         targets=answer.targets,
         proof=answer.proof,
     )
+
+
+def _request(session: Session, job_id: str, run: int) -> PlanRequest:
+    wanted = (
+        sa.select(JobRow, ScenarioRow.sha256, ScenarioRow.content)
+        .join(ScenarioRow, ScenarioRow.id == JobRow.scenario_id)
+        .where(JobRow.id == job_id)
+    )
+    job, sha256, content = session.execute(wanted).one()._tuple()
+    return PlanRequest(
+        job_id=job.id,
+        run=run,
+        scenario_sha256=sha256,
+        content=content,
+        solver=job.solver,
+        params=job.params,
+        seed=job.seed,
+        limits=job.limits,
+        opportunity_block=opportunity_store.load(session, sha256),
+        bound=bound_store.load(session, sha256),
+    )
+
+
+def _raise_unless_it_passes(error: SQLAlchemyError, consequence: str) -> None:
+    why = why_unavailable(error)
+    if why is None:
+        raise error
+    log.warning("%s (%s)", consequence, why, exc_info=True)

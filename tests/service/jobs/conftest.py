@@ -40,9 +40,11 @@ class Jobs:
     scenario_id: str
     folder: Path
 
-    def submit(self, solver: str, **changes: Any) -> str:
+    def submit(
+        self, solver: str, *, job_id: str | None = None, tenant: str = "local", **changes: Any
+    ) -> str:
         """Queue a job and return its id."""
-        job_id = new_id()
+        job_id = job_id or new_id()
         values: dict[str, Any] = {
             "params": {"log": str(self.folder / "starts.log")},
             "limits": {"time_s": 60.0, "memory_mb": 2048},
@@ -53,7 +55,7 @@ class Jobs:
                 sa.insert(JobRow).values(
                     id=job_id,
                     scenario_id=self.scenario_id,
-                    tenant="local",
+                    tenant=tenant,
                     state="queued",
                     solver=solver,
                     seed=0,
@@ -62,7 +64,7 @@ class Jobs:
                     **values,
                 )
             )
-            self.queue.enqueue(session, job_id, 1, priority=values["priority"], tenant="local")
+            self.queue.enqueue(session, job_id, 1, priority=values["priority"], tenant=tenant)
         return job_id
 
     def job(self, job_id: str) -> JobRow:

@@ -92,6 +92,20 @@ def test_a_job_being_cancelled_by_a_dead_worker_is_cancelled(jobs: Jobs) -> None
     assert jobs.job(job_id).state == "cancelled"
 
 
+def test_a_job_is_not_blamed_for_the_time_when_nobody_could_write(jobs: Jobs) -> None:
+    """After an outage its worker has the time of one lease to renew; then it counts as dead."""
+    reconciler = Reconciler(jobs.database, jobs.queue, lease_s=0.4, max_attempts=1)
+    reconciler.run()
+    job_id = jobs.submit("answer")
+    start_and_vanish(jobs, job_id)
+    time.sleep(0.4)
+    reconciler.run()
+    assert (jobs.job(job_id).state, jobs.job(job_id).lost_runs) == ("running", 0)
+    time.sleep(0.4)
+    reconciler.run()
+    assert (jobs.job(job_id).state, jobs.job(job_id).lost_runs) == ("failed", 1)
+
+
 def test_a_live_run_is_left_alone(jobs: Jobs) -> None:
     job_id = jobs.submit("answer")
     claim(jobs, job_id)

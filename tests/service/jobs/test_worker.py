@@ -143,6 +143,43 @@ def test_one_worker_serves_cancels_and_failures_by_priority(jobs: Jobs, workers:
     assert jobs.workers() == []
 
 
+def test_a_tenant_leaves_room_for_others(jobs: Jobs, workers: Workers) -> None:
+    """Two workers, one place a tenant: one of them stays free for whoever else comes."""
+    jobs.queue.configure(tenant_limit=1, poll_s=0.05)
+    giants = [jobs.submit("search", tenant="giant", priority=9) for _ in range(3)]
+    for _ in range(2):
+        workers.start()
+    jobs.until(lambda: any(jobs.job(job_id).state == "running" for job_id in giants))
+    for _ in range(6):
+        jobs.until_state(jobs.submit("answer", tenant="small", priority=0), "succeeded")
+    states = sorted(jobs.job(job_id).state for job_id in giants)
+    assert states == ["queued", "queued", "running"]
+
+
+def test_jobs_that_go_too_far_fail_with_their_reason_and_others_live_on(jobs: Jobs) -> None:
+    """Too much memory, too much time, and a job that takes its worker with it."""
+    settings = jobs.settings.model_copy(update={"max_attempts": 2})
+    supervisor = Supervisor(settings, work=WORK)
+    supervisor.start()
+    try:
+        greedy = jobs.submit("hog", limits={"time_s": 60.0, "memory_mb": 300}, priority=9)
+        slow = jobs.submit("no_plan", limits={"time_s": 0.1, "memory_mb": 2048}, priority=8)
+        poison = jobs.submit("kill_worker", priority=7)
+        harmless = jobs.submit("answer", priority=0)
+        reasons = {greedy: "memory_limit", slow: "time_limit", poison: "too_many_attempts"}
+        for job_id, code in reasons.items():
+            job = jobs.until_state(job_id, "failed", "succeeded")
+            assert job.error is not None
+            assert job.error["code"] == code
+            assert jobs.result(job_id) is None
+        assert "2 times" in (jobs.job(poison).error or {})["detail"]
+        assert sum(line.startswith(poison) for line in jobs.starts()) == 2
+        assert jobs.until_state(harmless, "failed", "succeeded").state == "succeeded"
+        jobs.until(lambda: jobs.queue.claims() == [])
+    finally:
+        supervisor.stop()
+
+
 def test_a_worker_ends_however_many_signals_come(jobs: Jobs, workers: Workers) -> None:
     """One signal in the middle of the handling of another must not lock it up."""
     for _ in range(2):

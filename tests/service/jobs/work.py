@@ -8,6 +8,8 @@ import signal
 import time
 from pathlib import Path
 
+import psutil
+
 from planner_core.errors import Cancelled, InvalidScenario
 from planner_core.solvers.base import Budget, Progress
 from service.jobs.plan_job import PlanAnswer, PlanRequest
@@ -44,6 +46,13 @@ def run(request: PlanRequest, budget: Budget) -> PlanAnswer:
             return answer(request, str(len(hoard)))
         case "crash":
             os.kill(os.getpid(), signal.SIGSEGV)
+        case "kill_worker":
+            fork_server = psutil.Process().parent()
+            assert fork_server is not None
+            worker = fork_server.parent()
+            assert worker is not None
+            worker.kill()
+            time.sleep(300)
         case "refuse":
             raise InvalidScenario("no_such_orbit", "The orbit is not one.", pointer="/satellites")
         case "bug":
@@ -62,8 +71,13 @@ def search(request: PlanRequest, budget: Budget) -> PlanAnswer:
 
 
 def answer(request: PlanRequest, termination: str) -> PlanAnswer:
-    """Return a small answer that names its job."""
-    timeline = {"job": request.job_id, "termination": termination, "validity": "valid"}
+    """Return a small answer that names its job and its run."""
+    timeline = {
+        "job": request.job_id,
+        "run": request.run,
+        "termination": termination,
+        "validity": "valid",
+    }
     targets = [{"target_id": "t0", "outcome": "collected", "reason": None}]
     return PlanAnswer(
         timeline=json.dumps(timeline),

@@ -1,0 +1,106 @@
+"""The API as a process that is started again whenever it ends, and a client that does not mind."""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import sys
+import threading
+import time
+from types import TracebackType
+from typing import Any
+
+import httpx
+
+from service.jobs.supervisor import environment_of
+from service.settings import Settings
+
+_PAUSE_S = 0.2
+
+
+class Api:
+    """One API process on one port, kept running."""
+
+    def __init__(self, settings: Settings):
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            self._port = probe.getsockname()[1]
+        self._environment = os.environ | environment_of(settings)
+        self._process: subprocess.Popen[bytes] | None = None
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._keep_running, daemon=True)
+        address = f"http://127.0.0.1:{self._port}"
+        self._client = httpx.Client(base_url=address, timeout=60, trust_env=False)
+
+    def __enter__(self) -> Api:
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self._stopping.set()
+        self._thread.join()
+        self.kill()
+        self._client.close()
+
+    def pid(self) -> int | None:
+        """Return the id of the process, if there is one."""
+        return None if self._process is None else self._process.pid
+
+    def kill(self) -> None:
+        """SIGKILL; the process is started again."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
+
+    def post_job(self, body: dict[str, Any]) -> str:
+        """Send a job until it is known to have been taken, and return its id.
+
+        An answer that did not come says nothing: the job is looked for by its label before it
+        is sent again.
+        """
+        while True:
+            known = self._until_answered("GET", "/v1/jobs", params={"label": body["label"]})
+            if known.json()["items"]:
+                return str(known.json()["items"][0]["id"])
+            answer = self._try("POST", "/v1/jobs", json=body)
+            if answer is not None:
+                assert answer.status_code == 202, answer.text
+                return str(answer.json()["id"])
+
+    def cancel(self, job_id: str) -> None:
+        """Cancel a job, however often it takes."""
+        answer = self._until_answered("POST", f"/v1/jobs/{job_id}/cancel")
+        if answer.status_code != 202:
+            # The answer to an earlier try was lost, but not what it did.
+            job = self._until_answered("GET", f"/v1/jobs/{job_id}").json()
+            assert job["state"] in ("cancelling", "cancelled"), job
+
+    def _until_answered(self, method: str, path: str, **options: Any) -> httpx.Response:
+        while True:
+            answer = self._try(method, path, **options)
+            if answer is not None:
+                return answer
+
+    def _try(self, method: str, path: str, **options: Any) -> httpx.Response | None:
+        try:
+            answer = self._client.request(method, path, **options)
+        except httpx.TransportError:
+            time.sleep(_PAUSE_S)
+            return None
+        if answer.status_code == 503:
+            time.sleep(_PAUSE_S)
+            return None
+        assert answer.status_code != 500, answer.text
+        return answer
+
+    def _keep_running(self) -> None:
+        command = [sys.executable, "-m", "service", "api", "--port", str(self._port)]
+        while not self._stopping.wait(_PAUSE_S):
+            if self._process is None or self._process.poll() is not None:
+                self._process = subprocess.Popen(command, env=self._environment)
