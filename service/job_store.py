@@ -29,6 +29,22 @@ class JobSpec:
     memory_mb: int
     priority: int
     label: str | None
+    rerun_of: str | None = None
+
+
+def spec_again(job: JobRow) -> JobSpec:
+    """Return the spec of the same frozen question once more."""
+    return JobSpec(
+        scenario_id=job.scenario_id,
+        solver=job.solver,
+        params=job.params,
+        seed=job.seed,
+        time_s=job.limits["time_s"],
+        memory_mb=job.limits["memory_mb"],
+        priority=job.priority,
+        label=job.label,
+        rerun_of=job.id,
+    )
 
 
 def submit(session: Session, queue: JobQueue, spec: JobSpec) -> JobRow:
@@ -46,6 +62,7 @@ def submit(session: Session, queue: JobQueue, spec: JobSpec) -> JobRow:
             limits={"time_s": spec.time_s, "memory_mb": spec.memory_mb},
             priority=spec.priority,
             label=spec.label,
+            rerun_of=spec.rerun_of,
             created_at=utc_now(),
             dispatched_at=utc_now(),
         )

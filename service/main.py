@@ -22,6 +22,7 @@ from service.api import (
 )
 from service.api.deps import check_request
 from service.api.errors import install_error_handlers
+from service.api.idempotency import install_replay
 from service.api.middleware import BodyLimit, RequestContext
 from service.db.session import Database
 from service.opportunities import OpportunityReader
@@ -76,6 +77,7 @@ def create_app(settings: Settings, queue: JobQueue | None = None) -> FastAPI:
     for router in ROUTERS:
         app.include_router(router)
     install_error_handlers(app)
+    install_replay(app)
     openapi.install_openapi(app)
     # The last one added is the outermost.
     app.add_middleware(BodyLimit, max_bytes=int(settings.max_body_mb * 1_000_000))
