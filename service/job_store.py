@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -103,7 +103,11 @@ def matching(**wanted: str | None) -> sa.Select[JobRow]:
 
 def scenario_hashes(session: Session, jobs: Iterable[JobRow]) -> dict[str, str]:
     """Return the SHA-256 of each scenario that these jobs plan, by its id."""
-    ids = {job.scenario_id for job in jobs}
+    return hashes_of(session, {job.scenario_id for job in jobs})
+
+
+def hashes_of(session: Session, ids: Collection[str]) -> dict[str, str]:
+    """Return the SHA-256 of each of these scenarios, by its id."""
     wanted = sa.select(ScenarioRow.id, ScenarioRow.sha256).where(ScenarioRow.id.in_(ids))
     return {row.id: row.sha256 for row in session.execute(wanted)}
 

@@ -10,6 +10,7 @@ from fastapi import Depends, FastAPI
 
 import planner_core
 from service.api import (
+    comparisons,
     ground_stations,
     job_events,
     jobs,
@@ -44,6 +45,7 @@ ROUTERS = (
     scenarios.router,
     jobs.router,
     job_events.router,
+    comparisons.router,
     solvers.router,
     meta.router,
     openapi.router,

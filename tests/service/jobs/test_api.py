@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -36,14 +35,6 @@ TARGETS = [
     }
     for number in range(7)
 ]
-
-
-@pytest.fixture
-def client(jobs: Jobs) -> Iterator[httpx.Client]:
-    """A client of a server that sends jobs to the queue, with nobody to run them."""
-    app = create_app(jobs.settings, jobs.queue)
-    with serve(app) as address, httpx.Client(base_url=address, timeout=60) as client:
-        yield client
 
 
 def post(client: httpx.Client, jobs: Jobs, **fields: Any) -> httpx.Response:
