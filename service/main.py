@@ -15,6 +15,7 @@ from service.api import (
     job_events,
     jobs,
     meta,
+    metrics,
     openapi,
     satellites,
     scenarios,
@@ -48,6 +49,7 @@ ROUTERS = (
     comparisons.router,
     solvers.router,
     meta.router,
+    metrics.router,
     openapi.router,
 )
 
@@ -76,6 +78,7 @@ def create_app(settings: Settings, queue: JobQueue | None = None) -> FastAPI:
     app.state.database = Database(settings.database_url)
     app.state.opportunities = OpportunityReader()
     app.state.queue = queue
+    app.state.call_counters = metrics.CallCounters()
     for router in ROUTERS:
         app.include_router(router)
     install_error_handlers(app)
@@ -83,7 +86,7 @@ def create_app(settings: Settings, queue: JobQueue | None = None) -> FastAPI:
     openapi.install_openapi(app)
     # The last one added is the outermost.
     app.add_middleware(BodyLimit, max_bytes=int(settings.max_body_mb * 1_000_000))
-    app.add_middleware(RequestContext)
+    app.add_middleware(RequestContext, counters=app.state.call_counters)
     return app
 
 

@@ -30,7 +30,7 @@ log = logging.getLogger(__name__)
 
 LONGEST_WAIT_S: Final = 30.0
 
-Suffix = Annotated[str, Path(description="Form of the answer; today `json`.")]
+Suffix = Annotated[str, Path(description="Form of the answer; today `json`.", examples=["json"])]
 
 
 @router.post("", status_code=202, responses=problem_responses(503))
@@ -111,7 +111,7 @@ async def get_job(
     return shown(job, sha256)
 
 
-@router.post("/{job_id}/cancel", status_code=202, responses=problem_responses(404, 409))
+@router.post("/{job_id}/cancel", status_code=202, responses=problem_responses(404, 409, 503))
 def cancel_job(job_id: str, database: DatabaseDep, request: Request, response: Response) -> JobOut:
     """Cancel a job: at once where it waits; a running one stops and keeps its best plan so far."""
     with database.transaction() as session:

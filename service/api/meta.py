@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime, timedelta
+from typing import Annotated
 
 import sqlalchemy as sa
-from fastapi import APIRouter
+from fastapi import APIRouter, Path
 from pydantic import BaseModel, Field
 
 import planner_core
@@ -84,7 +85,7 @@ def version() -> Version:
 
 
 @router.get("/problems/{code}", responses=problem_responses(404))
-def explain(code: str) -> ProblemExplained:
+def explain(code: Annotated[str, Path(examples=["tle-checksum"])]) -> ProblemExplained:
     """Explain a problem code, written with hyphens or underscores."""
     name = code.replace("-", "_")
     if name not in KINDS:

@@ -32,6 +32,7 @@ MAX_TARGETS = 100_000
 _TYPES = ("application/json", "application/geo+json", "text/csv")
 _REQUIRED = ("id", "lat_deg", "lon_deg")
 _COLUMNS = tuple(TargetIn.model_fields)
+_OPTIONAL = tuple(column for column in _COLUMNS if column not in _REQUIRED)
 _UNNAMED = "Targets"
 
 
@@ -74,7 +75,7 @@ _REQUEST_BODY: dict[str, Any] = {
                 "schema": {
                     "type": "string",
                     "description": f"A header with id, lat_deg, lon_deg and any of "
-                    f"{', '.join(_COLUMNS[3:])}; lat, latitude, lon, lng and longitude are "
+                    f"{', '.join(_OPTIONAL)}; lat, latitude, lon, lng and longitude are "
                     "taken as well. An empty cell means the default.",
                 }
             },

@@ -45,7 +45,9 @@ class seconds_between(FunctionElement[float]):  # noqa: N801 - reads as an SQL f
     type = sa.Double()
     inherit_cache = True
 
-    def __init__(self, start: sa.ColumnElement[Any], end: sa.ColumnElement[Any]):
+    def __init__(
+        self, start: sa.ColumnExpressionArgument[Any], end: sa.ColumnExpressionArgument[Any]
+    ):
         super().__init__(start, end)
 
 

@@ -25,7 +25,7 @@ from service.jobs.queue import DbosQueue, migrate_queue
 from service.jobs.supervisor import environment_of
 from service.main import create_app
 from service.settings import Settings
-from tests.service.conftest import serve
+from tests.service.conftest import checked_client, serve
 from tests.service.jobs.work import WORK
 
 PATIENCE_S = 60.0
@@ -184,7 +184,7 @@ def jobs(template_url: str, tmp_path: Path) -> Iterator[Jobs]:
 def client(jobs: Jobs) -> Iterator[httpx.Client]:
     """A client of a server that sends jobs to the queue, with nobody to run them."""
     app = create_app(jobs.settings, jobs.queue)
-    with serve(app) as address, httpx.Client(base_url=address, timeout=60) as client:
+    with serve(app) as address, checked_client(app, address) as client:
         yield client
 
 

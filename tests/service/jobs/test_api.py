@@ -163,6 +163,20 @@ def test_jobs_are_listed_newest_first_by_pages_and_filters(
     assert second.json()["next"] is None
 
 
+def test_pages_stay_in_step_while_jobs_are_added(client: httpx.Client, jobs: Jobs) -> None:
+    ids = [posted(client, jobs) for _ in range(5)]
+    seen: list[str] = []
+    cursor: dict[str, str] = {}
+    while True:
+        page = client.get("/v1/jobs", params={"limit": 2, **cursor}).json()
+        seen += [job["id"] for job in page["items"]]
+        if page["next"] is None:
+            break
+        posted(client, jobs)
+        cursor = {"cursor": page["next"]}
+    assert seen == ids[::-1]
+
+
 def test_what_does_not_exist_is_not_found(client: httpx.Client) -> None:
     for path in ("", "/timeline", "/timeline.csv", "/targets", "/proof"):
         assert_problem(client.get(f"/v1/jobs/none{path}"), 404, "not_found")
@@ -335,7 +349,8 @@ def test_events_tell_each_change_until_the_job_is_final(client: httpx.Client, jo
     assert last == client.get(f"/v1/jobs/{job_id}").json()
     assert last["state"] == "succeeded"
     number = rest[-3].removeprefix("id: ")
-    assert client.get(path, headers={"Last-Event-ID": number}).text == ""
+    all_seen = client.get(path, headers={"Last-Event-ID": number})
+    assert (all_seen.status_code, all_seen.text) == (204, "")
     assert client.get(path, headers={"Last-Event-ID": "1"}).text.startswith(f"id: {number}\n")
     assert_problem(client.get("/v1/jobs/none/events"), 404, "not_found")
 
