@@ -12,9 +12,10 @@ import pytest
 from planner_core.solvers import SOLVERS
 from service.jobs import lease
 from service.jobs.lease import Lease, Outcome
+from service.jobs.queue import DbosQueue
 from service.main import create_app
 from service.solver_params import params_of
-from tests.service.conftest import serve
+from tests.service.conftest import checked_client, serve
 from tests.service.jobs.conftest import Jobs, Workers
 from tests.service.problems import assert_problem
 
@@ -175,6 +176,16 @@ def test_pages_stay_in_step_while_jobs_are_added(client: httpx.Client, jobs: Job
         posted(client, jobs)
         cursor = {"cursor": page["next"]}
     assert seen == ids[::-1]
+
+
+def test_the_service_is_not_ready_without_its_queue(jobs: Jobs, workers: Workers) -> None:
+    workers.start()
+    elsewhere = DbosQueue(f"sqlite:///{jobs.folder / 'unmigrated.db'}")
+    for queue, status in ((jobs.queue, 200), (elsewhere, 503)):
+        app = create_app(jobs.settings, queue)
+        with serve(app) as address, checked_client(app, address) as client:
+            assert client.get("/health/ready").status_code == status
+    elsewhere.close()
 
 
 def test_what_does_not_exist_is_not_found(client: httpx.Client) -> None:
