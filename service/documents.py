@@ -14,6 +14,10 @@ from planner_core.run import Judged
 from planner_core.timeline import JudgedAction, Resourceline, Violation, plan_sha256
 
 SCHEMA_VERSION = "1.0"
+_COMPARED = (
+    "reward", "bound", "gap", "bound_proof", "collects", "contacts", "downlinked_mbit",
+    "downlinked_fraction",
+)  # fmt: skip
 
 Document = dict[str, Any]
 
@@ -26,6 +30,18 @@ def instant_text(instant: datetime) -> str:
     """
     text = instant.astimezone(UTC).isoformat(timespec="milliseconds")
     return text.removesuffix("+00:00") + "Z"
+
+
+def figures_of(timeline: Document) -> Document:
+    """Return the numbers of a timeline document that a table of several plans shows."""
+    totals, runtime_s = timeline["totals"], timeline["runtime_s"]
+    return {
+        **{name: totals[name] for name in _COMPARED},
+        "solve_s": runtime_s["solve"],
+        "runtime_s": round(sum(runtime_s.values()), 6),
+        "validity": timeline["validity"],
+        "plan_sha256": timeline["plan_sha256"],
+    }
 
 
 class Documents:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -29,6 +29,22 @@ class JobSpec:
     memory_mb: int
     priority: int
     label: str | None
+    rerun_of: str | None = None
+
+
+def spec_again(job: JobRow) -> JobSpec:
+    """Return the spec of the same frozen question once more."""
+    return JobSpec(
+        scenario_id=job.scenario_id,
+        solver=job.solver,
+        params=job.params,
+        seed=job.seed,
+        time_s=job.limits["time_s"],
+        memory_mb=job.limits["memory_mb"],
+        priority=job.priority,
+        label=job.label,
+        rerun_of=job.id,
+    )
 
 
 def submit(session: Session, queue: JobQueue, spec: JobSpec) -> JobRow:
@@ -46,6 +62,7 @@ def submit(session: Session, queue: JobQueue, spec: JobSpec) -> JobRow:
             limits={"time_s": spec.time_s, "memory_mb": spec.memory_mb},
             priority=spec.priority,
             label=spec.label,
+            rerun_of=spec.rerun_of,
             created_at=utc_now(),
             dispatched_at=utc_now(),
         )
@@ -86,7 +103,11 @@ def matching(**wanted: str | None) -> sa.Select[JobRow]:
 
 def scenario_hashes(session: Session, jobs: Iterable[JobRow]) -> dict[str, str]:
     """Return the SHA-256 of each scenario that these jobs plan, by its id."""
-    ids = {job.scenario_id for job in jobs}
+    return hashes_of(session, {job.scenario_id for job in jobs})
+
+
+def hashes_of(session: Session, ids: Collection[str]) -> dict[str, str]:
+    """Return the SHA-256 of each of these scenarios, by its id."""
     wanted = sa.select(ScenarioRow.id, ScenarioRow.sha256).where(ScenarioRow.id.in_(ids))
     return {row.id: row.sha256 for row in session.execute(wanted)}
 

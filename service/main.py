@@ -10,10 +10,12 @@ from fastapi import Depends, FastAPI
 
 import planner_core
 from service.api import (
+    comparisons,
     ground_stations,
     job_events,
     jobs,
     meta,
+    metrics,
     openapi,
     satellites,
     scenarios,
@@ -22,6 +24,7 @@ from service.api import (
 )
 from service.api.deps import check_request
 from service.api.errors import install_error_handlers
+from service.api.idempotency import install_replay
 from service.api.middleware import BodyLimit, RequestContext
 from service.db.session import Database
 from service.opportunities import OpportunityReader
@@ -43,8 +46,10 @@ ROUTERS = (
     scenarios.router,
     jobs.router,
     job_events.router,
+    comparisons.router,
     solvers.router,
     meta.router,
+    metrics.router,
     openapi.router,
 )
 
@@ -73,13 +78,15 @@ def create_app(settings: Settings, queue: JobQueue | None = None) -> FastAPI:
     app.state.database = Database(settings.database_url)
     app.state.opportunities = OpportunityReader()
     app.state.queue = queue
+    app.state.call_counters = metrics.CallCounters()
     for router in ROUTERS:
         app.include_router(router)
     install_error_handlers(app)
+    install_replay(app)
     openapi.install_openapi(app)
     # The last one added is the outermost.
     app.add_middleware(BodyLimit, max_bytes=int(settings.max_body_mb * 1_000_000))
-    app.add_middleware(RequestContext)
+    app.add_middleware(RequestContext, counters=app.state.call_counters)
     return app
 
 

@@ -1,15 +1,22 @@
-"""Answers that carry an ETag, and 304 where the client already has them."""
+"""Conditional requests: 304 where the client is up to date, 412 where it is not and should be."""
 
 from __future__ import annotations
 
-from typing import TypeVar
+from collections.abc import Callable
+from typing import Any, Final, TypeVar
 
 from fastapi import Request, Response
 from pydantic import BaseModel
 
-from service.api.shapes import etagged, matches
+from service.api.problems import ServiceError
+from service.api.shapes import etagged, matches, matches_strongly
 
 M = TypeVar("M", bound=BaseModel)
+
+NOT_MODIFIED: Final[dict[int | str, dict[str, Any]]] = {
+    304: {"description": "`If-None-Match` names what there is: nothing has changed."}
+}
+"""For ``responses=`` of every route that may answer so."""
 
 
 def unless_known(request: Request, response: Response, model: M) -> M | Response:
@@ -19,6 +26,23 @@ def unless_known(request: Request, response: Response, model: M) -> M | Response
         return Response(status_code=304, headers={"ETag": etag})
     response.headers["ETag"] = etag
     return model
+
+
+def require_match(request: Request, current: Callable[[], BaseModel]) -> None:
+    """Refuse a change (412) where ``If-Match`` names another state than the current one.
+
+    Call it in the transaction of the change, with the row locked.
+    """
+    asked = request.headers.get("if-match")
+    if asked is None:
+        return
+    etag = etagged(current())
+    if not matches_strongly(asked, etag):
+        raise ServiceError(
+            "precondition_failed",
+            f"If-Match is {asked[:200]}, but this is {etag} by now: somebody has changed it.",
+            headers={"ETag": etag},
+        )
 
 
 def created(response: Response, model: M, location: str) -> M:

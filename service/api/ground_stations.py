@@ -10,9 +10,10 @@ from fastapi import APIRouter, Request, Response
 from pydantic import BaseModel, Field
 from sqlalchemy.orm import Session
 
-from service.api.conditional import created, unless_known
+from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
 from service.api.deps import DatabaseDep, RawBodyDep, require_media_type
 from service.api.errors import problem_responses
+from service.api.idempotency import OnceDep
 from service.api.imports import (
     Imported,
     OnError,
@@ -57,13 +58,14 @@ class ImportedStation(BaseModel):
 
 @router.post("", status_code=201)
 def create_ground_station(
-    body: GroundStationIn, database: DatabaseDep, response: Response
+    body: GroundStationIn, once: OnceDep, response: Response
 ) -> GroundStationOut:
     """Store one ground station."""
     ground_station_from(body, "new")
-    with database.transaction() as session:
+    with once.transaction() as session:
         row = _add(session, body)
-    return created(response, _shown(row), f"/v1/ground-stations/{row.id}")
+        shown = created(response, _shown(row), f"/v1/ground-stations/{row.id}")
+        return once.keep(session, shown)
 
 
 @router.post(
@@ -75,7 +77,7 @@ def create_ground_station(
     responses=problem_responses(413, 415),
 )
 def import_ground_stations(
-    request: Request, data: RawBodyDep, database: DatabaseDep, on_error: OnErrorQuery = OnError.SKIP
+    request: Request, data: RawBodyDep, once: OnceDep, on_error: OnErrorQuery = OnError.SKIP
 ) -> Imported[ImportedStation]:
     """Store the stations of a file. A station that is stored already is not stored again.
 
@@ -93,8 +95,8 @@ def import_ground_stations(
     )
     faults = [*found.faults, *faults]
     refuse_if_asked(len(good), faults, on_error)
-    with database.transaction() as session:
-        return imported(_store(session, good), faults)
+    with once.transaction() as session:
+        return once.keep(session, imported(_store(session, good), faults))
 
 
 @router.get("")
@@ -106,7 +108,11 @@ def list_ground_stations(database: DatabaseDep, paging: PagingDep) -> Listed[Gro
     return Listed(items=[_shown(row) for row in page.rows], next=page.next)
 
 
-@router.get("/{station_id}", response_model=GroundStationOut, responses=problem_responses(404))
+@router.get(
+    "/{station_id}",
+    response_model=GroundStationOut,
+    responses={**NOT_MODIFIED, **problem_responses(404)},
+)
 def get_ground_station(
     station_id: str, database: DatabaseDep, request: Request, response: Response
 ) -> GroundStationOut | Response:
@@ -116,15 +122,17 @@ def get_ground_station(
     return unless_known(request, response, shown)
 
 
-@router.delete("/{station_id}", status_code=204, responses=problem_responses(404))
-def delete_ground_station(station_id: str, database: DatabaseDep) -> None:
+@router.delete("/{station_id}", status_code=204, responses=problem_responses(404, 412))
+def delete_ground_station(station_id: str, database: DatabaseDep, request: Request) -> None:
     """Delete a ground station. Scenarios that use it keep their copy."""
     with database.transaction() as session:
-        _find(session, station_id).deleted_at = datetime.now(UTC)
+        row = _find(session, station_id, to_change=True)
+        require_match(request, lambda: _shown(row))
+        row.deleted_at = datetime.now(UTC)
 
 
-def _find(session: Session, station_id: str) -> GroundStationRow:
-    row = session.get(GroundStationRow, station_id)
+def _find(session: Session, station_id: str, *, to_change: bool = False) -> GroundStationRow:
+    row = session.get(GroundStationRow, station_id, with_for_update=to_change)
     if row is None or row.deleted_at is not None:
         raise ServiceError("not_found", f"There is no ground station {station_id!r}.")
     return row

@@ -67,13 +67,17 @@ def _placed(fault: Fault) -> str:
     )
 
 
+def _schema_of(kind: str) -> dict[str, Any]:
+    return {} if kind.endswith("json") else {"type": "string"}
+
+
 def body_schemas(**examples: tuple[str, str]) -> dict[str, Any]:
-    """Return OpenAPI's ``requestBody`` for text bodies: media type to description."""
+    """Return OpenAPI's ``requestBody`` for files: media type to description."""
     return {
         "requestBody": {
             "required": True,
             "content": {
-                kind: {"schema": {"type": "string", "description": text}}
+                kind: {"schema": _schema_of(kind) | {"description": text}}
                 for kind, text in examples.values()
             },
         }

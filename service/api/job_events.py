@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import AsyncIterator
 from typing import Annotated, Final
 
-from fastapi import APIRouter, Header
+from fastapi import APIRouter, Header, Response
 from fastapi.responses import StreamingResponse
 
 from service.api.deps import DatabaseDep
@@ -26,21 +26,27 @@ _NOTHING_SEEN: Final = "0"
     response_class=StreamingResponse,
     responses={
         200: {"content": {"text/event-stream": {}}, "description": "One `job` event a change."},
+        204: {"description": "The job is final and `Last-Event-ID` is its end: do not reconnect."},
         **problem_responses(404),
     },
 )
 async def job_events(
     job_id: str,
     database: DatabaseDep,
-    last_event_id: Annotated[str, Header(description="The last event that was seen.")] = "",
-) -> StreamingResponse:
+    last_event_id: Annotated[
+        str, Header(alias="Last-Event-ID", description="The last event that was seen.")
+    ] = "",
+) -> Response:
     """Send the job as it is, then at each change, until it is final.
 
     Each event's data is what `GET /v1/jobs/{id}` answers. With `Last-Event-ID` the first
     event comes when the job is no longer what that event told.
     """
-    await wait_for_change(database, job_id, None, 0.0, _never)
+    job, _ = await wait_for_change(database, job_id, None, 0.0, _never)
     seen = last_event_id or _NOTHING_SEEN
+    if job.state in lease.FINAL and seen == str(job.version):
+        # What browsers do after a stream has ended is to ask for it again, for ever.
+        return Response(status_code=204)
     return StreamingResponse(
         _events(database, job_id, f'"{seen}"'),
         media_type="text/event-stream",

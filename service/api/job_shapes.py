@@ -38,8 +38,8 @@ InlineScenario = Annotated[
 ]
 
 
-class JobIn(Body):
-    """A scenario, the solver that is to plan it, and how."""
+class QuestionIn(Body):
+    """A scenario to plan, stored or sent along, and what a job of it may use."""
 
     scenario_id: str | None = Field(None, description="A stored scenario.")
     scenario: InlineScenario | None = Field(
@@ -47,12 +47,21 @@ class JobIn(Body):
         description="Instead of `scenario_id`: the body of `POST /v1/scenarios`, or a whole "
         "scenario file; it is stored with the job.",
     )
-    solver: str = Field(description="A name of `GET /v1/solvers`.")
-    params: dict[str, Any] = Field({}, description="The solver's own; the others are defaults.")
-    seed: int = Field(0, ge=0, lt=2**63, description="Same seed, same plan.")
     limits: LimitsIn = LimitsIn()
     priority: int = Field(5, ge=0, le=9, description="9 is the most urgent.")
     label: Name | None = None
+
+
+class SolverIn(Body):
+    """A solver and how it is to search."""
+
+    solver: str = Field(description="A name of `GET /v1/solvers`.")
+    params: dict[str, Any] = Field({}, description="The solver's own; the others are defaults.")
+    seed: int = Field(0, ge=0, lt=2**63, description="Same seed, same plan.")
+
+
+class JobIn(QuestionIn, SolverIn):
+    """A scenario, the solver that is to plan it, and how."""
 
 
 class ScenarioRef(BaseModel):
@@ -147,7 +156,8 @@ def shown(job: JobRow, scenario_sha256: str) -> JobOut:
             "targets": f"{address}/targets",
             "events": f"{address}/events",
             "scenario": f"/v1/scenarios/{job.scenario_id}",
-        },
+        }
+        | ({} if job.rerun_of is None else {"rerun_of": f"/v1/jobs/{job.rerun_of}"}),
     )
 
 

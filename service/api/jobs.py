@@ -4,41 +4,33 @@ from __future__ import annotations
 
 import json
 import logging
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
 from fastapi import APIRouter, Path, Query, Request, Response
 from sqlalchemy.exc import SQLAlchemyError
-from sqlalchemy.orm import Session
 
-from planner_core.errors import Fault
-from planner_core.solvers import solver_class
 from service import job_store as store
-from service import scenario_store
+from service.api import job_intake as intake
+from service.api.conditional import NOT_MODIFIED
 from service.api.deps import DatabaseDep, SettingsDep
-from service.api.errors import problem_responses, refuse
+from service.api.errors import problem_responses
+from service.api.idempotency import OnceDep
 from service.api.job_shapes import JobIn, JobOut, Outcome, TargetItem, etag_of_job, shown
 from service.api.job_wait import wait_for_change
 from service.api.paging import Listed, PagingDep, newest_first
 from service.api.problems import ServiceError
 from service.api.shapes import matches
 from service.db.rows import JobRow
-from service.db.session import Database
-from service.inputs import ScenarioFile, ScenarioIn
 from service.jobs import lease
 from service.jobs.lease import JobState
 from service.jobs.queue import JobQueue
-from service.settings import Settings
-from service.solver_params import params_of, parse_params
-from service.translate import inside, read_file
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
 log = logging.getLogger(__name__)
 
 LONGEST_WAIT_S: Final = 30.0
-_ASK_AGAIN_S: Final = 1
-_QUEUE_FULL_S: Final = 30
 
-Suffix = Annotated[str, Path(description="Form of the answer; today `json`.")]
+Suffix = Annotated[str, Path(description="Form of the answer; today `json`.", examples=["json"])]
 
 
 @router.post("", status_code=202, responses=problem_responses(503))
@@ -46,6 +38,7 @@ def create_job(
     body: JobIn,
     database: DatabaseDep,
     settings: SettingsDep,
+    once: OnceDep,
     request: Request,
     response: Response,
 ) -> JobOut:
@@ -53,23 +46,24 @@ def create_job(
 
     Jobs with a higher `priority` start first, those of the same priority in their order.
     """
-    queue = _queue(request)
-    solver = solver_class(body.solver)
-    params = params_of(parse_params(solver, body.params))
-    frozen = _frozen(database, settings, body)
-    with database.transaction() as session:
-        if store.num_waiting(session) >= settings.max_queued:
-            raise ServiceError(
-                "queue_full",
-                f"{settings.max_queued} jobs are waiting.",
-                headers={"Retry-After": str(_QUEUE_FULL_S)},
-            )
-        spec = _spec(body, settings, _scenario_id(session, body, frozen), params)
+    queue = intake.queue_of(request)
+    params = intake.all_params(body.solver, body.params)
+    time_s, memory_mb = intake.limits_of(body.limits, settings)
+    inline = intake.frozen(database, settings, body)
+    with once.transaction() as session:
+        intake.require_room(session, settings)
+        spec = store.JobSpec(
+            scenario_id=intake.stored_scenario(session, body, inline),
+            solver=body.solver,
+            params=params,
+            seed=body.seed,
+            time_s=time_s,
+            memory_mb=memory_mb,
+            priority=body.priority,
+            label=body.label,
+        )
         job = store.submit(session, queue, spec)
-        answer = _shown(session, job)
-    response.headers["Location"] = f"/v1/jobs/{job.id}"
-    _describe(response, job)
-    return answer
+        return once.keep(session, intake.accepted(session, response, job))
 
 
 @router.get("")
@@ -89,7 +83,11 @@ def list_jobs(
     return Listed(items=[shown(job, hashes[job.scenario_id]) for job in page.rows], next=page.next)
 
 
-@router.get("/{job_id}", response_model=JobOut, responses=problem_responses(404))
+@router.get(
+    "/{job_id}",
+    response_model=JobOut,
+    responses={**NOT_MODIFIED, **problem_responses(404)},
+)
 async def get_job(
     job_id: str,
     database: DatabaseDep,
@@ -109,15 +107,15 @@ async def get_job(
     job, sha256 = await wait_for_change(database, job_id, known, wait, request.is_disconnected)
     if matches(known, etag_of_job(job)):
         return Response(status_code=304, headers={"ETag": etag_of_job(job)})
-    _describe(response, job)
+    intake.describe(response, job)
     return shown(job, sha256)
 
 
-@router.post("/{job_id}/cancel", status_code=202, responses=problem_responses(404, 409))
+@router.post("/{job_id}/cancel", status_code=202, responses=problem_responses(404, 409, 503))
 def cancel_job(job_id: str, database: DatabaseDep, request: Request, response: Response) -> JobOut:
     """Cancel a job: at once where it waits; a running one stops and keeps its best plan so far."""
     with database.transaction() as session:
-        job = _find(session, job_id)
+        job = intake.find_job(session, job_id)
         was_waiting = job.state == "queued"
         if not lease.request_cancel(session, job_id):
             raise ServiceError(
@@ -126,17 +124,35 @@ def cancel_job(job_id: str, database: DatabaseDep, request: Request, response: R
                 "Only queued and running jobs can be cancelled.",
             )
         session.refresh(job)
-        answer = _shown(session, job)
+        answer = intake.shown_job(session, job)
     if was_waiting:
-        _forget(_queue(request), job)
-    _describe(response, job)
+        _forget(intake.queue_of(request), job)
+    intake.describe(response, job)
     return answer
+
+
+@router.post("/{job_id}/rerun", status_code=202, responses=problem_responses(404, 503))
+def rerun_job(
+    job_id: str, settings: SettingsDep, once: OnceDep, request: Request, response: Response
+) -> JobOut:
+    """Queue the same question again as a new job, whatever became of the first.
+
+    Scenario, solver, params, seed, limits, priority and label are the first one's, to which
+    `links.rerun_of` leads. Same seed and same version of the service give the same plan.
+    """
+    queue = intake.queue_of(request)
+    with once.transaction() as session:
+        spec = store.spec_again(intake.find_job(session, job_id))
+        intake.require_room(session, settings)
+        job = store.submit(session, queue, spec)
+        return once.keep(session, intake.accepted(session, response, job))
 
 
 @router.get(
     "/{job_id}/timeline",
     responses={
         200: {"content": {"application/json": {}}, "description": "The timeline document."},
+        **NOT_MODIFIED,
         **problem_responses(404, 406, 409),
     },
 )
@@ -149,6 +165,7 @@ def get_timeline(job_id: str, database: DatabaseDep, request: Request) -> Respon
     "/{job_id}/timeline.{suffix}",
     responses={
         200: {"content": {"application/json": {}}, "description": "The timeline document."},
+        **NOT_MODIFIED,
         **problem_responses(404, 406, 409),
     },
 )
@@ -163,6 +180,7 @@ def get_timeline_as(
     "/{job_id}/proof",
     responses={
         200: {"content": {"application/json": {}}, "description": "The proof document."},
+        **NOT_MODIFIED,
         **problem_responses(404, 409),
     },
 )
@@ -174,7 +192,7 @@ def get_proof(job_id: str, database: DatabaseDep, request: Request) -> Response:
     """
     etag = f'"{job_id}"'
     with database.reading() as session:
-        job = _find(session, job_id)
+        job = intake.find_job(session, job_id)
         if store.timeline_of(session, job_id) is None:
             raise _not_ready(job)
         proof = store.proof_of(session, job_id)
@@ -193,7 +211,7 @@ def list_targets(
 ) -> Listed[TargetItem]:
     """List every target of the scenario once, with its outcome and why it was left out."""
     with database.reading() as session:
-        job = _find(session, job_id)
+        job = intake.find_job(session, job_id)
         targets = store.targets_of(session, job_id)
     if targets is None:
         raise _not_ready(job)
@@ -206,81 +224,6 @@ def list_targets(
     ]
     page = paging.answer(found[: paging.limit + 1], lambda row: row[0])
     return Listed(items=[TargetItem(**target) for _, target in page.rows], next=page.next)
-
-
-def _queue(request: Request) -> JobQueue:
-    queue: JobQueue | None = request.app.state.queue
-    if queue is None:
-        raise ServiceError("not_live", "This server takes no jobs: it has no queue.")
-    return queue
-
-
-def _find(session: Session, job_id: str) -> JobRow:
-    job = store.find(session, job_id)
-    if job is None:
-        raise ServiceError("not_found", f"There is no job {job_id!r}.")
-    return job
-
-
-def _shown(session: Session, job: JobRow) -> JobOut:
-    return shown(job, store.scenario_hashes(session, [job])[job.scenario_id])
-
-
-def _describe(response: Response, job: JobRow) -> None:
-    response.headers["ETag"] = etag_of_job(job)
-    if job.state in lease.ACTIVE:
-        response.headers["Retry-After"] = str(_ASK_AGAIN_S)
-
-
-def _frozen(
-    database: Database, settings: Settings, body: JobIn
-) -> scenario_store.FrozenScenario | None:
-    """Return the inline scenario of a job, ready to be stored."""
-    scenario, days = body.scenario, settings.max_horizon_days
-    if (scenario is None) == (body.scenario_id is None):
-        detail = "Give either scenario_id or scenario."
-        if scenario is None:
-            raise refuse([Fault(code="missing_field", detail=detail, pointer="/scenario_id")])
-        raise refuse([Fault(code="invalid_value", detail=detail, pointer="/scenario")])
-    with inside("/scenario"):
-        if isinstance(scenario, ScenarioIn):
-            return scenario_store.freeze(database, scenario, max_horizon_days=days)
-        if isinstance(scenario, ScenarioFile):
-            file = read_file(scenario.model_dump(mode="json"))
-            return scenario_store.freeze_file(file, max_horizon_days=days)
-    return None
-
-
-def _scenario_id(
-    session: Session, body: JobIn, frozen: scenario_store.FrozenScenario | None
-) -> str:
-    if frozen is not None:
-        return scenario_store.save(session, frozen)[0].id
-    assert body.scenario_id is not None
-    if store.has_scenario(session, body.scenario_id):
-        return body.scenario_id
-    detail = f"There is no scenario {body.scenario_id!r}."
-    raise refuse([Fault(code="unknown_scenario", detail=detail, pointer="/scenario_id")])
-
-
-def _spec(
-    body: JobIn, settings: Settings, scenario_id: str, params: dict[str, Any]
-) -> store.JobSpec:
-    limits = body.limits
-    time_s = settings.default_time_s if limits.time_s is None else limits.time_s
-    if time_s > settings.max_time_s:
-        detail = f"{time_s:g} s is more than the {settings.max_time_s:g} s that a job may take."
-        raise refuse([Fault(code="value_out_of_range", detail=detail, pointer="/limits/time_s")])
-    return store.JobSpec(
-        scenario_id=scenario_id,
-        solver=body.solver,
-        params=params,
-        seed=body.seed,
-        time_s=time_s,
-        memory_mb=settings.default_memory_mb if limits.memory_mb is None else limits.memory_mb,
-        priority=body.priority,
-        label=body.label,
-    )
 
 
 def _forget(queue: JobQueue, job: JobRow) -> None:
@@ -302,7 +245,7 @@ def _timeline(
 ) -> Response:
     etag = f'"{job_id}"'  # a timeline never changes
     with database.reading() as session:
-        job = _find(session, job_id)
+        job = intake.find_job(session, job_id)
         if not acceptable:
             raise ServiceError("not_acceptable", "The timeline is offered as application/json.")
         timeline = store.timeline_of(session, job_id)
@@ -315,7 +258,7 @@ def _timeline(
 
 def _not_ready(job: JobRow) -> ServiceError:
     if job.state in lease.ACTIVE:
-        headers = {"Retry-After": str(_ASK_AGAIN_S)}
+        headers = {"Retry-After": str(intake.ASK_AGAIN_S)}
         return ServiceError("not_ready", f"The job is {job.state}.", headers=headers)
     why = job.error["code"] if job.error else "it was stopped before it had a plan"
     return ServiceError("not_ready", f"The job is {job.state} and left no answer: {why}.")

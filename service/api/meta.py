@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime, timedelta
+from typing import Annotated
 
 import sqlalchemy as sa
-from fastapi import APIRouter
+from fastapi import APIRouter, Path, Request
 from pydantic import BaseModel, Field
 
 import planner_core
@@ -15,6 +16,7 @@ from service.api.problems import KINDS, ServiceError, kind_of
 from service.api.shapes import Instant
 from service.db.rows import WorkerRow
 from service.db.session import Database
+from service.jobs.queue import JobQueue
 
 router = APIRouter(tags=["operations"])
 
@@ -32,6 +34,7 @@ class Ready(BaseModel):
 
     status: str = "ready"
     database: str = "ok"
+    queue: str = "ok"
     workers: int = Field(description="Workers heard of in the last 30 seconds.")
     last_heartbeat: Instant
 
@@ -59,9 +62,10 @@ def live() -> Live:
 
 
 @router.get("/health/ready", responses=problem_responses(503))
-def ready(database: DatabaseDep) -> Ready:
-    """Say whether the database answers and a worker has been heard of in the last 30 seconds."""
+def ready(database: DatabaseDep, request: Request) -> Ready:
+    """Say whether database and queue answer, and a worker was heard of in the last 30 seconds."""
     workers = _recent_workers(database)
+    _ask_queue(request.app.state.queue)
     if not workers:
         raise ServiceError("not_live", "No worker has been heard of in the last 30 seconds.")
     return Ready(workers=len(workers), last_heartbeat=max(workers))
@@ -77,6 +81,14 @@ def _recent_workers(database: Database) -> list[datetime]:
         raise ServiceError("not_live", "The database does not answer.") from error
 
 
+def _ask_queue(queue: JobQueue | None) -> None:
+    try:
+        if queue is not None:
+            queue.claims()
+    except sa.exc.DatabaseError as error:
+        raise ServiceError("not_live", "The queue does not answer.") from error
+
+
 @router.get("/version")
 def version() -> Version:
     """Return the version of the service."""
@@ -84,7 +96,7 @@ def version() -> Version:
 
 
 @router.get("/problems/{code}", responses=problem_responses(404))
-def explain(code: str) -> ProblemExplained:
+def explain(code: Annotated[str, Path(examples=["tle-checksum"])]) -> ProblemExplained:
     """Explain a problem code, written with hyphens or underscores."""
     name = code.replace("-", "_")
     if name not in KINDS:

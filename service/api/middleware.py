@@ -12,6 +12,7 @@ from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.api.errors import problem
+from service.api.metrics import CallCounters
 from service.ids import new_id
 from service.logs import request_id
 
@@ -23,11 +24,12 @@ _ACCEPTABLE_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
 class RequestContext:
     """Give each request an id: the caller's ``X-Request-ID`` where it is usable, else ours."""
 
-    def __init__(self, app: ASGIApp):
+    def __init__(self, app: ASGIApp, counters: CallCounters):
         self.app = app
+        self.counters = counters
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve one request, answer with its id, and log it."""
+        """Serve one request, answer with its id, log and count it."""
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
@@ -48,13 +50,15 @@ class RequestContext:
         try:
             await self.app(scope, receive, send_with_id)
         finally:
+            seconds = time.perf_counter() - started
+            self.counters.count(scope, status, seconds)
             logger.info(
                 "request",
                 extra={
                     "method": scope["method"],
                     "path": scope["path"],
                     "status": status,
-                    "duration_s": round(time.perf_counter() - started, 6),
+                    "duration_s": round(seconds, 6),
                 },
             )
 

@@ -11,6 +11,7 @@ from fastapi.responses import HTMLResponse
 from pydantic import BaseModel
 
 from service.api.errors import ProblemOut, problem_responses
+from service.api.examples import add_examples
 from service.api.target_catalogs import TargetCatalogIn
 
 router = APIRouter(include_in_schema=False)
@@ -23,6 +24,18 @@ _FURTHER_SCHEMAS: dict[str, type[BaseModel]] = {
 
 _ALWAYS = (422, 500, 503)
 _WITH_BODY = (413, 415)
+# What each of these answers says about itself, and which request header brings it about.
+_ANSWER_HEADERS = {
+    "201": {"Location": "Address of what was created.", "ETag": "Of its present form."},
+    "202": {"Location": "Where to follow it.", "Retry-After": "Seconds until it is worth asking."},
+    "304": {"ETag": "Of its present form."},
+    "412": {"ETag": "Of its present form."},
+    "503": {"Retry-After": "Seconds until it is worth asking again, where that is known."},
+}
+_CONDITIONS = {
+    "304": ("If-None-Match", "ETags that the client has: 304 where one is of the present form."),
+    "412": ("If-Match", "ETag that the thing must have: 412 where it has changed."),
+}
 _HEADERS = {
     "X-Request-ID": {
         "description": "Names this request in the logs and in problem documents.",
@@ -62,9 +75,29 @@ def _with_problems(document: dict[str, Any]) -> dict[str, Any]:
             statuses = _ALWAYS + (_WITH_BODY if "requestBody" in operation else ())
             for status, response in problem_responses(*statuses).items():
                 operation["responses"][str(status)] = response
-            for response in operation["responses"].values():
-                response["headers"] = _HEADERS | response.get("headers", {})
+            for status, (header, description) in _CONDITIONS.items():
+                if status in operation["responses"]:
+                    operation.setdefault("parameters", []).append(
+                        _header_parameter(header, description)
+                    )
+            for status, response in operation["responses"].items():
+                of_status = {
+                    name: {"description": text, "schema": {"type": "string"}}
+                    for name, text in _ANSWER_HEADERS.get(status, {}).items()
+                }
+                response["headers"] = _HEADERS | of_status | response.get("headers", {})
+    add_examples(document)
     return document
+
+
+def _header_parameter(name: str, description: str) -> dict[str, Any]:
+    return {
+        "name": name,
+        "in": "header",
+        "required": False,
+        "description": description,
+        "schema": {"type": "string"},
+    }
 
 
 @router.get("/docs", response_class=HTMLResponse)

@@ -63,6 +63,11 @@ KINDS: dict[str, ProblemKind] = {
     "invalid_transition": ProblemKind(
         409, "Not possible in this state", "The detail lists what the job's state allows."
     ),
+    "precondition_failed": ProblemKind(
+        412,
+        "Precondition failed",
+        "It is no longer what If-Match names: read it again, and decide anew.",
+    ),
     "body_too_large": ProblemKind(
         413, "Body too large", "Split the body, or raise SLEWLINE_MAX_BODY_MB on the server."
     ),
@@ -152,7 +157,7 @@ KINDS: dict[str, ProblemKind] = {
         "of its element set. Give newer elements, or allow_old_elements.",
     ),
     "idempotency_key_reused": ProblemKind(
-        422, "Idempotency key reused", "The key was used with another body; choose a new one."
+        422, "Idempotency key reused", "The key was used for another request; choose a new one."
     ),
     "internal_error": ProblemKind(
         500, "Internal error", "A fault of the service. Its log has the request_id."

@@ -14,9 +14,10 @@ from sqlalchemy.orm import Session
 from planner_core.errors import Fault
 from planner_core.orbits.ingest import read_elements
 from service import satellite_store as store
-from service.api.conditional import created, unless_known
+from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
 from service.api.deps import DatabaseDep, RawBodyDep, require_media_type
 from service.api.errors import problem_responses, refuse
+from service.api.idempotency import OnceDep
 from service.api.imports import (
     Imported,
     OnError,
@@ -87,14 +88,14 @@ class ImportedSatellite(BaseModel):
 
 
 @router.post("", status_code=201)
-def create_satellite(body: SatelliteIn, database: DatabaseDep, response: Response) -> SatelliteOut:
+def create_satellite(body: SatelliteIn, once: OnceDep, response: Response) -> SatelliteOut:
     """Store one satellite. A second one with the same catalogue number is another satellite."""
     satellite_from(body, "new")
     orbit = orbit_from(body)
-    with database.transaction() as session:
+    with once.transaction() as session:
         row = store.add_satellite(session, body, orbit)
-        shown = _shown(session, [row])[0]
-    return created(response, shown, f"/v1/satellites/{row.id}")
+        shown = created(response, _shown(session, [row])[0], f"/v1/satellites/{row.id}")
+        return once.keep(session, shown)
 
 
 @router.post(
@@ -108,7 +109,7 @@ def create_satellite(body: SatelliteIn, database: DatabaseDep, response: Respons
     responses=problem_responses(413, 415),
 )
 def import_satellites(
-    request: Request, data: RawBodyDep, database: DatabaseDep, on_error: OnErrorQuery = OnError.SKIP
+    request: Request, data: RawBodyDep, once: OnceDep, on_error: OnErrorQuery = OnError.SKIP
 ) -> Imported[ImportedSatellite]:
     """Store the element sets of a file; satellites get the paper's agility, sensor and resources.
 
@@ -118,9 +119,9 @@ def import_satellites(
     """
     found = read_elements(data, require_media_type(request, *_IMPORT_TYPES))
     refuse_if_asked(len(found.entries), found.faults, on_error)
-    with database.transaction() as session:
+    with once.transaction() as session:
         items = [_imported(one) for one in store.import_entries(session, found.entries)]
-    return imported(items, found.faults)
+        return once.keep(session, imported(items, found.faults))
 
 
 @router.get("")
@@ -140,7 +141,11 @@ def list_satellites(
         return Listed(items=_shown(session, page.rows), next=page.next)
 
 
-@router.get("/{satellite_id}", response_model=SatelliteOut, responses=problem_responses(404))
+@router.get(
+    "/{satellite_id}",
+    response_model=SatelliteOut,
+    responses={**NOT_MODIFIED, **problem_responses(404)},
+)
 def get_satellite(
     satellite_id: str, database: DatabaseDep, request: Request, response: Response
 ) -> SatelliteOut | Response:
@@ -150,24 +155,28 @@ def get_satellite(
     return unless_known(request, response, shown)
 
 
-@router.delete("/{satellite_id}", status_code=204, responses=problem_responses(404))
-def delete_satellite(satellite_id: str, database: DatabaseDep) -> None:
+@router.delete("/{satellite_id}", status_code=204, responses=problem_responses(404, 412))
+def delete_satellite(satellite_id: str, database: DatabaseDep, request: Request) -> None:
     """Delete a satellite. Scenarios that use it keep their copy."""
     with database.transaction() as session:
-        _find(session, satellite_id).deleted_at = datetime.now(UTC)
+        row = _find(session, satellite_id, to_change=True)
+        require_match(request, lambda: _shown(session, [row])[0])
+        row.deleted_at = datetime.now(UTC)
 
 
-@router.put("/{satellite_id}/elements", responses=problem_responses(404))
+@router.put("/{satellite_id}/elements", responses=problem_responses(404, 412))
 def put_elements(
-    satellite_id: str, body: OrbitIn, database: DatabaseDep, response: Response
+    satellite_id: str, body: OrbitIn, database: DatabaseDep, request: Request, response: Response
 ) -> SatelliteOut:
     """Store a further element set of the satellite; that of the newest epoch is in force.
 
-    Older ones stay readable. Scenarios that exist do not change.
+    Older ones stay readable. Scenarios that exist do not change. `If-Match` takes the ETag of
+    the satellite.
     """
     orbit = orbit_from(body)
     with database.transaction() as session:
-        row = _find(session, satellite_id)
+        row = _find(session, satellite_id, to_change=True)
+        require_match(request, lambda: _shown(session, [row])[0])
         _require_same_object(row, orbit.elements.norad_cat_id, body)
         store.add_elements(session, row.id, orbit.elements.epoch, orbit.stored)
         shown = _shown(session, [row])[0]
@@ -186,8 +195,8 @@ def list_elements(
     return Listed(items=[_shown_elements(row) for row in page.rows], next=page.next)
 
 
-def _find(session: Session, satellite_id: str) -> SatelliteRow:
-    row = session.get(SatelliteRow, satellite_id)
+def _find(session: Session, satellite_id: str, *, to_change: bool = False) -> SatelliteRow:
+    row = session.get(SatelliteRow, satellite_id, with_for_update=to_change)
     if row is None or row.deleted_at is not None:
         raise ServiceError("not_found", f"There is no satellite {satellite_id!r}.")
     return row

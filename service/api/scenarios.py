@@ -17,9 +17,10 @@ from planner_core.domain import Dynamics, Nadir
 from planner_core.orbits.places import View
 from planner_core.problem import COLLECT, CONTACT
 from service import scenario_store as store
-from service.api.conditional import created, unless_known
+from service.api.conditional import NOT_MODIFIED, created, unless_known
 from service.api.deps import DatabaseDep, SettingsDep
 from service.api.errors import problem_responses
+from service.api.idempotency import OnceDep
 from service.api.paging import Listed, PagingDep, newest_first
 from service.api.problems import ServiceError
 from service.api.shapes import Instant, etag_of, matches
@@ -109,17 +110,21 @@ class OpportunityOut(BaseModel):
     responses={200: {"model": ScenarioOut, "description": "The same question is stored already."}},
 )
 def create_scenario(
-    body: ScenarioIn, database: DatabaseDep, settings: SettingsDep, response: Response
+    body: ScenarioIn,
+    database: DatabaseDep,
+    settings: SettingsDep,
+    once: OnceDep,
+    response: Response,
 ) -> ScenarioOut:
     """Freeze a question: everything it names is copied into it.
 
     The same content again, under whatever name, answers 200 with the scenario that is there.
     """
     frozen = store.freeze(database, body, max_horizon_days=settings.max_horizon_days)
-    with database.transaction() as session:
+    with once.transaction() as session:
         row, is_new = store.save(session, frozen)
-    response.status_code = 201 if is_new else 200
-    return created(response, _shown(row), f"/v1/scenarios/{row.id}")
+        response.status_code = 201 if is_new else 200
+        return once.keep(session, created(response, _shown(row), f"/v1/scenarios/{row.id}"))
 
 
 @router.get("")
@@ -133,7 +138,7 @@ def list_scenarios(database: DatabaseDep, paging: PagingDep) -> Listed[ScenarioO
 @router.get(
     "/{scenario_id}",
     response_model=ScenarioOut | ScenarioFile,
-    responses=problem_responses(404),
+    responses={**NOT_MODIFIED, **problem_responses(404)},
 )
 def get_scenario(
     scenario_id: str,

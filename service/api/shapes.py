@@ -104,6 +104,16 @@ def matches(if_none_match: str | None, etag: str) -> bool:
     return "*" in known or etag.removeprefix("W/") in known
 
 
+def matches_strongly(if_match: str, etag: str) -> bool:
+    """Return whether an ``If-Match`` header names this ETag; a weak tag names nothing.
+
+    >>> matches_strongly('"x", "y"', '"y"'), matches_strongly('W/"y"', '"y"')
+    (True, False)
+    """
+    named = {tag.strip() for tag in if_match.split(",")}
+    return "*" in named or etag in named
+
+
 def etagged(model: BaseModel) -> str:
     """Return the ETag of a model's JSON."""
     return etag_of(model.model_dump_json())

@@ -13,9 +13,10 @@ from pydantic import BaseModel, Field, ValidationError
 from sqlalchemy.orm import Session
 
 from planner_core.errors import Fault
-from service.api.conditional import created, unless_known
+from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
 from service.api.deps import DatabaseDep, RawBodyDep, require_media_type
 from service.api.errors import faults_of_validation, problem_responses, refuse
+from service.api.idempotency import OnceDep
 from service.api.paging import Listed, PagingDep, newest_first
 from service.api.problems import ServiceError
 from service.api.shapes import Body, Instant, Name
@@ -31,6 +32,7 @@ MAX_TARGETS = 100_000
 _TYPES = ("application/json", "application/geo+json", "text/csv")
 _REQUIRED = ("id", "lat_deg", "lon_deg")
 _COLUMNS = tuple(TargetIn.model_fields)
+_OPTIONAL = tuple(column for column in _COLUMNS if column not in _REQUIRED)
 _UNNAMED = "Targets"
 
 
@@ -73,7 +75,7 @@ _REQUEST_BODY: dict[str, Any] = {
                 "schema": {
                     "type": "string",
                     "description": f"A header with id, lat_deg, lon_deg and any of "
-                    f"{', '.join(_COLUMNS[3:])}; lat, latitude, lon, lng and longitude are "
+                    f"{', '.join(_OPTIONAL)}; lat, latitude, lon, lng and longitude are "
                     "taken as well. An empty cell means the default.",
                 }
             },
@@ -92,7 +94,7 @@ def create_target_catalog(
     request: Request,
     response: Response,
     data: RawBodyDep,
-    database: DatabaseDep,
+    once: OnceDep,
     name: Annotated[
         Name | None, Query(description="Name of a catalogue whose file has none.")
     ] = None,
@@ -101,10 +103,11 @@ def create_target_catalog(
     kind = require_media_type(request, *_TYPES)
     found = _read(kind, data)
     targets = _checked(found)
-    with database.transaction() as session:
+    with once.transaction() as session:
         row = _add(session, found.name or name or _UNNAMED, targets)
-    shown = created(response, _shown(row), f"/v1/target-catalogs/{row.id}")
-    return CreatedCatalog(**shown.model_dump(), ignored_columns=list(found.ignored))
+        shown = created(response, _shown(row), f"/v1/target-catalogs/{row.id}")
+        answer = CreatedCatalog(**shown.model_dump(), ignored_columns=list(found.ignored))
+        return once.keep(session, answer)
 
 
 def _read(kind: str, data: bytes) -> Records:
@@ -176,7 +179,11 @@ def list_target_catalogs(database: DatabaseDep, paging: PagingDep) -> Listed[Tar
     return Listed(items=[_shown(row) for row in page.rows], next=page.next)
 
 
-@router.get("/{catalog_id}", response_model=TargetCatalogOut, responses=problem_responses(404))
+@router.get(
+    "/{catalog_id}",
+    response_model=TargetCatalogOut,
+    responses={**NOT_MODIFIED, **problem_responses(404)},
+)
 def get_target_catalog(
     catalog_id: str, database: DatabaseDep, request: Request, response: Response
 ) -> TargetCatalogOut | Response:
@@ -201,15 +208,17 @@ def list_targets(catalog_id: str, database: DatabaseDep, paging: PagingDep) -> L
     return Listed(items=[TargetIn(**row.body) for row in page.rows], next=page.next)
 
 
-@router.delete("/{catalog_id}", status_code=204, responses=problem_responses(404))
-def delete_target_catalog(catalog_id: str, database: DatabaseDep) -> None:
+@router.delete("/{catalog_id}", status_code=204, responses=problem_responses(404, 412))
+def delete_target_catalog(catalog_id: str, database: DatabaseDep, request: Request) -> None:
     """Delete a catalogue. Scenarios that use it keep their copy."""
     with database.transaction() as session:
-        _find(session, catalog_id).deleted_at = datetime.now(UTC)
+        row = _find(session, catalog_id, to_change=True)
+        require_match(request, lambda: _shown(row))
+        row.deleted_at = datetime.now(UTC)
 
 
-def _find(session: Session, catalog_id: str) -> TargetCatalogRow:
-    row = session.get(TargetCatalogRow, catalog_id)
+def _find(session: Session, catalog_id: str, *, to_change: bool = False) -> TargetCatalogRow:
+    row = session.get(TargetCatalogRow, catalog_id, with_for_update=to_change)
     if row is None or row.deleted_at is not None:
         raise ServiceError("not_found", f"There is no target catalogue {catalog_id!r}.")
     return row

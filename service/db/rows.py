@@ -161,6 +161,7 @@ class JobRow(Row):
     limits: Mapped[Json]
     priority: Mapped[int]
     label: Mapped[str | None]
+    rerun_of: Mapped[str | None] = mapped_column(sa.String(36))
     progress: Mapped[Json | None]
     termination: Mapped[str | None] = mapped_column(sa.String(32))
     error: Mapped[Json | None]
@@ -177,15 +178,57 @@ class JobRow(Row):
 
 
 class JobResultRow(Row):
-    """The answer of a job, written in the transaction that ends it: documents as JSON text."""
+    """The answer of a job, written in the transaction that ends it: documents as JSON text.
+
+    ``figures`` repeats the numbers of the timeline that tables show.
+    """
 
     __tablename__ = "job_result"
 
     job_id: Mapped[str] = mapped_column(sa.ForeignKey("job.id"), primary_key=True)
+    figures: Mapped[Json | None]
     timeline: Mapped[str] = mapped_column(sa.Text, deferred=True)
     targets: Mapped[str] = mapped_column(sa.Text, deferred=True)
     proof: Mapped[str | None] = mapped_column(sa.Text, deferred=True)
     created_at: Mapped[datetime]
+
+
+class ComparisonRow(Row):
+    """Several solvers on one scenario, side by side."""
+
+    __tablename__ = "comparison"
+
+    id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
+    scenario_id: Mapped[str] = mapped_column(sa.ForeignKey("scenario.id"))
+    tenant: Mapped[str] = mapped_column(sa.String(64), default="local")
+    label: Mapped[str | None]
+    created_at: Mapped[datetime]
+
+
+class ComparisonRunRow(Row):
+    """One line of a comparison, in the order of its request: a job like any other."""
+
+    __tablename__ = "comparison_run"
+
+    comparison_id: Mapped[str] = mapped_column(sa.ForeignKey("comparison.id"), primary_key=True)
+    position: Mapped[int] = mapped_column(primary_key=True)
+    job_id: Mapped[str] = mapped_column(sa.ForeignKey("job.id"))
+
+
+class IdempotencyKeyRow(Row):
+    """The answer that a caller's ``Idempotency-Key`` stands for, for as long as it is kept.
+
+    ``request_sha256`` tells the same request from another one. ``answer`` is its status,
+    headers and body; it is set in the transaction that stores what the request created.
+    """
+
+    __tablename__ = "idempotency_key"
+
+    tenant: Mapped[str] = mapped_column(sa.String(64), primary_key=True)
+    key: Mapped[str] = mapped_column(sa.String(255), primary_key=True)
+    request_sha256: Mapped[str] = mapped_column(sa.String(64))
+    answer: Mapped[Json | None]
+    created_at: Mapped[datetime] = mapped_column(index=True)
 
 
 class WorkerRow(Row):

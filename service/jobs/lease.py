@@ -36,7 +36,8 @@ class Lease:
 class Outcome:
     """How a run ended. ``timeline``, ``targets``, ``proof`` are documents as JSON text, or None.
 
-    ``progress`` is the last report; None leaves the one that the job has.
+    ``progress`` is the last report; None leaves the one that the job has. ``figures`` are the
+    timeline's numbers for tables.
     """
 
     state: JobState
@@ -46,6 +47,7 @@ class Outcome:
     timeline: str | None = None
     targets: str | None = None
     proof: str | None = None
+    figures: Mapping[str, Any] | None = None
 
     @classmethod
     def failed(cls, code: str, detail: str) -> Outcome:
@@ -130,6 +132,7 @@ def finish(session: Session, lease: Lease, outcome: Outcome) -> bool:
                 timeline=outcome.timeline,
                 targets=outcome.targets,
                 proof=outcome.proof,
+                figures=sa.null() if outcome.figures is None else dict(outcome.figures),
                 created_at=utc_now(),
             )
         )

@@ -12,7 +12,7 @@ from planner_core.build import ScenarioOpportunities
 from planner_core.run import plan_scenario
 from planner_core.solvers import solver_class
 from planner_core.solvers.base import Budget, Solver
-from service.documents import Documents
+from service.documents import Documents, figures_of
 from service.translate import scenario_from_content
 
 
@@ -66,6 +66,8 @@ class PlanAnswer:
         That bound with what proves it (JSON text).
     opportunity_block
         Opportunities to store, where this job was the first to compute them.
+    figures
+        The timeline's numbers for tables.
     """
 
     timeline: str
@@ -75,6 +77,7 @@ class PlanAnswer:
     bound: float | None = None
     proof: str | None = None
     opportunity_block: bytes | None = None
+    figures: Mapping[str, Any] | None = None
 
 
 def run_plan_job(request: PlanRequest, budget: Budget) -> PlanAnswer:
@@ -110,4 +113,5 @@ def run_plan_job(request: PlanRequest, budget: Budget) -> PlanAnswer:
         bound=judged.bound.value if judged.bound else None,
         proof=proofs.to_json(judged.bound) if judged.bound else None,
         opportunity_block=judged.opportunities.to_bytes() if block is None else None,
+        figures=figures_of(timeline),
     )

@@ -215,6 +215,7 @@ def outcome_of(ending: Ending) -> Outcome:
         timeline=answer.timeline,
         targets=answer.targets,
         proof=answer.proof,
+        figures=answer.figures,
     )
 
 

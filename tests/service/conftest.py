@@ -20,6 +20,7 @@ from service.db.session import Database
 from service.main import create_app
 from service.opportunities import OpportunityReader
 from service.settings import Settings
+from tests.service.contract import Contract
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,6 +48,12 @@ def serve(app: FastAPI) -> Iterator[str]:
     finally:
         server.should_exit = True
         thread.join()
+
+
+def checked_client(app: FastAPI, address: str) -> httpx.Client:
+    """Return a client that holds every answer against the application's OpenAPI document."""
+    contract = Contract(app.openapi())
+    return httpx.Client(base_url=address, timeout=60, event_hooks={"response": [contract.check]})
 
 
 @pytest.fixture(scope="session")
@@ -80,7 +87,7 @@ def service(settings: Settings, running_app: tuple[FastAPI, str]) -> Iterator[Se
     app.state.settings = settings
     app.state.database = Database(settings.database_url)
     app.state.opportunities = OpportunityReader()
-    with httpx.Client(base_url=address, timeout=60) as client:
+    with checked_client(app, address) as client:
         yield Service(app=app, client=client, database=app.state.database, settings=settings)
     app.state.opportunities.close()
     app.state.database.close()

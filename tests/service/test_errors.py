@@ -15,6 +15,7 @@ from service.db.session import Database
 from service.main import create_app
 from service.settings import Settings
 from tests.service.conftest import Service, serve
+from tests.service.factories import EPOCH, ground_station, satellite, target, tle
 from tests.service.problems import assert_problem
 
 
@@ -75,6 +76,40 @@ def test_the_callers_request_id_is_kept_only_where_it_is_harmless(client: httpx.
     assert kept.headers["x-request-id"] == "abc-1"
     replaced = client.get("/version", headers={"X-Request-ID": 'a"b<c>'})
     assert len(replaced.headers["x-request-id"]) == 36
+
+
+def test_a_change_that_was_meant_for_another_state_is_412(client: httpx.Client) -> None:
+    catalog = {"name": "C", "targets": [target()]}
+    for path, body in (
+        ("/v1/satellites", satellite()),
+        ("/v1/ground-stations", ground_station()),
+        ("/v1/target-catalogs", catalog),
+    ):
+        made = client.post(path, json=body)
+        address, etag = made.headers["location"], made.headers["etag"]
+        for wrong in ('"other"', f"W/{etag}"):
+            refused = client.delete(address, headers={"If-Match": wrong})
+            assert_problem(refused, 412, "precondition_failed")
+            assert refused.headers["etag"] == etag
+        assert client.get(address).status_code == 200
+        right = {"If-Match": f'"other", {etag}'}
+        assert client.delete(address, headers=right).status_code == 204
+        assert_problem(client.delete(address, headers={"If-Match": "*"}), 404, "not_found")
+
+
+def test_of_two_changes_of_one_state_only_the_first_is_made(client: httpx.Client) -> None:
+    made = client.post("/v1/satellites", json=satellite())
+    address, etag = made.headers["location"], made.headers["etag"]
+    known = {"If-Match": etag}
+    newer = {"tle": tle(epoch=EPOCH + timedelta(days=1))}
+    newest = {"tle": tle(epoch=EPOCH + timedelta(days=2))}
+    first = client.put(f"{address}/elements", json=newer, headers=known)
+    assert first.status_code == 200
+    second = client.put(f"{address}/elements", json=newest, headers=known)
+    assert_problem(second, 412, "precondition_failed")
+    assert len(client.get(f"{address}/elements").json()["items"]) == 2
+    assert_problem(client.delete(address, headers=known), 412, "precondition_failed")
+    assert client.delete(address, headers={"If-Match": first.headers["etag"]}).status_code == 204
 
 
 def test_each_code_is_explained_under_its_type(client: httpx.Client) -> None:

@@ -1,4 +1,4 @@
-"""The README's walk through the API runs as it is printed."""
+"""The walks through the API, in the README and its own page, run as they are printed."""
 
 from __future__ import annotations
 
@@ -17,24 +17,27 @@ ROOT = Path(__file__).resolve().parents[2]
 WITHIN_S = 120.0
 
 
-def _walk(url: str) -> str:
-    """Return the shell commands of the README, for a service at ``url``."""
-    blocks = re.findall(r"```sh\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.S)
+def _walk(page: str, url: str) -> str:
+    """Return the shell commands of a page, for a service at ``url``."""
+    blocks = re.findall(r"```sh\n(.*?)```", (ROOT / page).read_text(encoding="utf-8"), re.S)
     commands = "\n".join(block for block in blocks if "make demo" not in block)
     return commands.replace("http://127.0.0.1:8000", url).replace(
         ".venv/bin/slewline", f"{sys.executable} -m service"
     )
 
 
-@pytest.mark.skipif(
+needs_tools = pytest.mark.skipif(
     any(shutil.which(tool) is None for tool in ("bash", "curl", "awk", "python3")),
     reason="the walk needs bash, curl, awk and python3",
 )
-def test_every_command_of_the_walk_works(tmp_path: Path) -> None:
+
+
+def _output(page: str, tmp_path: Path) -> str:
+    """Return what the commands of a page print on a fresh service; none of them may fail."""
     (tmp_path / "service").symlink_to(ROOT / "service")
     with serving(tmp_path, "serve") as (_, line):
         ran = subprocess.run(
-            ["bash", "-eu", "-c", _walk(line.split()[-1])],
+            ["bash", "-eu", "-c", _walk(page, line.split()[-1])],
             cwd=tmp_path,
             env=os.environ | {"PYTHONPATH": str(ROOT)},
             capture_output=True,
@@ -43,11 +46,31 @@ def test_every_command_of_the_walk_works(tmp_path: Path) -> None:
             check=False,
         )
     assert ran.returncode == 0, ran.stderr
+    return ran.stdout
+
+
+@needs_tools
+def test_every_command_of_the_walk_works(tmp_path: Path) -> None:
+    printed = _output("README.md", tmp_path)
     answers = [
         '"kind": "contact"',
         '"bound_proof"',
         '"mode": "collect"',
         '"code": "tle_line_length"',
     ]
-    assert [part for part in answers if part not in ran.stdout] == []
-    assert re.search(r"^rule .* valid$", ran.stdout, re.M)
+    assert [part for part in answers if part not in printed] == []
+    assert re.search(r"^rule .* valid$", printed, re.M)
+
+
+@needs_tools
+def test_every_command_of_the_page_on_the_api_works(tmp_path: Path) -> None:
+    lines = [line.strip() for line in _output("docs/api.md", tmp_path).splitlines()]
+    assert lines[:4] == ["idempotency-replayed: true", "succeeded", "event: job", "304"]
+    first, again = lines[4:6]
+    assert len(first) == 64
+    assert first == again
+    assert lines[6] == "2"
+    assert [line.split()[0] for line in lines[7:9]] == ["rule", "forward_search"]
+    assert lines[9] == "412"
+    assert 'slewline_jobs{state="succeeded"} 4.0' in lines
+    assert lines[-2] == "unknown_solver"

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import httpx
 import pytest
 import sqlalchemy as sa
 
@@ -22,7 +23,9 @@ from service.db.session import Database
 from service.ids import new_id
 from service.jobs.queue import DbosQueue, migrate_queue
 from service.jobs.supervisor import environment_of
+from service.main import create_app
 from service.settings import Settings
+from tests.service.conftest import checked_client, serve
 from tests.service.jobs.work import WORK
 
 PATIENCE_S = 60.0
@@ -177,6 +180,14 @@ def jobs(template_url: str, tmp_path: Path) -> Iterator[Jobs]:
     )
     queue.close()
     database.close()
+
+
+@pytest.fixture
+def client(jobs: Jobs) -> Iterator[httpx.Client]:
+    """A client of a server that sends jobs to the queue, with nobody to run them."""
+    app = create_app(jobs.settings, jobs.queue)
+    with serve(app) as address, checked_client(app, address) as client:
+        yield client
 
 
 @pytest.fixture

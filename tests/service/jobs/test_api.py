@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -13,9 +12,10 @@ import pytest
 from planner_core.solvers import SOLVERS
 from service.jobs import lease
 from service.jobs.lease import Lease, Outcome
+from service.jobs.queue import DbosQueue
 from service.main import create_app
 from service.solver_params import params_of
-from tests.service.conftest import serve
+from tests.service.conftest import checked_client, serve
 from tests.service.jobs.conftest import Jobs, Workers
 from tests.service.problems import assert_problem
 
@@ -36,14 +36,6 @@ TARGETS = [
     }
     for number in range(7)
 ]
-
-
-@pytest.fixture
-def client(jobs: Jobs) -> Iterator[httpx.Client]:
-    """A client of a server that sends jobs to the queue, with nobody to run them."""
-    app = create_app(jobs.settings, jobs.queue)
-    with serve(app) as address, httpx.Client(base_url=address, timeout=60) as client:
-        yield client
 
 
 def post(client: httpx.Client, jobs: Jobs, **fields: Any) -> httpx.Response:
@@ -170,6 +162,30 @@ def test_jobs_are_listed_newest_first_by_pages_and_filters(
     second = client.get("/v1/jobs", params={"limit": 2, "label": "l0", "cursor": first["next"]})
     assert [job["id"] for job in first["items"] + second.json()["items"]] == ids[::-2]
     assert second.json()["next"] is None
+
+
+def test_pages_stay_in_step_while_jobs_are_added(client: httpx.Client, jobs: Jobs) -> None:
+    ids = [posted(client, jobs) for _ in range(5)]
+    seen: list[str] = []
+    cursor: dict[str, str] = {}
+    while True:
+        page = client.get("/v1/jobs", params={"limit": 2, **cursor}).json()
+        seen += [job["id"] for job in page["items"]]
+        if page["next"] is None:
+            break
+        posted(client, jobs)
+        cursor = {"cursor": page["next"]}
+    assert seen == ids[::-1]
+
+
+def test_the_service_is_not_ready_without_its_queue(jobs: Jobs, workers: Workers) -> None:
+    workers.start()
+    elsewhere = DbosQueue(f"sqlite:///{jobs.folder / 'unmigrated.db'}")
+    for queue, status in ((jobs.queue, 200), (elsewhere, 503)):
+        app = create_app(jobs.settings, queue)
+        with serve(app) as address, checked_client(app, address) as client:
+            assert client.get("/health/ready").status_code == status
+    elsewhere.close()
 
 
 def test_what_does_not_exist_is_not_found(client: httpx.Client) -> None:
@@ -344,7 +360,8 @@ def test_events_tell_each_change_until_the_job_is_final(client: httpx.Client, jo
     assert last == client.get(f"/v1/jobs/{job_id}").json()
     assert last["state"] == "succeeded"
     number = rest[-3].removeprefix("id: ")
-    assert client.get(path, headers={"Last-Event-ID": number}).text == ""
+    all_seen = client.get(path, headers={"Last-Event-ID": number})
+    assert (all_seen.status_code, all_seen.text) == (204, "")
     assert client.get(path, headers={"Last-Event-ID": "1"}).text.startswith(f"id: {number}\n")
     assert_problem(client.get("/v1/jobs/none/events"), 404, "not_found")
 

@@ -1,0 +1,193 @@
+"""Comparisons: several solvers on one frozen scenario, and one table of what they found."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Final, Literal, cast
+
+import sqlalchemy as sa
+from fastapi import APIRouter, Request, Response
+from pydantic import BaseModel, Field
+from sqlalchemy.orm import Session
+
+from service import comparison_store as store
+from service import job_store
+from service.api import job_intake as intake
+from service.api.conditional import NOT_MODIFIED, created, unless_known
+from service.api.deps import DatabaseDep, SettingsDep
+from service.api.errors import problem_responses
+from service.api.idempotency import OnceDep
+from service.api.job_shapes import ErrorOut, ProgressOut, QuestionIn, ScenarioRef, SolverIn
+from service.api.paging import Listed, PagingDep, newest_first
+from service.api.problems import ServiceError
+from service.api.shapes import Instant
+from service.comparison_store import Run
+from service.db.rows import ComparisonRow
+from service.jobs import lease
+from service.jobs.lease import JobState
+from service.translate import inside
+
+router = APIRouter(prefix="/v1/comparisons", tags=["comparisons"])
+
+MAX_RUNS: Final = 32
+
+
+class ComparisonIn(QuestionIn):
+    """A scenario and the solvers that are to plan it; limits, priority, label are of each job."""
+
+    runs: list[SolverIn] = Field(min_length=1, max_length=MAX_RUNS)
+
+
+class FiguresOut(BaseModel):
+    """Numbers of a run's timeline; all null as long as it has none."""
+
+    reward: float | None = Field(None, description="As the referee awarded it.")
+    bound: float | None = Field(None, description="No plan of the scenario can exceed it.")
+    gap: float | None = Field(None, description="`(bound - reward) / bound`.")
+    bound_proof: str | None = None
+    collects: int | None = None
+    contacts: int | None = None
+    downlinked_mbit: float | None = Field(
+        None, description="Null too where a recorder has no capacity in megabits."
+    )
+    downlinked_fraction: float | None = Field(None, description="In recorder capacities.")
+    solve_s: float | None = Field(None, description="Of the search alone.")
+    runtime_s: float | None = Field(None, description="Of the whole job's work.")
+    validity: str | None = None
+    plan_sha256: str | None = None
+
+
+class ComparedRun(FiguresOut):
+    """One line of the table."""
+
+    job_id: str
+    state: JobState
+    solver: str
+    params: dict[str, Any]
+    seed: int
+    progress: ProgressOut | None
+    termination: str | None
+    error: ErrorOut | None
+    links: dict[str, str]
+
+
+class ComparisonOut(BaseModel):
+    """Several solvers on one scenario, side by side."""
+
+    id: str
+    state: Literal["running", "finished"] = Field(
+        description="`finished` when every job is final, whether it succeeded or not."
+    )
+    scenario: ScenarioRef
+    label: str | None
+    created_at: Instant
+    runs: list[ComparedRun] = Field(description="In the order of the request.")
+    links: dict[str, str]
+
+
+@router.post("", status_code=202, responses=problem_responses(503))
+def create_comparison(
+    body: ComparisonIn,
+    database: DatabaseDep,
+    settings: SettingsDep,
+    once: OnceDep,
+    request: Request,
+    response: Response,
+) -> ComparisonOut:
+    """Queue a job for each run, all or none; the answer tells where the table grows."""
+    queue = intake.queue_of(request)
+    params = []
+    for position, run in enumerate(body.runs):
+        with inside(f"/runs/{position}"):
+            params.append(intake.all_params(run.solver, run.params))
+    time_s, memory_mb = intake.limits_of(body.limits, settings)
+    inline = intake.frozen(database, settings, body)
+    with once.transaction() as session:
+        intake.require_room(session, settings, len(body.runs))
+        scenario_id = intake.stored_scenario(session, body, inline)
+        specs = [
+            job_store.JobSpec(
+                scenario_id=scenario_id,
+                solver=run.solver,
+                params=of_run,
+                seed=run.seed,
+                time_s=time_s,
+                memory_mb=memory_mb,
+                priority=body.priority,
+                label=body.label,
+            )
+            for run, of_run in zip(body.runs, params, strict=True)
+        ]
+        row = store.submit(session, queue, specs, label=body.label)
+        shown = created(response, _shown(session, [row])[0], f"/v1/comparisons/{row.id}")
+        _describe(response, shown)
+        return once.keep(session, shown)
+
+
+@router.get("")
+def list_comparisons(database: DatabaseDep, paging: PagingDep) -> Listed[ComparisonOut]:
+    """List the comparisons, newest first."""
+    with database.reading() as session:
+        page = newest_first(session, sa.select(ComparisonRow), ComparisonRow.id, paging)
+        return Listed(items=_shown(session, page.rows), next=page.next)
+
+
+@router.get(
+    "/{comparison_id}",
+    response_model=ComparisonOut,
+    responses={**NOT_MODIFIED, **problem_responses(404)},
+)
+def get_comparison(
+    comparison_id: str, database: DatabaseDep, request: Request, response: Response
+) -> ComparisonOut | Response:
+    """Return the table as it stands: a line fills when its job has an answer."""
+    with database.reading() as session:
+        row = session.get(ComparisonRow, comparison_id)
+        if row is None:
+            raise ServiceError("not_found", f"There is no comparison {comparison_id!r}.")
+        shown = _shown(session, [row])[0]
+    _describe(response, shown)
+    return unless_known(request, response, shown)
+
+
+def _describe(response: Response, shown: ComparisonOut) -> None:
+    if shown.state == "running":
+        response.headers["Retry-After"] = str(intake.ASK_AGAIN_S)
+
+
+def _shown(session: Session, rows: Sequence[ComparisonRow]) -> list[ComparisonOut]:
+    runs = store.runs_of(session, [row.id for row in rows])
+    hashes = job_store.hashes_of(session, {row.scenario_id for row in rows})
+    return [_table(row, runs[row.id], hashes[row.scenario_id]) for row in rows]
+
+
+def _table(row: ComparisonRow, runs: list[Run], sha256: str) -> ComparisonOut:
+    is_active = any(run.job.state in lease.ACTIVE for run in runs)
+    return ComparisonOut(
+        id=row.id,
+        state="running" if is_active else "finished",
+        scenario=ScenarioRef(id=row.scenario_id, sha256=sha256),
+        label=row.label,
+        created_at=row.created_at,
+        runs=[_line(run) for run in runs],
+        links={
+            "self": f"/v1/comparisons/{row.id}",
+            "scenario": f"/v1/scenarios/{row.scenario_id}",
+        },
+    )
+
+
+def _line(run: Run) -> ComparedRun:
+    job, address = run.job, f"/v1/jobs/{run.job.id}"
+    return ComparedRun(
+        job_id=job.id,
+        state=cast(JobState, job.state),
+        solver=job.solver,
+        params=job.params,
+        seed=job.seed,
+        progress=None if job.progress is None else ProgressOut(**job.progress),
+        termination=job.termination,
+        error=None if job.error is None else ErrorOut(**job.error),
+        links={"job": address, "timeline": f"{address}/timeline"},
+        **(run.figures or {}),
+    )

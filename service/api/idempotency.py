@@ -1,0 +1,150 @@
+"""``Idempotency-Key``: a request that is sent again gets the answer of the first time."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Annotated, Any, Final, TypeVar
+
+from fastapi import Depends, FastAPI, Header, Request, Response
+from pydantic import BaseModel
+from sqlalchemy.orm import Session
+from starlette.concurrency import run_in_threadpool
+
+from service import idempotency_store as store
+from service.api.deps import DatabaseDep, SettingsDep
+from service.api.problems import ServiceError
+from service.db.session import Database
+from service.idempotency_store import KeptAnswer, Keyed
+from service.job_store import TENANT
+
+M = TypeVar("M", bound=BaseModel)
+
+REPLAYED: Final = "Idempotency-Replayed"
+# Those of an answer that belong to what was created; the others are of one exchange.
+_KEPT_HEADERS: Final = ("location", "etag", "retry-after")
+
+
+class AlreadyAnswered(Exception):
+    """The request came before; this is what it was answered."""
+
+    def __init__(self, answer: KeptAnswer):
+        super().__init__(answer.status)
+        self.answer = answer
+
+
+class Once:
+    """Lets a request that creates something do so once for each key.
+
+    A route opens its transaction with ``transaction`` and passes its answer through ``keep``
+    before that ends. Refused requests keep nothing: their key can be used again.
+    """
+
+    def __init__(self, database: Database, keyed: Keyed | None, status: int, response: Response):
+        self._database = database
+        self._keyed = keyed
+        self._status = status
+        self._response = response
+
+    def find(self) -> None:
+        """Raise ``AlreadyAnswered`` where the request is a repeated one."""
+        if self._keyed is None:
+            return
+        with self._database.reading() as session, _told_reuse():
+            answer = store.find(session, self._keyed)
+        if answer is not None:
+            raise AlreadyAnswered(answer)
+
+    @contextmanager
+    def transaction(self) -> Iterator[Session]:
+        """Yield a session that may write, in which the key is this request's."""
+        with self._database.transaction() as session:
+            if self._keyed is not None:
+                with _told_reuse():
+                    answer = store.claim(session, self._keyed)
+                if answer is not None:
+                    raise AlreadyAnswered(answer)
+            yield session
+
+    def keep(self, session: Session, model: M) -> M:
+        """Return the answer, and store it under the key with the headers set so far."""
+        if self._keyed is not None:
+            headers = self._response.headers
+            answer = KeptAnswer(
+                status=self._response.status_code or self._status,
+                headers={name: headers[name] for name in _KEPT_HEADERS if name in headers},
+                body=model.model_dump_json(),
+            )
+            store.keep(session, self._keyed, answer)
+        return model
+
+
+async def _once(
+    request: Request,
+    response: Response,
+    database: DatabaseDep,
+    settings: SettingsDep,
+    idempotency_key: Annotated[
+        str | None,
+        Header(
+            alias="Idempotency-Key",
+            min_length=1,
+            max_length=255,
+            pattern=r"^[\x21-\x7e]+$",
+            description="A name of your choice for this request. Sent again with the same body, "
+            "it creates nothing and gets the stored answer, with `Idempotency-Replayed: true`.",
+        ),
+    ] = None,
+) -> Once:
+    keyed = None
+    if idempotency_key is not None:
+        keyed = Keyed(
+            tenant=TENANT,
+            key=idempotency_key,
+            request_sha256=_fingerprint(request, await request.body()),
+            keep_s=settings.idempotency_hours * 3600.0,
+        )
+    once = Once(database, keyed, request.scope["route"].status_code or 200, response)
+    # What a repeated request names may be gone by now: it is answered before that is looked up.
+    await run_in_threadpool(once.find)
+    return once
+
+
+OnceDep = Annotated[Once, Depends(_once)]
+
+
+def install_replay(app: FastAPI) -> None:
+    """Answer repeated requests with what they were answered first."""
+    app.add_exception_handler(AlreadyAnswered, _replay)
+
+
+def _replay(_request: Request, error: Exception) -> Response:
+    assert isinstance(error, AlreadyAnswered)
+    answer = error.answer
+    headers = answer.headers | {REPLAYED: "true"}
+    return Response(answer.body, answer.status, headers, media_type="application/json")
+
+
+def _fingerprint(request: Request, body: bytes) -> str:
+    parts: list[Any] = [
+        request.method,
+        request.url.path,
+        sorted(request.query_params.multi_items()),
+    ]
+    try:
+        # Two spellings of one JSON document are one request.
+        parts.append(json.dumps(json.loads(body), sort_keys=True))
+    except (ValueError, RecursionError):
+        parts.append(hashlib.sha256(body).hexdigest())
+    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
+
+
+@contextmanager
+def _told_reuse() -> Iterator[None]:
+    try:
+        yield
+    except store.KeyReused:
+        detail = "The Idempotency-Key was used for another request; choose a new one."
+        raise ServiceError("idempotency_key_reused", detail) from None

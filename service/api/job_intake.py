@@ -1,0 +1,116 @@
+"""From what a client sends to stored jobs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+from fastapi import Request, Response
+from sqlalchemy.orm import Session
+
+from planner_core.errors import Fault
+from planner_core.solvers import solver_class
+from service import job_store as store
+from service import scenario_store
+from service.api.errors import refuse
+from service.api.job_shapes import JobOut, LimitsIn, QuestionIn, etag_of_job, shown
+from service.api.problems import ServiceError
+from service.db.rows import JobRow
+from service.db.session import Database
+from service.inputs import ScenarioFile, ScenarioIn
+from service.jobs import lease
+from service.jobs.queue import JobQueue
+from service.scenario_store import FrozenScenario
+from service.settings import Settings
+from service.solver_params import params_of, parse_params
+from service.translate import inside, read_file
+
+ASK_AGAIN_S: Final = 1
+_QUEUE_FULL_S: Final = 30
+
+
+def queue_of(request: Request) -> JobQueue:
+    """Return the queue; 503 where this server has none."""
+    queue: JobQueue | None = request.app.state.queue
+    if queue is None:
+        raise ServiceError("not_live", "This server takes no jobs: it has no queue.")
+    return queue
+
+
+def all_params(solver: str, params: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a solver's parameters, defaults filled in; a planner's error where they are wrong."""
+    return params_of(parse_params(solver_class(solver), params))
+
+
+def frozen(database: Database, settings: Settings, body: QuestionIn) -> FrozenScenario | None:
+    """Return the inline scenario of a body, ready to be stored; None where it names one."""
+    scenario, days = body.scenario, settings.max_horizon_days
+    if (scenario is None) == (body.scenario_id is None):
+        detail = "Give either scenario_id or scenario."
+        if scenario is None:
+            raise refuse([Fault(code="missing_field", detail=detail, pointer="/scenario_id")])
+        raise refuse([Fault(code="invalid_value", detail=detail, pointer="/scenario")])
+    with inside("/scenario"):
+        if isinstance(scenario, ScenarioIn):
+            return scenario_store.freeze(database, scenario, max_horizon_days=days)
+        if isinstance(scenario, ScenarioFile):
+            file = read_file(scenario.model_dump(mode="json"))
+            return scenario_store.freeze_file(file, max_horizon_days=days)
+    return None
+
+
+def stored_scenario(session: Session, body: QuestionIn, inline: FrozenScenario | None) -> str:
+    """Return the id of the scenario in question; an inline one is stored."""
+    if inline is not None:
+        return scenario_store.save(session, inline)[0].id
+    assert body.scenario_id is not None
+    if store.has_scenario(session, body.scenario_id):
+        return body.scenario_id
+    detail = f"There is no scenario {body.scenario_id!r}."
+    raise refuse([Fault(code="unknown_scenario", detail=detail, pointer="/scenario_id")])
+
+
+def limits_of(limits: LimitsIn, settings: Settings) -> tuple[float, int]:
+    """Return seconds and megabytes that a job may use, the server's where nothing is said."""
+    time_s = settings.default_time_s if limits.time_s is None else limits.time_s
+    if time_s > settings.max_time_s:
+        detail = f"{time_s:g} s is more than the {settings.max_time_s:g} s that a job may take."
+        raise refuse([Fault(code="value_out_of_range", detail=detail, pointer="/limits/time_s")])
+    return time_s, settings.default_memory_mb if limits.memory_mb is None else limits.memory_mb
+
+
+def require_room(session: Session, settings: Settings, num_jobs: int = 1) -> None:
+    """Refuse more jobs than the queue may hold."""
+    if store.num_waiting(session) + num_jobs > settings.max_queued:
+        raise ServiceError(
+            "queue_full",
+            f"At most {settings.max_queued} jobs may wait, and there is no room for {num_jobs}.",
+            headers={"Retry-After": str(_QUEUE_FULL_S)},
+        )
+
+
+def find_job(session: Session, job_id: str) -> JobRow:
+    """Return a job; 404 where there is none."""
+    job = store.find(session, job_id)
+    if job is None:
+        raise ServiceError("not_found", f"There is no job {job_id!r}.")
+    return job
+
+
+def shown_job(session: Session, job: JobRow) -> JobOut:
+    """Return a job as clients see it."""
+    return shown(job, store.scenario_hashes(session, [job])[job.scenario_id])
+
+
+def describe(response: Response, job: JobRow) -> None:
+    """Set the headers that every answer about one job has."""
+    response.headers["ETag"] = etag_of_job(job)
+    if job.state in lease.ACTIVE:
+        response.headers["Retry-After"] = str(ASK_AGAIN_S)
+
+
+def accepted(session: Session, response: Response, job: JobRow) -> JobOut:
+    """Return a job that was just queued, and tell where to follow it."""
+    response.headers["Location"] = f"/v1/jobs/{job.id}"
+    describe(response, job)
+    return shown_job(session, job)

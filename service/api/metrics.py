@@ -1,0 +1,158 @@
+"""``GET /metrics``: the service in the text format of Prometheus.
+
+What concerns jobs comes from the database, so that every API process tells the same; calls
+are counted by each process for itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, Final, cast
+
+import sqlalchemy as sa
+from fastapi import APIRouter, Depends, Request, Response
+from prometheus_client import (
+    CONTENT_TYPE_LATEST,
+    CollectorRegistry,
+    Counter,
+    Histogram,
+    ProcessCollector,
+    generate_latest,
+)
+from prometheus_client.core import (
+    CounterMetricFamily,
+    GaugeMetricFamily,
+    InfoMetricFamily,
+    Metric,
+    SummaryMetricFamily,
+)
+from starlette.types import Scope
+
+import planner_core
+from service import metrics_store
+from service.api.deps import DatabaseDep
+from service.db.session import Database
+from service.metrics_store import Snapshot
+
+router = APIRouter(tags=["operations"])
+
+_METHODS: Final = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"})
+_BUCKETS_S: Final = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0)
+
+
+class CallCounters:
+    """The calls of this process, by route."""
+
+    def __init__(self) -> None:
+        self.registry = CollectorRegistry()
+        ProcessCollector(registry=self.registry)
+        self._calls = Counter(
+            "slewline_http_requests",
+            "Calls answered by this process.",
+            ("method", "route", "status"),
+            registry=self.registry,
+        )
+        self._seconds = Histogram(
+            "slewline_http_request_seconds",
+            "Seconds until the answer of a call was sent; streams and waits included.",
+            ("method", "route"),
+            buckets=_BUCKETS_S,
+            registry=self.registry,
+        )
+
+    def count(self, scope: Scope, status: int, seconds: float) -> None:
+        """Count one call that has ended."""
+        # Not the path: every id and every scanner's guess would be a series of its own.
+        route = getattr(scope.get("route"), "path_format", "none")
+        method = scope["method"] if scope["method"] in _METHODS else "other"
+        self._calls.labels(method, route, str(status)).inc()
+        self._seconds.labels(method, route).observe(seconds)
+
+
+def _counters(request: Request) -> CallCounters:
+    return cast(CallCounters, request.app.state.call_counters)
+
+
+@router.get(
+    "/metrics",
+    response_class=Response,
+    responses={200: {"content": {"text/plain": {}}, "description": "Prometheus text format."}},
+)
+def metrics(
+    database: DatabaseDep, counters: Annotated[CallCounters, Depends(_counters)]
+) -> Response:
+    """Return figures for Prometheus: jobs, workers, orbits, and the calls of this process.
+
+    Where the database does not answer, `slewline_database_up` is 0 and its figures are absent.
+    """
+    service = CollectorRegistry()
+    service.register(_Collected(list(_families(database))))
+    text = generate_latest(service) + generate_latest(counters.registry)
+    return Response(text, headers={"Content-Type": CONTENT_TYPE_LATEST})
+
+
+class _Collected:
+    """Families read once, for one answer."""
+
+    def __init__(self, families: list[Metric]):
+        self._families = families
+
+    def collect(self) -> list[Metric]:
+        return self._families
+
+
+def _families(database: Database) -> Iterator[Metric]:
+    yield InfoMetricFamily("slewline_build", "What runs.", {"version": planner_core.__version__})
+    try:
+        with database.reading() as session:
+            snapshot = metrics_store.take(session)
+    except sa.exc.DatabaseError:
+        snapshot = None
+    up = 0.0 if snapshot is None else 1.0
+    yield GaugeMetricFamily("slewline_database_up", "1 where the database answers.", up)
+    if snapshot is not None:
+        yield from _of_jobs(snapshot)
+        yield from _of_others(snapshot)
+
+
+def _of_jobs(snapshot: Snapshot) -> Iterator[Metric]:
+    jobs = GaugeMetricFamily("slewline_jobs", "Jobs by state.", labels=["state"])
+    for state, number in snapshot.num_jobs.items():
+        jobs.add_metric([state], number)
+    yield jobs
+    yield GaugeMetricFamily(
+        "slewline_queue_oldest_seconds",
+        "How long the oldest waiting job has waited.",
+        snapshot.oldest_waiting_s,
+    )
+    times = SummaryMetricFamily(
+        "slewline_job_seconds",
+        "From first start to end of the jobs that have ended.",
+        labels=["solver", "state", "termination"],
+    )
+    for one in snapshot.job_times:
+        labels = [one.solver, one.state, one.termination]
+        times.add_metric(labels, count_value=one.num_jobs, sum_value=one.total_s)
+    yield times
+    yield CounterMetricFamily(
+        "slewline_leases_lost", "Runs whose worker died.", snapshot.num_leases_lost
+    )
+
+
+def _of_others(snapshot: Snapshot) -> Iterator[Metric]:
+    workers = GaugeMetricFamily(
+        "slewline_worker_heartbeat_age_seconds",
+        "Since the last sign of life of each worker of the last day.",
+        labels=["worker"],
+    )
+    for worker, age_s in snapshot.heartbeat_age_s.items():
+        workers.add_metric([worker], age_s)
+    yield workers
+    orbits = GaugeMetricFamily(
+        "slewline_orbit_age_seconds",
+        "Since the epoch of the newest elements of each satellite planned in the last 7 days.",
+        labels=["satellite_id", "name"],
+    )
+    for orbit in snapshot.orbits:
+        orbits.add_metric([orbit.satellite_id, orbit.name], orbit.age_s)
+    yield orbits

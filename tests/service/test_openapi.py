@@ -1,0 +1,245 @@
+"""A client that knows nothing but the OpenAPI document gets along with the running service."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import httpx
+import pytest
+
+from tests.service.contract import Contract, Document
+from tests.service.serving import serving
+
+WITHIN_S = 60.0
+RARE = {
+    "406": "one form of a timeline",
+    "409": "a job in the wrong state",
+    "413": "a body of many megabytes",
+    "500": "a fault of the service",
+    "503": "a full queue, or a service without a worker",
+}
+
+
+class Client:
+    """Calls operations by what the document says of them, and keeps what they made."""
+
+    def __init__(self, http: httpx.Client, document: Document):
+        self.http = http
+        self.document = document
+        self.contract = Contract(document)
+        http.event_hooks = {"response": [self.contract.check]}
+
+    def operations(self, method: str) -> Iterator[tuple[str, Document]]:
+        for path, operations in self.document["paths"].items():
+            if method in operations:
+                yield path, operations[method]
+
+    def known(self, collection: str, field: str) -> str | None:
+        """Return a field of the newest item of a collection, or None where it has none."""
+        items = self.http.get(collection).json()["items"]
+        return items[0].get(field, items[0].get("id")) if items else None
+
+    def path(self, template: str, operation: Document) -> str | None:
+        """Return a path with things that exist, or None where there are none yet."""
+        path = template
+        for parameter in operation.get("parameters", []):
+            if parameter["in"] != "path":
+                continue
+            name, slot = parameter["name"], "{" + parameter["name"] + "}"
+            examples = parameter["schema"].get("examples") or parameter.get("examples")
+            collection = template.partition("/" + slot)[0]
+            value = examples[0] if examples else self.known(collection, name)
+            if value is None:
+                return None
+            path = path.replace(slot, value)
+        return path
+
+    def bodies(self, operation: Document) -> Iterator[tuple[str, Any]]:
+        """Yield an example of each media type that the operation takes."""
+        for media_type, content in operation["requestBody"]["content"].items():
+            schema = content["schema"]
+            if "$ref" in schema:
+                name = schema["$ref"].rpartition("/")[2]
+                schema = self.document["components"]["schemas"][name]
+            yield media_type, self.with_ids(schema["examples"][0])
+
+    def with_ids(self, body: Any) -> Any:
+        """Return a body whose ``things_ids`` and ``thing_id`` are of things that exist."""
+        if not isinstance(body, dict):
+            return body
+        filled = dict(body)
+        for name in body:
+            for collection in self.document["paths"]:
+                thing = collection.rpartition("/")[2].replace("-", "_").removesuffix("s")
+                if name == f"{thing}_id":
+                    filled[name] = self.known(collection, "id")
+                elif name == f"{thing}_ids":
+                    filled[name] = [self.known(collection, "id")]
+        return filled
+
+    def send(
+        self, method: str, path: str, media_type: str, body: Any, **headers: str
+    ) -> httpx.Response:
+        named = {name.replace("_", "-"): value for name, value in headers.items()}
+        if media_type.endswith("json") and not isinstance(body, bytes):
+            named["Content-Type"] = media_type
+            return self.http.request(method, path, json=body, headers=named)
+        named["Content-Type"] = media_type
+        content = body.encode() if isinstance(body, str) else body
+        return self.http.request(method, path, content=content, headers=named)
+
+
+@pytest.fixture(scope="module")
+def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Client]:
+    folder = tmp_path_factory.mktemp("openapi")
+    with (
+        serving(folder, "serve", "--workers", "1") as (_, line),
+        httpx.Client(base_url=line.split()[-1], timeout=60, trust_env=False) as http,
+    ):
+        yield Client(http, http.get("/openapi.json").json())
+
+
+def create_all(client: Client) -> None:
+    """Send every example of every call that creates, as soon as what it names exists."""
+    left = [(path, op) for path, op in client.operations("post") if "{" not in path]
+    while left:
+        before = len(left)
+        for path, operation in list(left):
+            answers = []
+            for media_type, body in client.bodies(operation):
+                if isinstance(body, dict) and (None in body.values() or [None] in body.values()):
+                    break
+                key = f"{path}-{media_type}".replace("/", "-")
+                answers = [
+                    client.send("POST", path, media_type, body, Idempotency_Key=key)
+                    for _ in range(2)
+                ]
+                assert [answer.is_success for answer in answers] == [True] * 2, answers[0].text
+                assert answers[1].headers["idempotency-replayed"] == "true"
+                again = client.send("POST", path, media_type, body)
+                assert again.is_success, again.text
+            if answers:
+                left.remove((path, operation))
+        assert len(left) < before, f"nothing can be created of {left}"
+
+
+def read_all(client: Client) -> None:
+    """Read all there is, each until it is no longer in work, and again with what is known."""
+    for template, operation in client.operations("get"):
+        path = client.path(template, operation)
+        assert path is not None, template
+        answer = settled(client, path)
+        assert answer.status_code == 200, answer.text
+        if "304" in operation["responses"]:
+            known = {"If-None-Match": answer.headers["etag"]}
+            assert client.http.get(path, headers=known).status_code == 304
+        if "204" in operation["responses"]:
+            ids = [line[4:] for line in answer.text.splitlines() if line.startswith("id: ")]
+            seen = {"Last-Event-ID": ids[-1]}
+            assert client.http.get(path, headers=seen).status_code == 204
+
+
+def settled(client: Client, path: str) -> httpx.Response:
+    deadline_s = time.monotonic() + WITHIN_S
+    while "retry-after" in (answer := client.http.get(path)).headers:
+        assert time.monotonic() < deadline_s, answer.text
+        time.sleep(0.1)
+    return answer
+
+
+def refuse_all(client: Client) -> None:
+    """Send what every operation must refuse."""
+    for method in ("get", "post", "put", "delete"):
+        for template, operation in client.operations(method):
+            path = client.path(template, operation)
+            assert path is not None
+            call = client.http.request
+            assert call(method, path, params={"no_such": "1"}).status_code == 422, path
+            if "404" in operation["responses"]:
+                missing = template.replace("{", "no-such-").replace("}", "")
+                body = next(client.bodies(operation))[1] if "requestBody" in operation else None
+                assert call(method, missing, json=body).status_code == 404, missing
+            for parameter in operation.get("parameters", []):
+                if parameter["in"] == "query" and parameter["schema"].get("type") in {
+                    "integer",
+                    "number",
+                    "boolean",
+                }:
+                    wrong = call(method, path, params={parameter["name"]: "some"})
+                    assert wrong.status_code == 422, (path, parameter)
+            if "requestBody" in operation:
+                for media_type in operation["requestBody"]["content"]:
+                    for junk in (b"", b"{}", b"[]", b"{", b"\xff\xfe", b'{"name": 5}', b"null"):
+                        answer = client.send(method, path, media_type, junk)
+                        assert answer.status_code == 422, (path, media_type, junk, answer.text)
+                assert client.send(method, path, "image/png", b"x").status_code == 415
+
+
+def test_a_client_of_the_document_alone_uses_every_operation(client: Client) -> None:
+    create_all(client)
+    read_all(client)
+    refuse_all(client)
+    for template, operation in client.operations("put"):
+        path = client.path(template, operation)
+        assert path is not None
+        for media_type, body in client.bodies(operation):
+            stale = client.send("PUT", path, media_type, body, If_Match='"stale"')
+            assert stale.status_code == 412
+            assert client.send("PUT", path, media_type, body, If_Match="*").status_code == 200
+    for template, operation in client.operations("post"):
+        if "requestBody" not in operation:
+            path = client.path(template, operation)
+            assert path is not None
+            assert client.http.post(path).status_code in (202, 409)
+    jobs = client.http.get("/v1/jobs").json()["items"]
+    client.http.post(f"/v1/jobs/{jobs[0]['id']}/cancel")
+    for template, operation in client.operations("delete"):
+        path = client.path(template, operation)
+        assert path is not None
+        assert client.http.delete(path, headers={"If-Match": '"stale"'}).status_code == 412
+        assert client.http.delete(path).status_code == 204
+    declared = {
+        (method.upper(), path, status)
+        for path, operations in client.document["paths"].items()
+        for method, operation in operations.items()
+        for status in operation["responses"]
+        if status not in RARE
+    }
+    unseen = declared - client.contract.seen
+    assert unseen == set()
+
+
+def test_an_answer_that_is_not_declared_is_noticed() -> None:
+    document = {
+        "components": {"schemas": {"Thing": {"type": "object", "required": ["id"]}}},
+        "paths": {
+            "/things/{id}": {
+                "get": {
+                    "responses": {
+                        "200": {
+                            "content": {
+                                "application/json": {
+                                    "schema": {"$ref": "#/components/schemas/Thing"}
+                                }
+                            }
+                        },
+                        "204": {},
+                    }
+                }
+            }
+        },
+    }
+    request = httpx.Request("GET", "http://x/things/1")
+    contract = Contract(document)
+    contract.check(httpx.Response(200, json={"id": 1}, request=request))
+    contract.check(httpx.Response(204, request=request))
+    for wrong in (
+        httpx.Response(200, json={}, request=request),
+        httpx.Response(200, text="hello", request=request),
+        httpx.Response(204, text="hello", request=request),
+        httpx.Response(404, request=request),
+    ):
+        with pytest.raises(AssertionError):
+            contract.check(wrong)
