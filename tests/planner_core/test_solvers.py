@@ -149,7 +149,8 @@ def test_the_compiled_forward_search_plans_what_the_listing_plans(
         seed, dynamics, use_resources, num_collects=14, num_contacts=4, num_offers=num_offers
     )
     solver = ForwardSearch(
-        depth=depth, breadth=breadth, window_moves_per_task=0.0, feasibility=feasibility, unimaged_only=unimaged_only,
+        depth=depth, breadth=breadth, feasibility=feasibility, unimaged_only=unimaged_only,
+        window_moves_per_task=0.0,
         gamma=0.99, discount=discount, contact_counts=contact_counts, image_needs=image_needs,
     )  # fmt: skip
     satellite = problem.satellites[0]
