@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from planner_core.bounds.bound import Bound
@@ -92,7 +92,8 @@ def test_it_equals_brute_force(
     assert_proven(problem, solution, best_reward(problem))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=60, deadline=None)
+@example(seed=1940, spread="odd", num_satellites=2, gap=0.0)  # tasks struck out were forgotten
 @given(
     seed=SEEDS, spread=SPREADS, num_satellites=st.integers(1, 2), gap=st.sampled_from([0.0, 0.05])
 )

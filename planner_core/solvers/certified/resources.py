@@ -31,7 +31,9 @@ from planner_core.timeline import replay
 
 _MAX_UNITS: Final = 2000
 _FIRST_GOAL: Final = 0.95
-_MOVES: Final = 40  # of the search for plans, between two looks at the bound
+_FIRST_MOVES: Final = (10, 40)  # of the search for plans, at least and at most, before contacts
+_TASKS_A_MOVE: Final = 80  # are fixed: the more tasks, the more it finds by itself
+_FURTHER_MOVES: Final = 20  # after each round of that
 _FIRST_STEPS: Final = 2  # of the search for prices, where sets of contacts gave new ones
 _STEPS: Final = 8
 _PATIENCE: Final = 3  # rounds without a new set of contacts or a better plan
@@ -278,7 +280,7 @@ def solve_with_resources(problem: Problem, budget: Budget, seed: int, gap: float
         preferred = search.without_resources()
         choices.start(preferred, 1.0)
         search.offer(choices.plan)
-    search.search(choices, _MOVES)
+    search.search(choices, int(np.clip(len(problem.opportunities) // _TASKS_A_MOVE, *_FIRST_MOVES)))
     _close_in(search, choices)
     if not search.is_done:
         search.exhaust()
@@ -313,7 +315,7 @@ def _close_in(search: ResourceSearch, choices: ChoiceSearch) -> None:
         if not is_new and not is_better:
             search.refine(prices)
             is_better = search.fix_contacts(is_last=True)
-            search.search(choices, 2 * _MOVES)
+            search.search(choices, _FURTHER_MOVES)
         if is_better:
             choices.adopt(search.plan)
         idle_rounds = 0 if is_new or is_better else idle_rounds + 1

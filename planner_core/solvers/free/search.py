@@ -103,6 +103,11 @@ class FreeSearch:
         return self.reward + max(self.unit, 0.5 * TOLERANCE * self.reward, 1e-9)
 
     @property
+    def refuted(self) -> float:
+        """What is known of plans once none is ``better``: they are worth no more than this."""
+        return self.reward if self.unit else self.better
+
+    @property
     def is_done(self) -> bool:
         """Whether plan and bound are close enough, or the budget is spent."""
         return self.is_close or self.budget.is_spent()
@@ -131,9 +136,12 @@ class FreeSearch:
 
     def step(self, step: Multipliers) -> None:
         """Learn from prices: a bound, and of each open task what it can be part of."""
-        total, through = values_through(self.problem, self._network, self._rows, step)
+        total, through = values_through(
+            self.problem, self._network, self._rows, step, ~self.is_struck
+        )
         before = self.bound
-        self.lower(total)
+        # Plans that hold what is struck out are worth less than a better one.
+        self.lower(max(total, self.refuted))
         by_row = np.empty(len(self._rows))
         by_row[self._network.row] = through
         lower = np.minimum(self.through, by_row)
@@ -280,7 +288,7 @@ class FreeSearch:
         tree = self._part(master, ~self.is_struck, max_parts)
         if tree is not None:
             self.tree = tree
-            self.lower(self.reward)
+            self.lower(self.refuted)
 
     def _part(self, master: Master, is_open: Bools, max_parts: int) -> Refutation | None:
         """Return why no plan of the open tasks is better; None where that takes too long."""
