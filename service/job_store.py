@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
@@ -13,8 +13,6 @@ from service.db.clock import utc_now
 from service.db.rows import JobResultRow, JobRow, ScenarioRow
 from service.ids import new_id
 from service.jobs.queue import JobQueue
-
-TENANT: Final = "local"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,6 +27,7 @@ class JobSpec:
     memory_mb: int
     priority: int
     label: str | None
+    owner: str
 
 
 def submit(session: Session, queue: JobQueue, spec: JobSpec) -> JobRow:
@@ -38,7 +37,7 @@ def submit(session: Session, queue: JobQueue, spec: JobSpec) -> JobRow:
         sa.insert(JobRow).values(
             id=job_id,
             scenario_id=spec.scenario_id,
-            tenant=TENANT,
+            tenant=spec.owner,
             state="queued",
             solver=spec.solver,
             params=dict(spec.params),
@@ -50,7 +49,7 @@ def submit(session: Session, queue: JobQueue, spec: JobSpec) -> JobRow:
             dispatched_at=utc_now(),
         )
     )
-    queue.enqueue(session, job_id, 1, priority=spec.priority, tenant=TENANT)
+    queue.enqueue(session, job_id, 1, priority=spec.priority, tenant=spec.owner)
     return session.get_one(JobRow, job_id)
 
 
@@ -69,6 +68,11 @@ def num_waiting(session: Session) -> int:
 def find(session: Session, job_id: str) -> JobRow | None:
     """Return a job, or None."""
     return session.get(JobRow, job_id)
+
+
+def owner_of(session: Session, job_id: str) -> str | None:
+    """Return whose job this is, or None for no job."""
+    return session.scalar(sa.select(JobRow.tenant).where(JobRow.id == job_id))
 
 
 def version_of(session: Session, job_id: str) -> int | None:

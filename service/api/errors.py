@@ -14,7 +14,9 @@ from pydantic import BaseModel, Field, ValidationError
 from starlette.exceptions import HTTPException
 
 from planner_core.errors import Fault, PlannerError
+from service.access.tokens import masked
 from service.api.problems import ServiceError, kind_of
+from service.api.security_headers import SECURITY_HEADERS
 
 PROBLEM_JSON = "application/problem+json"
 MAX_FAULTS = 100
@@ -85,7 +87,7 @@ def problem(
         status=number,
         code=code,
         detail=_sendable(detail),
-        instance=request.url.path,
+        instance=masked(request.url.path),
         request_id=request.state.request_id,
         errors=[
             FaultOut(
@@ -104,7 +106,8 @@ def problem(
 
 def _sendable(text: str) -> str:
     # JSON can spell half a surrogate pair, as a field's name for example; UTF-8 cannot.
-    return text.encode("utf-8", "replace").decode()
+    # And who put a key into an address by mistake finds no copy of it in the answer.
+    return masked(text.encode("utf-8", "replace").decode())
 
 
 def refuse(faults: Sequence[Fault], *, code: str | None = None) -> ServiceError:
@@ -241,5 +244,6 @@ def _on_bug(request: Request, error: Exception) -> JSONResponse:
         request,
         "internal_error",
         f"The service failed; its log has request {request.state.request_id}.",
-        headers={"X-Request-ID": request.state.request_id},
+        # This answer is made outside of all that adds headers.
+        headers={"X-Request-ID": request.state.request_id} | SECURITY_HEADERS,
     )

@@ -11,7 +11,7 @@ from pydantic import BaseModel, Field
 from sqlalchemy.orm import Session
 
 from service.api.conditional import created, unless_known
-from service.api.deps import DatabaseDep, RawBodyDep, require_media_type
+from service.api.deps import AuditDep, DatabaseDep, RawBodyDep, require_media_type
 from service.api.errors import problem_responses
 from service.api.imports import (
     Imported,
@@ -57,12 +57,13 @@ class ImportedStation(BaseModel):
 
 @router.post("", status_code=201)
 def create_ground_station(
-    body: GroundStationIn, database: DatabaseDep, response: Response
+    body: GroundStationIn, database: DatabaseDep, audit: AuditDep, response: Response
 ) -> GroundStationOut:
     """Store one ground station."""
     ground_station_from(body, "new")
     with database.transaction() as session:
         row = _add(session, body)
+        audit.record(session, "create", "ground_station", row.id)
     return created(response, _shown(row), f"/v1/ground-stations/{row.id}")
 
 
@@ -75,7 +76,11 @@ def create_ground_station(
     responses=problem_responses(413, 415),
 )
 def import_ground_stations(
-    request: Request, data: RawBodyDep, database: DatabaseDep, on_error: OnErrorQuery = OnError.SKIP
+    request: Request,
+    data: RawBodyDep,
+    database: DatabaseDep,
+    audit: AuditDep,
+    on_error: OnErrorQuery = OnError.SKIP,
 ) -> Imported[ImportedStation]:
     """Store the stations of a file. A station that is stored already is not stored again.
 
@@ -94,7 +99,10 @@ def import_ground_stations(
     faults = [*found.faults, *faults]
     refuse_if_asked(len(good), faults, on_error)
     with database.transaction() as session:
-        return imported(_store(session, good), faults)
+        items = _store(session, good)
+        new = [item.id for item in items if item.status == "created"]
+        audit.record(session, "create", "ground_station", *new)
+    return imported(items, faults)
 
 
 @router.get("")
@@ -117,10 +125,11 @@ def get_ground_station(
 
 
 @router.delete("/{station_id}", status_code=204, responses=problem_responses(404))
-def delete_ground_station(station_id: str, database: DatabaseDep) -> None:
+def delete_ground_station(station_id: str, database: DatabaseDep, audit: AuditDep) -> None:
     """Delete a ground station. Scenarios that use it keep their copy."""
     with database.transaction() as session:
         _find(session, station_id).deleted_at = datetime.now(UTC)
+        audit.record(session, "delete", "ground_station", station_id)
 
 
 def _find(session: Session, station_id: str) -> GroundStationRow:

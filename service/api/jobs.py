@@ -6,7 +6,7 @@ import json
 import logging
 from typing import Annotated, Any, Final
 
-from fastapi import APIRouter, Path, Query, Request, Response
+from fastapi import APIRouter, Depends, Path, Query, Request, Response
 from sqlalchemy.exc import OperationalError
 from sqlalchemy.orm import Session
 
@@ -14,7 +14,9 @@ from planner_core.errors import Fault
 from planner_core.solvers import solver_class
 from service import job_store as store
 from service import scenario_store
-from service.api.deps import DatabaseDep, SettingsDep
+from service.access.audit import Audit
+from service.access.callers import Caller
+from service.api.deps import AuditDep, CallerDep, DatabaseDep, SettingsDep, own_job_only
 from service.api.errors import problem_responses, refuse
 from service.api.job_shapes import JobIn, JobOut, Outcome, TargetItem, etag_of_job, shown
 from service.api.job_wait import wait_for_change
@@ -31,7 +33,7 @@ from service.settings import Settings
 from service.solver_params import params_of, parse_params
 from service.translate import inside, read_file
 
-router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
+router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[Depends(own_job_only)])
 log = logging.getLogger(__name__)
 
 LONGEST_WAIT_S: Final = 30.0
@@ -46,6 +48,8 @@ def create_job(
     body: JobIn,
     database: DatabaseDep,
     settings: SettingsDep,
+    caller: CallerDep,
+    audit: AuditDep,
     request: Request,
     response: Response,
 ) -> JobOut:
@@ -64,8 +68,10 @@ def create_job(
                 f"{settings.max_queued} jobs are waiting.",
                 headers={"Retry-After": str(_QUEUE_FULL_S)},
             )
-        spec = _spec(body, settings, _scenario_id(session, body, frozen), params)
+        scenario_id = _scenario_id(session, audit, body, frozen)
+        spec = _spec(body, settings, caller, scenario_id, params)
         job = store.submit(session, queue, spec)
+        audit.record(session, "create", "job", job.id)
         answer = _shown(session, job)
     response.headers["Location"] = f"/v1/jobs/{job.id}"
     _describe(response, job)
@@ -75,14 +81,21 @@ def create_job(
 @router.get("")
 def list_jobs(
     database: DatabaseDep,
+    caller: CallerDep,
     paging: PagingDep,
     state: Annotated[JobState | None, Query(description="Only jobs in this state.")] = None,
     solver: Annotated[str | None, Query(description="Only jobs of this solver.")] = None,
     scenario_id: Annotated[str | None, Query(description="Only jobs of this scenario.")] = None,
     label: Annotated[str | None, Query(description="Only jobs with exactly this label.")] = None,
 ) -> Listed[JobOut]:
-    """List the jobs, newest first."""
-    query = store.matching(state=state, solver=solver, scenario_id=scenario_id, label=label)
+    """List the jobs of the key's owner, newest first; all jobs for the scope `admin`."""
+    query = store.matching(
+        state=state,
+        solver=solver,
+        scenario_id=scenario_id,
+        label=label,
+        tenant=caller.visible_owner,
+    )
     with database.reading() as session:
         page = newest_first(session, query, JobRow.id, paging)
         hashes = store.scenario_hashes(session, page.rows)
@@ -114,7 +127,9 @@ async def get_job(
 
 
 @router.post("/{job_id}/cancel", status_code=202, responses=problem_responses(404, 409))
-def cancel_job(job_id: str, database: DatabaseDep, request: Request, response: Response) -> JobOut:
+def cancel_job(
+    job_id: str, database: DatabaseDep, audit: AuditDep, request: Request, response: Response
+) -> JobOut:
     """Cancel a job: at once where it waits; a running one stops and keeps its best plan so far."""
     with database.transaction() as session:
         job = _find(session, job_id)
@@ -125,6 +140,7 @@ def cancel_job(job_id: str, database: DatabaseDep, request: Request, response: R
                 f"The job is {job.state}, which is final: no transition is allowed from there. "
                 "Only queued and running jobs can be cancelled.",
             )
+        audit.record(session, "cancel", "job", job_id)
         session.refresh(job)
         answer = _shown(session, job)
     if was_waiting:
@@ -252,10 +268,13 @@ def _frozen(
 
 
 def _scenario_id(
-    session: Session, body: JobIn, frozen: scenario_store.FrozenScenario | None
+    session: Session, audit: Audit, body: JobIn, frozen: scenario_store.FrozenScenario | None
 ) -> str:
     if frozen is not None:
-        return scenario_store.save(session, frozen)[0].id
+        row, is_new = scenario_store.save(session, frozen)
+        if is_new:
+            audit.record(session, "create", "scenario", row.id)
+        return row.id
     assert body.scenario_id is not None
     if store.has_scenario(session, body.scenario_id):
         return body.scenario_id
@@ -264,7 +283,7 @@ def _scenario_id(
 
 
 def _spec(
-    body: JobIn, settings: Settings, scenario_id: str, params: dict[str, Any]
+    body: JobIn, settings: Settings, caller: Caller, scenario_id: str, params: dict[str, Any]
 ) -> store.JobSpec:
     limits = body.limits
     time_s = settings.default_time_s if limits.time_s is None else limits.time_s
@@ -280,6 +299,7 @@ def _spec(
         memory_mb=settings.default_memory_mb if limits.memory_mb is None else limits.memory_mb,
         priority=body.priority,
         label=body.label,
+        owner=caller.owner,
     )
 
 

@@ -11,6 +11,7 @@ from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from service.access.callers import Caller
 from service.api.errors import problem
 from service.ids import new_id
 from service.logs import request_id
@@ -48,6 +49,7 @@ class RequestContext:
         try:
             await self.app(scope, receive, send_with_id)
         finally:
+            caller: Caller | None = scope["state"].get("caller")
             logger.info(
                 "request",
                 extra={
@@ -55,6 +57,8 @@ class RequestContext:
                     "path": scope["path"],
                     "status": status,
                     "duration_s": round(time.perf_counter() - started, 6),
+                    "owner": caller.owner if caller else None,
+                    "key_id": caller.key_id if caller else None,
                 },
             )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from datetime import UTC, datetime
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 import sqlalchemy as sa
 from fastapi import APIRouter, Query, Request, Response
@@ -15,7 +15,7 @@ from planner_core.errors import Fault
 from planner_core.orbits.ingest import read_elements
 from service import satellite_store as store
 from service.api.conditional import created, unless_known
-from service.api.deps import DatabaseDep, RawBodyDep, require_media_type
+from service.api.deps import AuditDep, DatabaseDep, RawBodyDep, require_media_type
 from service.api.errors import problem_responses, refuse
 from service.api.imports import (
     Imported,
@@ -34,6 +34,8 @@ from service.translate import orbit_from, satellite_from
 
 router = APIRouter(prefix="/v1/satellites", tags=["satellites"])
 
+_ADD_ELEMENTS: Final = "add_elements"
+_ACTIONS: Final[dict[store.Status, str]] = {"created": "create", "elements_added": _ADD_ELEMENTS}
 _IMPORT_TYPES = ("text/plain", "application/json", "text/csv", "application/xml", "text/xml")
 
 
@@ -87,12 +89,15 @@ class ImportedSatellite(BaseModel):
 
 
 @router.post("", status_code=201)
-def create_satellite(body: SatelliteIn, database: DatabaseDep, response: Response) -> SatelliteOut:
+def create_satellite(
+    body: SatelliteIn, database: DatabaseDep, audit: AuditDep, response: Response
+) -> SatelliteOut:
     """Store one satellite. A second one with the same catalogue number is another satellite."""
     satellite_from(body, "new")
     orbit = orbit_from(body)
     with database.transaction() as session:
         row = store.add_satellite(session, body, orbit)
+        audit.record(session, "create", "satellite", row.id)
         shown = _shown(session, [row])[0]
     return created(response, shown, f"/v1/satellites/{row.id}")
 
@@ -108,7 +113,11 @@ def create_satellite(body: SatelliteIn, database: DatabaseDep, response: Respons
     responses=problem_responses(413, 415),
 )
 def import_satellites(
-    request: Request, data: RawBodyDep, database: DatabaseDep, on_error: OnErrorQuery = OnError.SKIP
+    request: Request,
+    data: RawBodyDep,
+    database: DatabaseDep,
+    audit: AuditDep,
+    on_error: OnErrorQuery = OnError.SKIP,
 ) -> Imported[ImportedSatellite]:
     """Store the element sets of a file; satellites get the paper's agility, sensor and resources.
 
@@ -120,6 +129,9 @@ def import_satellites(
     refuse_if_asked(len(found.entries), found.faults, on_error)
     with database.transaction() as session:
         items = [_imported(one) for one in store.import_entries(session, found.entries)]
+        for status, action in _ACTIONS.items():
+            changed = [item.id for item in items if item.status == status]
+            audit.record(session, action, "satellite", *changed)
     return imported(items, found.faults)
 
 
@@ -151,15 +163,20 @@ def get_satellite(
 
 
 @router.delete("/{satellite_id}", status_code=204, responses=problem_responses(404))
-def delete_satellite(satellite_id: str, database: DatabaseDep) -> None:
+def delete_satellite(satellite_id: str, database: DatabaseDep, audit: AuditDep) -> None:
     """Delete a satellite. Scenarios that use it keep their copy."""
     with database.transaction() as session:
         _find(session, satellite_id).deleted_at = datetime.now(UTC)
+        audit.record(session, "delete", "satellite", satellite_id)
 
 
 @router.put("/{satellite_id}/elements", responses=problem_responses(404))
 def put_elements(
-    satellite_id: str, body: OrbitIn, database: DatabaseDep, response: Response
+    satellite_id: str,
+    body: OrbitIn,
+    database: DatabaseDep,
+    audit: AuditDep,
+    response: Response,
 ) -> SatelliteOut:
     """Store a further element set of the satellite; that of the newest epoch is in force.
 
@@ -170,6 +187,7 @@ def put_elements(
         row = _find(session, satellite_id)
         _require_same_object(row, orbit.elements.norad_cat_id, body)
         store.add_elements(session, row.id, orbit.elements.epoch, orbit.stored)
+        audit.record(session, _ADD_ELEMENTS, "satellite", row.id)
         shown = _shown(session, [row])[0]
     return created(response, shown, f"/v1/satellites/{row.id}/elements")
 

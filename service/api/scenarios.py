@@ -18,7 +18,7 @@ from planner_core.orbits.places import View
 from planner_core.problem import COLLECT, CONTACT
 from service import scenario_store as store
 from service.api.conditional import created, unless_known
-from service.api.deps import DatabaseDep, SettingsDep
+from service.api.deps import AuditDep, DatabaseDep, SettingsDep
 from service.api.errors import problem_responses
 from service.api.paging import Listed, PagingDep, newest_first
 from service.api.problems import ServiceError
@@ -109,7 +109,11 @@ class OpportunityOut(BaseModel):
     responses={200: {"model": ScenarioOut, "description": "The same question is stored already."}},
 )
 def create_scenario(
-    body: ScenarioIn, database: DatabaseDep, settings: SettingsDep, response: Response
+    body: ScenarioIn,
+    database: DatabaseDep,
+    settings: SettingsDep,
+    audit: AuditDep,
+    response: Response,
 ) -> ScenarioOut:
     """Freeze a question: everything it names is copied into it.
 
@@ -118,6 +122,8 @@ def create_scenario(
     frozen = store.freeze(database, body, max_horizon_days=settings.max_horizon_days)
     with database.transaction() as session:
         row, is_new = store.save(session, frozen)
+        if is_new:
+            audit.record(session, "create", "scenario", row.id)
     response.status_code = 201 if is_new else 200
     return created(response, _shown(row), f"/v1/scenarios/{row.id}")
 
