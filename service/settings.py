@@ -48,7 +48,7 @@ class Settings(BaseSettings):
     max_running_per_tenant: int = Field(64, ge=1)
     require_keys: bool = False
     api_keys: SecretStr = SecretStr("")
-    rate_limit_per_s: float | None = Field(None, ge=0)
+    rate_limit_per_s: float | None = Field(None, ge=0, allow_inf_nan=False)
     rate_limit_burst: int = Field(200, ge=1)
     cors_origins: str = ""
 

@@ -12,6 +12,8 @@ import sqlalchemy as sa
 from service.cli import OK, WRONG_INPUT, main
 from service.db.rows import AuditEventRow
 from service.db.session import Database
+from service.server import NoKey, require_key
+from service.settings import Settings
 from tests.service.problems import assert_problem
 from tests.service.serving import serving
 
@@ -93,9 +95,11 @@ def test_a_wrong_key_is_not_made(program: Program, wrong: tuple[str, str]) -> No
 def test_keys_that_are_no_longer_good_do_not_let_others_be_served(program: Program) -> None:
     program.run("keys", "revoke", program.create().split("_")[1])
     program.create("admin", "--expires-days", "1e-9")
-    status, _, said = program.run("api", "--host", "0.0.0.0", "--port", "0")
-    assert status == WRONG_INPUT
-    assert "without a key" in said
+    beyond = Settings(database_url=program.url, host="0.0.0.0")
+    with pytest.raises(NoKey, match=r"0\.0\.0\.0 without a key"):
+        require_key(beyond)
+    program.create("read")
+    require_key(beyond)
 
 
 def test_with_a_key_the_service_listens_for_others_and_asks_for_it(
