@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import planner_core
 from planner_core.errors import Cancelled, PlannerError
+from service.access.callers import Scope, is_plain_name
 
 if TYPE_CHECKING:
     from service.settings import Settings
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
 OK = 0
 FAILED = 1
 WRONG_INPUT = 2
+
+_LONGEST_DAYS = 3650
 
 Command = Callable[[argparse.Namespace], int]
 
@@ -77,11 +80,18 @@ def _parser() -> argparse.ArgumentParser:
 
     _add_solve(_command(commands, "solve", _solve, "plan a scenario file, without a service"))
 
+    _add_keys(_command(commands, "keys", None, "make, list and revoke API keys"))
+
     _command(commands, "openapi", _openapi, "print the description of the HTTP API")
     return parser
 
 
-def _command(commands: Any, name: str, run: Command, help: str) -> argparse.ArgumentParser:  # noqa: A002
+def _command(
+    commands: Any,
+    name: str,
+    run: Command | None,
+    help: str,  # noqa: A002
+) -> argparse.ArgumentParser:
     parser: argparse.ArgumentParser = commands.add_parser(name, help=help, description=help)
     parser.set_defaults(command=run)
     return parser
@@ -94,6 +104,33 @@ def _add_address(parser: argparse.ArgumentParser) -> None:
 
 def _add_database(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--database-url", help="SQLAlchemy URL (a SQLite file of the user)")
+
+
+def _add_keys(parser: argparse.ArgumentParser) -> None:
+    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+    create = _command(commands, "create", _create_key, "make a key and print it, this once")
+    create.add_argument("--name", required=True, type=_plain_name, help="what the key is for")
+    create.add_argument("--owner", required=True, type=_plain_name, help="whose jobs it sees")
+    create.add_argument("--scope", required=True, choices=[scope.value for scope in Scope])
+    create.add_argument("--expires-days", type=_days, default=365.0, metavar="DAYS", help="(365)")
+    _add_database(create)
+    _add_database(_command(commands, "list", _list_keys, "list all keys, without their secrets"))
+    revoke = _command(commands, "revoke", _revoke_key, "make a key worthless at once")
+    revoke.add_argument("key_id", metavar="ID", help="the twelve digits after slw_")
+    _add_database(revoke)
+
+
+def _days(text: str) -> float:
+    days = _positive(text)
+    if days > _LONGEST_DAYS:
+        raise argparse.ArgumentTypeError(f"a key lasts at most {_LONGEST_DAYS} days")
+    return days
+
+
+def _plain_name(text: str) -> str:
+    if not is_plain_name(text):
+        raise argparse.ArgumentTypeError(f"{text!r} is not 1 to 64 letters, digits, ., _ and -")
+    return text
 
 
 def _add_solve(parser: argparse.ArgumentParser) -> None:
@@ -135,7 +172,7 @@ def _positive(text: str) -> float:
 
 def _settings(options: argparse.Namespace) -> Settings:
     """Return the settings of the environment, with the options given on top."""
-    from pydantic import ValidationError
+    from pydantic import SecretStr, ValidationError
 
     from service.settings import Settings
 
@@ -146,7 +183,10 @@ def _settings(options: argparse.Namespace) -> Settings:
         first = error.errors()[0]
         name = str(first["loc"][0])
         option = f"--{name.replace('_', '-')}" if name in given else f"SLEWLINE_{name.upper()}"
-        raise _WrongInput(f"{option}: {first['msg']}, not {first['input']!r}") from error
+        # A setting with secrets in it is never repeated.
+        is_secret = Settings.model_fields[name].annotation is SecretStr
+        instead = "" if is_secret else f", not {first['input']!r}"
+        raise _WrongInput(f"{option}: {first['msg']}{instead}") from error
 
 
 def _serve(options: argparse.Namespace) -> int:
@@ -158,10 +198,12 @@ def _api(options: argparse.Namespace) -> int:
 
 
 def _run_server(settings: Settings, *, with_workers: bool) -> int:
-    from service.server import CannotServe, serve
+    from service.server import CannotServe, NoKey, serve
 
     try:
         return serve(settings, with_workers=with_workers)
+    except NoKey as error:
+        raise _WrongInput(str(error)) from error
     except CannotServe as error:
         return _complain(str(error), FAILED)
 
@@ -179,6 +221,36 @@ def _migrate(options: argparse.Namespace) -> int:
 
     prepare_database(_settings(options))
     print("The database is up to date.")
+    return OK
+
+
+def _create_key(options: argparse.Namespace) -> int:
+    from service.key_commands import create_key
+
+    create_key(
+        _settings(options),
+        name=options.name,
+        owner=options.owner,
+        scope=Scope(options.scope),
+        expires_days=options.expires_days,
+    )
+    return OK
+
+
+def _list_keys(options: argparse.Namespace) -> int:
+    from service.key_commands import list_keys
+
+    list_keys(_settings(options))
+    return OK
+
+
+def _revoke_key(options: argparse.Namespace) -> int:
+    from service.key_commands import NoSuchKey, revoke_key
+
+    try:
+        revoke_key(_settings(options), options.key_id)
+    except NoSuchKey:
+        raise _WrongInput(f"there is no key {options.key_id!r}; see slewline keys list") from None
     return OK
 
 

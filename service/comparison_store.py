@@ -13,7 +13,7 @@ from service import job_store
 from service.db.clock import utc_now
 from service.db.rows import ComparisonRow, ComparisonRunRow, JobResultRow, JobRow
 from service.ids import new_id
-from service.job_store import TENANT, JobSpec
+from service.job_store import JobSpec
 from service.jobs.queue import JobQueue
 
 
@@ -33,7 +33,7 @@ def submit(
     row = {
         "id": own_id,
         "scenario_id": specs[0].scenario_id,
-        "tenant": TENANT,
+        "tenant": specs[0].owner,
         "label": label,
         "created_at": utc_now(),
     }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -158,6 +159,7 @@ def _start(port: int, workers: int, database_url: str, log: IO[bytes]) -> subpro
         stdout=subprocess.PIPE,
         stderr=log,
         text=True,
+        env=os.environ | {"SLEWLINE_REQUIRE_KEYS": "false"},
         start_new_session=True,  # so that Ctrl-C reaches only this process, which ends the other
     )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
@@ -13,8 +13,6 @@ from service.db.clock import utc_now
 from service.db.rows import JobResultRow, JobRow, ScenarioRow
 from service.ids import new_id
 from service.jobs.queue import JobQueue
-
-TENANT: Final = "local"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,11 +27,12 @@ class JobSpec:
     memory_mb: int
     priority: int
     label: str | None
+    owner: str
     rerun_of: str | None = None
 
 
-def spec_again(job: JobRow) -> JobSpec:
-    """Return the spec of the same frozen question once more."""
+def spec_again(job: JobRow, owner: str) -> JobSpec:
+    """Return the spec of the same frozen question once more, for whoever asks it now."""
     return JobSpec(
         scenario_id=job.scenario_id,
         solver=job.solver,
@@ -43,6 +42,7 @@ def spec_again(job: JobRow) -> JobSpec:
         memory_mb=job.limits["memory_mb"],
         priority=job.priority,
         label=job.label,
+        owner=owner,
         rerun_of=job.id,
     )
 
@@ -54,7 +54,7 @@ def submit(session: Session, queue: JobQueue, spec: JobSpec) -> JobRow:
         sa.insert(JobRow).values(
             id=job_id,
             scenario_id=spec.scenario_id,
-            tenant=TENANT,
+            tenant=spec.owner,
             state="queued",
             solver=spec.solver,
             params=dict(spec.params),
@@ -67,7 +67,7 @@ def submit(session: Session, queue: JobQueue, spec: JobSpec) -> JobRow:
             dispatched_at=utc_now(),
         )
     )
-    queue.enqueue(session, job_id, 1, priority=spec.priority, tenant=TENANT)
+    queue.enqueue(session, job_id, 1, priority=spec.priority, tenant=spec.owner)
     return session.get_one(JobRow, job_id)
 
 
@@ -86,6 +86,11 @@ def num_waiting(session: Session) -> int:
 def find(session: Session, job_id: str) -> JobRow | None:
     """Return a job, or None."""
     return session.get(JobRow, job_id)
+
+
+def owner_of(session: Session, job_id: str) -> str | None:
+    """Return whose job this is, or None for no job."""
+    return session.scalar(sa.select(JobRow.tenant).where(JobRow.id == job_id))
 
 
 def version_of(session: Session, job_id: str) -> int | None:

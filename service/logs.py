@@ -8,6 +8,8 @@ import sys
 from contextvars import ContextVar
 from datetime import UTC, datetime
 
+from service.access.tokens import masked
+
 request_id: ContextVar[str | None] = ContextVar("request_id", default=None)
 job_id: ContextVar[str | None] = ContextVar("job_id", default=None)
 
@@ -15,7 +17,7 @@ _STANDARD = frozenset(vars(logging.makeLogRecord({}))) | {"message", "asctime", 
 
 
 class JsonFormatter(logging.Formatter):
-    """Write a record with its ``extra`` fields as one line of JSON."""
+    """Write a record with its ``extra`` fields as one line of JSON, keys masked."""
 
     def format(self, record: logging.LogRecord) -> str:
         """Return the line."""
@@ -31,7 +33,7 @@ class JsonFormatter(logging.Formatter):
         if record.exc_info:
             fields["traceback"] = self.formatException(record.exc_info)
         kept = {k: v for k, v in fields.items() if v is not None}
-        return json.dumps(kept, default=str, ensure_ascii=False)
+        return masked(json.dumps(kept, default=str, ensure_ascii=False))
 
 
 def configure_logging(level: str = "INFO") -> None:

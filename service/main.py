@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from typing import TYPE_CHECKING
 
 from fastapi import Depends, FastAPI
+from starlette.middleware.cors import CORSMiddleware
 
 import planner_core
 from service.api import (
+    audit_events,
     comparisons,
     ground_stations,
     job_events,
@@ -24,8 +26,10 @@ from service.api import (
 )
 from service.api.deps import check_request
 from service.api.errors import install_error_handlers
+from service.api.guard import Guard
 from service.api.idempotency import install_replay
 from service.api.middleware import BodyLimit, RequestContext
+from service.api.security_headers import SecurityHeaders
 from service.db.session import Database
 from service.opportunities import OpportunityReader
 from service.settings import Settings
@@ -48,6 +52,7 @@ ROUTERS = (
     job_events.router,
     comparisons.router,
     solvers.router,
+    audit_events.router,
     meta.router,
     metrics.router,
     openapi.router,
@@ -86,8 +91,29 @@ def create_app(settings: Settings, queue: JobQueue | None = None) -> FastAPI:
     openapi.install_openapi(app)
     # The last one added is the outermost.
     app.add_middleware(BodyLimit, max_bytes=int(settings.max_body_mb * 1_000_000))
+    app.add_middleware(Guard, settings=settings)
+    if settings.allowed_origins:
+        _allow_pages(app, settings.allowed_origins)
+    app.add_middleware(SecurityHeaders)
     app.add_middleware(RequestContext, counters=app.state.call_counters)
     return app
+
+
+def _allow_pages(app: FastAPI, origins: Sequence[str]) -> None:
+    # Before the guard, which would ask a browser's preflight request for a key.
+    app.add_middleware(
+        CORSMiddleware,
+        allow_origins=origins,
+        allow_methods=["GET", "HEAD", "POST", "PUT", "PATCH", "DELETE"],
+        allow_headers=[
+            "Authorization", "X-API-Key", "Content-Type", "Idempotency-Key", "If-Match",
+            "If-None-Match", "Last-Event-ID", "X-Request-ID",
+        ],
+        expose_headers=[
+            "ETag", "Idempotency-Replayed", "Link", "Location", "Retry-After",
+            "WWW-Authenticate", "X-Request-ID",
+        ],
+    )  # fmt: skip
 
 
 @asynccontextmanager

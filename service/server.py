@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ipaddress
 import signal
 import socket
 import threading
@@ -14,7 +13,9 @@ from typing import Final
 import httpx
 import uvicorn
 
+from service.access import key_store
 from service.db.migrate import upgrade
+from service.db.session import Database
 from service.jobs.queue import DbosQueue, migrate_queue
 from service.jobs.supervisor import Supervisor
 from service.logs import configure_logging
@@ -31,10 +32,38 @@ class CannotServe(Exception):
     """The service cannot run as configured; the message says what to change."""
 
 
+class NoKey(CannotServe):
+    """Others could reach the service, and nobody holds a key that it would ask them for."""
+
+
 def prepare_database(settings: Settings) -> None:
     """Create or update the tables of the service and of its queue."""
     upgrade(settings.database_url)
     migrate_queue(settings)
+
+
+def require_key(settings: Settings) -> None:
+    """Refuse to serve beyond this machine before there is a key.
+
+    Raises
+    ------
+    NoKey
+        Where there is none that is good now.
+    """
+    if settings.is_local or settings.static_keys:
+        return
+    upgrade(settings.database_url)
+    database = Database(settings.database_url)
+    try:
+        with database.reading() as session:
+            if key_store.has_good_key(session):
+                return
+    finally:
+        database.close()
+    raise NoKey(
+        f"Will not listen on {settings.host} without a key: make one with slewline keys create, "
+        "or set SLEWLINE_API_KEYS."
+    )
 
 
 def listen(host: str, port: int) -> socket.socket:
@@ -43,13 +72,8 @@ def listen(host: str, port: int) -> socket.socket:
     Raises
     ------
     CannotServe
-        Where the host is not this machine's loopback, or the port is taken.
+        Where the port is taken, or the host is not one of this machine's addresses.
     """
-    if not _is_loopback(host):
-        raise CannotServe(
-            f"Will not listen on {host}: whoever reaches the service may use it. "
-            "Give --host 127.0.0.1, and put a proxy that asks for credentials before it."
-        )
     try:
         family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
         return socket.create_server(address[:2], family=family, backlog=2048)
@@ -71,6 +95,7 @@ def serve(settings: Settings, *, with_workers: bool) -> int:
     stop = StopRequest()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stop.ask())
+    require_key(settings)
     with ExitStack() as stack:
         listener = stack.enter_context(listen(settings.host, settings.port))
         configure_logging()
@@ -133,12 +158,3 @@ def _wait_for(url: str, is_over: Callable[[], bool]) -> bool:
                 pass  # not listening yet
             time.sleep(_LOOK_EVERY_S)
     return False
-
-
-def _is_loopback(host: str) -> bool:
-    if host == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False

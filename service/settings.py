@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+import ipaddress
+import re
 from pathlib import Path
+from typing import Final
 
 import platformdirs
-from pydantic import Field
+from pydantic import Field, SecretStr, field_serializer, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
+
+from service.access.static_keys import StaticKeys
+
+_REQUESTS_PER_S: Final = 50.0
+_ORIGIN = re.compile(r"https?://[A-Za-z0-9.-]+(:\d+)?|https?://\[[0-9A-Fa-f:]+\](:\d+)?")
 
 
 def default_database_url() -> str:
@@ -18,7 +26,9 @@ def default_database_url() -> str:
 class Settings(BaseSettings):
     """The configuration of every process of the service."""
 
-    model_config = SettingsConfigDict(env_prefix="SLEWLINE_", frozen=True)
+    model_config = SettingsConfigDict(
+        env_prefix="SLEWLINE_", frozen=True, hide_input_in_errors=True
+    )
 
     database_url: str = Field(default_factory=default_database_url)
     host: str = "127.0.0.1"
@@ -37,3 +47,59 @@ class Settings(BaseSettings):
     max_queued: int = Field(10_000, ge=1)
     max_running_per_tenant: int = Field(64, ge=1)
     idempotency_hours: float = Field(24.0, gt=0, le=8760)
+    require_keys: bool = False
+    api_keys: SecretStr = SecretStr("")
+    rate_limit_per_s: float | None = Field(None, ge=0, allow_inf_nan=False)
+    rate_limit_burst: int = Field(200, ge=1)
+    cors_origins: str = ""
+
+    @property
+    def is_local(self) -> bool:
+        """Return whether only this machine can reach the server."""
+        if self.host == "localhost":
+            return True
+        try:
+            return ipaddress.ip_address(self.host).is_loopback
+        except ValueError:
+            return False
+
+    @property
+    def keys_required(self) -> bool:
+        """Return whether callers must show a key. Beyond this machine there is no way round."""
+        return self.require_keys or not self.is_local
+
+    @property
+    def static_keys(self) -> StaticKeys:
+        """Return the keys of ``api_keys``."""
+        return StaticKeys.parse(self.api_keys.get_secret_value())
+
+    @property
+    def requests_per_s(self) -> float:
+        """Return how many requests a second a caller may make; 0 stands for any number."""
+        if self.rate_limit_per_s is None:
+            return 0.0 if self.is_local else _REQUESTS_PER_S
+        return self.rate_limit_per_s
+
+    @property
+    def allowed_origins(self) -> tuple[str, ...]:
+        """Return the sites whose pages may call the service from a browser."""
+        return tuple(self.cors_origins.replace(",", " ").split())
+
+    @field_validator("api_keys")
+    @classmethod
+    def _check_keys(cls, value: SecretStr) -> SecretStr:
+        StaticKeys.parse(value.get_secret_value())
+        return value
+
+    @field_validator("cors_origins")
+    @classmethod
+    def _check_origins(cls, value: str) -> str:
+        for origin in value.replace(",", " ").split():
+            if not _ORIGIN.fullmatch(origin):
+                raise ValueError(f"{origin!r} is no origin such as https://ops.example")
+        return value
+
+    @field_serializer("api_keys")
+    def _keep(self, _value: SecretStr) -> str:
+        """Leave the keys out of what workers are told: nobody calls them."""
+        return ""

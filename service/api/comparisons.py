@@ -14,7 +14,7 @@ from service import comparison_store as store
 from service import job_store
 from service.api import job_intake as intake
 from service.api.conditional import NOT_MODIFIED, created, unless_known
-from service.api.deps import DatabaseDep, SettingsDep
+from service.api.deps import AuditDep, CallerDep, DatabaseDep, SettingsDep
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
 from service.api.job_shapes import ErrorOut, ProgressOut, QuestionIn, ScenarioRef, SolverIn
@@ -91,6 +91,8 @@ def create_comparison(
     database: DatabaseDep,
     settings: SettingsDep,
     once: OnceDep,
+    caller: CallerDep,
+    audit: AuditDep,
     request: Request,
     response: Response,
 ) -> ComparisonOut:
@@ -104,7 +106,7 @@ def create_comparison(
     inline = intake.frozen(database, settings, body)
     with once.transaction() as session:
         intake.require_room(session, settings, len(body.runs))
-        scenario_id = intake.stored_scenario(session, body, inline)
+        scenario_id = intake.stored_scenario(session, audit, body, inline)
         specs = [
             job_store.JobSpec(
                 scenario_id=scenario_id,
@@ -115,20 +117,29 @@ def create_comparison(
                 memory_mb=memory_mb,
                 priority=body.priority,
                 label=body.label,
+                owner=caller.owner,
             )
             for run, of_run in zip(body.runs, params, strict=True)
         ]
         row = store.submit(session, queue, specs, label=body.label)
-        shown = created(response, _shown(session, [row])[0], f"/v1/comparisons/{row.id}")
+        shown = _shown(session, [row])[0]
+        audit.record(session, "create", "job", *(run.job_id for run in shown.runs))
+        audit.record(session, "create", "comparison", row.id)
+        shown = created(response, shown, f"/v1/comparisons/{row.id}")
         _describe(response, shown)
         return once.keep(session, shown)
 
 
 @router.get("")
-def list_comparisons(database: DatabaseDep, paging: PagingDep) -> Listed[ComparisonOut]:
-    """List the comparisons, newest first."""
+def list_comparisons(
+    database: DatabaseDep, caller: CallerDep, paging: PagingDep
+) -> Listed[ComparisonOut]:
+    """List the comparisons of the key's owner, newest first; all for the scope `admin`."""
+    query = sa.select(ComparisonRow)
+    if caller.visible_owner is not None:
+        query = query.where(ComparisonRow.tenant == caller.visible_owner)
     with database.reading() as session:
-        page = newest_first(session, sa.select(ComparisonRow), ComparisonRow.id, paging)
+        page = newest_first(session, query, ComparisonRow.id, paging)
         return Listed(items=_shown(session, page.rows), next=page.next)
 
 
@@ -138,12 +149,16 @@ def list_comparisons(database: DatabaseDep, paging: PagingDep) -> Listed[Compari
     responses={**NOT_MODIFIED, **problem_responses(404)},
 )
 def get_comparison(
-    comparison_id: str, database: DatabaseDep, request: Request, response: Response
+    comparison_id: str,
+    database: DatabaseDep,
+    caller: CallerDep,
+    request: Request,
+    response: Response,
 ) -> ComparisonOut | Response:
     """Return the table as it stands: a line fills when its job has an answer."""
     with database.reading() as session:
         row = session.get(ComparisonRow, comparison_id)
-        if row is None:
+        if row is None or caller.visible_owner not in (None, row.tenant):
             raise ServiceError("not_found", f"There is no comparison {comparison_id!r}.")
         shown = _shown(session, [row])[0]
     _describe(response, shown)

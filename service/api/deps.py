@@ -8,9 +8,14 @@ from typing import Annotated, cast
 from fastapi import Depends, Request
 from fastapi.dependencies.models import Dependant
 from fastapi.routing import APIRoute
+from starlette.concurrency import run_in_threadpool
 
 from planner_core.errors import Fault
+from service import job_store
+from service.access.audit import Audit
+from service.access.callers import Caller, Scope
 from service.api.errors import refuse
+from service.api.guard import require_scope
 from service.api.problems import ServiceError
 from service.db.session import Database
 from service.settings import Settings
@@ -28,9 +33,38 @@ async def _raw_body(request: Request) -> bytes:
     return await request.body()
 
 
+def _caller(request: Request) -> Caller:
+    return cast(Caller, request.state.caller)
+
+
+def _audit(request: Request) -> Audit:
+    return Audit(caller=_caller(request), request_id=request.state.request_id)
+
+
 DatabaseDep = Annotated[Database, Depends(_database)]
 SettingsDep = Annotated[Settings, Depends(_settings)]
 RawBodyDep = Annotated[bytes, Depends(_raw_body)]
+CallerDep = Annotated[Caller, Depends(_caller)]
+AuditDep = Annotated[Audit, Depends(_audit)]
+
+
+def admin_only(caller: CallerDep) -> None:
+    """Refuse callers without the scope `admin`."""
+    require_scope(caller, Scope.ADMIN)
+
+
+async def own_job_only(request: Request, caller: CallerDep, database: DatabaseDep) -> None:
+    """Let a caller reach only jobs of its own: for it there are no others (404)."""
+    job_id = request.path_params.get("job_id")
+    owner = caller.visible_owner
+    if job_id is not None and owner is not None:
+        await run_in_threadpool(_require_owner, database, job_id, owner)
+
+
+def _require_owner(database: Database, job_id: str, owner: str) -> None:
+    with database.reading() as session:
+        if job_store.owner_of(session, job_id) != owner:
+            raise ServiceError("not_found", f"There is no job {job_id!r}.")
 
 
 def media_type_of(request: Request) -> str:

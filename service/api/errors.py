@@ -15,7 +15,9 @@ from sqlalchemy.exc import SQLAlchemyError
 from starlette.exceptions import HTTPException
 
 from planner_core.errors import Fault, PlannerError
+from service.access.tokens import masked
 from service.api.problems import ServiceError, kind_of
+from service.api.security_headers import SECURITY_HEADERS
 from service.db.failures import why_unavailable
 
 PROBLEM_JSON = "application/problem+json"
@@ -53,7 +55,7 @@ def install_error_handlers(app: FastAPI) -> None:
     app.add_exception_handler(PlannerError, _on_planner_error)
     app.add_exception_handler(RequestValidationError, _on_validation_error)
     app.add_exception_handler(HTTPException, _on_http_exception)
-    app.add_exception_handler(SQLAlchemyError, _on_database_error)
+    app.add_exception_handler(SQLAlchemyError, on_database_error)
     app.add_exception_handler(Exception, _on_bug)
 
 
@@ -89,7 +91,7 @@ def problem(
         status=number,
         code=code,
         detail=_sendable(detail),
-        instance=request.url.path,
+        instance=masked(request.url.path),
         request_id=request.state.request_id,
         errors=[
             FaultOut(
@@ -108,7 +110,8 @@ def problem(
 
 def _sendable(text: str) -> str:
     # JSON can spell half a surrogate pair, as a field's name for example; UTF-8 cannot.
-    return text.encode("utf-8", "replace").decode()
+    # And who put a key into an address by mistake finds no copy of it in the answer.
+    return masked(text.encode("utf-8", "replace").decode())
 
 
 def refuse(faults: Sequence[Fault], *, code: str | None = None) -> ServiceError:
@@ -237,7 +240,8 @@ def _http_detail(request: Request, error: HTTPException) -> str:
     return error.detail
 
 
-def _on_database_error(request: Request, error: Exception) -> JSONResponse:
+def on_database_error(request: Request, error: Exception) -> JSONResponse:
+    """Answer 503 where the database is away or full; raise again what is a fault of ours."""
     why = why_unavailable(error)
     if why is None:
         raise error  # a fault of ours
@@ -255,5 +259,6 @@ def _on_bug(request: Request, error: Exception) -> JSONResponse:
         request,
         "internal_error",
         f"The service failed; its log has request {request.state.request_id}.",
-        headers={"X-Request-ID": request.state.request_id},
+        # This answer is made outside of all that adds headers.
+        headers={"X-Request-ID": request.state.request_id} | SECURITY_HEADERS,
     )

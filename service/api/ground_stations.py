@@ -11,7 +11,7 @@ from pydantic import BaseModel, Field
 from sqlalchemy.orm import Session
 
 from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
-from service.api.deps import DatabaseDep, RawBodyDep, require_media_type
+from service.api.deps import AuditDep, DatabaseDep, RawBodyDep, require_media_type
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
 from service.api.imports import (
@@ -58,12 +58,13 @@ class ImportedStation(BaseModel):
 
 @router.post("", status_code=201)
 def create_ground_station(
-    body: GroundStationIn, once: OnceDep, response: Response
+    body: GroundStationIn, once: OnceDep, audit: AuditDep, response: Response
 ) -> GroundStationOut:
     """Store one ground station."""
     ground_station_from(body, "new")
     with once.transaction() as session:
         row = _add(session, body)
+        audit.record(session, "create", "ground_station", row.id)
         shown = created(response, _shown(row), f"/v1/ground-stations/{row.id}")
         return once.keep(session, shown)
 
@@ -77,7 +78,11 @@ def create_ground_station(
     responses=problem_responses(413, 415),
 )
 def import_ground_stations(
-    request: Request, data: RawBodyDep, once: OnceDep, on_error: OnErrorQuery = OnError.SKIP
+    request: Request,
+    data: RawBodyDep,
+    once: OnceDep,
+    audit: AuditDep,
+    on_error: OnErrorQuery = OnError.SKIP,
 ) -> Imported[ImportedStation]:
     """Store the stations of a file. A station that is stored already is not stored again.
 
@@ -96,7 +101,10 @@ def import_ground_stations(
     faults = [*found.faults, *faults]
     refuse_if_asked(len(good), faults, on_error)
     with once.transaction() as session:
-        return once.keep(session, imported(_store(session, good), faults))
+        items = _store(session, good)
+        new = [item.id for item in items if item.status == "created"]
+        audit.record(session, "create", "ground_station", *new)
+        return once.keep(session, imported(items, faults))
 
 
 @router.get("")
@@ -123,12 +131,15 @@ def get_ground_station(
 
 
 @router.delete("/{station_id}", status_code=204, responses=problem_responses(404, 412))
-def delete_ground_station(station_id: str, database: DatabaseDep, request: Request) -> None:
+def delete_ground_station(
+    station_id: str, database: DatabaseDep, audit: AuditDep, request: Request
+) -> None:
     """Delete a ground station. Scenarios that use it keep their copy."""
     with database.transaction() as session:
         row = _find(session, station_id, to_change=True)
         require_match(request, lambda: _shown(row))
         row.deleted_at = datetime.now(UTC)
+        audit.record(session, "delete", "ground_station", station_id)
 
 
 def _find(session: Session, station_id: str, *, to_change: bool = False) -> GroundStationRow:

@@ -14,11 +14,10 @@ from sqlalchemy.orm import Session
 from starlette.concurrency import run_in_threadpool
 
 from service import idempotency_store as store
-from service.api.deps import DatabaseDep, SettingsDep
+from service.api.deps import CallerDep, DatabaseDep, SettingsDep
 from service.api.problems import ServiceError
 from service.db.session import Database
 from service.idempotency_store import KeptAnswer, Keyed
-from service.job_store import TENANT
 
 M = TypeVar("M", bound=BaseModel)
 
@@ -86,6 +85,7 @@ async def _once(
     response: Response,
     database: DatabaseDep,
     settings: SettingsDep,
+    caller: CallerDep,
     idempotency_key: Annotated[
         str | None,
         Header(
@@ -101,7 +101,7 @@ async def _once(
     keyed = None
     if idempotency_key is not None:
         keyed = Keyed(
-            tenant=TENANT,
+            tenant=caller.owner,
             key=idempotency_key,
             request_sha256=_fingerprint(request, await request.body()),
             keep_s=settings.idempotency_hours * 3600.0,

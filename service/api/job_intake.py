@@ -12,6 +12,7 @@ from planner_core.errors import Fault
 from planner_core.solvers import solver_class
 from service import job_store as store
 from service import scenario_store
+from service.access.audit import Audit
 from service.api.errors import refuse
 from service.api.job_shapes import JobOut, LimitsIn, QuestionIn, etag_of_job, shown
 from service.api.problems import ServiceError
@@ -59,10 +60,15 @@ def frozen(database: Database, settings: Settings, body: QuestionIn) -> FrozenSc
     return None
 
 
-def stored_scenario(session: Session, body: QuestionIn, inline: FrozenScenario | None) -> str:
+def stored_scenario(
+    session: Session, audit: Audit, body: QuestionIn, inline: FrozenScenario | None
+) -> str:
     """Return the id of the scenario in question; an inline one is stored."""
     if inline is not None:
-        return scenario_store.save(session, inline)[0].id
+        row, is_new = scenario_store.save(session, inline)
+        if is_new:
+            audit.record(session, "create", "scenario", row.id)
+        return row.id
     assert body.scenario_id is not None
     if store.has_scenario(session, body.scenario_id):
         return body.scenario_id

@@ -6,13 +6,13 @@ import json
 import logging
 from typing import Annotated, Final
 
-from fastapi import APIRouter, Path, Query, Request, Response
+from fastapi import APIRouter, Depends, Path, Query, Request, Response
 from sqlalchemy.exc import SQLAlchemyError
 
 from service import job_store as store
 from service.api import job_intake as intake
 from service.api.conditional import NOT_MODIFIED
-from service.api.deps import DatabaseDep, SettingsDep
+from service.api.deps import AuditDep, CallerDep, DatabaseDep, SettingsDep, own_job_only
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
 from service.api.job_shapes import JobIn, JobOut, Outcome, TargetItem, etag_of_job, shown
@@ -25,7 +25,7 @@ from service.jobs import lease
 from service.jobs.lease import JobState
 from service.jobs.queue import JobQueue
 
-router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
+router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[Depends(own_job_only)])
 log = logging.getLogger(__name__)
 
 LONGEST_WAIT_S: Final = 30.0
@@ -39,6 +39,8 @@ def create_job(
     database: DatabaseDep,
     settings: SettingsDep,
     once: OnceDep,
+    caller: CallerDep,
+    audit: AuditDep,
     request: Request,
     response: Response,
 ) -> JobOut:
@@ -53,7 +55,7 @@ def create_job(
     with once.transaction() as session:
         intake.require_room(session, settings)
         spec = store.JobSpec(
-            scenario_id=intake.stored_scenario(session, body, inline),
+            scenario_id=intake.stored_scenario(session, audit, body, inline),
             solver=body.solver,
             params=params,
             seed=body.seed,
@@ -61,22 +63,31 @@ def create_job(
             memory_mb=memory_mb,
             priority=body.priority,
             label=body.label,
+            owner=caller.owner,
         )
         job = store.submit(session, queue, spec)
+        audit.record(session, "create", "job", job.id)
         return once.keep(session, intake.accepted(session, response, job))
 
 
 @router.get("")
 def list_jobs(
     database: DatabaseDep,
+    caller: CallerDep,
     paging: PagingDep,
     state: Annotated[JobState | None, Query(description="Only jobs in this state.")] = None,
     solver: Annotated[str | None, Query(description="Only jobs of this solver.")] = None,
     scenario_id: Annotated[str | None, Query(description="Only jobs of this scenario.")] = None,
     label: Annotated[str | None, Query(description="Only jobs with exactly this label.")] = None,
 ) -> Listed[JobOut]:
-    """List the jobs, newest first."""
-    query = store.matching(state=state, solver=solver, scenario_id=scenario_id, label=label)
+    """List the jobs of the key's owner, newest first; all jobs for the scope `admin`."""
+    query = store.matching(
+        state=state,
+        solver=solver,
+        scenario_id=scenario_id,
+        label=label,
+        tenant=caller.visible_owner,
+    )
     with database.reading() as session:
         page = newest_first(session, query, JobRow.id, paging)
         hashes = store.scenario_hashes(session, page.rows)
@@ -112,7 +123,9 @@ async def get_job(
 
 
 @router.post("/{job_id}/cancel", status_code=202, responses=problem_responses(404, 409, 503))
-def cancel_job(job_id: str, database: DatabaseDep, request: Request, response: Response) -> JobOut:
+def cancel_job(
+    job_id: str, database: DatabaseDep, audit: AuditDep, request: Request, response: Response
+) -> JobOut:
     """Cancel a job: at once where it waits; a running one stops and keeps its best plan so far."""
     with database.transaction() as session:
         job = intake.find_job(session, job_id)
@@ -123,6 +136,7 @@ def cancel_job(job_id: str, database: DatabaseDep, request: Request, response: R
                 f"The job is {job.state}, which is final: no transition is allowed from there. "
                 "Only queued and running jobs can be cancelled.",
             )
+        audit.record(session, "cancel", "job", job_id)
         session.refresh(job)
         answer = intake.shown_job(session, job)
     if was_waiting:
@@ -133,7 +147,13 @@ def cancel_job(job_id: str, database: DatabaseDep, request: Request, response: R
 
 @router.post("/{job_id}/rerun", status_code=202, responses=problem_responses(404, 503))
 def rerun_job(
-    job_id: str, settings: SettingsDep, once: OnceDep, request: Request, response: Response
+    job_id: str,
+    settings: SettingsDep,
+    once: OnceDep,
+    caller: CallerDep,
+    audit: AuditDep,
+    request: Request,
+    response: Response,
 ) -> JobOut:
     """Queue the same question again as a new job, whatever became of the first.
 
@@ -142,9 +162,10 @@ def rerun_job(
     """
     queue = intake.queue_of(request)
     with once.transaction() as session:
-        spec = store.spec_again(intake.find_job(session, job_id))
+        spec = store.spec_again(intake.find_job(session, job_id), caller.owner)
         intake.require_room(session, settings)
         job = store.submit(session, queue, spec)
+        audit.record(session, "create", "job", job.id)
         return once.keep(session, intake.accepted(session, response, job))
 
 

@@ -11,6 +11,7 @@ from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from service.access.callers import Caller
 from service.api.errors import problem
 from service.api.metrics import CallCounters
 from service.ids import new_id
@@ -52,6 +53,7 @@ class RequestContext:
         finally:
             seconds = time.perf_counter() - started
             self.counters.count(scope, status, seconds)
+            caller: Caller | None = scope["state"].get("caller")
             logger.info(
                 "request",
                 extra={
@@ -59,6 +61,8 @@ class RequestContext:
                     "path": scope["path"],
                     "status": status,
                     "duration_s": round(seconds, 6),
+                    "owner": caller.owner if caller else None,
+                    "key_id": caller.key_id if caller else None,
                 },
             )
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
 from html import escape
 from typing import Any
 
@@ -12,6 +14,7 @@ from pydantic import BaseModel
 
 from service.api.errors import ProblemOut, problem_responses
 from service.api.examples import add_examples
+from service.api.guard import is_limited, is_open
 from service.api.target_catalogs import TargetCatalogIn
 
 router = APIRouter(include_in_schema=False)
@@ -35,6 +38,17 @@ _ANSWER_HEADERS = {
 _CONDITIONS = {
     "304": ("If-None-Match", "ETags that the client has: 304 where one is of the present form."),
     "412": ("If-Match", "ETag that the thing must have: 412 where it has changed."),
+}
+_WITH_KEY = (401, 403, 503)
+_LIMITED = (429,)
+_KEYS = {
+    "bearer": {"type": "http", "scheme": "bearer", "description": "A key of the service."},
+    "header": {
+        "type": "apiKey",
+        "in": "header",
+        "name": "X-API-Key",
+        "description": "The same, for clients that cannot set Authorization.",
+    },
 }
 _HEADERS = {
     "X-Request-ID": {
@@ -70,9 +84,14 @@ def _with_problems(document: dict[str, Any]) -> dict[str, Any]:
         schema = model.model_json_schema(ref_template="#/components/schemas/{model}")
         schemas |= schema.pop("$defs", {})
         schemas[name] = schema | {"title": name}
-    for operations in document["paths"].values():
+    document["components"]["securitySchemes"] = _KEYS
+    for path, operations in document["paths"].items():
         for operation in operations.values():
             statuses = _ALWAYS + (_WITH_BODY if "requestBody" in operation else ())
+            statuses += _LIMITED if is_limited(path) else ()
+            if not is_open(path):
+                statuses += _WITH_KEY
+                operation["security"] = [{name: []} for name in _KEYS]
             for status, response in problem_responses(*statuses).items():
                 operation["responses"][str(status)] = response
             for status, (header, description) in _CONDITIONS.items():
@@ -101,7 +120,7 @@ def _header_parameter(name: str, description: str) -> dict[str, Any]:
 
 
 @router.get("/docs", response_class=HTMLResponse)
-def docs(request: Request) -> str:
+def docs(request: Request) -> HTMLResponse:
     """Return the list of all calls as one page of plain HTML."""
     document = request.app.openapi()
     parts = [
@@ -114,13 +133,16 @@ def docs(request: Request) -> str:
         f"{_fields(schema)}</details>"
         for name, schema in sorted(document["components"]["schemas"].items())
     ]
-    return _PAGE.format(
+    page = _PAGE.format(
+        style=_STYLE,
+        script=_SCRIPT,
         title=escape(document["info"]["title"]),
         version=escape(document["info"]["version"]),
         description=escape(document["info"]["description"]),
         operations="\n".join(parts),
         models="\n".join(models),
     )
+    return HTMLResponse(page, headers={"Content-Security-Policy": _PAGE_POLICY})
 
 
 def _operation(method: str, path: str, operation: dict[str, Any]) -> str:
@@ -181,25 +203,40 @@ def _type(schema: dict[str, Any]) -> str:
     return escape(str(schema.get("format") or schema.get("type", "any")))
 
 
+_STYLE = """
+body { font: 16px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto;
+  padding: 0 1rem; }
+summary { cursor: pointer; padding: .3rem 0; }
+details { border-bottom: 1px solid #8884; }
+td { padding: .1rem 1rem .1rem 0; vertical-align: top; }
+"""
+
+_SCRIPT = """
+const show = () => { const d = document.getElementById(location.hash.slice(1));
+  if (d) d.open = true; };
+addEventListener("hashchange", show); show();
+"""
+
 _PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>{title} {version}: the HTTP API</title>
 <meta name="viewport" content="width=device-width, initial-scale=1">
-<style>
-body {{ font: 16px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto;
-  padding: 0 1rem; }}
-summary {{ cursor: pointer; padding: .3rem 0; }}
-details {{ border-bottom: 1px solid #8884; }}
-td {{ padding: .1rem 1rem .1rem 0; vertical-align: top; }}
-</style></head><body>
+<style>{style}</style></head><body>
 <h1>{title} {version}</h1><p>{description}</p>
 <p>The same as a machine reads it: <a href="/openapi.json">/openapi.json</a> (OpenAPI 3.1).</p>
 <h2>Calls</h2>
 {operations}
 <h2>Shapes</h2>
 {models}
-<script>
-const show = () => {{ const d = document.getElementById(location.hash.slice(1));
-  if (d) d.open = true; }};
-addEventListener("hashchange", show); show();
-</script>
+<script>{script}</script>
 </body></html>"""
+
+
+def _hash_of(text: str) -> str:
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
+
+
+# The page may run its own script and style, by their hashes, and nothing else.
+_PAGE_POLICY = (
+    f"default-src 'none'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'; "
+    f"style-src {_hash_of(_STYLE)}; script-src {_hash_of(_SCRIPT)}"
+)

@@ -48,6 +48,30 @@ class ServiceError(Exception):
 
 
 KINDS: dict[str, ProblemKind] = {
+    "authentication_required": ProblemKind(
+        401,
+        "Key required",
+        "Send a key as Authorization: Bearer <key> or as X-API-Key. slewline keys create makes "
+        "one.",
+    ),
+    "invalid_key": ProblemKind(
+        401, "Invalid key", "The key is mistyped, has expired or was revoked; ask for a new one."
+    ),
+    "insufficient_scope": ProblemKind(
+        403,
+        "Insufficient scope",
+        "Keys are made to read, to submit or to administrate; the detail names the scope needed.",
+    ),
+    "foreign_origin": ProblemKind(
+        403,
+        "Page of another site",
+        "Without a key, only pages of the sites in SLEWLINE_CORS_ORIGINS may change anything.",
+    ),
+    "rate_limited": ProblemKind(
+        429,
+        "Too many requests",
+        "Wait for Retry-After seconds; SLEWLINE_RATE_LIMIT_PER_S and _BURST set the limit.",
+    ),
     "not_found": ProblemKind(
         404, "Not found", "Nothing is stored under this address, or it has been deleted."
     ),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from datetime import UTC, datetime
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 import sqlalchemy as sa
 from fastapi import APIRouter, Query, Request, Response
@@ -15,7 +15,7 @@ from planner_core.errors import Fault
 from planner_core.orbits.ingest import read_elements
 from service import satellite_store as store
 from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
-from service.api.deps import DatabaseDep, RawBodyDep, require_media_type
+from service.api.deps import AuditDep, DatabaseDep, RawBodyDep, require_media_type
 from service.api.errors import problem_responses, refuse
 from service.api.idempotency import OnceDep
 from service.api.imports import (
@@ -35,6 +35,8 @@ from service.translate import orbit_from, satellite_from
 
 router = APIRouter(prefix="/v1/satellites", tags=["satellites"])
 
+_ADD_ELEMENTS: Final = "add_elements"
+_ACTIONS: Final[dict[store.Status, str]] = {"created": "create", "elements_added": _ADD_ELEMENTS}
 _IMPORT_TYPES = ("text/plain", "application/json", "text/csv", "application/xml", "text/xml")
 
 
@@ -88,12 +90,15 @@ class ImportedSatellite(BaseModel):
 
 
 @router.post("", status_code=201)
-def create_satellite(body: SatelliteIn, once: OnceDep, response: Response) -> SatelliteOut:
+def create_satellite(
+    body: SatelliteIn, once: OnceDep, audit: AuditDep, response: Response
+) -> SatelliteOut:
     """Store one satellite. A second one with the same catalogue number is another satellite."""
     satellite_from(body, "new")
     orbit = orbit_from(body)
     with once.transaction() as session:
         row = store.add_satellite(session, body, orbit)
+        audit.record(session, "create", "satellite", row.id)
         shown = created(response, _shown(session, [row])[0], f"/v1/satellites/{row.id}")
         return once.keep(session, shown)
 
@@ -109,7 +114,11 @@ def create_satellite(body: SatelliteIn, once: OnceDep, response: Response) -> Sa
     responses=problem_responses(413, 415),
 )
 def import_satellites(
-    request: Request, data: RawBodyDep, once: OnceDep, on_error: OnErrorQuery = OnError.SKIP
+    request: Request,
+    data: RawBodyDep,
+    once: OnceDep,
+    audit: AuditDep,
+    on_error: OnErrorQuery = OnError.SKIP,
 ) -> Imported[ImportedSatellite]:
     """Store the element sets of a file; satellites get the paper's agility, sensor and resources.
 
@@ -121,6 +130,9 @@ def import_satellites(
     refuse_if_asked(len(found.entries), found.faults, on_error)
     with once.transaction() as session:
         items = [_imported(one) for one in store.import_entries(session, found.entries)]
+        for status, action in _ACTIONS.items():
+            changed = [item.id for item in items if item.status == status]
+            audit.record(session, action, "satellite", *changed)
         return once.keep(session, imported(items, found.faults))
 
 
@@ -156,17 +168,25 @@ def get_satellite(
 
 
 @router.delete("/{satellite_id}", status_code=204, responses=problem_responses(404, 412))
-def delete_satellite(satellite_id: str, database: DatabaseDep, request: Request) -> None:
+def delete_satellite(
+    satellite_id: str, database: DatabaseDep, audit: AuditDep, request: Request
+) -> None:
     """Delete a satellite. Scenarios that use it keep their copy."""
     with database.transaction() as session:
         row = _find(session, satellite_id, to_change=True)
         require_match(request, lambda: _shown(session, [row])[0])
         row.deleted_at = datetime.now(UTC)
+        audit.record(session, "delete", "satellite", satellite_id)
 
 
 @router.put("/{satellite_id}/elements", responses=problem_responses(404, 412))
 def put_elements(
-    satellite_id: str, body: OrbitIn, database: DatabaseDep, request: Request, response: Response
+    satellite_id: str,
+    body: OrbitIn,
+    database: DatabaseDep,
+    audit: AuditDep,
+    request: Request,
+    response: Response,
 ) -> SatelliteOut:
     """Store a further element set of the satellite; that of the newest epoch is in force.
 
@@ -179,6 +199,7 @@ def put_elements(
         require_match(request, lambda: _shown(session, [row])[0])
         _require_same_object(row, orbit.elements.norad_cat_id, body)
         store.add_elements(session, row.id, orbit.elements.epoch, orbit.stored)
+        audit.record(session, _ADD_ELEMENTS, "satellite", row.id)
         shown = _shown(session, [row])[0]
     return created(response, shown, f"/v1/satellites/{row.id}/elements")
 

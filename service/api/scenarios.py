@@ -18,7 +18,7 @@ from planner_core.orbits.places import View
 from planner_core.problem import COLLECT, CONTACT
 from service import scenario_store as store
 from service.api.conditional import NOT_MODIFIED, created, unless_known
-from service.api.deps import DatabaseDep, SettingsDep
+from service.api.deps import AuditDep, DatabaseDep, SettingsDep
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
 from service.api.paging import Listed, PagingDep, newest_first
@@ -114,6 +114,7 @@ def create_scenario(
     database: DatabaseDep,
     settings: SettingsDep,
     once: OnceDep,
+    audit: AuditDep,
     response: Response,
 ) -> ScenarioOut:
     """Freeze a question: everything it names is copied into it.
@@ -123,6 +124,8 @@ def create_scenario(
     frozen = store.freeze(database, body, max_horizon_days=settings.max_horizon_days)
     with once.transaction() as session:
         row, is_new = store.save(session, frozen)
+        if is_new:
+            audit.record(session, "create", "scenario", row.id)
         response.status_code = 201 if is_new else 200
         return once.keep(session, created(response, _shown(row), f"/v1/scenarios/{row.id}"))
 

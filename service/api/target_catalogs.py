@@ -14,7 +14,7 @@ from sqlalchemy.orm import Session
 
 from planner_core.errors import Fault
 from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
-from service.api.deps import DatabaseDep, RawBodyDep, require_media_type
+from service.api.deps import AuditDep, DatabaseDep, RawBodyDep, require_media_type
 from service.api.errors import faults_of_validation, problem_responses, refuse
 from service.api.idempotency import OnceDep
 from service.api.paging import Listed, PagingDep, newest_first
@@ -95,6 +95,7 @@ def create_target_catalog(
     response: Response,
     data: RawBodyDep,
     once: OnceDep,
+    audit: AuditDep,
     name: Annotated[
         Name | None, Query(description="Name of a catalogue whose file has none.")
     ] = None,
@@ -105,6 +106,7 @@ def create_target_catalog(
     targets = _checked(found)
     with once.transaction() as session:
         row = _add(session, found.name or name or _UNNAMED, targets)
+        audit.record(session, "create", "target_catalog", row.id)
         shown = created(response, _shown(row), f"/v1/target-catalogs/{row.id}")
         answer = CreatedCatalog(**shown.model_dump(), ignored_columns=list(found.ignored))
         return once.keep(session, answer)
@@ -209,12 +211,15 @@ def list_targets(catalog_id: str, database: DatabaseDep, paging: PagingDep) -> L
 
 
 @router.delete("/{catalog_id}", status_code=204, responses=problem_responses(404, 412))
-def delete_target_catalog(catalog_id: str, database: DatabaseDep, request: Request) -> None:
+def delete_target_catalog(
+    catalog_id: str, database: DatabaseDep, audit: AuditDep, request: Request
+) -> None:
     """Delete a catalogue. Scenarios that use it keep their copy."""
     with database.transaction() as session:
         row = _find(session, catalog_id, to_change=True)
         require_match(request, lambda: _shown(row))
         row.deleted_at = datetime.now(UTC)
+        audit.record(session, "delete", "target_catalog", catalog_id)
 
 
 def _find(session: Session, catalog_id: str, *, to_change: bool = False) -> TargetCatalogRow:

@@ -153,7 +153,7 @@ class JobRow(Row):
 
     id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
     scenario_id: Mapped[str] = mapped_column(sa.ForeignKey("scenario.id"), index=True)
-    tenant: Mapped[str] = mapped_column(sa.String(64), default="local")
+    tenant: Mapped[str] = mapped_column(sa.String(64), default="local", index=True)
     state: Mapped[str] = mapped_column(sa.String(16), index=True)
     solver: Mapped[str] = mapped_column(sa.String(64))
     params: Mapped[Json]
@@ -239,3 +239,34 @@ class WorkerRow(Row):
     id: Mapped[str] = mapped_column(sa.String(128), primary_key=True)
     started_at: Mapped[datetime]
     seen_at: Mapped[datetime]
+
+
+class ApiKeyRow(Row):
+    """An API key: all but its token, of which only a digest is kept."""
+
+    __tablename__ = "api_key"
+
+    id: Mapped[str] = mapped_column(sa.String(12), primary_key=True)
+    name: Mapped[str] = mapped_column(sa.String(64))
+    owner: Mapped[str] = mapped_column(sa.String(64))
+    scope: Mapped[str] = mapped_column(sa.String(16))
+    token_sha256: Mapped[str] = mapped_column(sa.String(64))
+    created_at: Mapped[datetime]
+    expires_at: Mapped[datetime]
+    revoked_at: Mapped[datetime | None]
+
+
+class AuditEventRow(Row):
+    """One change of one object. Triggers of the database refuse to change or delete a row."""
+
+    __tablename__ = "audit_event"
+
+    id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
+    at: Mapped[datetime]
+    owner: Mapped[str] = mapped_column(sa.String(64))
+    key_id: Mapped[str | None]
+    key_name: Mapped[str | None] = mapped_column(sa.String(64))
+    request_id: Mapped[str | None] = mapped_column(sa.String(64))
+    action: Mapped[str] = mapped_column(sa.String(32))
+    kind: Mapped[str] = mapped_column(sa.String(32))
+    object_id: Mapped[str] = mapped_column(sa.String(64), index=True)

@@ -15,7 +15,7 @@ import sqlalchemy as sa
 
 from service.cli import FAILED, OK, WRONG_INPUT, main
 
-COMMANDS = ("serve", "api", "worker", "migrate", "demo", "solve", "openapi")
+COMMANDS = ("serve", "api", "worker", "migrate", "demo", "solve", "keys", "openapi")
 
 
 @pytest.fixture(autouse=True)
@@ -58,12 +58,14 @@ def test_help_loads_neither_the_web_framework_nor_the_compiler() -> None:
 
 @pytest.mark.parametrize("command", ["serve", "api"])
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.0.2.7", "planner.example"])
-def test_listening_beyond_this_machine_is_refused(
+def test_listening_beyond_this_machine_without_a_key_is_refused(
     command: str, host: str, capsys: pytest.CaptureFixture[str], database_url: str
 ) -> None:
     status = main([command, "--host", host, "--port", "0", "--database-url", database_url])
-    assert status == FAILED
-    assert f"Will not listen on {host}" in capsys.readouterr().err
+    assert status == WRONG_INPUT
+    said = capsys.readouterr().err
+    assert f"Will not listen on {host} without a key" in said
+    assert said.count("\n") == 1
 
 
 def test_a_taken_port_is_named(capsys: pytest.CaptureFixture[str], database_url: str) -> None:

@@ -14,9 +14,12 @@ from tests.service.serving import serving
 
 WITHIN_S = 60.0
 RARE = {
+    "401": "a call without a key (tests/service/access)",
+    "403": "a key without the scope, or a page of another site (tests/service/access)",
     "406": "one form of a timeline",
     "409": "a job in the wrong state",
     "413": "a body of many megabytes",
+    "429": "a caller in a hurry (tests/service/access)",
     "500": "a fault of the service",
     "503": "a full queue, or a service without a worker",
 }

@@ -1,0 +1,1 @@
+"""Who may call the service, how often, and the record of what they changed."""

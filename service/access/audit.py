@@ -1,0 +1,52 @@
+"""The record of changes: who did what to what, written in the transaction of the change."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import sqlalchemy as sa
+from sqlalchemy.orm import Session
+
+from service.access.callers import Caller
+from service.db.clock import utc_now
+from service.db.rows import AuditEventRow
+from service.ids import new_id
+
+COMMAND_LINE: Final = "command line"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Audit:
+    """Writes down the changes of one request.
+
+    Parameters
+    ----------
+    caller
+        None for whoever has the database itself: the command line.
+    """
+
+    caller: Caller | None
+    request_id: str | None
+
+    def record(self, session: Session, action: str, kind: str, *object_ids: str) -> None:
+        """Add one event for each object to the caller's transaction."""
+        if not object_ids:
+            return
+        caller = self.caller
+        shared = {
+            "at": utc_now(),
+            "owner": caller.owner if caller else COMMAND_LINE,
+            "key_id": caller.key_id if caller else None,
+            "key_name": caller.key_name if caller else None,
+            "request_id": self.request_id,
+            "action": action,
+            "kind": kind,
+        }
+        session.execute(
+            sa.insert(AuditEventRow).values(shared),
+            [{"id": new_id(), "object_id": object_id} for object_id in object_ids],
+        )
+
+
+BY_COMMAND_LINE: Final = Audit(caller=None, request_id=None)

@@ -1,0 +1,80 @@
+"""API keys in the database: made, listed, revoked, looked up."""
+
+from __future__ import annotations
+
+import hmac
+from collections.abc import Sequence
+from typing import Any, Final, cast
+
+import sqlalchemy as sa
+from sqlalchemy.orm import Session
+
+from service.access.callers import Caller, Scope
+from service.access.tokens import digest_of, key_id_of, new_token
+from service.db.clock import utc_now
+from service.db.rows import ApiKeyRow
+
+_SECONDS_A_DAY: Final = 86_400.0
+
+
+def create(
+    session: Session, *, name: str, owner: str, scope: Scope, expires_days: float
+) -> tuple[str, str]:
+    """Store a new key. Return its id and its token, which nobody can find out again."""
+    key_id, token = new_token()
+    session.execute(
+        sa.insert(ApiKeyRow).values(
+            id=key_id,
+            name=name,
+            owner=owner,
+            scope=scope.value,
+            token_sha256=digest_of(token),
+            created_at=utc_now(),
+            expires_at=utc_now(expires_days * _SECONDS_A_DAY),
+        )
+    )
+    return key_id, token
+
+
+def every_key(session: Session) -> Sequence[tuple[ApiKeyRow, bool]]:
+    """Return all keys, oldest first, each with whether it is good now."""
+    rows = session.execute(
+        sa.select(ApiKeyRow, _is_good()).order_by(ApiKeyRow.created_at, ApiKeyRow.id)
+    )
+    return [(row, bool(is_good)) for row, is_good in rows]
+
+
+def revoke(session: Session, key_id: str) -> bool:
+    """Make a key worthless from now on; return whether it was there and not yet revoked."""
+    changed = session.execute(
+        sa.update(ApiKeyRow)
+        .where(ApiKeyRow.id == key_id, ApiKeyRow.revoked_at.is_(None))
+        .values(revoked_at=utc_now())
+        .execution_options(synchronize_session=False)
+    )
+    return cast("sa.CursorResult[Any]", changed).rowcount == 1
+
+
+def has_key(session: Session, key_id: str) -> bool:
+    """Return whether there is a key of this id, good or not."""
+    return session.scalar(sa.select(ApiKeyRow.id).where(ApiKeyRow.id == key_id)) is not None
+
+
+def has_good_key(session: Session) -> bool:
+    """Return whether anybody holds a key that is good now."""
+    return session.scalar(sa.select(ApiKeyRow.id).where(_is_good()).limit(1)) is not None
+
+
+def find_caller(session: Session, token: str) -> Caller | None:
+    """Return whose token this is; None where it is wrong, expired or revoked."""
+    key_id = key_id_of(token)
+    if key_id is None:
+        return None
+    row = session.scalar(sa.select(ApiKeyRow).where(ApiKeyRow.id == key_id, _is_good()))
+    if row is None or not hmac.compare_digest(row.token_sha256, digest_of(token)):
+        return None
+    return Caller(owner=row.owner, scope=Scope(row.scope), key_id=row.id, key_name=row.name)
+
+
+def _is_good() -> sa.ColumnElement[bool]:
+    return sa.and_(ApiKeyRow.revoked_at.is_(None), ApiKeyRow.expires_at > utc_now())

@@ -1,0 +1,58 @@
+"""The record of changes, for administrators."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import sqlalchemy as sa
+from fastapi import APIRouter, Depends, Query
+from pydantic import BaseModel, Field
+
+from service.api.deps import DatabaseDep, admin_only
+from service.api.paging import Listed, PagingDep, newest_first
+from service.api.shapes import Instant
+from service.db.rows import AuditEventRow
+
+router = APIRouter(
+    prefix="/v1/audit-events", tags=["operations"], dependencies=[Depends(admin_only)]
+)
+
+
+class AuditEventOut(BaseModel):
+    """One change of one object."""
+
+    id: str
+    at: Instant
+    owner: str = Field(description="Whose key it was; `local` without a key.")
+    key_id: str | None
+    key_name: str | None
+    request_id: str | None = Field(description="As in the answer's `X-Request-ID` and the logs.")
+    action: str = Field(description="`create`, `delete`, `cancel` and so on; more may be added.")
+    kind: str = Field(description="`satellite`, `job` and so on; more may be added.")
+    object_id: str
+
+
+@router.get("")
+def list_audit_events(
+    database: DatabaseDep,
+    paging: PagingDep,
+    object_id: Annotated[str | None, Query(description="Only of this object.")] = None,
+    kind: Annotated[str | None, Query(description="Only of objects of this kind.")] = None,
+    action: Annotated[str | None, Query(description="Only this action.")] = None,
+    owner: Annotated[str | None, Query(description="Only by keys of this owner.")] = None,
+) -> Listed[AuditEventOut]:
+    """List who changed what, newest first. Needs the scope `admin`."""
+    wanted = {"object_id": object_id, "kind": kind, "action": action, "owner": owner}
+    conditions = [
+        getattr(AuditEventRow, column) == value
+        for column, value in wanted.items()
+        if value is not None
+    ]
+    query = sa.select(AuditEventRow).where(*conditions)
+    with database.reading() as session:
+        page = newest_first(session, query, AuditEventRow.id, paging)
+    return Listed(items=[_shown(row) for row in page.rows], next=page.next)
+
+
+def _shown(row: AuditEventRow) -> AuditEventOut:
+    return AuditEventOut.model_validate(row, from_attributes=True)

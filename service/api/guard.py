@@ -1,0 +1,170 @@
+"""The door: each request is given its caller, or refused, before its body is read."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from sqlalchemy.exc import SQLAlchemyError
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from service.access import key_store
+from service.access.callers import LOCAL_CALLER, NOBODY, Caller
+from service.access.callers import Scope as KeyScope
+from service.access.rate_limit import RateLimiter
+from service.access.static_keys import StaticKeys
+from service.api.errors import on_database_error, problem
+from service.api.problems import ServiceError
+from service.db.session import Database
+from service.settings import Settings
+
+OPEN: Final = ("/health", "/version", "/docs", "/openapi.json", "/problems")
+"""What anybody may read, with all below it."""
+
+_UNLIMITED: Final = "/health"
+_READING: Final = ("GET", "HEAD", "OPTIONS")
+_FOREIGN: Final = ("cross-site", "same-site")
+
+
+def is_open(path: str) -> bool:
+    """Return whether a path needs no key.
+
+    >>> is_open("/health/live"), is_open("/docs"), is_open("/docs-of-mine"), is_open("/v1/jobs")
+    (True, True, False, False)
+    """
+    return any(_is_below(path, root) for root in OPEN)
+
+
+def is_limited(path: str) -> bool:
+    """Return whether requests to a path are counted: a health check must never be refused."""
+    return not _is_below(path, _UNLIMITED)
+
+
+class Guard:
+    """Find each request's caller and put it into ``request.state.caller``.
+
+    Reading asks for the scope `read`, every other method for `submit`: a new route is guarded
+    without anybody thinking of it. What asks for more says so itself (``deps.admin_only``).
+    """
+
+    def __init__(self, app: ASGIApp, settings: Settings):
+        self.app = app
+        self._keys_required = settings.keys_required
+        self._static_keys: StaticKeys = settings.static_keys
+        self._own_pages = settings.allowed_origins
+        per_s = settings.requests_per_s
+        self._limiter = RateLimiter(per_s, settings.rate_limit_burst) if per_s else None
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one request, or refuse it."""
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        request = Request(scope)
+        try:
+            request.state.caller = await self._admitted(request)
+        except ServiceError as error:
+            answer = problem(request, error.code, error.detail, headers=error.headers)
+            await answer(scope, receive, send)
+            return
+        except SQLAlchemyError as error:
+            await on_database_error(request, error)(scope, receive, send)
+            return
+        await self.app(scope, receive, send)
+
+    async def _admitted(self, request: Request) -> Caller:
+        path = request.url.path
+        if is_open(path):
+            if is_limited(path):
+                self._count(request, NOBODY)
+            return NOBODY
+        try:
+            caller = await self._caller(request)
+        except ServiceError:
+            # A wrong key counts as well, or it could be guessed at any speed.
+            self._count(request, NOBODY)
+            raise
+        self._count(request, caller)
+        require_scope(caller, KeyScope.READ if _is_reading(request) else KeyScope.SUBMIT)
+        if caller.key_id is None:
+            self._refuse_foreign_pages(request)
+        return caller
+
+    async def _caller(self, request: Request) -> Caller:
+        token = _token(request)
+        if token is None:
+            if self._keys_required:
+                raise ServiceError(
+                    "authentication_required",
+                    "This call needs a key: Authorization: Bearer <key>, or X-API-Key.",
+                    headers={"WWW-Authenticate": 'Bearer realm="slewline"'},
+                )
+            return LOCAL_CALLER
+        database: Database = request.app.state.database
+        caller = self._static_keys.find(token) or await run_in_threadpool(_find, database, token)
+        if caller is None:
+            raise ServiceError(
+                "invalid_key",
+                "The key is unknown, expired or revoked.",
+                headers={"WWW-Authenticate": 'Bearer realm="slewline", error="invalid_token"'},
+            )
+        return caller
+
+    def _count(self, request: Request, caller: Caller) -> None:
+        if self._limiter is None:
+            return
+        address = request.client.host if request.client else "unknown"
+        who = f"key {caller.key_id}" if caller.key_id else f"address {address}"
+        wait_s = self._limiter.take(who)
+        if wait_s > 0.0:
+            raise ServiceError(
+                "rate_limited",
+                f"Too many requests; the next one is possible in {wait_s:.3f} s.",
+                headers={"Retry-After": str(math.ceil(wait_s))},
+            )
+
+    def _refuse_foreign_pages(self, request: Request) -> None:
+        # Without a key, being on this machine is the credential; a browser on it lends that to
+        # every page of the internet. Browsers say where a request comes from, and no page can
+        # change what they say.
+        is_foreign = request.headers.get("sec-fetch-site") in _FOREIGN
+        if not is_foreign or _is_reading(request):
+            return
+        if request.headers.get("origin") not in self._own_pages:
+            raise ServiceError(
+                "foreign_origin", "A page of another site may not change anything here."
+            )
+
+
+def require_scope(caller: Caller, needed: KeyScope) -> None:
+    """Raise 403 ``insufficient_scope`` where the caller's scope does not include this one."""
+    if caller.scope.includes(needed):
+        return
+    challenge = f'Bearer realm="slewline", error="insufficient_scope", scope="{needed}"'
+    raise ServiceError(
+        "insufficient_scope",
+        f"This call needs the scope {needed}; the key has {caller.scope}.",
+        headers={"WWW-Authenticate": challenge},
+    )
+
+
+def _is_reading(request: Request) -> bool:
+    return request.method in _READING
+
+
+def _token(request: Request) -> str | None:
+    scheme, _, credentials = request.headers.get("authorization", "").partition(" ")
+    if scheme.lower() == "bearer":
+        return credentials.strip()
+    return request.headers.get("x-api-key")
+
+
+def _find(database: Database, token: str) -> Caller | None:
+    with database.reading() as session:
+        return key_store.find_caller(session, token)
+
+
+def _is_below(path: str, root: str) -> bool:
+    return path == root or path.startswith(f"{root}/")
