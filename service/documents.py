@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from datetime import UTC, datetime
 from typing import Any
 
 from planner_core import __version__
@@ -12,6 +11,7 @@ from planner_core.orbits.sgp4_record import GRAVITY
 from planner_core.reasons import TargetOutcome
 from planner_core.run import Judged
 from planner_core.timeline import JudgedAction, Resourceline, Violation, plan_sha256
+from service.instants import instant_text
 
 SCHEMA_VERSION = "1.0"
 _COMPARED = (
@@ -20,16 +20,6 @@ _COMPARED = (
 )  # fmt: skip
 
 Document = dict[str, Any]
-
-
-def instant_text(instant: datetime) -> str:
-    """Return RFC 3339 in UTC with milliseconds.
-
-    >>> instant_text(datetime(2026, 1, 1, 12, 30, 0, 250_000, tzinfo=UTC))
-    '2026-01-01T12:30:00.250Z'
-    """
-    text = instant.astimezone(UTC).isoformat(timespec="milliseconds")
-    return text.removesuffix("+00:00") + "Z"
 
 
 def figures_of(timeline: Document) -> Document:

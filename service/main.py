@@ -23,6 +23,7 @@ from service.api import (
     scenarios,
     solvers,
     target_catalogs,
+    webhooks,
 )
 from service.api.deps import check_request
 from service.api.errors import install_error_handlers
@@ -52,6 +53,7 @@ ROUTERS = (
     job_events.router,
     comparisons.router,
     solvers.router,
+    webhooks.router,
     audit_events.router,
     meta.router,
     metrics.router,

@@ -12,9 +12,10 @@ from sqlalchemy.orm import Session
 
 from service import satellite_store
 from service.db.clock import seconds_between, utc_now
-from service.db.rows import JobRow, SatelliteRow, ScenarioRow, WorkerRow
+from service.db.rows import JobRow, SatelliteRow, ScenarioRow, WebhookDeliveryRow, WorkerRow
 from service.jobs import lease
 from service.jobs.lease import JobState
+from service.webhooks.outbox import DeliveryState
 
 ORBITS_OF_LAST_S: Final = 7 * 86400.0
 """A satellite is in use while a job active or newer than this plans it."""
@@ -52,6 +53,8 @@ class Snapshot:
         How long the oldest waiting job has waited; 0 where none waits.
     heartbeat_age_s
         By worker, dead ones of the last day included.
+    num_deliveries
+        Of webhooks, by state; ended ones of the last 30 days.
     """
 
     num_jobs: Mapping[str, int]
@@ -60,6 +63,7 @@ class Snapshot:
     num_leases_lost: int
     heartbeat_age_s: Mapping[str, float]
     orbits: Sequence[OrbitAge]
+    num_deliveries: Mapping[str, int]
 
 
 def take(session: Session) -> Snapshot:
@@ -74,6 +78,7 @@ def take(session: Session) -> Snapshot:
         num_leases_lost=session.scalar(sa.select(sa.func.sum(JobRow.lost_runs))) or 0,
         heartbeat_age_s=dict(session.execute(seen_s).all()),
         orbits=_orbits(session, now),
+        num_deliveries=_num_deliveries(session),
     )
 
 
@@ -81,6 +86,12 @@ def _num_jobs(session: Session) -> dict[str, int]:
     counted = sa.select(JobRow.state, sa.func.count()).group_by(JobRow.state)
     found = dict(session.execute(counted).all())
     return {state: found.get(state, 0) for state in get_args(JobState)}
+
+
+def _num_deliveries(session: Session) -> dict[str, int]:
+    state = WebhookDeliveryRow.state
+    found = dict(session.execute(sa.select(state, sa.func.count()).group_by(state)).all())
+    return {state: found.get(state, 0) for state in get_args(DeliveryState)}
 
 
 def _job_times(session: Session) -> list[JobTime]:

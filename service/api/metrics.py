@@ -156,3 +156,11 @@ def _of_others(snapshot: Snapshot) -> Iterator[Metric]:
     for orbit in snapshot.orbits:
         orbits.add_metric([orbit.satellite_id, orbit.name], orbit.age_s)
     yield orbits
+    deliveries = GaugeMetricFamily(
+        "slewline_webhook_deliveries",
+        "Messages of webhooks by state; ended ones of the last 30 days.",
+        labels=["state"],
+    )
+    for state, number in snapshot.num_deliveries.items():
+        deliveries.add_metric([state], number)
+    yield deliveries

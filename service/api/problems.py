@@ -186,6 +186,18 @@ KINDS: dict[str, ProblemKind] = {
     "internal_error": ProblemKind(
         500, "Internal error", "A fault of the service. Its log has the request_id."
     ),
+    "webhook_address_refused": ProblemKind(
+        422,
+        "Webhook address refused",
+        "Webhooks go to https addresses of the public internet. Who runs the service may allow "
+        "others with SLEWLINE_WEBHOOK_PRIVATE_ADDRESSES=true.",
+    ),
+    "too_many_webhooks": ProblemKind(
+        422, "Too many webhooks", "Delete one that is no longer needed."
+    ),
+    "webhook_disabled": ProblemKind(
+        409, "Webhook disabled", "Its receiver answered 410 Gone. Make a new webhook to go on."
+    ),
     "queue_full": ProblemKind(
         503, "Queue full", "Too many jobs are waiting; try again after Retry-After seconds."
     ),

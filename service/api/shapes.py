@@ -18,6 +18,8 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
+from service.instants import instant_text
+
 _RFC3339 = re.compile(
     r"(\d{4}-\d\d-\d\d)[Tt ](\d\d:\d\d:\d\d)(?:\.(\d{1,9})\d*)?([Zz]|[+-]\d\d:\d\d)?"
 )
@@ -49,20 +51,10 @@ def parse_instant(value: object) -> datetime:
         raise PydanticCustomError("invalid_time", "There is no such instant") from None
 
 
-def format_instant(instant: datetime) -> str:
-    """Return the instant as the API writes it.
-
-    >>> format_instant(datetime(2026, 1, 1, tzinfo=UTC))
-    '2026-01-01T00:00:00.000Z'
-    """
-    text = instant.astimezone(UTC).isoformat(timespec="milliseconds")
-    return text.removesuffix("+00:00") + "Z"
-
-
 Instant = Annotated[
     datetime,
     BeforeValidator(parse_instant),
-    PlainSerializer(format_instant, return_type=str, when_used="json"),
+    PlainSerializer(instant_text, return_type=str, when_used="json"),
     WithJsonSchema(
         {"type": "string", "format": "date-time", "examples": ["2026-01-31T12:00:00.000Z"]}
     ),

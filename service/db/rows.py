@@ -270,3 +270,42 @@ class AuditEventRow(Row):
     action: Mapped[str] = mapped_column(sa.String(32))
     kind: Mapped[str] = mapped_column(sa.String(32))
     object_id: Mapped[str] = mapped_column(sa.String(64), index=True)
+
+
+class WebhookRow(Row):
+    """Where the ends of an owner's jobs are told. ``secret`` signs, so it is kept as it is."""
+
+    __tablename__ = "webhook"
+
+    id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
+    owner: Mapped[str] = mapped_column(sa.String(64), index=True)
+    name: Mapped[str | None]
+    url: Mapped[str]
+    events: Mapped[list[str]] = mapped_column(sa.JSON)
+    secret: Mapped[str]
+    created_at: Mapped[datetime]
+    disabled_at: Mapped[datetime | None]
+    disabled_because: Mapped[str | None]
+
+
+class WebhookDeliveryRow(Row):
+    """One message to one webhook: ``pending`` until it is ``delivered`` or has ``failed``.
+
+    ``attempts`` is also the fencing token: only who made the newest attempt tells how it went.
+    """
+
+    __tablename__ = "webhook_delivery"
+    __table_args__ = (sa.Index("ix_webhook_delivery_due", "state", "due_at"),)
+
+    id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
+    webhook_id: Mapped[str] = mapped_column(sa.ForeignKey("webhook.id"), index=True)
+    job_id: Mapped[str | None] = mapped_column(sa.String(36))
+    event: Mapped[str] = mapped_column(sa.String(32))
+    payload: Mapped[str]
+    state: Mapped[str] = mapped_column(sa.String(16))
+    attempts: Mapped[int] = mapped_column(default=0)
+    due_at: Mapped[datetime | None]
+    last_status: Mapped[int | None]
+    last_error: Mapped[str | None]
+    created_at: Mapped[datetime]
+    ended_at: Mapped[datetime | None]

@@ -17,6 +17,7 @@ from sqlalchemy.orm import Session
 from service.db.clock import utc_now
 from service.db.rows import JobResultRow, JobRow
 from service.jobs.queue import JobQueue
+from service.webhooks import outbox
 
 JobState = Literal["queued", "running", "cancelling", "succeeded", "failed", "cancelled", "expired"]
 ACTIVE: Final[tuple[JobState, ...]] = ("queued", "running", "cancelling")
@@ -116,14 +117,14 @@ def finish(session: Session, lease: Lease, outcome: Outcome) -> bool:
     state: Any = outcome.state
     if state == "succeeded":
         state = sa.case((JobRow.state == "cancelling", "cancelled"), else_="succeeded")
-    changed = _update(
+    changed = _end(
         session,
+        lease.job_id,
         _held(lease),
         state=state,
         termination=outcome.termination,
         error=sa.null() if outcome.error is None else dict(outcome.error),
         progress=JobRow.progress if outcome.progress is None else dict(outcome.progress),
-        **_ended(),
     )
     if changed and outcome.timeline is not None and outcome.targets is not None:
         session.execute(
@@ -141,9 +142,8 @@ def finish(session: Session, lease: Lease, outcome: Outcome) -> bool:
 
 def hand_back(session: Session, queue: JobQueue, lease: Lease) -> None:
     """Give a running job back to the queue; it does not count as an attempt."""
-    if _update(
-        session, _held(lease) & (JobRow.state == "cancelling"), state="cancelled", **_ended()
-    ):
+    cancelled = _held(lease) & (JobRow.state == "cancelling")
+    if _end(session, lease.job_id, cancelled, state="cancelled"):
         return
     redispatch(session, queue, _held(lease), lease.job_id)
 
@@ -187,8 +187,7 @@ def request_cancel(session: Session, job_id: str) -> bool:
     -------
     Whether the job was active; asking twice is no mistake.
     """
-    waits = sa.and_(JobRow.id == job_id, JobRow.state == "queued")
-    if _update(session, waits, state="cancelled", cancel_requested=True, **_ended()):
+    if _end(session, job_id, JobRow.state == "queued", state="cancelled", cancel_requested=True):
         return True
     runs = sa.and_(JobRow.id == job_id, JobRow.state == "running")
     asked = {"state": "cancelling", "cancel_requested": True, "version": JobRow.version + 1}
@@ -198,11 +197,16 @@ def request_cancel(session: Session, job_id: str) -> bool:
 
 
 def end_expired(
-    session: Session, guard: sa.ColumnElement[bool], *, outcome: Outcome, **changes: Any
+    session: Session,
+    job_id: str,
+    guard: sa.ColumnElement[bool],
+    *,
+    outcome: Outcome,
+    **changes: Any,
 ) -> bool:
     """End a job whose worker is gone, if ``guard`` still holds."""
     error = sa.null() if outcome.error is None else dict(outcome.error)
-    return _update(session, guard, state=outcome.state, error=error, **_ended(), **changes)
+    return _end(session, job_id, guard, state=outcome.state, error=error, **changes)
 
 
 def _held(lease: Lease) -> sa.ColumnElement[bool]:
@@ -213,8 +217,13 @@ def _held(lease: Lease) -> sa.ColumnElement[bool]:
     )
 
 
-def _ended() -> dict[str, Any]:
-    return {"finished_at": utc_now(), "lease_until": None, "version": JobRow.version + 1}
+def _end(session: Session, job_id: str, guard: sa.ColumnElement[bool], **values: Any) -> bool:
+    """Give a job its final state, if ``guard`` still holds; who waits for it will be told."""
+    ended = {"finished_at": utc_now(), "lease_until": None, "version": JobRow.version + 1}
+    if not _update(session, guard & (JobRow.id == job_id), **ended, **values):
+        return False
+    outbox.tell_end_of(session, job_id)
+    return True
 
 
 def _update(session: Session, guard: sa.ColumnElement[bool], **values: Any) -> bool:

@@ -100,20 +100,18 @@ class Reconciler:
 
     def _recover(self, job_id: str) -> None:
         """End a job whose lease has lapsed, or queue it anew: one transaction."""
-        expired = sa.and_(
-            JobRow.id == job_id,
-            JobRow.lease_until < utc_now(),
-        )
+        expired = JobRow.lease_until < utc_now()
         cancelling = expired & (JobRow.state == "cancelling")
         running = expired & (JobRow.state == "running")
         last = running & (JobRow.lost_runs + 1 >= self._max_attempts)
         lost = JobRow.lost_runs + 1
         detail = f"The worker died or was cut off {self._max_attempts} times while it ran this job."
         too_many = lease.Outcome.failed("too_many_attempts", detail)
+        cancelled = lease.Outcome(state="cancelled")
         with self._database.transaction() as session:
             done = (
-                lease.end_expired(session, cancelling, outcome=lease.Outcome(state="cancelled"))
-                or lease.end_expired(session, last, outcome=too_many, lost_runs=lost)
+                lease.end_expired(session, job_id, cancelling, outcome=cancelled)
+                or lease.end_expired(session, job_id, last, outcome=too_many, lost_runs=lost)
                 or lease.redispatch(session, self._queue, running, job_id, lost_runs=lost)
             )
         if done:

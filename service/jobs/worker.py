@@ -31,11 +31,13 @@ from service.jobs.reconcile import Reconciler
 from service.jobs.runner import Abandoned, Limits, Order, Runner, Work
 from service.settings import Settings
 from service.stopping import StopRequest
+from service.webhooks.courier import Courier
 
 log = logging.getLogger(__name__)
 T = TypeVar("T")
 
 _RETRY_S: Final = 1.0
+_COURIER_LOOKS_EVERY_S: Final = 1.0
 _STOP_WITHIN_S: Final = 5.0
 _FORGET_WORKER_S: Final = 86400.0
 
@@ -63,6 +65,11 @@ class Worker:
             lease_s=settings.lease_s,
             max_attempts=settings.max_attempts,
         )
+        self._courier = Courier(
+            self._database,
+            look_every_s=_COURIER_LOOKS_EVERY_S,
+            private=settings.webhook_private_addresses,
+        )
         self._stopping = threading.Event()
         self._stop_request = StopRequest()
         self._idle = threading.Event()
@@ -79,6 +86,7 @@ class Worker:
         consumer = DbosConsumer(self._settings.database_url, self.id, self.handle)
         self._enrol()
         consumer.start()
+        self._courier.start()
         try:
             while is_wanted() and not self._stop_request.wait(self._settings.reconcile_s):
                 self._look_after_others()
@@ -86,6 +94,7 @@ class Worker:
             self._stopping.set()
             self._idle.wait(_STOP_WITHIN_S)
             consumer.stop()
+            self._courier.stop()
             self._leave()
 
     def _is_stopping(self) -> bool:
@@ -225,7 +234,7 @@ def _request(session: Session, job_id: str, run: int) -> PlanRequest:
         .join(ScenarioRow, ScenarioRow.id == JobRow.scenario_id)
         .where(JobRow.id == job_id)
     )
-    job, sha256, content = session.execute(wanted).one()._tuple()
+    job, sha256, content = session.execute(wanted).one()
     return PlanRequest(
         job_id=job.id,
         run=run,

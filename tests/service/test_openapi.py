@@ -52,7 +52,7 @@ class Client:
                 continue
             name, slot = parameter["name"], "{" + parameter["name"] + "}"
             examples = parameter["schema"].get("examples") or parameter.get("examples")
-            collection = template.partition("/" + slot)[0]
+            collection = path.partition("/" + slot)[0]
             value = examples[0] if examples else self.known(collection, name)
             if value is None:
                 return None
@@ -126,6 +126,9 @@ def create_all(client: Client) -> None:
             if answers:
                 left.remove((path, operation))
         assert len(left) < before, f"nothing can be created of {left}"
+    # So that there is a delivery as well.
+    (webhook,) = client.http.get("/v1/webhooks?limit=1").json()["items"]
+    assert client.http.post(f"{webhook['links']['self']}/test").status_code == 202
 
 
 def read_all(client: Client) -> None:

@@ -98,6 +98,25 @@ def compare(client: httpx.Client) -> str:
     )
 
 
+def new_webhook(client: httpx.Client) -> str:
+    return post(client, "/v1/webhooks", {"url": "https://ops.example/"})
+
+
+def try_webhook(client: httpx.Client) -> str:
+    own_id = new_webhook(client)
+    post(client, f"/v1/webhooks/{own_id}/test", None)
+    return own_id
+
+
+def redeliver(client: httpx.Client) -> str:
+    own_id = new_webhook(client)
+    deliveries = f"/v1/webhooks/{own_id}/deliveries"
+    post(
+        client, f"{deliveries}/{post(client, f'/v1/webhooks/{own_id}/test', None)}/redeliver", None
+    )
+    return own_id
+
+
 CHANGES: dict[tuple[str, str], tuple[Callable[[httpx.Client], str], str, str]] = {
     ("post", "/v1/satellites"): (new_satellite, "create", "satellite"),
     ("post", "/v1/satellites/import"): (import_satellites, "create", "satellite"),
@@ -120,6 +139,14 @@ CHANGES: dict[tuple[str, str], tuple[Callable[[httpx.Client], str], str, str]] =
     ("post", "/v1/jobs"): (new_job, "create", "job"),
     ("post", "/v1/jobs/{job_id}/rerun"): (rerun, "create", "job"),
     ("post", "/v1/comparisons"): (compare, "create", "comparison"),
+    ("post", "/v1/webhooks"): (new_webhook, "create", "webhook"),
+    ("delete", "/v1/webhooks/{webhook_id}"): (
+        delete(new_webhook, "/v1/webhooks"), "delete", "webhook",
+    ),
+    ("post", "/v1/webhooks/{webhook_id}/test"): (try_webhook, "test", "webhook"),
+    ("post", "/v1/webhooks/{webhook_id}/deliveries/{delivery_id}/redeliver"): (
+        redeliver, "redeliver", "webhook",
+    ),
     ("post", "/v1/jobs/{job_id}/cancel"): (cancel, "cancel", "job"),
 }  # fmt: skip
 

@@ -1,0 +1,1 @@
+"""Webhooks: what ends is told to those who asked, signed, until they have it."""

@@ -1,0 +1,205 @@
+"""Deliveries in the database: written in the transaction of what they tell, sent afterwards.
+
+A delivery that was taken comes due again by itself after ``TAKEN_S``: whoever took it and
+died needs no successor to be told. So each is sent at least once, and in rare cases twice with
+the same ``webhook-id``.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import Any, Final, Literal
+
+import sqlalchemy as sa
+from sqlalchemy.orm import Session
+
+from service.db.clock import utc_now
+from service.db.rows import JobRow, WebhookDeliveryRow, WebhookRow
+from service.ids import new_id
+from service.instants import instant_text
+from service.webhooks import events
+
+DeliveryState = Literal["pending", "delivered", "failed"]
+
+TAKEN_S: Final = 60.0
+KEEP_S: Final = 30 * 86400.0
+_SWEPT_AT_ONCE: Final = 500
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parcel:
+    """A delivery that was taken, with all that sending it needs.
+
+    Attributes
+    ----------
+    attempt
+        1 for the first; also what its outcome must name to be written down.
+    """
+
+    id: str
+    webhook_id: str
+    attempt: int
+    url: str
+    secret: str
+    payload: str
+
+
+def tell_end_of(session: Session, job_id: str) -> None:
+    """Queue a delivery for each webhook of the job's owner that asked for this end."""
+    wanted = (
+        sa.select(JobRow, WebhookRow)
+        .join(WebhookRow, WebhookRow.owner == JobRow.tenant)
+        .where(JobRow.id == job_id, WebhookRow.disabled_at.is_(None))
+        .execution_options(populate_existing=True)
+    )
+    for job, webhook in session.execute(wanted):
+        event = events.event_of(job.state)
+        if event in webhook.events:
+            queue(session, webhook, event, events.data_of(job), job_id=job_id)
+
+
+def queue(
+    session: Session, webhook: WebhookRow, event: str, data: dict[str, Any], *, job_id: str | None
+) -> str:
+    """Queue one delivery and return its id."""
+    now = session.execute(sa.select(utc_now())).scalar_one()
+    # Frozen here: each attempt signs and sends the same bytes.
+    payload = json.dumps({"type": event, "timestamp": instant_text(now), "data": data})
+    return _add(session, webhook, event, payload, job_id)
+
+
+def repeat(session: Session, webhook: WebhookRow, delivery: WebhookDeliveryRow) -> str:
+    """Queue the same message once more and return the id of the new delivery."""
+    return _add(session, webhook, delivery.event, delivery.payload, delivery.job_id)
+
+
+def _add(
+    session: Session, webhook: WebhookRow, event: str, payload: str, job_id: str | None
+) -> str:
+    delivery_id = new_id()
+    session.execute(
+        sa.insert(WebhookDeliveryRow).values(
+            id=delivery_id,
+            webhook_id=webhook.id,
+            job_id=job_id,
+            event=event,
+            payload=payload,
+            state="pending",
+            due_at=utc_now(),
+            created_at=utc_now(),
+        )
+    )
+    return delivery_id
+
+
+def take(session: Session, *, busy: Collection[str], limit: int) -> list[Parcel]:
+    """Take deliveries that are due, the oldest of each webhook, and count the attempt.
+
+    Parameters
+    ----------
+    busy
+        Webhooks that are being sent to: a slow one holds up nobody else.
+    """
+    is_due = sa.and_(
+        WebhookDeliveryRow.state == "pending",
+        WebhookDeliveryRow.due_at <= utc_now(),
+        WebhookDeliveryRow.webhook_id.not_in(busy),
+    )
+    first = sa.select(sa.func.min(WebhookDeliveryRow.id)).where(is_due)
+    first = first.group_by(WebhookDeliveryRow.webhook_id).limit(limit)
+    found = session.execute(
+        sa.select(WebhookDeliveryRow.id, WebhookDeliveryRow.attempts).where(
+            WebhookDeliveryRow.id.in_(first)
+        )
+    ).all()
+    parcels = []
+    for delivery_id, attempts in found:
+        # The guard lets only one of several workers have it.
+        taken = _update(
+            session, delivery_id, attempts, due_at=utc_now(TAKEN_S), attempts=attempts + 1
+        )
+        if taken:
+            parcels.append(_parcel(session, delivery_id))
+    return parcels
+
+
+def _parcel(session: Session, delivery_id: str) -> Parcel:
+    wanted = (
+        sa.select(WebhookDeliveryRow, WebhookRow)
+        .join(WebhookRow, WebhookRow.id == WebhookDeliveryRow.webhook_id)
+        .where(WebhookDeliveryRow.id == delivery_id)
+    )
+    delivery, webhook = session.execute(wanted).one()
+    return Parcel(
+        id=delivery.id,
+        webhook_id=webhook.id,
+        attempt=delivery.attempts,
+        url=webhook.url,
+        secret=webhook.secret,
+        payload=delivery.payload,
+    )
+
+
+def arrived(session: Session, parcel: Parcel, status: int) -> None:
+    """Note that the receiver has it."""
+    _update(
+        session, parcel.id, parcel.attempt,
+        state="delivered", due_at=None, last_status=status, last_error=None, ended_at=utc_now(),
+    )  # fmt: skip
+
+
+def failed(
+    session: Session, parcel: Parcel, why: str, status: int | None, *, again_s: float | None
+) -> None:
+    """Note a failed attempt.
+
+    Parameters
+    ----------
+    again_s
+        After how long to try again; None to give up.
+    """
+    told: dict[str, Any] = {"last_status": status, "last_error": why}
+    if again_s is None:
+        told |= {"state": "failed", "due_at": None, "ended_at": utc_now()}
+    else:
+        told |= {"due_at": utc_now(again_s)}
+    _update(session, parcel.id, parcel.attempt, **told)
+
+
+def disable(session: Session, webhook_id: str, why: str) -> None:
+    """Send nothing to this webhook any more."""
+    session.execute(
+        sa.update(WebhookRow)
+        .where(WebhookRow.id == webhook_id, WebhookRow.disabled_at.is_(None))
+        .values(disabled_at=utc_now(), disabled_because=why)
+    )
+    session.execute(
+        sa.update(WebhookDeliveryRow)
+        .where(WebhookDeliveryRow.webhook_id == webhook_id, WebhookDeliveryRow.state == "pending")
+        .values(state="failed", due_at=None, last_error=why, ended_at=utc_now())
+    )
+
+
+def sweep(session: Session) -> None:
+    """Forget some deliveries that ended long ago."""
+    old = sa.select(WebhookDeliveryRow.id).where(WebhookDeliveryRow.ended_at < utc_now(-KEEP_S))
+    ids = session.scalars(old.limit(_SWEPT_AT_ONCE)).all()
+    if ids:
+        session.execute(sa.delete(WebhookDeliveryRow).where(WebhookDeliveryRow.id.in_(ids)))
+
+
+def _update(session: Session, delivery_id: str, attempt: int, **values: Any) -> bool:
+    statement = (
+        sa.update(WebhookDeliveryRow)
+        .where(
+            WebhookDeliveryRow.id == delivery_id,
+            WebhookDeliveryRow.attempts == attempt,
+            WebhookDeliveryRow.state == "pending",
+        )
+        .values(**values)
+        .returning(WebhookDeliveryRow.id)
+        .execution_options(synchronize_session=False)
+    )
+    return session.execute(statement).first() is not None
