@@ -208,6 +208,14 @@ def test_waiting_ends_and_the_job_goes_on(patient: Client, jobs: Jobs) -> None:
     assert refused.value.code == "not_ready"
 
 
+def test_waiting_for_a_comparison_ends_too(patient: Client, jobs: Jobs) -> None:
+    table = patient.comparisons.submit(jobs.scenario_id, [{"solver": "rule"}], label="night")
+    with pytest.raises(WaitTimedOut):
+        patient.comparisons.wait(table.id, timeout_s=0.3)
+    patient.jobs.cancel(table.runs[0].job_id)
+    assert patient.comparisons.wait(table.id).runs[0].state == "cancelled"
+
+
 def test_a_job_that_fails_is_an_error_and_a_cancelled_one_is_not(
     patient: Client, jobs: Jobs, workers: Workers
 ) -> None:
