@@ -81,6 +81,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_solve(_command(commands, "solve", _solve, "plan a scenario file, without a service"))
 
     _add_keys(_command(commands, "keys", None, "make, list and revoke API keys"))
+    _add_plan(_command(commands, "plan", _plan, "have a service plan a scenario, and follow it"))
 
     _command(commands, "openapi", _openapi, "print the description of the HTTP API")
     return parser
@@ -135,6 +136,25 @@ def _plain_name(text: str) -> str:
 
 def _add_solve(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scenario", type=Path, metavar="SCENARIO.json")
+    _add_search(parser)
+
+
+def _add_plan(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("scenario", type=Path, nargs="?", metavar="SCENARIO.json")
+    parser.add_argument("--scenario-id", metavar="ID", help="a stored scenario, not a file")
+    _add_search(parser)
+    parser.add_argument("--url", help="the service (SLEWLINE_URL, or port 8000 of this machine)")
+    parser.add_argument(
+        "--key-env", metavar="NAME", help="environment variable with the API key (SLEWLINE_KEY)"
+    )
+    parser.add_argument("--label", help="a name for the job")
+    parser.add_argument("--priority", type=int, help="0 to 9, the most urgent (5)")
+    parser.add_argument(
+        "--detach", action="store_true", help="print the job's id and do not wait for it"
+    )
+
+
+def _add_search(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--solver", required=True, metavar="NAME")
     parser.add_argument(
         "--param", action="append", default=[], type=_parameter, metavar="KEY=VALUE",
@@ -264,6 +284,7 @@ def _demo(options: argparse.Namespace) -> int:
 
 
 def _solve(options: argparse.Namespace) -> int:
+    from service.scenario_files import place_of
     from service.solve import solve_file
 
     try:
@@ -276,7 +297,7 @@ def _solve(options: argparse.Namespace) -> int:
             out=options.out,
         )
     except PlannerError as error:
-        place = _place(error.fault.pointer or "", options.scenario)
+        place = place_of(error.fault.pointer or "", options.scenario)
         raise _WrongInput(f"{place}: {error.detail}") from error
     except Cancelled:
         return _complain("stopped before there was a plan", FAILED)
@@ -284,17 +305,16 @@ def _solve(options: argparse.Namespace) -> int:
         raise _WrongInput(f"{error.filename}: {error.strerror}") from error
 
 
-def _place(pointer: str, scenario: Path) -> str:
-    """Return where on the command line or in the file a fault lies.
+def _plan(options: argparse.Namespace) -> int:
+    from service.client import ClientError
+    from service.plan_command import Refused, run_plan
 
-    >>> _place("/params/depth", Path("day.json")), _place("/horizon/end", Path("day.json"))
-    ('--param depth', 'day.json /horizon/end')
-    """
-    if pointer == "/solver":
-        return "--solver"
-    if pointer.startswith("/params/"):
-        return f"--param {pointer.removeprefix('/params/')}"
-    return f"{scenario} {pointer}".strip()
+    try:
+        return run_plan(options)
+    except Refused as error:
+        raise _WrongInput(str(error)) from error
+    except ClientError as error:
+        return _complain(str(error), FAILED)
 
 
 def _openapi(options: argparse.Namespace) -> int:

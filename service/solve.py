@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import json
 import signal
 from collections.abc import Mapping
@@ -10,12 +9,12 @@ from concurrent.futures import ThreadPoolExecutor, wait
 from pathlib import Path
 from typing import Any, Final
 
-from planner_core.errors import InvalidScenario
 from planner_core.solvers import solver_class
 from planner_core.solvers.base import Budget
 from service.jobs.plan_job import PlanAnswer, PlanRequest, run_plan_job
+from service.scenario_files import read_scenario, require_folder
 from service.solver_params import params_of, parse_params
-from service.summary import HEADER, LEGEND, summary_row, table
+from service.summary import summary
 from service.translate import canonical, sha256_of
 
 _LOOK_EVERY_S: Final = 0.05
@@ -52,11 +51,10 @@ def solve_file(
     OSError
         Where a file cannot be read or written.
     """
-    if out is not None and not out.parent.is_dir():
-        # Better said before the search than after it.
-        raise FileNotFoundError(errno.ENOENT, "No such folder", str(out.parent))
+    if out is not None:
+        require_folder(out)
     chosen = parse_params(solver_class(solver), params)
-    content = canonical(_read_json(path))
+    content = canonical(read_scenario(path))
     request = PlanRequest(
         job_id="local",
         scenario_sha256=sha256_of(content),
@@ -69,9 +67,7 @@ def solve_file(
     timeline = json.loads(_answer(request, Budget(time_s)).timeline)
     if out is not None:
         out.write_text(json.dumps(timeline, indent=1) + "\n", encoding="utf-8")
-    print(table([HEADER, summary_row(timeline)]))
-    print(LEGEND)
-    print(f"ended: {timeline['termination']}; plan {timeline['plan_sha256']}")
+    print(summary(timeline))
     return 0 if timeline["validity"] == "valid" else 1
 
 
@@ -85,13 +81,3 @@ def _answer(request: PlanRequest, budget: Budget) -> PlanAnswer:
             if budget.is_spent() and not budget.is_cancelled:
                 budget.expire()
         return job.result()
-
-
-def _read_json(path: Path) -> dict[str, Any]:
-    try:
-        content = json.loads(path.read_text(encoding="utf-8-sig"))
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise InvalidScenario("malformed_json", f"{path} is not JSON: {error}.") from error
-    if not isinstance(content, dict):
-        raise InvalidScenario("malformed_json", f"{path} must hold one JSON object.")
-    return content

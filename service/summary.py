@@ -35,6 +35,12 @@ def summary_row(timeline: Mapping[str, Any]) -> tuple[str, ...]:
     )
 
 
+def summary(timeline: Mapping[str, Any]) -> str:
+    """Return one timeline document as a table with its legend, and how the search ended."""
+    ended = f"ended: {timeline['termination']}; plan {timeline['plan_sha256']}"
+    return "\n".join([table([HEADER, summary_row(timeline)]), LEGEND, ended])
+
+
 def table(rows: Sequence[Sequence[str]]) -> str:
     """Return rows as lines with aligned columns, the first one under the left edge.
 

@@ -15,7 +15,9 @@ import sqlalchemy as sa
 
 from service.cli import FAILED, OK, WRONG_INPUT, main
 
-COMMANDS = ("serve", "api", "worker", "migrate", "demo", "solve", "keys", "openapi")
+COMMANDS = (
+    "serve", "api", "worker", "migrate", "demo", "solve", "plan", "keys", "openapi",
+)  # fmt: skip
 
 
 @pytest.fixture(autouse=True)

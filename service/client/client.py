@@ -1,0 +1,139 @@
+"""The client: an address, a key, and what the service offers."""
+
+from __future__ import annotations
+
+import ipaddress
+import os
+import re
+from collections.abc import Iterator
+from types import TracebackType
+from typing import Final, Self
+
+import httpx
+
+import planner_core
+from service.client.comparisons import Comparisons
+from service.client.ground_stations import GroundStations
+from service.client.jobs import Jobs
+from service.client.satellites import Satellites
+from service.client.scenarios import Scenarios
+from service.client.shapes import Ready, Solver, Version
+from service.client.target_catalogs import TargetCatalogs
+from service.client.transport import Transport, path_of, read
+
+DEFAULT_URL: Final = "http://127.0.0.1:8000"
+_KEY = re.compile(r"[\x21-\x7e]+")
+
+
+class Client:
+    """A service, and all that can be asked of it. Threads may share one.
+
+    Parameters
+    ----------
+    url, key
+        Where the service is, and the API key it asks for; by default what the environment
+        says in ``SLEWLINE_URL`` and ``SLEWLINE_KEY``, or the service of this machine.
+    timeout_s
+        For how long one answer may keep silent.
+    patience_s
+        For how long a request that is lost, or that the service cannot take now, is sent again.
+    """
+
+    satellites: Satellites
+    ground_stations: GroundStations
+    target_catalogs: TargetCatalogs
+    scenarios: Scenarios
+    jobs: Jobs
+    comparisons: Comparisons
+
+    def __init__(
+        self,
+        url: str | None = None,
+        key: str | None = None,
+        *,
+        timeout_s: float = 60.0,
+        patience_s: float = 60.0,
+    ):
+        address = _address(url or os.environ.get("SLEWLINE_URL") or DEFAULT_URL)
+        secret = key if key is not None else os.environ.get("SLEWLINE_KEY")
+        headers = {"User-Agent": f"slewline-client/{planner_core.__version__}"}
+        if secret:
+            headers["Authorization"] = f"Bearer {_sendable(secret)}"
+        self._http = httpx.Client(
+            base_url=address,
+            headers=headers,
+            timeout=timeout_s,
+            trust_env=not _is_this_machine(address.host),  # no proxy leads back to it
+        )
+        self._transport = Transport(self._http, patience_s=patience_s)
+        self.satellites = Satellites(self._transport)
+        self.ground_stations = GroundStations(self._transport)
+        self.target_catalogs = TargetCatalogs(self._transport)
+        self.scenarios = Scenarios(self._transport)
+        self.jobs = Jobs(self._transport)
+        self.comparisons = Comparisons(self._transport)
+
+    @property
+    def url(self) -> str:
+        """Where the service is."""
+        return self._transport.address
+
+    def solvers(self) -> Iterator[Solver]:
+        """Yield the solvers that the service has."""
+        return self._transport.pages(path_of("solvers"), Solver)
+
+    def solver(self, name: str) -> Solver:
+        """Return one solver."""
+        return self._transport.get(path_of("solvers", name), Solver)
+
+    def version(self) -> Version:
+        """Return what runs there."""
+        return self._transport.get("/version", Version)
+
+    def ready(self) -> Ready:
+        """Return who takes jobs there; a ``ServiceError`` at once where nobody does."""
+        return read(Ready, self._transport.request("GET", "/health/ready", patience_s=0.0))
+
+    def close(self) -> None:
+        """Close the connections."""
+        self._http.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"Client({self.url!r})"
+
+
+def _address(url: str) -> httpx.URL:
+    try:
+        address = httpx.URL(url)
+    except httpx.InvalidURL as error:
+        raise ValueError(f"the service's URL cannot be read: {error}") from error
+    if address.scheme not in ("http", "https") or not address.host:
+        raise ValueError("the service's URL must begin with http:// or https://")
+    return address
+
+
+def _sendable(key: str) -> str:
+    # httpx would name the key in its complaint.
+    if not _KEY.fullmatch(key):
+        raise ValueError("the API key has characters that no key has, a line's end perhaps")
+    return key
+
+
+def _is_this_machine(host: str) -> bool:
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False

@@ -1,0 +1,120 @@
+"""What can go wrong between a program and the service."""
+
+from __future__ import annotations
+
+from email.utils import parsedate_to_datetime
+from typing import TYPE_CHECKING
+
+import httpx
+from pydantic import ValidationError
+
+from service.client.shapes import Fault, Shape
+
+if TYPE_CHECKING:
+    from service.client.jobs import Job
+
+
+class ClientError(Exception):
+    """The base of every error of this package."""
+
+
+class Unreachable(ClientError):
+    """No answer came, for as long as the client is patient."""
+
+
+class UnexpectedAnswer(ClientError):
+    """The answer is not what the API says: another program, or a version that does not fit."""
+
+
+class ServiceError(ClientError):
+    """The service refused a request, or failed at it.
+
+    Attributes
+    ----------
+    status, code, detail
+        Of the problem document; ``code`` is stable, and ``http_502`` and the like where the
+        answer was none of the service's own.
+    errors
+        Each single fault, with its JSON pointer or line of the file.
+    request_id
+        What to search the service's log for.
+    retry_after_s
+        When to come back, where the service said so.
+    """
+
+    def __init__(
+        self,
+        *,
+        status: int,
+        code: str,
+        detail: str,
+        errors: tuple[Fault, ...] = (),
+        request_id: str | None = None,
+        retry_after_s: float | None = None,
+    ):
+        super().__init__(f"{code} ({status}): {detail}")
+        self.status = status
+        self.code = code
+        self.detail = detail
+        self.errors = errors
+        self.request_id = request_id
+        self.retry_after_s = retry_after_s
+
+
+class JobFailed(ClientError):
+    """A job ended without doing what was asked; ``job.error`` says why."""
+
+    def __init__(self, job: Job):
+        why = f"{job.error.code}: {job.error.detail}" if job.error else "no reason is given"
+        super().__init__(f"job {job.id} {job.state}: {why}")
+        self.job = job
+
+
+class WaitTimedOut(ClientError):
+    """What was waited for did not happen in time. It goes on: this ends only the waiting."""
+
+
+class _Problem(Shape):
+    code: str
+    detail: str
+    request_id: str | None = None
+    errors: tuple[Fault, ...] = ()
+
+
+def error_of(response: httpx.Response) -> ServiceError:
+    """Return the error that an answer tells, a problem document or not."""
+    retry_after_s = seconds_asked(response)
+    try:
+        told = _Problem.model_validate_json(response.content)
+    except ValidationError:
+        # A proxy on the way, for example, which answers in HTML.
+        where = response.headers.get("location")
+        detail = response.reason_phrase or "no explanation"
+        return ServiceError(
+            status=response.status_code,
+            code=f"http_{response.status_code}",
+            detail=f"{detail}, to {where}" if where else detail,
+            request_id=response.headers.get("x-request-id"),
+            retry_after_s=retry_after_s,
+        )
+    return ServiceError(
+        status=response.status_code,
+        code=told.code,
+        detail=told.detail,
+        errors=told.errors,
+        request_id=told.request_id,
+        retry_after_s=retry_after_s,
+    )
+
+
+def seconds_asked(response: httpx.Response) -> float | None:
+    """Return what ``Retry-After`` asks for, in seconds; None where there is none to be read."""
+    text = response.headers.get("retry-after", "").strip()
+    if text.isdecimal():
+        return float(text)
+    try:
+        at = parsedate_to_datetime(text)
+        sent = parsedate_to_datetime(response.headers.get("date", ""))
+        return max(0.0, (at - sent).total_seconds())
+    except (TypeError, ValueError):
+        return None

@@ -1,0 +1,234 @@
+"""Jobs: send one, follow it, read its answer."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator, Mapping
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from pydantic import PrivateAttr, ValidationError
+
+from service.client.answers import (
+    Failure,
+    Limits,
+    Progress,
+    ScenarioRef,
+    TargetOutcome,
+    Timeline,
+)
+from service.client.errors import JobFailed, UnexpectedAnswer
+from service.client.following import follow, polled
+from service.client.shapes import Json, Scenario, Stored
+from service.client.transport import Transport, path_of
+
+FINAL = frozenset({"succeeded", "failed", "cancelled", "expired"})
+
+
+class Job(Stored):
+    """A job as it stood when it was read; what asks the service returns a new one."""
+
+    state: str
+    scenario: ScenarioRef
+    solver: str
+    params: Json
+    seed: int
+    limits: Limits
+    attempt: int
+    priority: int
+    label: str | None
+    progress: Progress | None
+    created_at: datetime
+    started_at: datetime | None
+    finished_at: datetime | None
+    termination: str | None
+    error: Failure | None
+
+    _jobs: Jobs = PrivateAttr()
+
+    @property
+    def is_final(self) -> bool:
+        """Whether it changes no more."""
+        return self.state in FINAL
+
+    def refresh(self) -> Job:
+        """Return the job as it stands now."""
+        return self._jobs.get(self.id, known=self)
+
+    def follow(self) -> Iterator[Job]:
+        """Yield the job as it is, then at each change, until it is final."""
+        return self._jobs.follow(self.id)
+
+    def wait(self, timeout_s: float | None = None) -> Job:
+        """Return the job once it has succeeded or was cancelled.
+
+        Raises
+        ------
+        JobFailed
+            Where it ends in any other way.
+        WaitTimedOut
+            Where it is not final after ``timeout_s``.
+        """
+        return self._jobs.wait(self.id, timeout_s)
+
+    def cancel(self) -> Job:
+        """Ask for its end; the best plan so far is kept."""
+        return self._jobs.cancel(self.id)
+
+    def rerun(self) -> Job:
+        """Queue the same question again."""
+        return self._jobs.rerun(self.id)
+
+    def timeline(self) -> Timeline:
+        """Return its plan, judged."""
+        return self._jobs.timeline(self.id)
+
+    def download(self, file: Path | str) -> Path:
+        """Write its timeline to a file, in the form that the suffix names."""
+        return self._jobs.download(self.id, file)
+
+    def targets(
+        self, *, outcome: str | None = None, reason: str | None = None
+    ) -> Iterator[TargetOutcome]:
+        """Yield every target of the scenario with what became of it."""
+        return self._jobs.targets(self.id, outcome=outcome, reason=reason)
+
+
+class Jobs:
+    """The jobs of the service."""
+
+    def __init__(self, transport: Transport):
+        self._transport = transport
+
+    def submit(
+        self,
+        scenario: str | Scenario | Mapping[str, Any],
+        solver: str,
+        *,
+        params: Mapping[str, Any] | None = None,
+        seed: int = 0,
+        time_s: float | None = None,
+        memory_mb: int | None = None,
+        priority: int | None = None,
+        label: str | None = None,
+        idempotency_key: str | None = None,
+    ) -> Job:
+        """Queue a job, once however often the request has to be sent.
+
+        Parameters
+        ----------
+        scenario
+            A stored one or its id; or the content of a scenario file, or the body of a
+            scenario, which is stored with the job (once, if it was sent before).
+        params
+            The solver's own; the others are its defaults.
+        time_s, memory_mb
+            What the job may use.
+        priority
+            0 to 9, 9 being the most urgent.
+        """
+        body = question(scenario, time_s, memory_mb, priority, label)
+        body |= {"solver": solver, "params": dict(params or {}), "seed": seed}
+        return self._own(
+            self._transport.post(path_of("jobs"), Job, json=body, idempotency_key=idempotency_key)
+        )
+
+    def list(
+        self,
+        *,
+        state: str | None = None,
+        solver: str | None = None,
+        scenario_id: str | None = None,
+        label: str | None = None,
+    ) -> Iterator[Job]:
+        """Yield the jobs, newest first."""
+        params = {"state": state, "solver": solver, "scenario_id": scenario_id, "label": label}
+        return map(self._own, self._transport.pages(path_of("jobs"), Job, params))
+
+    def get(self, job_id: str, *, known: Job | None = None) -> Job:
+        """Return one job; ``known`` itself where nothing has changed since it was read."""
+        etag = known.etag if known else None
+        headers = {} if etag is None else {"If-None-Match": etag}
+        answer = self._transport.request("GET", path_of("jobs", job_id), headers=headers)
+        if known is not None and answer.status_code == 304:
+            return known
+        return self._read(answer.text, answer.headers.get("etag"))
+
+    def follow(self, job_id: str) -> Iterator[Job]:
+        """Yield the job as it is, then at each change, until it is final."""
+        return follow(self._transport, path_of("jobs", job_id), self._read)
+
+    def wait(self, job_id: str, timeout_s: float | None = None) -> Job:
+        """Return the job once it has succeeded or was cancelled; see ``Job.wait``."""
+        path = path_of("jobs", job_id)
+        # A stream of events has no end of its own in sight: only questions can be timed.
+        states = (
+            self.follow(job_id)
+            if timeout_s is None
+            else polled(self._transport, path, self._read, timeout_s=timeout_s)
+        )
+        job = deque(states, maxlen=1).pop()
+        if job.state in ("failed", "expired"):
+            raise JobFailed(job)
+        return job
+
+    def cancel(self, job_id: str) -> Job:
+        """Ask for a job's end. Not sent again where the answer is lost: look at the job then."""
+        answer = self._transport.request("POST", path_of("jobs", job_id, "cancel"))
+        return self._read(answer.text, answer.headers.get("etag"))
+
+    def rerun(self, job_id: str, *, idempotency_key: str | None = None) -> Job:
+        """Queue the same question again."""
+        path = path_of("jobs", job_id, "rerun")
+        return self._own(self._transport.post(path, Job, idempotency_key=idempotency_key))
+
+    def timeline(self, job_id: str) -> Timeline:
+        """Return a job's plan, judged; ``not_ready`` before there is one."""
+        return self._transport.get(path_of("jobs", job_id, "timeline"), Timeline)
+
+    def download(self, job_id: str, file: Path | str) -> Path:
+        """Write a timeline to a file, in the form that its suffix names.
+
+        The file appears once it is complete; one that was there stays until then.
+        """
+        to = Path(file)
+        name = f"timeline{to.suffix.lower() or '.json'}"
+        self._transport.save(path_of("jobs", job_id, name), to)
+        return to
+
+    def targets(
+        self, job_id: str, *, outcome: str | None = None, reason: str | None = None
+    ) -> Iterator[TargetOutcome]:
+        """Yield every target of the scenario with what became of it."""
+        params = {"outcome": outcome, "reason": reason, "limit": 500}
+        return self._transport.pages(path_of("jobs", job_id, "targets"), TargetOutcome, params)
+
+    def _read(self, text: str, etag: str | None = None) -> Job:
+        try:
+            job = Job.model_validate_json(text)
+        except ValidationError as error:
+            raise UnexpectedAnswer(f"a job is not as the API says: {error}") from error
+        return self._own(job.model_copy(update={"etag": etag}))
+
+    def _own(self, job: Job) -> Job:
+        job._jobs = self
+        return job
+
+
+def question(
+    scenario: str | Scenario | Mapping[str, Any],
+    time_s: float | None,
+    memory_mb: int | None,
+    priority: int | None,
+    label: str | None,
+) -> Json:
+    """Return what jobs and comparisons ask for in one way; what is None is left out."""
+    if isinstance(scenario, Mapping):
+        asked: Json = {"scenario": dict(scenario)}
+    else:
+        asked = {"scenario_id": scenario.id if isinstance(scenario, Scenario) else scenario}
+    limits = {"time_s": time_s, "memory_mb": memory_mb}
+    asked["limits"] = {name: value for name, value in limits.items() if value is not None}
+    optional = {"priority": priority, "label": label}
+    return asked | {name: value for name, value in optional.items() if value is not None}

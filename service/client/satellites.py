@@ -1,0 +1,103 @@
+"""Satellites and their element sets."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from service.client.shapes import Elements, Import, ImportedSatellite, Satellite
+from service.client.transport import Transport, path_of, read
+from service.client.uploads import Source, upload
+
+
+class Satellites:
+    """The satellites that are stored."""
+
+    def __init__(self, transport: Transport):
+        self._transport = transport
+
+    def create(
+        self,
+        name: str,
+        *,
+        tle: Sequence[str] | None = None,
+        omm: Mapping[str, Any] | None = None,
+        agility: Mapping[str, Any] | None = None,
+        sensor: Mapping[str, Any] | None = None,
+        resources: str | Mapping[str, Any] | None = None,
+        idempotency_key: str | None = None,
+    ) -> Satellite:
+        """Store a satellite; its orbit is ``tle``, two lines, or ``omm``, keywords."""
+        optional = {
+            "tle": None if tle is None else list(tle),
+            "omm": omm,
+            "agility": agility,
+            "sensor": sensor,
+            "resources": resources,
+        }
+        body = {"name": name} | {k: v for k, v in optional.items() if v is not None}
+        return self._transport.post(
+            path_of("satellites"), Satellite, json=body, idempotency_key=idempotency_key
+        )
+
+    def import_elements(
+        self,
+        source: Source,
+        form: str | None = None,
+        *,
+        reject_all: bool = False,
+        idempotency_key: str | None = None,
+    ) -> Import[ImportedSatellite]:
+        """Store the element sets of a file: ``tle``, ``kvn``, ``json``, ``csv`` or ``xml``.
+
+        Records whose catalogue number is known join that satellite, so that importing the
+        same file again changes nothing.
+
+        Parameters
+        ----------
+        source, form
+            The file, or its content and form.
+        reject_all
+            Whether one bad record refuses the file.
+        """
+        content, headers = upload(source, form)
+        return self._transport.post(
+            path_of("satellites", "import"),
+            Import[ImportedSatellite],
+            params={"on_error": "reject_all" if reject_all else "skip"},
+            content=content,
+            headers=headers,
+            idempotency_key=idempotency_key,
+        )
+
+    def list(self, *, norad_cat_id: int | None = None) -> Iterator[Satellite]:
+        """Yield the satellites, newest first."""
+        params = {"norad_cat_id": norad_cat_id}
+        return self._transport.pages(path_of("satellites"), Satellite, params)
+
+    def get(self, satellite_id: str) -> Satellite:
+        """Return one satellite."""
+        return self._transport.get(path_of("satellites", satellite_id), Satellite)
+
+    def elements(self, satellite_id: str) -> Iterator[Elements]:
+        """Yield all element sets of a satellite, the last stored first."""
+        return self._transport.pages(path_of("satellites", satellite_id, "elements"), Elements)
+
+    def put_elements(
+        self,
+        satellite_id: str,
+        *,
+        tle: Sequence[str] | None = None,
+        omm: Mapping[str, Any] | None = None,
+        if_match: str | None = None,
+    ) -> Satellite:
+        """Store a further element set, where the satellite is still as ``if_match`` says."""
+        body = {"omm": omm} if tle is None else {"tle": list(tle)}
+        headers = {} if if_match is None else {"If-Match": if_match}
+        path = path_of("satellites", satellite_id, "elements")
+        answer = self._transport.request("PUT", path, json=body, headers=headers)
+        return read(Satellite, answer)
+
+    def delete(self, satellite_id: str, *, if_match: str | None = None) -> None:
+        """Delete a satellite; scenarios keep their copy."""
+        self._transport.delete(path_of("satellites", satellite_id), if_match=if_match)

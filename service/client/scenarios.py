@@ -1,0 +1,88 @@
+"""Scenarios: frozen questions, and the opportunities they offer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from datetime import datetime
+from typing import Any
+
+from service.client.shapes import Json, Opportunity, Scenario
+from service.client.transport import Transport, path_of
+
+
+class Scenarios:
+    """The scenarios that are stored."""
+
+    def __init__(self, transport: Transport):
+        self._transport = transport
+
+    def create(
+        self,
+        *,
+        start: datetime | str,
+        end: datetime | str,
+        satellite_ids: Sequence[str],
+        target_catalog_ids: Sequence[str],
+        ground_station_ids: Sequence[str] = (),
+        idempotency_key: str | None = None,
+        **optional: Any,
+    ) -> Scenario:
+        """Freeze a question. The same content again is the scenario that is there.
+
+        Parameters
+        ----------
+        start, end
+            With their offset from UTC; an instant without one is refused.
+        optional
+            ``name``, ``use_resources``, ``dynamics``, ``collect_spacing_s`` and so on.
+        """
+        body = {
+            "horizon": {"start": _text(start), "end": _text(end)},
+            "satellite_ids": list(satellite_ids),
+            "target_catalog_ids": list(target_catalog_ids),
+            "ground_station_ids": list(ground_station_ids),
+            **optional,
+        }
+        return self._transport.post(
+            path_of("scenarios"), Scenario, json=body, idempotency_key=idempotency_key
+        )
+
+    def list(self) -> Iterator[Scenario]:
+        """Yield the scenarios, newest first."""
+        return self._transport.pages(path_of("scenarios"), Scenario)
+
+    def get(self, scenario_id: str) -> Scenario:
+        """Return one scenario."""
+        return self._transport.get(path_of("scenarios", scenario_id), Scenario)
+
+    def file(self, scenario_id: str) -> Json:
+        """Return the self-contained scenario file, which ``slewline solve`` takes too."""
+        path = path_of("scenarios", scenario_id)
+        answer: Json = self._transport.request("GET", path, params={"expand": True}).json()
+        return answer
+
+    def opportunities(
+        self,
+        scenario_id: str,
+        *,
+        kind: str | None = None,
+        target_id: str | None = None,
+        satellite_id: str | None = None,
+    ) -> Iterator[Opportunity]:
+        """Yield what could be done before any planning, in order of start.
+
+        The service computes it at the first call and asks to come back until it has.
+        """
+        params = {
+            "kind": kind,
+            "target_id": target_id,
+            "satellite_id": satellite_id,
+            "limit": 500,
+        }
+        return self._transport.pages(
+            path_of("scenarios", scenario_id, "opportunities"), Opportunity, params
+        )
+
+
+def _text(instant: datetime | str) -> str:
+    return instant if isinstance(instant, str) else instant.isoformat()

@@ -1,0 +1,260 @@
+"""Requests that outlive lost connections: sent again where that is safe, and only there."""
+
+from __future__ import annotations
+
+import logging
+import os
+import secrets
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import IO, Any, Final, TypeVar
+from urllib.parse import quote
+
+import httpx
+from pydantic import ValidationError
+from tenacity import (
+    RetryCallState,
+    Retrying,
+    retry_if_exception,
+    stop_before_delay,
+    wait_random_exponential,
+)
+
+from service.client.errors import (
+    ServiceError,
+    UnexpectedAnswer,
+    Unreachable,
+    error_of,
+)
+from service.client.shapes import Shape, Stored
+
+log = logging.getLogger("service.client")
+
+M = TypeVar("M", bound=Shape)
+R = TypeVar("R")
+
+Params = Mapping[str, str | int | float | bool | None]
+
+_COME_BACK: Final = frozenset({429, 502, 503, 504})
+_NEVER_SENT: Final = (httpx.ConnectError, httpx.ConnectTimeout, httpx.PoolTimeout)
+_LOST: Final = (httpx.NetworkError, httpx.TimeoutException, httpx.RemoteProtocolError)
+_PAUSE: Final = wait_random_exponential(multiplier=0.5, max=10.0)
+
+
+class Transport:
+    """Sends requests of one client.
+
+    A request is sent again after a lost connection, 429, 502, 503 and 504, where a repeat
+    does no harm: GET, PUT and DELETE without ``If-Match``, and POST with an idempotency key.
+    Any request is where the service was never reached. The pauses grow, are partly chance,
+    and never end before ``Retry-After``.
+    """
+
+    def __init__(self, http: httpx.Client, *, patience_s: float):
+        self.http = http
+        self.patience_s = patience_s
+
+    def request(
+        self,
+        method: str,
+        path: str,
+        *,
+        params: Params | None = None,
+        headers: Mapping[str, str] | None = None,
+        patience_s: float | None = None,
+        **body: Any,
+    ) -> httpx.Response:
+        """Return the answer to a request, which is a success or 304.
+
+        Parameters
+        ----------
+        patience_s
+            For how long it is tried again, at most.
+        body
+            ``json`` or ``content``.
+
+        Raises
+        ------
+        ServiceError
+            Where the service refuses.
+        Unreachable
+            Where no answer came.
+        """
+        sent = httpx.Headers(headers)
+        given = {name: value for name, value in (params or {}).items() if value is not None}
+
+        def send() -> httpx.Response:
+            answer = self.http.request(method, path, params=given, headers=sent, **body)
+            return checked(answer)
+
+        return self._again(send, is_repeatable(method, sent), patience_s)
+
+    def get(self, path: str, shape: type[M], params: Params | None = None) -> M:
+        """Return what is there."""
+        return read(shape, self.request("GET", path, params=params))
+
+    def post(
+        self,
+        path: str,
+        shape: type[M],
+        *,
+        idempotency_key: str | None,
+        headers: Mapping[str, str] | None = None,
+        **rest: Any,
+    ) -> M:
+        """Return what was created, once however often the request has to be sent."""
+        key = {"Idempotency-Key": idempotency_key or secrets.token_hex(16)}
+        return read(shape, self.request("POST", path, headers={**(headers or {}), **key}, **rest))
+
+    def delete(self, path: str, *, if_match: str | None = None) -> None:
+        """Delete what is there; only in the state that ``if_match`` names, where it is given."""
+        attempts = 0
+        headers = {} if if_match is None else {"If-Match": if_match}
+
+        def send() -> None:
+            nonlocal attempts
+            attempts += 1
+            answer = self.http.delete(path, headers=headers)
+            if answer.status_code == 404 and attempts > 1:
+                return  # by the attempt before, whose answer was lost
+            checked(answer)
+
+        self._again(send, is_repeatable("DELETE", httpx.Headers(headers)))
+
+    def pages(self, path: str, shape: type[M], params: Params | None = None) -> Iterator[M]:
+        """Yield all of a list, page by page as they are asked for."""
+        cursor: str | None = None
+        while True:
+            answer = self.request("GET", path, params={**(params or {}), "cursor": cursor})
+            try:
+                page = answer.json()
+                items, cursor = page["items"], page["next"]
+            except (ValueError, KeyError, TypeError) as error:
+                raise _unexpected(answer, error) from error
+            for item in items:
+                yield _validated(answer, partial(shape.model_validate, item))
+            if cursor is None:
+                return
+
+    @contextmanager
+    def stream(
+        self, path: str, headers: Mapping[str, str], *, silence_s: float
+    ) -> Iterator[httpx.Response]:
+        """Yield an answer that is still coming; it ends where nothing comes for so long."""
+        timeout = httpx.Timeout(**{**self.http.timeout.as_dict(), "read": silence_s})
+        with self.http.stream("GET", path, headers=headers, timeout=timeout) as answer:
+            yield checked(answer)
+
+    def save(self, path: str, file: Path) -> None:
+        """Write what is there to a file, which appears whole or not at all."""
+
+        def fetch() -> None:
+            with self.http.stream("GET", path) as answer, written_whole(file) as out:
+                for chunk in checked(answer).iter_bytes():
+                    out.write(chunk)
+
+        self._again(fetch, True)
+
+    def _again(self, send: Callable[[], R], repeatable: bool, patience_s: float | None = None) -> R:
+        retrying = Retrying(
+            retry=retry_if_exception(lambda error: _is_worth_another(error, repeatable)),
+            stop=stop_before_delay(self.patience_s if patience_s is None else patience_s),
+            wait=_pause,
+            before_sleep=_tell,
+            reraise=True,
+        )
+        try:
+            return retrying(send)
+        except httpx.TransportError as error:
+            raise Unreachable(f"{self.address}: {_words(error)}") from error
+
+    @property
+    def address(self) -> str:
+        """The service's URL without credentials."""
+        return str(self.http.base_url.copy_with(userinfo=b"")).rstrip("/")
+
+
+def path_of(*parts: str) -> str:
+    """Return a path of the API.
+
+    >>> path_of("jobs", "a/b", "cancel")
+    '/v1/jobs/a%2Fb/cancel'
+    """
+    return "/".join(["/v1", *(quote(part, safe="") for part in parts)])
+
+
+def is_repeatable(method: str, headers: httpx.Headers) -> bool:
+    """Return whether the service may get this request twice without harm.
+
+    >>> is_repeatable("POST", httpx.Headers()), is_repeatable("GET", httpx.Headers())
+    (False, True)
+    """
+    # What If-Match named is gone once the first attempt has been obeyed.
+    if method in ("GET", "PUT", "DELETE"):
+        return "If-Match" not in headers
+    return "Idempotency-Key" in headers
+
+
+def checked(answer: httpx.Response) -> httpx.Response:
+    """Return an answer that is a success or 304; raise what any other one tells."""
+    if answer.is_success or answer.status_code == 304:
+        return answer
+    answer.read()
+    raise error_of(answer)
+
+
+def read(shape: type[M], answer: httpx.Response) -> M:
+    """Return what an answer holds, with its ETag where the shape has one."""
+    found = _validated(answer, lambda: shape.model_validate_json(answer.content))
+    if isinstance(found, Stored):
+        return found.model_copy(update={"etag": answer.headers.get("etag")})
+    return found
+
+
+@contextmanager
+def written_whole(file: Path) -> Iterator[IO[bytes]]:
+    """Yield a file to write that takes its name once it is complete."""
+    part = file.with_name(f".{file.name}.{secrets.token_hex(4)}.part")
+    try:
+        with part.open("xb") as out:
+            yield out
+        os.replace(part, file)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _validated(answer: httpx.Response, build: Callable[[], M]) -> M:
+    try:
+        return build()
+    except ValidationError as error:
+        raise _unexpected(answer, error) from error
+
+
+def _unexpected(answer: httpx.Response, error: Exception) -> UnexpectedAnswer:
+    request = answer.request
+    return UnexpectedAnswer(f"{request.method} {request.url.path}: not as the API says: {error}")
+
+
+def _is_worth_another(error: BaseException, repeatable: bool) -> bool:
+    if isinstance(error, ServiceError):
+        return repeatable and error.status in _COME_BACK
+    return isinstance(error, _NEVER_SENT) or (repeatable and isinstance(error, _LOST))
+
+
+def _pause(attempt: RetryCallState) -> float:
+    """Return seconds until the next attempt: what was asked for, and a random share on top."""
+    error = attempt.outcome.exception() if attempt.outcome else None
+    asked_s = error.retry_after_s if isinstance(error, ServiceError) else None
+    return (asked_s or 0.0) + _PAUSE(attempt)
+
+
+def _tell(attempt: RetryCallState) -> None:
+    error = attempt.outcome.exception() if attempt.outcome else None
+    if error is not None:
+        log.warning("%s; trying again in %.1f s", _words(error), attempt.upcoming_sleep)
+
+
+def _words(error: BaseException) -> str:
+    return str(error) or type(error).__name__

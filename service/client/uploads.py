@@ -1,0 +1,47 @@
+"""Files on their way to the service: their bytes, and the media type that names their form."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+Source = Path | str | bytes
+"""A file, or its content."""
+
+MEDIA_TYPES: Final = {
+    "tle": "text/plain",
+    "kvn": "text/plain",
+    "json": "application/json",
+    "geojson": "application/geo+json",
+    "csv": "text/csv",
+    "xml": "application/xml",
+}
+_SUFFIXES: Final = {".txt": "tle", ".2le": "tle", ".3le": "tle"}
+
+
+def upload(source: Source, form: str | None) -> tuple[bytes, dict[str, str]]:
+    """Return the content of a file and the header that tells its form.
+
+    Parameters
+    ----------
+    form
+        A name of ``MEDIA_TYPES``; of a ``Path`` the suffix tells it.
+
+    >>> upload("id,lat_deg,lon_deg", "csv")
+    (b'id,lat_deg,lon_deg', {'Content-Type': 'text/csv'})
+    """
+    name = form
+    if name is None and isinstance(source, Path):
+        name = _SUFFIXES.get(source.suffix.lower(), source.suffix.lower().removeprefix("."))
+    if name not in MEDIA_TYPES:
+        known = ", ".join(MEDIA_TYPES)
+        said = "the form of a text must be given" if name is None else f"there is no form {name!r}"
+        raise ValueError(f"{said}: {known}")
+    match source:
+        case Path():
+            content = source.read_bytes()
+        case str():
+            content = source.encode()
+        case bytes():
+            content = source
+    return content, {"Content-Type": MEDIA_TYPES[name]}

@@ -1,0 +1,106 @@
+"""``slewline plan``: a scenario to the service, its plan back."""
+
+from __future__ import annotations
+
+import secrets
+import sys
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from service.client import Client, Job, JobFailed, ServiceError
+from service.progress_line import ProgressLine
+from service.summary import summary
+
+
+def plan(
+    client: Client,
+    scenario: str | Mapping[str, Any],
+    *,
+    solver: str,
+    params: Mapping[str, Any],
+    seed: int = 0,
+    time_s: float | None = None,
+    priority: int | None = None,
+    label: str | None = None,
+    out: Path | None = None,
+    detach: bool = False,
+) -> int:
+    """Have a scenario planned, print a summary, and return 0 where the plan is valid, else 1.
+
+    Ctrl-C cancels the job and saves the best plan that it had; a second one leaves at once.
+
+    Parameters
+    ----------
+    scenario
+        The content of a scenario file, or the id of a stored scenario. A content that the
+        service knows is not stored again.
+    solver, params, seed, time_s, priority, label
+        Of the job.
+    out
+        Where to save the timeline; the suffix chooses its form.
+    detach
+        Whether to print the job's id and leave it to itself.
+
+    Raises
+    ------
+    ClientError
+        Where the service refuses, fails or does not answer.
+    OSError
+        Where the timeline cannot be written.
+    """
+    key = secrets.token_hex(16)
+
+    def submit() -> Job:
+        return client.jobs.submit(
+            scenario,
+            solver,
+            params=params,
+            seed=seed,
+            time_s=time_s,
+            priority=priority,
+            label=label,
+            idempotency_key=key,
+        )
+
+    try:
+        job = submit()
+    except KeyboardInterrupt:
+        # It may have been taken already: under the same key that very job is answered.
+        _cancel(submit())
+        raise
+    if detach:
+        print(job.id)
+        return 0
+    print(f"job {job.id} at {client.url}", file=sys.stderr)
+    job = _followed(job)
+    if job.state in ("failed", "expired"):
+        raise JobFailed(job)
+    timeline = job.timeline()
+    print(summary(timeline.model_dump()))
+    if out is not None:
+        job.download(out)
+    return 0 if timeline.validity == "valid" else 1
+
+
+def _followed(job: Job) -> Job:
+    """Return the job at its end."""
+    with ProgressLine(sys.stderr) as line:
+        try:
+            return _watched(job, line)
+        except KeyboardInterrupt:
+            return _watched(_cancel(job), line)
+
+
+def _watched(job: Job, line: ProgressLine) -> Job:
+    for state in job.follow():
+        line.show(state)
+        job = state
+    return job
+
+
+def _cancel(job: Job) -> Job:
+    with suppress(ServiceError):  # it may have ended by itself: what follows will tell
+        return job.cancel()
+    return job

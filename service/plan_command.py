@@ -1,0 +1,104 @@
+"""What ``slewline plan`` was given on its command line, and where a refusal lies in it."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Final
+
+from planner_core.errors import PlannerError
+from service.client import Client, ServiceError
+from service.plan import plan
+from service.scenario_files import place_of, read_scenario, require_folder
+
+_SUFFIXES: Final = (".json", ".csv", ".geojson", ".czml", ".ics")  # the service has the last word
+_OPTIONS: Final = {
+    "/limits/time_s": "--time-s",
+    "/seed": "--seed",
+    "/label": "--label",
+    "/priority": "--priority",
+    "/scenario_id": "--scenario-id",
+}
+_OF_THE_INPUT: Final = (413, 422)
+
+
+class Refused(Exception):
+    """Something on the command line, in the environment or in a file; the message names it."""
+
+
+def run_plan(options: argparse.Namespace) -> int:
+    """Run the command and return its exit status.
+
+    Raises
+    ------
+    Refused
+        Where the input is wrong.
+    ClientError
+        Where the service does not do what was asked.
+    """
+    with _placed(options.scenario):
+        _check(options)
+        scenario = options.scenario_id or read_scenario(options.scenario)
+        with _client(options) as client:
+            return plan(
+                client,
+                scenario,
+                solver=options.solver,
+                params=dict(options.param),
+                seed=options.seed,
+                time_s=options.time_s,
+                priority=options.priority,
+                label=options.label,
+                out=options.out,
+                detach=options.detach,
+            )
+
+
+def _client(options: argparse.Namespace) -> Client:
+    if options.key_env is not None and options.key_env not in os.environ:
+        raise Refused(f"--key-env: there is no variable {options.key_env}")
+    key = None if options.key_env is None else os.environ[options.key_env]
+    try:
+        return Client(options.url, key)
+    except ValueError as error:
+        raise Refused(str(error)) from error
+
+
+def _check(options: argparse.Namespace) -> None:
+    if (options.scenario is None) == (options.scenario_id is None):
+        raise Refused("give either SCENARIO.json or --scenario-id")
+    if options.out is None:
+        return
+    if options.detach:
+        raise Refused("--out: with --detach there is no plan to write yet")
+    if options.out.suffix.lower() not in _SUFFIXES:
+        raise Refused(f"--out: {options.out} must end in one of {', '.join(_SUFFIXES)}")
+    require_folder(options.out)
+
+
+@contextmanager
+def _placed(scenario: Path) -> Iterator[None]:
+    try:
+        yield
+    except ServiceError as error:
+        if error.status not in _OF_THE_INPUT:
+            raise
+        raise Refused(_faults(error, scenario)) from error
+    except PlannerError as error:
+        raise Refused(f"{scenario}: {error.detail}") from error
+    except OSError as error:
+        raise Refused(f"{error.filename}: {error.strerror}") from error
+
+
+def _faults(error: ServiceError, scenario: Path) -> str:
+    """Return what the service found wrong, a line for each fault."""
+    lines = []
+    for fault in error.errors:
+        pointer = fault.pointer or ""
+        own = pointer.removeprefix("/scenario/")
+        in_file = f"{scenario} /{own}" if own != pointer else place_of(pointer, scenario)
+        lines.append(f"{_OPTIONS.get(pointer, in_file)}: {fault.detail}")
+    return "\n".join(lines) or error.detail
