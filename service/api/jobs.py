@@ -20,6 +20,7 @@ from service.api.job_wait import wait_for_change
 from service.api.paging import Listed, PagingDep, newest_first
 from service.api.problems import ServiceError
 from service.api.shapes import matches
+from service.api.timeline_shapes import JSON_PROOF, JSON_TIMELINE
 from service.db.rows import JobRow
 from service.jobs import lease
 from service.jobs.lease import JobState
@@ -172,7 +173,7 @@ def rerun_job(
 @router.get(
     "/{job_id}/timeline",
     responses={
-        200: {"content": {"application/json": {}}, "description": "The timeline document."},
+        200: {"content": JSON_TIMELINE, "description": "The timeline document."},
         **NOT_MODIFIED,
         **problem_responses(404, 406, 409),
     },
@@ -185,7 +186,7 @@ def get_timeline(job_id: str, database: DatabaseDep, request: Request) -> Respon
 @router.get(
     "/{job_id}/timeline.{suffix}",
     responses={
-        200: {"content": {"application/json": {}}, "description": "The timeline document."},
+        200: {"content": JSON_TIMELINE, "description": "The timeline document."},
         **NOT_MODIFIED,
         **problem_responses(404, 406, 409),
     },
@@ -200,7 +201,7 @@ def get_timeline_as(
 @router.get(
     "/{job_id}/proof",
     responses={
-        200: {"content": {"application/json": {}}, "description": "The proof document."},
+        200: {"content": JSON_PROOF, "description": "The proof document."},
         **NOT_MODIFIED,
         **problem_responses(404, 409),
     },

@@ -16,6 +16,7 @@ from service.api.errors import ProblemOut, problem_responses
 from service.api.examples import add_examples
 from service.api.guard import is_limited, is_open
 from service.api.target_catalogs import TargetCatalogIn
+from service.api.timeline_shapes import ProofOut, TimelineOut
 
 router = APIRouter(include_in_schema=False)
 
@@ -23,6 +24,8 @@ router = APIRouter(include_in_schema=False)
 _FURTHER_SCHEMAS: dict[str, type[BaseModel]] = {
     "Problem": ProblemOut,
     "TargetCatalogIn": TargetCatalogIn,
+    "Timeline": TimelineOut,
+    "Proof": ProofOut,
 }
 
 _ALWAYS = (422, 500, 503)

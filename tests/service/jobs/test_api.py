@@ -17,7 +17,10 @@ from service.main import create_app
 from service.solver_params import params_of
 from tests.service.conftest import checked_client, serve
 from tests.service.jobs.conftest import Jobs, Workers
+from tests.service.jobs.work import EMPTY
 from tests.service.problems import assert_problem
+
+TIMELINE = EMPTY | {"job": "one", "termination": "optimal"}
 
 KEYS = {
     "id", "state", "scenario", "solver", "params", "seed", "limits", "attempt", "priority",
@@ -61,7 +64,7 @@ def finish(jobs: Jobs, job_id: str, outcome: Outcome | None = None) -> None:
     answered = Outcome(
         state="succeeded",
         termination="optimal",
-        timeline='{"validity": "valid"}',
+        timeline=json.dumps(TIMELINE),
         targets=json.dumps(TARGETS),
     )
     held = start(jobs, job_id)
@@ -288,7 +291,8 @@ def test_the_timeline_is_not_ready_before_the_job_has_ended(
 
 
 def test_the_proof_of_a_bound_is_kept_with_the_answer(client: httpx.Client, jobs: Jobs) -> None:
-    for proof, shown in (('{"value": 3.0}', {"value": 3.0}), (None, None)):
+    found = {"version": 1, "proof": "lagrangian", "value": 3.0, "prices": [1.0, 2.0]}
+    for proof, shown in ((json.dumps(found), found), (None, None)):
         job_id = posted(client, jobs)
         answered = Outcome(state="succeeded", timeline="{}", targets="[]", proof=proof)
         finish(jobs, job_id, answered)
@@ -307,7 +311,7 @@ def test_the_timeline_comes_as_json_and_in_no_other_form_yet(
     path = f"/v1/jobs/{job_id}/timeline"
     answer = client.get(path)
     assert answer.headers["content-type"] == "application/json"
-    assert answer.json() == {"validity": "valid"}
+    assert answer.json() == TIMELINE
     known = {"If-None-Match": answer.headers["etag"]}
     assert client.get(path, headers=known).status_code == 304
     for accept in ("application/json", "text/csv, */*;q=0.1", "application/*"):

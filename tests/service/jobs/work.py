@@ -15,6 +15,30 @@ from planner_core.solvers.base import Budget, Progress
 from service.jobs.plan_job import PlanAnswer, PlanRequest
 from service.jobs.runner import Work
 
+_SPAN = {"start": "2026-03-01T00:00:00.000Z", "end": "2026-03-02T00:00:00.000Z"}
+EMPTY = {
+    "schema_version": "1.0",
+    "scenario_sha256": "0" * 64,
+    "plan_sha256": "0" * 64,
+    "solver": {"name": "answer", "version": "0", "params": {}, "seed": 0},
+    "horizon": _SPAN,
+    "dynamics": "physical",
+    "use_resources": False,
+    "runtime_s": dict.fromkeys(("access", "compile", "solve", "verify"), 0.0),
+    "validity": "valid",
+    "violations": [],
+    "totals": {
+        **dict.fromkeys(("reward", "collects", "contacts"), 0),
+        **dict.fromkeys(("bound", "gap", "bound_proof", "downlinked_mbit", "downlinked_fraction")),
+        **dict.fromkeys(("battery_min_fraction", "recorder_max_fraction")),
+        "targets": dict.fromkeys(("downlinked", "collected", "unscheduled", "excluded"), 0),
+    },
+    "warnings": [],
+    "models": {},
+    "satellites": [],
+}
+"""A timeline of nothing, with every field that readers may count on."""
+
 WORK = Work(function="tests.service.jobs.work:run", preload="tests.service.jobs.work")
 
 
@@ -72,12 +96,7 @@ def search(request: PlanRequest, budget: Budget) -> PlanAnswer:
 
 def answer(request: PlanRequest, termination: str) -> PlanAnswer:
     """Return a small answer that names its job and its run."""
-    timeline = {
-        "job": request.job_id,
-        "run": request.run,
-        "termination": termination,
-        "validity": "valid",
-    }
+    timeline = EMPTY | {"job": request.job_id, "run": request.run, "termination": termination}
     targets = [{"target_id": "t0", "outcome": "collected", "reason": None}]
     return PlanAnswer(
         timeline=json.dumps(timeline),
