@@ -171,7 +171,6 @@ def _worker(options: argparse.Namespace) -> int:
     from service.jobs.runner import Work
 
     run_worker(_settings(options), Work())
-    return OK
 
 
 def _migrate(options: argparse.Namespace) -> int:

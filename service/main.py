@@ -75,7 +75,7 @@ def create_app(settings: Settings, queue: JobQueue | None = None) -> FastAPI:
         redirect_slashes=False,
     )
     app.state.settings = settings
-    app.state.database = Database(settings.database_url)
+    app.state.database = Database(settings.database_url, settings.database_timeout_s)
     app.state.opportunities = OpportunityReader()
     app.state.queue = queue
     app.state.call_counters = metrics.CallCounters()

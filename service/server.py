@@ -90,7 +90,7 @@ def serve(settings: Settings, *, with_workers: bool) -> int:
 
 @contextmanager
 def _running_api(settings: Settings, listener: socket.socket) -> Iterator[threading.Thread]:
-    queue = DbosQueue(settings.database_url)
+    queue = DbosQueue(settings.database_url, settings.database_timeout_s)
     config = uvicorn.Config(
         create_app(settings, queue),
         log_config=None,

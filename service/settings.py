@@ -8,6 +8,8 @@ import platformdirs
 from pydantic import Field
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
+from service.db.postgresql import DEFAULT_TIMEOUT_S
+
 
 def default_database_url() -> str:
     """Return the SQLite file under the user's data directory."""
@@ -21,6 +23,7 @@ class Settings(BaseSettings):
     model_config = SettingsConfigDict(env_prefix="SLEWLINE_", frozen=True)
 
     database_url: str = Field(default_factory=default_database_url)
+    database_timeout_s: float = Field(DEFAULT_TIMEOUT_S, gt=0, le=600)
     host: str = "127.0.0.1"
     port: int = Field(8000, ge=0, le=65535)
     workers: int = Field(2, ge=0, le=64)

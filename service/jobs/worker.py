@@ -28,6 +28,7 @@ from service.jobs.lease import Lease, Outcome
 from service.jobs.plan_job import PlanAnswer, PlanRequest
 from service.jobs.queue import DbosConsumer, DbosQueue
 from service.jobs.reconcile import Reconciler
+from service.jobs.renewal import Renewal
 from service.jobs.runner import Abandoned, Limits, Order, Runner, Work
 from service.settings import Settings
 from service.stopping import StopRequest
@@ -54,8 +55,8 @@ class Worker:
     def __init__(self, settings: Settings, work: Work):
         self.id = f"{socket.gethostname()}-{os.getpid()}-{secrets.token_hex(4)}"
         self._settings = settings
-        self._database = Database(settings.database_url)
-        self._queue = DbosQueue(settings.database_url)
+        self._database = Database(settings.database_url, settings.database_timeout_s)
+        self._queue = DbosQueue(settings.database_url, settings.database_timeout_s)
         self._runner = Runner(work)
         self._reconciler = Reconciler(
             self._database,
@@ -76,7 +77,9 @@ class Worker:
         """Work until ``stop`` is called or ``is_wanted`` says no."""
         if not self._runner.warm_up(lambda: is_wanted() and not self._is_stopping()):
             return
-        consumer = DbosConsumer(self._settings.database_url, self.id, self.handle)
+        consumer = DbosConsumer(
+            self._settings.database_url, self.id, self.handle, self._settings.database_timeout_s
+        )
         self._enrol()
         consumer.start()
         try:
@@ -117,17 +120,21 @@ class Worker:
         limits = Limits(
             time_s=float(request.limits["time_s"]), memory_mb=int(request.limits["memory_mb"])
         )
-        ending = self._runner.run(
-            request,
-            limits,
-            tick_s=self._settings.heartbeat_s,
-            tick=lambda progress: self._tick(held, progress),
-        )
+        renewal = Renewal(lambda progress: self._renew(held, progress))
+        try:
+            ending = self._runner.run(
+                request,
+                limits,
+                tick_s=self._settings.heartbeat_s,
+                tick=lambda progress: (
+                    Order.ABANDON if self._is_stopping() else renewal.tick(progress)
+                ),
+            )
+        finally:
+            renewal.end()
         self._conclude(held, request, ending)
 
-    def _tick(self, held: Lease, progress: Progress | None) -> Order:
-        if self._is_stopping():
-            return Order.ABANDON
+    def _renew(self, held: Lease, progress: Progress | None) -> Order:
         report = None if progress is None else dataclasses.asdict(progress)
         try:
             with self._database.transaction() as session:
@@ -193,8 +200,11 @@ class Worker:
             log.warning("could not look for stranded jobs", exc_info=True)
 
     def _leave(self) -> None:
-        with self._database.transaction() as session:
-            session.execute(sa.delete(WorkerRow).where(WorkerRow.id == self.id))
+        try:
+            with self._database.transaction() as session:
+                session.execute(sa.delete(WorkerRow).where(WorkerRow.id == self.id))
+        except SQLAlchemyError as error:
+            _raise_unless_it_passes(error, "could not take leave")
         self._queue.close()
         self._database.close()
 
