@@ -15,7 +15,7 @@ import sqlalchemy as sa
 
 from service.cli import FAILED, OK, WRONG_INPUT, main
 
-COMMANDS = ("serve", "api", "worker", "migrate", "demo", "solve", "openapi")
+COMMANDS = ("serve", "api", "worker", "migrate", "backup", "demo", "solve", "openapi")
 
 
 @pytest.fixture(autouse=True)
