@@ -173,8 +173,12 @@ def _run_server(settings: Settings, *, with_workers: bool) -> int:
 def _worker(options: argparse.Namespace) -> int:
     from service.jobs.__main__ import run_worker
     from service.jobs.runner import Work
+    from service.tracing import CannotTrace
 
-    run_worker(_settings(options), Work())
+    try:
+        run_worker(_settings(options), Work())
+    except CannotTrace as error:
+        return _complain(str(error), FAILED)
 
 
 def _migrate(options: argparse.Namespace) -> int:

@@ -21,6 +21,7 @@ from service.logs import configure_logging
 from service.main import create_app
 from service.settings import Settings
 from service.stopping import StopRequest
+from service.tracing import CannotTrace, start_tracing
 
 _READY_WITHIN_S: Final = 300.0  # a first start may have kernels to compile
 _LOOK_EVERY_S: Final = 0.1
@@ -74,6 +75,7 @@ def serve(settings: Settings, *, with_workers: bool) -> int:
     with ExitStack() as stack:
         listener = stack.enter_context(listen(settings.host, settings.port))
         configure_logging()
+        stack.enter_context(_traced(settings))
         prepare_database(settings)
         api = stack.enter_context(_running_api(settings, listener))
         health = "live"
@@ -86,6 +88,19 @@ def serve(settings: Settings, *, with_workers: bool) -> int:
         while api.is_alive() and not stop.wait(_LOOK_EVERY_S):
             pass
     return 0 if stop.is_asked() else 1
+
+
+@contextmanager
+def _traced(settings: Settings) -> Iterator[None]:
+    try:
+        provider = start_tracing(settings, "api")
+    except CannotTrace as error:
+        raise CannotServe(str(error)) from error
+    try:
+        yield
+    finally:
+        if provider is not None:
+            provider.shutdown()
 
 
 @contextmanager

@@ -40,3 +40,4 @@ class Settings(BaseSettings):
     max_queued: int = Field(10_000, ge=1)
     max_running_per_tenant: int = Field(64, ge=1)
     idempotency_hours: float = Field(24.0, gt=0, le=8760)
+    otel: bool | None = None

@@ -13,6 +13,7 @@ from service.jobs.runner import Work
 from service.jobs.worker import Worker
 from service.logs import configure_logging
 from service.settings import Settings
+from service.tracing import start_tracing
 
 log = logging.getLogger(__name__)
 
@@ -34,6 +35,7 @@ def main(arguments: list[str] | None = None) -> NoReturn:
 def run_worker(settings: Settings, work: Work, *, supervisor: int | None = None) -> NoReturn:
     """Run one worker in this process, which ends with it; this must be its main thread."""
     configure_logging()
+    spans = start_tracing(settings, "worker")
     worker = Worker(settings, work)
     signal.signal(signal.SIGTERM, lambda *_: worker.stop())
     signal.signal(signal.SIGINT, lambda *_: worker.stop())
@@ -49,6 +51,8 @@ def run_worker(settings: Settings, work: Work, *, supervisor: int | None = None)
         status = 1
     # Some thread of the queue's library may yet try to reach a database that hangs, to write
     # what we do not need: it would hold up an ordinary exit for minutes.
+    if spans is not None:
+        spans.shutdown()
     logging.shutdown()
     os._exit(status)
 

@@ -17,7 +17,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.orm import Session
 
 from planner_core.solvers.base import Progress
-from service import bound_store, opportunity_store
+from service import bound_store, opportunity_store, tracing
 from service.db.clock import utc_now
 from service.db.failures import why_unavailable
 from service.db.rows import JobRow, ScenarioRow, WorkerRow
@@ -32,6 +32,7 @@ from service.jobs.renewal import Renewal
 from service.jobs.runner import Abandoned, Limits, Order, Runner, Work
 from service.settings import Settings
 from service.stopping import StopRequest
+from service.tracing import JobSpan
 
 log = logging.getLogger(__name__)
 T = TypeVar("T")
@@ -114,9 +115,14 @@ class Worker:
             held = lease.start(session, job_id, dispatch, lease_s=self._settings.lease_s)
         if held is None:
             return
-        request = self._insist(
+        request, traceparent = self._insist(
             self._database.reading, lambda session: _request(session, job_id, held.run)
         )
+        names = {"job_id": job_id, "run": held.run, "solver": request.solver}
+        with tracing.running(traceparent, **names) as span:
+            self._run(held, request, span)
+
+    def _run(self, held: Lease, request: PlanRequest, span: JobSpan) -> None:
         limits = Limits(
             time_s=float(request.limits["time_s"]), memory_mb=int(request.limits["memory_mb"])
         )
@@ -129,10 +135,16 @@ class Worker:
                 tick=lambda progress: (
                     Order.ABANDON if self._is_stopping() else renewal.tick(progress)
                 ),
+                on_phase=span.enter_phase,
             )
         finally:
             renewal.end()
+        span.enter_phase("store")
         self._conclude(held, request, ending)
+        if isinstance(ending, Abandoned):
+            span.note_end("abandoned")
+        else:
+            span.note_end(outcome_of(ending).state, failed=isinstance(ending, Refused))
 
     def _renew(self, held: Lease, progress: Progress | None) -> Order:
         report = None if progress is None else dataclasses.asdict(progress)
@@ -229,14 +241,14 @@ def outcome_of(ending: Ending) -> Outcome:
     )
 
 
-def _request(session: Session, job_id: str, run: int) -> PlanRequest:
+def _request(session: Session, job_id: str, run: int) -> tuple[PlanRequest, str | None]:
     wanted = (
         sa.select(JobRow, ScenarioRow.sha256, ScenarioRow.content)
         .join(ScenarioRow, ScenarioRow.id == JobRow.scenario_id)
         .where(JobRow.id == job_id)
     )
-    job, sha256, content = session.execute(wanted).one()._tuple()
-    return PlanRequest(
+    job, sha256, content = session.execute(wanted).one()
+    request = PlanRequest(
         job_id=job.id,
         run=run,
         scenario_sha256=sha256,
@@ -248,6 +260,7 @@ def _request(session: Session, job_id: str, run: int) -> PlanRequest:
         opportunity_block=opportunity_store.load(session, sha256),
         bound=bound_store.load(session, sha256),
     )
+    return request, job.traceparent
 
 
 def _raise_unless_it_passes(error: SQLAlchemyError, consequence: str) -> None:
