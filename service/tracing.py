@@ -83,7 +83,7 @@ def start_tracing(settings: Settings, role: str) -> TracerProvider | None:
 
 def is_untraced(scope: MutableMapping[str, Any]) -> bool:
     """Return whether a request is one of those that only ask whether we are well."""
-    return scope["type"] == "http" and scope["path"].startswith(_UNTRACED)
+    return scope["type"] == "http" and str(scope["path"]).startswith(_UNTRACED)
 
 
 def note_queued(job_id: str) -> str | None:

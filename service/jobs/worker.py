@@ -118,8 +118,9 @@ class Worker:
         request, traceparent = self._insist(
             self._database.reading, lambda session: _request(session, job_id, held.run)
         )
-        names = {"job_id": job_id, "run": held.run, "solver": request.solver}
-        with tracing.running(traceparent, **names) as span:
+        with tracing.running(
+            traceparent, job_id=job_id, run=held.run, solver=request.solver
+        ) as span:
             self._run(held, request, span)
 
     def _run(self, held: Lease, request: PlanRequest, span: JobSpan) -> None:
