@@ -6,6 +6,8 @@ BIN := .venv/bin
 STAMP := .venv/.installed
 WARM := .venv/.warm
 KERNELS := $(shell grep -rlE '^@(kernel|borrowing|inlined)' planner_core --include=*.py)
+LOCK := $(UV) pip compile pyproject.toml --universal --python-version 3.11 --generate-hashes \
+	--no-emit-index-url
 PIP := $(BIN)/python -m pip -qq --disable-pip-version-check
 
 .PHONY: help setup demo serve test chaos check format lock paper paper-quick clean
@@ -18,7 +20,7 @@ help:
 	@echo "make check    lint, format, types, import contracts, examples in docstrings"
 	@echo "make setup    the environment in .venv (the others call it)"
 	@echo "make format   rewrite the sources in the one layout"
-	@echo "make lock     resolve the dependencies again into requirements.lock (needs uv)"
+	@echo "make lock     resolve the dependencies again into the lock files (needs uv)"
 	@echo "make paper    the paper's study again, within two hours; writes docs/paper-reproduction.md"
 	@echo "make paper-quick  the same in five minutes, into build/paper-quick"
 	@echo "make clean    remove all that these commands made"
@@ -71,8 +73,8 @@ format: setup
 	$(BIN)/ruff format .
 
 lock:
-	$(UV) pip compile pyproject.toml --extra dev --extra study --universal --python-version 3.11 \
-		--generate-hashes --no-emit-index-url -o requirements.lock
+	$(LOCK) --extra dev --extra study --extra otel -o requirements.lock
+	$(LOCK) --extra otel --extra build -c requirements.lock -o docker/requirements.lock
 
 # Both go on where they were stopped.
 paper: setup

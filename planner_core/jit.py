@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
+import shutil
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final, TypeVar, cast
@@ -35,11 +38,28 @@ def _set_cache_folder() -> None:
     """
     if "NUMBA_CACHE_DIR" in os.environ:
         return
+    name = f"kernels-{sources_fingerprint()}"
     beside = _PACKAGE / "__pycache__"
-    can_write = os.access(beside if beside.is_dir() else _PACKAGE, os.W_OK)
-    base = beside if can_write else platformdirs.user_cache_path("slewline")
+    folder = beside / name
+    if not os.access(beside if beside.is_dir() else _PACKAGE, os.W_OK):
+        folder = platformdirs.user_cache_path("slewline") / name
+        _bring_along(beside / name, folder)
     config: Any = numba.config
-    config.CACHE_DIR = str(base / f"kernels-{sources_fingerprint()}")
+    config.CACHE_DIR = str(folder)
+
+
+def _bring_along(installed: Path, folder: Path) -> None:
+    """Copy the kernels of an installation that is read-only: Numba reads only where it can write.
+
+    What was compiled for another processor is compiled again into the copy.
+    """
+    if folder.exists() or not installed.is_dir():
+        return
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=folder.parent) as spare:
+        copy = shutil.copytree(installed, Path(spare) / "kernels")
+        with contextlib.suppress(OSError):  # another process was first
+            copy.rename(folder)
 
 
 _set_cache_folder()

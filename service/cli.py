@@ -74,6 +74,10 @@ def _parser() -> argparse.ArgumentParser:
     migrate = _command(commands, "migrate", _migrate, "create or update the database")
     _add_database(migrate)
 
+    backup = _command(commands, "backup", _backup, "copy a SQLite database that is in use")
+    backup.add_argument("file", type=Path, metavar="FILE", help="a new file")
+    _add_database(backup)
+
     demo = _command(commands, "demo", _demo, "plan a real-size mission and print what came out")
     demo.add_argument("--serve", action="store_true", help="keep serving afterwards")
     demo.add_argument("--out", type=Path, default=Path("demo-output"), help="folder for timelines")
@@ -231,9 +235,12 @@ def _run_server(settings: Settings, *, with_workers: bool) -> int:
 def _worker(options: argparse.Namespace) -> int:
     from service.jobs.__main__ import run_worker
     from service.jobs.runner import Work
+    from service.tracing import CannotTrace
 
-    run_worker(_settings(options), Work())
-    return OK
+    try:
+        run_worker(_settings(options), Work())
+    except CannotTrace as error:
+        return _complain(str(error), FAILED)
 
 
 def _migrate(options: argparse.Namespace) -> int:
@@ -241,6 +248,17 @@ def _migrate(options: argparse.Namespace) -> int:
 
     prepare_database(_settings(options))
     print("The database is up to date.")
+    return OK
+
+
+def _backup(options: argparse.Namespace) -> int:
+    from service.db.backup import CannotBackUp, back_up
+
+    try:
+        back_up(_settings(options).database_url, options.file)
+    except CannotBackUp as error:
+        return _complain(str(error), FAILED)
+    print(f"The database is in {options.file}.")
     return OK
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
 
+from service import tracing
 from service.db.clock import utc_now
 from service.db.rows import JobResultRow, JobRow, ScenarioRow
 from service.ids import new_id
@@ -63,6 +64,7 @@ def submit(session: Session, queue: JobQueue, spec: JobSpec) -> JobRow:
             priority=spec.priority,
             label=spec.label,
             rerun_of=spec.rerun_of,
+            traceparent=tracing.note_queued(job_id),
             created_at=utc_now(),
             dispatched_at=utc_now(),
         )

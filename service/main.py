@@ -34,6 +34,7 @@ from service.api.security_headers import SecurityHeaders
 from service.db.session import Database
 from service.opportunities import OpportunityReader
 from service.settings import Settings
+from service.tracing import is_untraced
 
 if TYPE_CHECKING:
     from service.jobs.queue import JobQueue
@@ -80,9 +81,17 @@ def create_app(settings: Settings, queue: JobQueue | None = None) -> FastAPI:
         lifespan=_lifespan,
         dependencies=[Depends(check_request)],
         redirect_slashes=False,
+        # Spans where service.tracing has set them up; metrics and logs are our own.
+        telemetry={
+            "metrics": False,
+            "logs": False,
+            "operation_spans": False,
+            "auto_configure": False,
+            "exclude": is_untraced,
+        },
     )
     app.state.settings = settings
-    app.state.database = Database(settings.database_url)
+    app.state.database = Database(settings.database_url, settings.database_timeout_s)
     app.state.opportunities = OpportunityReader()
     app.state.queue = queue
     app.state.call_counters = metrics.CallCounters()

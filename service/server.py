@@ -22,6 +22,7 @@ from service.logs import configure_logging
 from service.main import create_app
 from service.settings import Settings
 from service.stopping import StopRequest
+from service.tracing import CannotTrace, start_tracing
 
 _READY_WITHIN_S: Final = 300.0  # a first start may have kernels to compile
 _LOOK_EVERY_S: Final = 0.1
@@ -99,6 +100,7 @@ def serve(settings: Settings, *, with_workers: bool) -> int:
     with ExitStack() as stack:
         listener = stack.enter_context(listen(settings.host, settings.port))
         configure_logging()
+        stack.enter_context(_traced(settings))
         prepare_database(settings)
         api = stack.enter_context(_running_api(settings, listener))
         health = "live"
@@ -114,8 +116,21 @@ def serve(settings: Settings, *, with_workers: bool) -> int:
 
 
 @contextmanager
+def _traced(settings: Settings) -> Iterator[None]:
+    try:
+        provider = start_tracing(settings, "api")
+    except CannotTrace as error:
+        raise CannotServe(str(error)) from error
+    try:
+        yield
+    finally:
+        if provider is not None:
+            provider.shutdown()
+
+
+@contextmanager
 def _running_api(settings: Settings, listener: socket.socket) -> Iterator[threading.Thread]:
-    queue = DbosQueue(settings.database_url)
+    queue = DbosQueue(settings.database_url, settings.database_timeout_s)
     config = uvicorn.Config(
         create_app(settings, queue),
         log_config=None,

@@ -12,6 +12,7 @@ from pydantic import Field, SecretStr, field_serializer, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from service.access.static_keys import StaticKeys
+from service.db.postgresql import DEFAULT_TIMEOUT_S
 
 _REQUESTS_PER_S: Final = 50.0
 _ORIGIN = re.compile(r"https?://[A-Za-z0-9.-]+(:\d+)?|https?://\[[0-9A-Fa-f:]+\](:\d+)?")
@@ -31,6 +32,7 @@ class Settings(BaseSettings):
     )
 
     database_url: str = Field(default_factory=default_database_url)
+    database_timeout_s: float = Field(DEFAULT_TIMEOUT_S, gt=0, le=600)
     host: str = "127.0.0.1"
     port: int = Field(8000, ge=0, le=65535)
     workers: int = Field(2, ge=0, le=64)
@@ -48,6 +50,7 @@ class Settings(BaseSettings):
     max_running_per_tenant: int = Field(64, ge=1)
     webhook_private_addresses: bool = False
     idempotency_hours: float = Field(24.0, gt=0, le=8760)
+    otel: bool | None = None
     require_keys: bool = False
     api_keys: SecretStr = SecretStr("")
     rate_limit_per_s: float | None = Field(None, ge=0, allow_inf_nan=False)

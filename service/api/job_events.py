@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import AsyncIterator
 from typing import Annotated, Final
 
 from fastapi import APIRouter, Depends, Header, Response
 from fastapi.responses import StreamingResponse
+from sqlalchemy.exc import SQLAlchemyError
 
 from service.api.deps import DatabaseDep, own_job_only
 from service.api.errors import problem_responses
 from service.api.job_shapes import etag_of_job, shown
 from service.api.job_wait import wait_for_change
+from service.db.failures import why_unavailable
 from service.db.session import Database
 from service.jobs import lease
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[Depends(own_job_only)])
+log = logging.getLogger(__name__)
 
 SIGN_OF_LIFE_S: Final = 10.0
 _NOTHING_SEEN: Final = "0"
@@ -40,7 +44,8 @@ async def job_events(
     """Send the job as it is, then at each change, until it is final.
 
     Each event's data is what `GET /v1/jobs/{id}` answers. With `Last-Event-ID` the first
-    event comes when the job is no longer what that event told.
+    event comes when the job is no longer what that event told. The stream also ends where the
+    database fails: ask again with `Last-Event-ID`.
     """
     job, _ = await wait_for_change(database, job_id, None, 0.0, _never)
     seen = last_event_id or _NOTHING_SEEN
@@ -56,7 +61,15 @@ async def job_events(
 
 async def _events(database: Database, job_id: str, seen: str) -> AsyncIterator[str]:
     while True:
-        job, sha256 = await wait_for_change(database, job_id, seen, SIGN_OF_LIFE_S, _never)
+        try:
+            job, sha256 = await wait_for_change(database, job_id, seen, SIGN_OF_LIFE_S, _never)
+        except SQLAlchemyError as error:
+            why = why_unavailable(error)
+            if why is None:
+                raise
+            # Who asks again with Last-Event-ID misses nothing.
+            log.warning("a stream of events ended early (%s)", why, extra={"job_id": job_id})
+            return
         if etag_of_job(job) != seen:
             seen = etag_of_job(job)
             data = shown(job, sha256).model_dump_json()

@@ -56,8 +56,9 @@ class ProblemExplained(BaseModel):
 
 
 @router.get("/health/live")
-def live() -> Live:
+async def live() -> Live:
     """Say that the process answers; nothing else is asked."""
+    # Not in a thread: those may all be waiting for a database that hangs.
     return Live()
 
 

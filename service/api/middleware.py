@@ -6,6 +6,7 @@ import logging
 import re
 import time
 
+from opentelemetry import trace
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
@@ -38,6 +39,7 @@ class RequestContext:
         own_id = asked if _ACCEPTABLE_ID.fullmatch(asked) else new_id()
         scope.setdefault("state", {})["request_id"] = own_id
         request_id.set(own_id)
+        trace.get_current_span().set_attribute("slewline.request_id", own_id)
         started = time.perf_counter()
         status = 500
 

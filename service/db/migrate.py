@@ -20,7 +20,8 @@ def upgrade(database_url: str) -> None:
     The second of two processes waits for the first (SQLite's write lock, an advisory lock on
     PostgreSQL) and then finds nothing left to do.
     """
-    engine = make_engine(database_url)
+    # A change of a large table takes as long as it takes, and so does the turn before.
+    engine = make_engine(database_url, timeout_s=None)
     try:
         with engine.begin() as connection:
             _wait_for_turn(connection)

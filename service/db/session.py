@@ -10,6 +10,8 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
 
+from service.db.postgresql import DEFAULT_TIMEOUT_S, make_postgresql_engine
+
 _SQLITE_PRAGMAS = ("busy_timeout = 30000", "synchronous = FULL", "foreign_keys = ON")
 
 
@@ -20,10 +22,12 @@ class Database:
     ----------
     url
         SQLAlchemy URL. A SQLite file (its folder is made) or PostgreSQL.
+    timeout_s
+        How long a statement may take on PostgreSQL.
     """
 
-    def __init__(self, url: str):
-        self.engine = make_engine(url)
+    def __init__(self, url: str, timeout_s: float = DEFAULT_TIMEOUT_S):
+        self.engine = make_engine(url, timeout_s)
         self._reader = self.engine.execution_options(read_only=True)
 
     @contextmanager
@@ -43,11 +47,11 @@ class Database:
         self.engine.dispose()
 
 
-def make_engine(url: str) -> sa.Engine:
+def make_engine(url: str, timeout_s: float | None = DEFAULT_TIMEOUT_S) -> sa.Engine:
     """Return an engine set up as the service needs it (SQLite: WAL, every commit synced)."""
     address = sa.make_url(url)
     if address.get_backend_name() != "sqlite":
-        return sa.create_engine(url, pool_pre_ping=True, pool_size=10, max_overflow=40)
+        return make_postgresql_engine(url, timeout_s, pool_size=10, max_overflow=40)
     if address.database and address.database != ":memory:":
         Path(address.database).parent.mkdir(parents=True, exist_ok=True)
     engine = sa.create_engine(url, pool_size=10, max_overflow=40)

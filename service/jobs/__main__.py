@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import argparse
+import logging
 import os
 import signal
-import sys
+from typing import NoReturn
 
 from service.jobs.parent import die_with_parent
 from service.jobs.runner import Work
 from service.jobs.worker import Worker
 from service.logs import configure_logging
 from service.settings import Settings
+from service.tracing import start_tracing
+
+log = logging.getLogger(__name__)
 
 
-def main(arguments: list[str] | None = None) -> int:
+def main(arguments: list[str] | None = None) -> NoReturn:
     """Run a worker until SIGTERM, or until the process ``--supervisor`` is gone."""
     parser = argparse.ArgumentParser(prog="python -m service.jobs")
     parser.add_argument("--work", default=Work().function, help="module:function")
@@ -26,21 +30,32 @@ def main(arguments: list[str] | None = None) -> int:
         Work(function=options.work, preload=options.preload),
         supervisor=options.supervisor,
     )
-    return 0
 
 
-def run_worker(settings: Settings, work: Work, *, supervisor: int | None = None) -> None:
-    """Run one worker in this process, which must be its main thread."""
+def run_worker(settings: Settings, work: Work, *, supervisor: int | None = None) -> NoReturn:
+    """Run one worker in this process, which ends with it; this must be its main thread."""
     configure_logging()
+    spans = start_tracing(settings, "worker")
     worker = Worker(settings, work)
     signal.signal(signal.SIGTERM, lambda *_: worker.stop())
     signal.signal(signal.SIGINT, lambda *_: worker.stop())
-    if supervisor is None:
-        worker.run()
-        return
-    die_with_parent(signal.SIGTERM)
-    worker.run(lambda: os.getppid() == supervisor)
+    status = 0
+    try:
+        if supervisor is None:
+            worker.run()
+        else:
+            die_with_parent(signal.SIGTERM)
+            worker.run(lambda: os.getppid() == supervisor)
+    except Exception:
+        log.exception("the worker failed")
+        status = 1
+    # Some thread of the queue's library may yet try to reach a database that hangs, to write
+    # what we do not need: it would hold up an ordinary exit for minutes.
+    if spans is not None:
+        spans.shutdown()
+    logging.shutdown()
+    os._exit(status)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

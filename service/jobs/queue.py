@@ -16,6 +16,7 @@ import sqlalchemy as sa
 from dbos import DBOS, DBOSClient, DBOSConfig, EnqueueOptions
 from sqlalchemy.orm import Session
 
+from service.db.postgresql import DEFAULT_TIMEOUT_S, make_postgresql_engine
 from service.db.sqlite_clock import add_sqlite_clock
 from service.settings import Settings
 
@@ -75,11 +76,11 @@ def parse_dispatch_name(name: str) -> tuple[str, int]:
     return job_id, int(dispatch)
 
 
-def make_queue_engine(database_url: str) -> sa.Engine | None:
+def make_queue_engine(database_url: str, timeout_s: float = DEFAULT_TIMEOUT_S) -> sa.Engine | None:
     """Return the engine DBOS must use, or None where its own will do (SQLite)."""
     if sa.make_url(database_url).get_backend_name() == "sqlite":
         return None
-    engine = sa.create_engine(database_url, pool_pre_ping=True, pool_size=10)
+    engine = make_postgresql_engine(database_url, timeout_s, pool_size=10)
     sa.event.listen(engine, "handle_error", _mark_disconnect)
     return engine
 
@@ -97,7 +98,7 @@ def _mark_disconnect(context: sa.engine.ExceptionContext) -> None:
 def migrate_queue(settings: Settings) -> None:
     """Create or update the queue's own tables, and the queue in them."""
     DBOS.migrate(settings.database_url)
-    queue = DbosQueue(settings.database_url)
+    queue = DbosQueue(settings.database_url, settings.database_timeout_s)
     try:
         queue.configure(tenant_limit=settings.max_running_per_tenant, poll_s=settings.queue_poll_s)
     finally:
@@ -111,10 +112,12 @@ class DbosQueue:
     ----------
     database_url
         Where ``migrate_queue`` has been run.
+    timeout_s
+        How long a statement may take on PostgreSQL.
     """
 
-    def __init__(self, database_url: str):
-        self._engine = make_queue_engine(database_url)
+    def __init__(self, database_url: str, timeout_s: float = DEFAULT_TIMEOUT_S):
+        self._engine = make_queue_engine(database_url, timeout_s)
         self._client = DBOSClient(
             system_database_url=database_url,
             system_database_engine=self._engine,
@@ -192,8 +195,14 @@ class DbosConsumer:
         Must never have been used before: DBOS would restart that worker's dispatches.
     """
 
-    def __init__(self, database_url: str, executor_id: str, handle: Callable[[str, int], None]):
-        self._engine = make_queue_engine(database_url)
+    def __init__(
+        self,
+        database_url: str,
+        executor_id: str,
+        handle: Callable[[str, int], None],
+        timeout_s: float = DEFAULT_TIMEOUT_S,
+    ):
+        self._engine = make_queue_engine(database_url, timeout_s)
         config = DBOSConfig(
             name=APPLICATION,
             system_database_url=database_url,

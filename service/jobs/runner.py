@@ -106,6 +106,7 @@ class Runner:
         *,
         tick_s: float,
         tick: Callable[[Progress | None], Order],
+        on_phase: Callable[[str], None] = lambda _: None,
     ) -> Ending | Abandoned:
         """Do the work and return how it ended.
 
@@ -114,6 +115,8 @@ class Runner:
         tick
             Called every ``tick_s`` with the newest progress, or None where there is nothing
             new; says how to go on.
+        on_phase
+            Called with the name of each phase when it begins.
         """
         ours, theirs = self._context.Pipe()
         process = self._context.Process(
@@ -124,7 +127,7 @@ class Runner:
         try:
             process.start()
             theirs.close()
-            return _Run(process, ours, limits, tick_s, tick).until_end()
+            return _Run(process, ours, limits, tick_s, tick, on_phase).until_end()
         finally:
             ours.close()
             _end(process)
@@ -140,12 +143,15 @@ class _Run:
         limits: Limits,
         tick_s: float,
         tick: Callable[[Progress | None], Order],
+        on_phase: Callable[[str], None],
     ):
         self._process = process
         self._pipe = pipe
         self._limits = limits
         self._tick_s = tick_s
         self._tick = tick
+        self._on_phase = on_phase
+        self._phase: str | None = None
         self._progress: Progress | None = None
         self._verifying = False
         self._next_tick_s = 0.0
@@ -186,6 +192,9 @@ class _Run:
 
     def _note(self, progress: Progress) -> None:
         self._progress = progress
+        if progress.phase != self._phase:
+            self._phase = progress.phase
+            self._on_phase(progress.phase)
         if progress.phase == "verify" and not self._verifying:
             self._verifying = True
             self._kill_at_s += VERIFY_GRACE_S

@@ -17,7 +17,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.orm import Session
 
 from planner_core.solvers.base import Progress
-from service import bound_store, opportunity_store
+from service import bound_store, opportunity_store, tracing
 from service.db.clock import utc_now
 from service.db.failures import why_unavailable
 from service.db.rows import JobRow, ScenarioRow, WorkerRow
@@ -28,9 +28,11 @@ from service.jobs.lease import Lease, Outcome
 from service.jobs.plan_job import PlanAnswer, PlanRequest
 from service.jobs.queue import DbosConsumer, DbosQueue
 from service.jobs.reconcile import Reconciler
+from service.jobs.renewal import Renewal
 from service.jobs.runner import Abandoned, Limits, Order, Runner, Work
 from service.settings import Settings
 from service.stopping import StopRequest
+from service.tracing import JobSpan
 from service.webhooks.courier import Courier
 
 log = logging.getLogger(__name__)
@@ -56,8 +58,8 @@ class Worker:
     def __init__(self, settings: Settings, work: Work):
         self.id = f"{socket.gethostname()}-{os.getpid()}-{secrets.token_hex(4)}"
         self._settings = settings
-        self._database = Database(settings.database_url)
-        self._queue = DbosQueue(settings.database_url)
+        self._database = Database(settings.database_url, settings.database_timeout_s)
+        self._queue = DbosQueue(settings.database_url, settings.database_timeout_s)
         self._runner = Runner(work)
         self._reconciler = Reconciler(
             self._database,
@@ -83,7 +85,9 @@ class Worker:
         """Work until ``stop`` is called or ``is_wanted`` says no."""
         if not self._runner.warm_up(lambda: is_wanted() and not self._is_stopping()):
             return
-        consumer = DbosConsumer(self._settings.database_url, self.id, self.handle)
+        consumer = DbosConsumer(
+            self._settings.database_url, self.id, self.handle, self._settings.database_timeout_s
+        )
         self._enrol()
         consumer.start()
         self._courier.start()
@@ -120,23 +124,39 @@ class Worker:
             held = lease.start(session, job_id, dispatch, lease_s=self._settings.lease_s)
         if held is None:
             return
-        request = self._insist(
+        request, traceparent = self._insist(
             self._database.reading, lambda session: _request(session, job_id, held.run)
         )
+        with tracing.running(
+            traceparent, job_id=job_id, run=held.run, solver=request.solver
+        ) as span:
+            self._run(held, request, span)
+
+    def _run(self, held: Lease, request: PlanRequest, span: JobSpan) -> None:
         limits = Limits(
             time_s=float(request.limits["time_s"]), memory_mb=int(request.limits["memory_mb"])
         )
-        ending = self._runner.run(
-            request,
-            limits,
-            tick_s=self._settings.heartbeat_s,
-            tick=lambda progress: self._tick(held, progress),
-        )
+        renewal = Renewal(lambda progress: self._renew(held, progress))
+        try:
+            ending = self._runner.run(
+                request,
+                limits,
+                tick_s=self._settings.heartbeat_s,
+                tick=lambda progress: (
+                    Order.ABANDON if self._is_stopping() else renewal.tick(progress)
+                ),
+                on_phase=span.enter_phase,
+            )
+        finally:
+            renewal.end()
+        span.enter_phase("store")
         self._conclude(held, request, ending)
+        if isinstance(ending, Abandoned):
+            span.note_end("abandoned")
+        else:
+            span.note_end(outcome_of(ending).state, failed=isinstance(ending, Refused))
 
-    def _tick(self, held: Lease, progress: Progress | None) -> Order:
-        if self._is_stopping():
-            return Order.ABANDON
+    def _renew(self, held: Lease, progress: Progress | None) -> Order:
         report = None if progress is None else dataclasses.asdict(progress)
         try:
             with self._database.transaction() as session:
@@ -202,8 +222,11 @@ class Worker:
             log.warning("could not look for stranded jobs", exc_info=True)
 
     def _leave(self) -> None:
-        with self._database.transaction() as session:
-            session.execute(sa.delete(WorkerRow).where(WorkerRow.id == self.id))
+        try:
+            with self._database.transaction() as session:
+                session.execute(sa.delete(WorkerRow).where(WorkerRow.id == self.id))
+        except SQLAlchemyError as error:
+            _raise_unless_it_passes(error, "could not take leave")
         self._queue.close()
         self._database.close()
 
@@ -228,14 +251,14 @@ def outcome_of(ending: Ending) -> Outcome:
     )
 
 
-def _request(session: Session, job_id: str, run: int) -> PlanRequest:
+def _request(session: Session, job_id: str, run: int) -> tuple[PlanRequest, str | None]:
     wanted = (
         sa.select(JobRow, ScenarioRow.sha256, ScenarioRow.content)
         .join(ScenarioRow, ScenarioRow.id == JobRow.scenario_id)
         .where(JobRow.id == job_id)
     )
     job, sha256, content = session.execute(wanted).one()
-    return PlanRequest(
+    request = PlanRequest(
         job_id=job.id,
         run=run,
         scenario_sha256=sha256,
@@ -247,6 +270,7 @@ def _request(session: Session, job_id: str, run: int) -> PlanRequest:
         opportunity_block=opportunity_store.load(session, sha256),
         bound=bound_store.load(session, sha256),
     )
+    return request, job.traceparent
 
 
 def _raise_unless_it_passes(error: SQLAlchemyError, consequence: str) -> None:

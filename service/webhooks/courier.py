@@ -35,6 +35,7 @@ RETRY_AFTER_S: Final = (5.0, 300.0, 1800.0, 7200.0, 18000.0, 36000.0, 50400.0, 7
 _MOST_AT_ONCE: Final = 16
 _ANSWER_WITHIN_S: Final = 20.0
 _LONGEST_WAIT_S: Final = 86400.0
+_STOP_WITHIN_S: Final = 5.0
 _GONE: Final = 410
 _SWEEP_EVERY_S: Final = 3600.0
 
@@ -75,7 +76,8 @@ class Courier:
     def stop(self) -> None:
         """End. What was being sent comes due again, for whoever looks then."""
         self._stopping.set()
-        self._thread.join()
+        # It may stand before a database that hangs; nothing of it is needed any more.
+        self._thread.join(_STOP_WITHIN_S)
 
     def _run(self) -> None:
         asyncio.run(self._work())

@@ -16,7 +16,7 @@ import sqlalchemy as sa
 from service.cli import FAILED, OK, WRONG_INPUT, main
 
 COMMANDS = (
-    "serve", "api", "worker", "migrate", "demo", "solve", "plan", "keys", "openapi",
+    "serve", "api", "worker", "migrate", "backup", "demo", "solve", "plan", "keys", "openapi",
 )  # fmt: skip
 
 

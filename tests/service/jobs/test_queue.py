@@ -32,14 +32,16 @@ def test_a_server_that_is_gone_counts_as_a_lost_connection(tmp_path: Path) -> No
         (psycopg.errors.UniqueViolation("duplicate key"), False),
     ],
 )
-def test_only_a_lost_connection_is_marked(error: Exception, is_marked: bool) -> None:
+def test_only_a_lost_connection_is_marked(
+    error: Exception, is_marked: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     engine = make_queue_engine("postgresql+psycopg://nobody@/none?host=/nowhere")
     assert engine is not None
 
-    @sa.event.listens_for(engine, "do_connect")
-    def fail(*_: object) -> None:
+    def fail(*_: object, **__: object) -> None:
         raise error
 
+    monkeypatch.setattr(psycopg.Connection, "connect", fail)
     with pytest.raises(sa.exc.DBAPIError) as caught:
         engine.connect()
     assert caught.value.connection_invalidated is is_marked

@@ -1,0 +1,48 @@
+"""Renewing a lease beside the run, so that a database that hangs holds up nobody but itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from typing import Final
+
+from planner_core.solvers.base import Progress
+from service.jobs.runner import Order
+
+_PATIENCE_S: Final = 0.25
+
+
+class Renewal:
+    """Calls ``renew`` in a thread of its own, once at a time.
+
+    The run's limits are enforced, and a worker told to stop gives its job up, also while a
+    renewal gets no answer.
+
+    Parameters
+    ----------
+    renew
+        Renews the lease with the newest progress (None where there is none), and says how to
+        go on.
+    """
+
+    def __init__(self, renew: Callable[[Progress | None], Order]):
+        self._renew = renew
+        self._thread = ThreadPoolExecutor(1, "renewal")
+        self._pending: Future[Order] | None = None
+        self._unsent: Progress | None = None
+
+    def tick(self, progress: Progress | None) -> Order:
+        """Renew, or see what became of the last time; go on where there is no answer yet."""
+        self._unsent = progress or self._unsent
+        if self._pending is None:
+            self._pending = self._thread.submit(self._renew, self._unsent)
+            self._unsent = None
+        done, _ = wait([self._pending], _PATIENCE_S)
+        if not done:
+            return Order.GO_ON
+        answered, self._pending = self._pending, None
+        return answered.result()
+
+    def end(self) -> None:
+        """Renew no more. What is still under way can do no harm: the run number guards it."""
+        self._thread.shutdown(wait=False)
