@@ -386,7 +386,7 @@ class Scenario:
     collect_spacing_s: float | None = None
     continuous_starts: bool = False
     allow_old_elements: bool = False
-    pins: Pins = Pins()
+    pins: Pins = field(default_factory=Pins)
     warnings: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:

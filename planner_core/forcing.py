@@ -130,7 +130,7 @@ def _fill(track: Track, plan: Sequence) -> bool:
         row = plan.rows[i]
         if i == n - 1:
             plan.cap[i], plan.drop[i], plan.floor[i] = np.inf, np.inf, -np.inf
-            plan.rise[i] = track.telemetry_per_s * max(0.0, track.data_end_s - track.data_from_s[row])
+            plan.rise[i] = _waited(track, row, track.data_end_s)
             continue
         after = plan.rows[i + 1]
         charge = track.charge_per_s * max(0.0, track.charge_to_s[after] - track.charge_from_s[row])
@@ -175,9 +175,7 @@ class Forced(NamedTuple):
     highest: Floats
 
 
-def force_each(
-    problem: Problem, planned: PlannedSatellite, candidates: Ints
-) -> Forced:
+def force_each(problem: Problem, planned: PlannedSatellite, candidates: Ints) -> Forced:
     """Return what forcing each of these local rows into the satellite's plan does."""
     n = len(candidates)
     forced = Forced(

@@ -23,7 +23,7 @@ from planner_core.comparable import Order, are_comparable, order_of, transitive_
 from planner_core.domain import Scenario
 from planner_core.errors import InvalidScenario
 from planner_core.jit import kernel
-from planner_core.pins import KeptAction
+from planner_core.pins import PinnedAction
 from planner_core.plan import Plan
 from planner_core.problem import (
     ACCESS_FOUND,
@@ -32,8 +32,8 @@ from planner_core.problem import (
     RULED_OUT,
     Blocked,
     Bools,
-    Ints,
     Kept,
+    Longs,
     Opportunities,
     Pinned,
     Problem,
@@ -71,8 +71,11 @@ def resolve(scenario: Scenario, table: Opportunities) -> Pinned:
     offset_s = scenario.horizon.offset_s
     return Pinned(
         kept=tuple(
-            Kept(row=_row_of(scenario, table, pin, f"/pins/keep/{i}"), pointer=f"/pins/keep/{i}")
+            Kept(row=row_of(scenario, table, pin, f"/pins/keep/{i}"), pointer=f"/pins/keep/{i}")
             for i, pin in enumerate(pins.keep)
+        ),
+        skipped=frozenset(
+            row_of(scenario, table, pin, f"/pins/skip/{i}") for i, pin in enumerate(pins.skip)
         ),
         blocked=tuple(
             Blocked(
@@ -88,8 +91,8 @@ def resolve(scenario: Scenario, table: Opportunities) -> Pinned:
     )
 
 
-def _row_of(scenario: Scenario, table: Opportunities, pin: KeptAction, pointer: str) -> int:
-    """Return the opportunity that a pin means."""
+def row_of(scenario: Scenario, table: Opportunities, pin: PinnedAction, pointer: str) -> int:
+    """Return the opportunity that an operator's words mean."""
     fits = np.ones(len(table), dtype=np.bool_)
     if pin.satellite_id is not None:
         ids = [satellite.id for satellite in scenario.satellites]
@@ -127,7 +130,7 @@ def _number_of(opportunity_id: str) -> int:
     return int(found[1]) if found else -1
 
 
-def _why_none(scenario: Scenario, table: Opportunities, named: Ints, pin: KeptAction) -> str:
+def _why_none(scenario: Scenario, table: Opportunities, named: Longs, pin: PinnedAction) -> str:
     if len(named) == 0 or pin.start is None:
         return "The scenario has no opportunity like this."
     away_s = np.abs(table.start_s[named] - scenario.horizon.offset_s(pin.start))
@@ -159,7 +162,11 @@ def apply_pins(problem: Problem, pinned: Pinned) -> Problem:
     keepers = [(int(place[kept.row]), excluded) for kept, excluded in beside]
     part = replace(
         part,
-        pinned=replace(part.pinned, struck=_struck(problem, is_struck, keepers)),
+        pinned=replace(
+            part.pinned,
+            skipped=frozenset(),
+            struck=_struck(problem, is_struck, keepers),
+        ),
         target_access=_access_left(problem, part),
     )
     _check_limits(part)
@@ -221,6 +228,7 @@ def _ruled_out(problem: Problem, pinned: Pinned) -> Bools:
     """Return the opportunities that are forbidden or lie in a blocked interval."""
     table = problem.opportunities
     is_out: Bools = (table.kind == COLLECT) & np.isin(table.place, sorted(pinned.forbidden))
+    is_out[sorted(pinned.skipped)] = True
     for blocked in pinned.blocked:
         is_out |= (
             (table.satellite == blocked.satellite)
@@ -266,7 +274,7 @@ def _excluded(order: Order, row: int, num_rows: int) -> Bools:
     return excluded
 
 
-def _without_antenna(problem: Problem, row: int, kept: Ints) -> Bools:
+def _without_antenna(problem: Problem, row: int, kept: Longs) -> Bools:
     """Return the contacts that find no antenna where ``row`` and other ``kept`` ones run."""
     table = problem.opportunities
     station = table.place[row]
@@ -305,9 +313,7 @@ def _struck(
 
 def _access_left(problem: Problem, part: Problem) -> np.ndarray:
     """Return why targets have no collect, pins included."""
-    is_lost = (problem.target_access == ACCESS_FOUND) & (
-        np.diff(part.target_opportunities[1]) == 0
-    )
+    is_lost = (problem.target_access == ACCESS_FOUND) & (np.diff(part.target_opportunities[1]) == 0)
     return np.where(is_lost, RULED_OUT, problem.target_access).astype(np.int8)
 
 

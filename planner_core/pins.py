@@ -17,8 +17,8 @@ PinnedMode = Literal["collect", "contact"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class KeptAction:
-    """An action that every plan must hold: a booked contact, a promised image.
+class PinnedAction:
+    """An action in words: a booked contact, a promised image.
 
     Attributes
     ----------
@@ -52,14 +52,25 @@ class BlockedInterval:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pins:
-    """All that a scenario pins. ``forbid`` names targets that no plan may collect."""
+    """All that a scenario pins.
 
-    keep: tuple[KeptAction, ...] = ()
+    Attributes
+    ----------
+    keep, skip
+        Actions that every plan must hold, and single ones that none may.
+    block
+        Spans in which a satellite may not act.
+    forbid
+        Ids of targets that no plan may collect.
+    """
+
+    keep: tuple[PinnedAction, ...] = ()
+    skip: tuple[PinnedAction, ...] = ()
     block: tuple[BlockedInterval, ...] = ()
     forbid: tuple[str, ...] = ()
 
     def __bool__(self) -> bool:
-        return bool(self.keep or self.block or self.forbid)
+        return bool(self.keep or self.skip or self.block or self.forbid)
 
     def check(
         self,
@@ -76,24 +87,25 @@ class Pins:
         InvalidScenario
             With a pointer into ``/pins``.
         """
-        for i, kept in enumerate(self.keep):
-            at = f"/pins/keep/{i}"
-            _known(kept.satellite_id, satellite_ids, "satellite", f"{at}/satellite_id")
-            _known(kept.target_id, target_ids, "target", f"{at}/target_id")
-            _known(kept.station_id, station_ids, "ground_station", f"{at}/station_id")
-            num_names = (kept.target_id is not None) + (kept.station_id is not None)
+        actions = [(f"/pins/keep/{i}", action) for i, action in enumerate(self.keep)]
+        actions += [(f"/pins/skip/{i}", action) for i, action in enumerate(self.skip)]
+        for at, action in actions:
+            _known(action.satellite_id, satellite_ids, "satellite", f"{at}/satellite_id")
+            _known(action.target_id, target_ids, "target", f"{at}/target_id")
+            _known(action.station_id, station_ids, "ground_station", f"{at}/station_id")
+            num_names = (action.target_id is not None) + (action.station_id is not None)
             _require(
-                num_names <= 1 and (num_names == 1 or kept.opportunity_id is not None),
+                num_names <= 1 and (num_names == 1 or action.opportunity_id is not None),
                 at,
-                "Name the target_id, the station_id or the opportunity_id to be kept.",
+                "Name either the target_id or the station_id, or else the opportunity_id.",
             )
             _require(
-                kept.end is None or (kept.start is not None and kept.end >= kept.start),
+                action.end is None or (action.start is not None and action.end >= action.start),
                 f"{at}/end",
                 "end needs a start, and lies not before it.",
             )
             _require(
-                kept.station_id is None or has_contacts,
+                action.station_id is None or has_contacts,
                 f"{at}/station_id",
                 "Without use_resources no contacts are planned.",
             )

@@ -208,7 +208,7 @@ class Struck:
     row
         Of the scenario's table, which the problem no longer has.
     kept
-        Rows of the problem that it cannot stand beside; none where it is blocked or forbidden.
+        Rows of the problem that it cannot stand beside; none where it is ruled out itself.
     """
 
     row: int
@@ -223,6 +223,8 @@ class Pinned:
 
     Attributes
     ----------
+    skipped
+        Rows that no plan may take, as long as they are in the table.
     forbidden
         Targets that no plan may collect.
     struck
@@ -230,6 +232,7 @@ class Pinned:
     """
 
     kept: tuple[Kept, ...] = ()
+    skipped: frozenset[int] = frozenset()
     blocked: tuple[Blocked, ...] = ()
     forbidden: frozenset[int] = frozenset()
     struck: Mapping[int, tuple[Struck, ...]] = field(default_factory=dict)

@@ -54,7 +54,7 @@ NO_ACCESS: Final = {
     ACCESS_TOO_SHORT: "Every access is shorter than its collect.",
 }
 _EXCLUDED: Final = "A pin forbids it."
-_BLOCKED: Final = "All its opportunities lie in intervals that pins block."
+_BLOCKED: Final = "Pins rule all its opportunities out."
 _ROUNDED: Final = 1e4  # fractions of capacity are stated to as many parts
 _SURE: Final = 2e-9  # of capacity: a stated limit is not touched
 
@@ -140,8 +140,11 @@ class Search:
     breadth: int | None = None
 
 
+UNKNOWN_SEARCH: Final = Search()
+
+
 def explain(
-    problem: Problem, plan: Plan, timeline: Timeline, search: Search = Search()
+    problem: Problem, plan: Plan, timeline: Timeline, search: Search = UNKNOWN_SEARCH
 ) -> tuple[TargetOutcome, ...]:
     """Return every target exactly once, with its outcome and, if left out, a true reason."""
     reasons = _settled_reasons(problem, plan, timeline)
@@ -332,13 +335,12 @@ class _Changes(NamedTuple):
         agility = [s.agility for s in problem.satellites]
         resources = [s.resources for s in problem.satellites]
         now = {
-            "slew_rate_deg_s": np.array([a.slew_rate_deg_s for a in agility])[satellite],
-            "settle_s": np.array([a.settle_s for a in agility])[satellite],
-            "battery_min_fraction": np.array([r.battery_min_fraction for r in resources])[satellite],
-            "recorder_max_fraction": np.array([r.recorder_max_fraction for r in resources])[
-                satellite
-            ],
+            "slew_rate_deg_s": np.array([a.slew_rate_deg_s for a in agility]),
+            "settle_s": np.array([a.settle_s for a in agility]),
+            "battery_min_fraction": np.array([r.battery_min_fraction for r in resources]),
+            "recorder_max_fraction": np.array([r.recorder_max_fraction for r in resources]),
         }
+        now = {name: values[satellite] for name, values in now.items()}
         is_free = (forced.first == forced.last) & (forced.broken != FITS)
         lowest = np.floor((forced.lowest - _SURE) * _ROUNDED) / _ROUNDED
         highest = np.ceil((forced.highest + _SURE) * _ROUNDED) / _ROUNDED
@@ -478,9 +480,7 @@ class _Teller:
         track = self.planned.track
         return float(track.data_end_s if row == AT_END else track.start_s[row])
 
-    def _detail(
-        self, c: int, limit: str | None, delta: float | None, num_blocking: int
-    ) -> str:
+    def _detail(self, c: int, limit: str | None, delta: float | None, num_blocking: int) -> str:
         said = []
         if not self.planned.is_sound:
             said.append("The plan breaks limits of this satellite as it is.")

@@ -22,7 +22,9 @@ def restricted(problem: Problem, rows: npt.NDArray[np.integer]) -> Problem:
     place = np.cumsum(is_left) - 1
     pinned = replace(
         problem.pinned,
-        kept=tuple(replace(k, row=int(place[k.row])) for k in problem.pinned.kept if is_left[k.row]),
+        kept=tuple(
+            replace(k, row=int(place[k.row])) for k in problem.pinned.kept if is_left[k.row]
+        ),
     )
     return replace(
         problem,

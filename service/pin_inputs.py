@@ -6,14 +6,14 @@ from typing import Annotated
 
 from pydantic import Field, StringConstraints
 
-from planner_core.pins import BlockedInterval, KeptAction, PinnedMode, Pins
+from planner_core.pins import BlockedInterval, PinnedAction, PinnedMode, Pins
 from service.api.shapes import Body, Instant
 
 Id = Annotated[str, StringConstraints(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")]
 
 
-class KeptIn(Body):
-    """An action that every plan must hold: a booked contact, a promised image."""
+class PinnedActionIn(Body):
+    """An action in words: a booked contact, a promised image."""
 
     satellite_id: Id | None = Field(None, description="Any satellite by default.")
     target_id: Id | None = Field(None, description="Of the image.")
@@ -21,7 +21,7 @@ class KeptIn(Body):
     start: Instant | None = Field(
         None,
         description="Of the opportunities that start and end touch, the one that starts nearest "
-        "to start is kept. Needed where there are several.",
+        "to start is meant. Needed where there are several.",
     )
     end: Instant | None = Field(None, description="start by default.")
     opportunity_id: Id | None = Field(
@@ -41,7 +41,12 @@ class BlockedIn(Body):
 class PinsIn(Body):
     """What plans must hold, and what they must not."""
 
-    keep: list[KeptIn] = Field([], max_length=10_000)
+    keep: list[PinnedActionIn] = Field(
+        [], max_length=10_000, description="Actions that every plan must hold."
+    )
+    skip: list[PinnedActionIn] = Field(
+        [], max_length=10_000, description="Single actions that no plan may hold."
+    )
     block: list[BlockedIn] = Field([], max_length=10_000)
     forbid: list[Id] = Field(
         [], max_length=10_000, description="Ids of targets that no plan may collect."
@@ -51,10 +56,8 @@ class PinsIn(Body):
 def pins_from(body: PinsIn) -> Pins:
     """Return the pins of one body."""
     return Pins(
-        keep=tuple(
-            KeptAction(**{name: getattr(kept, name) for name in KeptIn.model_fields})
-            for kept in body.keep
-        ),
+        keep=tuple(_action(pinned) for pinned in body.keep),
+        skip=tuple(_action(pinned) for pinned in body.skip),
         block=tuple(
             BlockedInterval(
                 satellite_id=blocked.satellite_id,
@@ -66,3 +69,7 @@ def pins_from(body: PinsIn) -> Pins:
         ),
         forbid=tuple(body.forbid),
     )
+
+
+def _action(body: PinnedActionIn) -> PinnedAction:
+    return PinnedAction(**{name: getattr(body, name) for name in PinnedActionIn.model_fields})

@@ -31,7 +31,7 @@ from planner_core.solvers import ForwardSearch, Milp, Rule
 from planner_core.solvers.base import Budget, Termination
 from planner_core.timeline import Timeline, replay
 from tests.planner_core.brute_force import best_plan
-from tests.planner_core.problems import ECLIPSES, Task, make_problem, random_problem
+from tests.planner_core.problems import ECLIPSES, TIGHT, Task, make_problem, random_problem
 
 SEEDS = st.integers(0, 10**6)
 DYNAMICS = st.sampled_from(["physical", "paper"])
@@ -95,7 +95,8 @@ def check_reasons(problem: Problem, plan: Plan, search: Search) -> set[str]:
         forced = {int(c): judged(problem, [*own, int(c)]) for c in collects}
         fits = any(t.is_valid for t in forced.values())
         assert fits == (
-            reason.code == "not_considered" or reason.code == "solver_limit" and not reason.blocking
+            reason.code == "not_considered"
+            or (reason.code == "solver_limit" and not reason.blocking)
         )
         if fits or reason.opportunity is None:
             continue
@@ -156,10 +157,12 @@ def test_reasons_and_changes_hold_before_the_referee(
 
 def test_all_kinds_of_reasons_and_changes_come_up() -> None:
     codes: set[str] = set()
+    weak = replace(TIGHT, initial_battery_fraction=0.5, recorder_max_fraction=1.0)
     for seed in range(60):
         problem = random_problem(
             seed, num_satellites=2, num_targets=14, num_collects=24, num_contacts=5,
-            agility=Agility(settle_s=10.0),
+            agility=Agility(settle_s=10.0), use_resources=seed % 3 > 0,
+            resources=weak if seed % 3 == 1 else TIGHT,
         )  # fmt: skip
         plan = Rule().solve(problem, Budget(), 0).plan
         if replay(problem, plan).is_valid:
