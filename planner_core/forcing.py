@@ -9,6 +9,7 @@ worked out once, backward.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
@@ -293,16 +294,15 @@ def _rate_for(angle_deg: float, available_s: float, acceleration_deg_s2: float) 
     """Return a rate, in whole thousandths, that turns through an angle in time."""
     if available_s <= 0.0:
         return _NEVER
-    rate = angle_deg / available_s
+    rate: float = angle_deg / available_s
     if acceleration_deg_s2 > 0.0:
         room = available_s * available_s - 4.0 * angle_deg / acceleration_deg_s2
         if room < 0.0:
             return _NEVER
-        rate = (available_s - np.sqrt(room)) * acceleration_deg_s2 / 2.0
-    rate = np.ceil(rate * 1000.0) / 1000.0
-    if slew_s(angle_deg, rate, acceleration_deg_s2) > available_s + TIME_TOLERANCE_S / 2.0:
-        rate += 1e-3
-    return rate
+        rate = (available_s - math.sqrt(room)) * acceleration_deg_s2 / 2.0
+    rate = math.ceil(rate * 1000.0) / 1000.0
+    is_late = slew_s(angle_deg, rate, acceleration_deg_s2) > available_s + TIME_TOLERANCE_S / 2.0
+    return rate + 1e-3 if is_late else rate
 
 
 class Displaced(NamedTuple):

@@ -176,10 +176,10 @@ def explain(
 
 def _settled_reasons(problem: Problem, plan: Plan, timeline: Timeline) -> dict[int, Reason]:
     """Return the reasons that need no trial: pins, geometry, and collects that do not count."""
-    reasons = {}
+    reasons: dict[int, Reason] = {}
     positions = {action.opportunity: p for p, action in enumerate(plan.actions)}
-    for target in np.flatnonzero(np.diff(problem.target_opportunities[1]) == 0):
-        reasons[int(target)] = _without_opportunity(problem, positions, int(target))
+    for target in np.flatnonzero(np.diff(problem.target_opportunities[1]) == 0).tolist():
+        reasons[target] = _without_opportunity(problem, positions, target)
     blamed = {
         position: violation.code for violation in timeline.violations
         for position in violation.blamed
@@ -198,7 +198,7 @@ def _without_opportunity(problem: Problem, positions: Mapping[int, int], target:
     detail = NO_ACCESS.get(int(problem.target_access[target]))
     if detail is not None:
         return Reason(code="no_access", certainty="proven", detail=detail)
-    kept = {row for struck in problem.pinned.struck[target] for row in struck.kept}
+    kept = {row for struck in problem.pinned.struck.get(target, ()) for row in struck.kept}
     if not kept:
         return Reason(code="excluded", certainty="proven", detail=_BLOCKED)
     return Reason(
@@ -271,7 +271,7 @@ def _forced_reasons(
         if len(own) == 0:
             continue
         picked = chosen[own]
-        forced = Forced(*(column[picked] for column in tried.forced))
+        forced = Forced._make(column[picked] for column in tried.forced)
         rows = problem.local_row[tried.rows[picked]]
         displaced = displace_each(one, rows, forced)
         teller = _Teller(problem, one, forced, displaced, search)
@@ -297,7 +297,7 @@ def _try_all(problem: Problem, planned: list[PlannedSatellite], targets: Longs) 
     columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
     back = np.empty(len(order), dtype=np.int64)
     back[order] = np.arange(len(order))
-    return _Tried(rows, first, satellite, Forced(*(column[back] for column in columns)))
+    return _Tried(rows, first, satellite, Forced._make(column[back] for column in columns))
 
 
 def _chosen(tried: _Tried) -> Longs:

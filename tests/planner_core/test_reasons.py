@@ -55,10 +55,11 @@ def with_settings(problem: Problem, change: Change) -> Problem:
         agility, resources = satellite.agility, satellite.resources
         if index == change.satellite:
             for name, value in change.settings.items():
+                setting: dict[str, Any] = {name: value}
                 if hasattr(agility, name):
-                    agility = replace(agility, **{name: value})
+                    agility = replace(agility, **setting)
                 else:
-                    resources = replace(resources, **{name: value})
+                    resources = replace(resources, **setting)
         satellites.append(
             build_satellite_problem(
                 index,
@@ -84,7 +85,7 @@ def check_reasons(problem: Problem, plan: Plan, search: Search) -> set[str]:
     outcomes = explain(problem, plan, timeline, search)
     assert [o.target for o in outcomes] == list(range(len(problem.target_ids)))
     own = rows_of(plan)
-    codes = set()
+    codes: set[str] = set()
     for outcome in outcomes:
         reason, collects = outcome.reason, problem.collects_of(outcome.target)
         assert (reason is None) == (outcome.target in timeline.collected)

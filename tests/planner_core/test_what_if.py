@@ -56,7 +56,7 @@ def instant(plan: Judged, offset_s: float) -> datetime:
     return plan.scenario.horizon.instant(offset_s)
 
 
-def name_of(plan: Judged, action: JudgedAction) -> dict[str, str]:
+def name_of(plan: Judged, action: JudgedAction) -> dict[str, Any]:
     assert action.opportunity is not None
     place = int(plan.problem.opportunities.place[action.opportunity])
     if action.mode == "collect":
@@ -147,7 +147,7 @@ def test_a_pin_that_means_nothing_is_refused_by_name(
     scenario, table = mission(), computed().opportunities
     counts = np.bincount(table.place[table.kind == COLLECT])
     several = scenario.targets[int(np.flatnonzero(counts > 1)[0])].id
-    pin = {name: several if value == "T" else value for name, value in keep.items()}
+    pin: dict[str, Any] = {name: several if value == "T" else value for name, value in keep.items()}
     if "start" in pin:
         pin["start"] = scenario.horizon.instant(pin["start"] - 3600.0)
 

@@ -29,7 +29,8 @@ def test_a_scenario_without_pins_keeps_its_hash() -> None:
     # As it was before there were pins.
     known = "a71fdbf590481341cc28bfbd86fbd64fa895abd501d371ae88ec13216d2d9b10"
     assert sha256_of(canonical(plain)) == known
-    for empty in ({}, {"keep": []}, {"forbid": [], "block": []}):
+    nothing: list[dict[str, Any]] = [{}, {"keep": []}, {"forbid": [], "block": []}]
+    for empty in nothing:
         assert sha256_of(canonical(plain | {"pins": empty})) == known
 
 
