@@ -492,7 +492,8 @@ class _Teller:
             said.append(f"With it the {limit} would reach its limit.")
         if delta is not None:
             actions = "1 action" if num_blocking == 1 else f"{num_blocking} actions"
-            said.append(f"It fits in place of {actions}; the reward changes by {delta:+g}.")
+            change = f"changes by {delta:+g}" if delta else "stays the same"
+            said.append(f"It fits in place of {actions}; the reward {change}.")
             if self.search.is_optimal and delta <= 0.0:
                 said.append("The plan is proven optimal: none with it earns more.")
         return " ".join(said)
