@@ -21,13 +21,10 @@ from planner_core.problem import Bools, Bytes, Floats, Ints, Problem, may_follow
 from planner_core.slew import INSTANT, TIME_TOLERANCE_S, angle_between_deg, slew_s
 from planner_core.track import NO_TASK, STRICT, Track, compile_track, take
 
-MAX_DROPS: Final = 4
 FITS: Final = 0
 BATTERY: Final = 1
 RECORDER: Final = 2
-AT_END: Final = -2
 _MOST_RATE: Final = 5.0  # times the satellite's own: nobody changes more than that
-_LOOK_BACK: Final = 30  # collects that may make room
 _NEVER: Final = 1e9
 
 
@@ -131,7 +128,7 @@ def _fill(track: Track, plan: Sequence) -> bool:
         row = plan.rows[i]
         if i == n - 1:
             plan.cap[i], plan.drop[i], plan.floor[i] = np.inf, np.inf, -np.inf
-            plan.rise[i] = _waited(track, row, track.data_end_s)
+            plan.rise[i] = waited(track, row, track.data_end_s)
             continue
         after = plan.rows[i + 1]
         charge = track.charge_per_s * max(0.0, track.charge_to_s[after] - track.charge_from_s[row])
@@ -144,7 +141,7 @@ def _fill(track: Track, plan: Sequence) -> bool:
         rise = max(0.0, plan.rise[i + 1])
         plan.floor[i] = max(plan.floor[i + 1], rise)
         plan.rise[i] = max(track.telemetry_per_s * peak_s, gain + rise)
-    end = plan.recorder[n] + _waited(track, last, track.data_end_s)
+    end = plan.recorder[n] + waited(track, last, track.data_end_s)
     return is_sound and end < track.recorder_max - STRICT
 
 
@@ -218,9 +215,9 @@ def _force_each(
             middle = (k + high) // 2
             k, high = (middle + 1, high) if rows[middle] < row else (k, middle)
         first = last = k
-        while first > 0 and not _follows(track, rows[first - 1], row):
+        while first > 0 and not follows(track, rows[first - 1], row):
             first -= 1
-        while last < n and not _follows(track, row, rows[last]):
+        while last < n and not follows(track, row, rows[last]):
             last += 1
         forced.first[c], forced.last[c] = first, last
         for i in range(first, last):
@@ -265,20 +262,20 @@ def _levels(track: Track, plan: Sequence, row: int, first: int, last: int) -> tu
     """
     before = plan.rows[first - 1] if first > 0 else NO_TASK
     battery, recorder = plan.battery[first], plan.recorder[first]
-    peak = recorder + _waited(track, before, track.data_peak_s[row])
+    peak = recorder + waited(track, before, track.data_peak_s[row])
     battery, recorder, _ = take(track, before, row, battery, recorder)
     lowest, highest = battery, max(peak, recorder)
     if last == len(plan.rows):
-        return lowest, max(highest, recorder + _waited(track, row, track.data_end_s))
+        return lowest, max(highest, recorder + waited(track, row, track.data_end_s))
     after = plan.rows[last]
-    highest = max(highest, recorder + _waited(track, row, track.data_peak_s[after]))
+    highest = max(highest, recorder + waited(track, row, track.data_peak_s[after]))
     battery, recorder, _ = take(track, row, after, battery, recorder)
     lowest = min(lowest, battery, plan.cap[last], battery + plan.drop[last])
     return lowest, max(highest, recorder, plan.floor[last], recorder + plan.rise[last])
 
 
 @inlined
-def _waited(track: Track, last: int, until_s: float) -> float:
+def waited(track: Track, last: int, until_s: float) -> float:
     """Return the telemetry from a task's end to an instant."""
     from_s = track.data_from_s[last] if last >= 0 else 0.0
     return track.telemetry_per_s * max(0.0, until_s - from_s)
@@ -305,176 +302,7 @@ def _rate_for(angle_deg: float, available_s: float, acceleration_deg_s2: float) 
     return rate + 1e-3 if is_late else rate
 
 
-class Displaced(NamedTuple):
-    """What one opportunity displaces in all, so that it fits.
-
-    Attributes
-    ----------
-    dropped
-        Which tasks of the plan; shape ``(n, num_tasks)``.
-    is_settled
-        Whether the rest then keeps the limits; nothing more may be dropped otherwise.
-    broken, break_row
-        Which limit breaks first with only those in its way dropped, and at which task: a local
-        row, or ``AT_END``.
-    """
-
-    dropped: Bools
-    is_settled: Bools
-    broken: Bytes
-    break_row: Ints
-
-
-def displace_each(planned: PlannedSatellite, candidates: Ints, forced: Forced) -> Displaced:
-    """Return what these opportunities displace, battery and recorder included.
-
-    What is in the way goes first. Then collects that earn least and lie nearest ahead of the
-    break go, one by one, and those that turn out not to matter come back.
-    """
-    n = len(candidates)
-    displaced = Displaced(
-        dropped=np.zeros((n, len(planned.sequence.rows)), dtype=np.bool_),
-        is_settled=np.zeros(n, dtype=np.bool_),
-        broken=np.zeros(n, dtype=np.uint8),
-        break_row=np.full(n, AT_END, dtype=np.int32),
-    )
-    for c in range(n):
-        displaced.dropped[c, forced.first[c] : forced.last[c]] = True
-    drops = np.empty(MAX_DROPS, dtype=np.int32)
-    _displace_each(planned.track, planned.sequence, candidates, forced, displaced, drops)
-    return displaced
-
-
-@borrowing
-def _displace_each(
-    track: Track,
-    plan: Sequence,
-    candidates: Ints,
-    forced: Forced,
-    displaced: Displaced,
-    drops: Ints,
-) -> None:
-    n = len(plan.rows)
-    dropped = displaced.dropped
-    for c in range(len(candidates)):
-        row, first = candidates[c], forced.first[c]
-        is_free = forced.loss[c] < np.inf
-        displaced.is_settled[c] = is_free
-        if not track.use_resources or forced.broken[c] == FITS:
-            continue
-        begin, end = first, forced.last[c]
-        at, broken = _first_break(track, plan, dropped, c, row, first, begin, end)
-        if at < 0:
-            continue
-        displaced.broken[c] = broken
-        if at != n:
-            displaced.break_row[c] = row if at == n + 1 else plan.rows[at]
-        num_drops = 0
-        while is_free and at >= 0 and num_drops < MAX_DROPS:
-            until = first - 1 if at == n + 1 else min(at, n - 1)
-            found = _least(track, plan, dropped, c, row, first, until)
-            if found < 0:
-                break
-            dropped[c, found] = True
-            drops[num_drops] = found
-            num_drops += 1
-            begin, end = min(begin, found), max(end, found + 1)
-            at, broken = _first_break(track, plan, dropped, c, row, first, begin, end)
-        displaced.is_settled[c] = is_free and at < 0
-        for i in range(num_drops):
-            dropped[c, drops[i]] = False
-            if at >= 0 or i == num_drops - 1:
-                dropped[c, drops[i]] = at < 0
-                continue
-            is_needed = not _may_stand(track, plan, dropped, c, row, first, drops[i], True)
-            if not is_needed:
-                again, broken = _first_break(track, plan, dropped, c, row, first, begin, end)
-                is_needed = again >= 0
-            dropped[c, drops[i]] = is_needed
-
-
-@borrowing
-def _first_break(
-    track: Track, plan: Sequence, dropped: Bools, c: int, row: int, at: int, begin: int, end: int
-) -> tuple[int, int]:
-    """Return the task at which a limit breaks and which; n for the end, n + 1 for ``row``.
-
-    -1 and ``FITS`` where none does. ``row`` stands before task ``at``; other changes lie
-    between ``begin`` and ``end``.
-    """
-    n = len(plan.rows)
-    battery, recorder = plan.battery[begin], plan.recorder[begin]
-    last = plan.rows[begin - 1] if begin > 0 else NO_TASK
-    for i in range(begin, n + 1):
-        if i == at:
-            battery, recorder, is_within = take(track, last, row, battery, recorder)
-            if not is_within:
-                return n + 1, BATTERY if battery <= track.battery_min + STRICT else RECORDER
-            last = row
-        if i == n or dropped[c, i]:
-            continue
-        battery, recorder, is_within = take(track, last, plan.rows[i], battery, recorder)
-        if not is_within:
-            return i, BATTERY if battery <= track.battery_min + STRICT else RECORDER
-        last = plan.rows[i]
-        if i == max(at, end):
-            # Nothing changes from here on.
-            lowest = min(plan.cap[i], battery + plan.drop[i])
-            highest = max(plan.floor[i], recorder + plan.rise[i])
-            if lowest > track.battery_min + STRICT and highest < track.recorder_max - STRICT:
-                return -1, FITS
-    if recorder + _waited(track, last, track.data_end_s) >= track.recorder_max - STRICT:
-        return n, RECORDER
-    return -1, FITS
-
-
-@borrowing
-def _least(
-    track: Track, plan: Sequence, dropped: Bools, c: int, row: int, at: int, until: int
-) -> int:
-    """Return the collect up to ``until`` that earns least, the latest of those; -1 for none."""
-    found, num_seen = -1, 0
-    i = until
-    while i >= 0 and num_seen < _LOOK_BACK:
-        if not (dropped[c, i] or plan.is_fixed[i] or track.is_contact[plan.rows[i]]):
-            num_seen += 1
-            is_less = found < 0 or plan.earned[i] < plan.earned[found]
-            if is_less and _may_stand(track, plan, dropped, c, row, at, i, False):
-                found = i
-        i -= 1
-    return found
-
-
-@borrowing
-def _may_stand(
-    track: Track,
-    plan: Sequence,
-    dropped: Bools,
-    c: int,
-    row: int,
-    at: int,
-    i: int,
-    is_taken: bool,
-) -> bool:
-    """Return whether the tasks around task ``i`` follow each other, with or without it."""
-    before, after = i - 1, i + 1
-    while before >= 0 and dropped[c, before]:
-        before -= 1
-    while after < len(plan.rows) and dropped[c, after]:
-        after += 1
-    previous = plan.rows[before] if before >= 0 else NO_TASK
-    following = plan.rows[after] if after < len(plan.rows) else NO_TASK
-    if before < at <= i:
-        previous = row
-    if i < at <= after:
-        following = row
-    if not is_taken:
-        return following < 0 or _follows(track, previous, following)
-    return _follows(track, previous, plan.rows[i]) and (
-        following < 0 or _follows(track, plan.rows[i], following)
-    )
-
-
 @inlined
-def _follows(track: Track, a: int, b: int) -> bool:
+def follows(track: Track, a: int, b: int) -> bool:
+    """Return whether a task may follow another directly, or stand first."""
     return may_follow(a, b, track.near_from, track.far_from, track.offset, track.bits)

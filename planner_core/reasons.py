@@ -9,24 +9,13 @@ through one target's opportunities with the referee itself.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Final, Literal, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from planner_core.forcing import (
-    AT_END,
-    BATTERY,
-    FITS,
-    RECORDER,
-    Displaced,
-    Forced,
-    PlannedSatellite,
-    displace_each,
-    force_each,
-)
-from planner_core.model import Guidance, Model, State
+from planner_core.displacing import displace_each
+from planner_core.forcing import FITS, Forced, PlannedSatellite, force_each
 from planner_core.plan import Plan
 from planner_core.problem import (
     ACCESS_TOO_SHORT,
@@ -38,15 +27,17 @@ from planner_core.problem import (
     Longs,
     Problem,
 )
+from planner_core.reason import (
+    UNKNOWN_SEARCH,
+    Change,
+    Outcome,
+    Reason,
+    ReasonCode,
+    Search,
+    TargetOutcome,
+)
+from planner_core.reason_teller import Teller
 from planner_core.timeline import Timeline
-from planner_core.track import NO_TASK
-
-Outcome = Literal["downlinked", "collected", "unscheduled", "excluded"]
-ReasonCode = Literal[
-    "no_access", "excluded", "slew_conflict", "displaced_by", "battery", "recorder",
-    "not_considered", "solver_limit",
-]  # fmt: skip
-Certainty = Literal["proven", "verified", "heuristic"]
 
 NO_ACCESS: Final = {
     NEVER_VISIBLE: "No satellite rises above its horizon during the planning horizon.",
@@ -57,90 +48,6 @@ _EXCLUDED: Final = "A pin forbids it."
 _BLOCKED: Final = "Pins rule all its opportunities out."
 _ROUNDED: Final = 1e4  # fractions of capacity are stated to as many parts
 _SURE: Final = 2e-9  # of capacity: a stated limit is not touched
-
-_LIMITS: Final[dict[int, Literal["battery", "recorder"]]] = {
-    BATTERY: "battery", RECORDER: "recorder",
-}  # fmt: skip
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Change:
-    """A change with which a target would be in the plan; it has been tried.
-
-    Attributes
-    ----------
-    opportunity
-        What could then be taken.
-    satellite, settings
-        Settings of that satellite (``slew_rate_deg_s``, ``settle_s``,
-        ``battery_min_fraction``, ``recorder_max_fraction``) and values that just suffice.
-        None and none where actions have to be dropped.
-    drop
-        Positions in ``plan.actions`` of the actions that have to go.
-    """
-
-    opportunity: int
-    satellite: int | None = None
-    settings: Mapping[str, float] = field(default_factory=dict)
-    drop: tuple[int, ...] = ()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Reason:
-    """Why a target is left out.
-
-    Attributes
-    ----------
-    blocking
-        Positions in ``plan.actions`` of the actions in its way.
-    opportunity
-        The opportunity that the reason speaks of, where it is one.
-    at_s
-        When the limit would break, where one would.
-    reward_delta
-        What the plan would earn more with it and without the blocking actions.
-    change
-        The smallest change that lets it in, among those tried.
-    """
-
-    code: ReasonCode
-    certainty: Certainty
-    detail: str
-    blocking: tuple[int, ...] = ()
-    opportunity: int | None = None
-    at_s: float | None = None
-    reward_delta: float | None = None
-    change: Change | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TargetOutcome:
-    """What became of one target; ``position`` is that of the action that collected it."""
-
-    target: int
-    outcome: Outcome
-    position: int | None
-    satellite: int | None
-    reason: Reason | None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Search:
-    """What is known of the search that made a plan.
-
-    Attributes
-    ----------
-    is_optimal
-        Whether no plan earns more.
-    breadth
-        How many tasks it looked at in each state at most; None for all.
-    """
-
-    is_optimal: bool = False
-    breadth: int | None = None
-
-
-UNKNOWN_SEARCH: Final = Search()
 
 
 def explain(
@@ -274,7 +181,7 @@ def _forced_reasons(
         forced = Forced._make(column[picked] for column in tried.forced)
         rows = problem.local_row[tried.rows[picked]]
         displaced = displace_each(one, rows, forced)
-        teller = _Teller(problem, one, forced, displaced, search)
+        teller = Teller(problem, one, forced, displaced, search)
         for c, at in enumerate(own):
             target = int(targets[at])
             row = int(tried.rows[picked[c]])
@@ -386,114 +293,3 @@ class _Changes(NamedTuple):
                 if not np.isnan(values[at])
             },
         )
-
-
-@dataclass(frozen=True, slots=True, kw_only=False, eq=False)
-class _Teller:
-    """Puts what was tried on one satellite into words."""
-
-    problem: Problem
-    planned: PlannedSatellite
-    forced: Forced
-    displaced: Displaced
-    search: Search
-
-    def reason(self, c: int, target: int, opportunity: int, change: Change | None) -> Reason:
-        """Return the reason of the target whose opportunity stands at ``c``."""
-        sequence = self.planned.sequence
-        dropped = np.flatnonzero(self.displaced.dropped[c])
-        blocking = tuple(sorted(self.planned.positions[dropped].tolist()))
-        limit = _LIMITS.get(int(self.displaced.broken[c]))
-        if limit is None and not blocking:
-            return self._fitting(c, target, opportunity)
-        is_settled = bool(self.displaced.is_settled[c])
-        delta = None
-        if is_settled:
-            delta = float(self.problem.target_reward[target] - sequence.earned[dropped].sum())
-            change = change or Change(opportunity=opportunity, drop=blocking)
-        return Reason(
-            code=self._code(c, limit, delta),
-            certainty=self._certainty(delta),
-            detail=self._detail(c, limit, delta, len(blocking)),
-            blocking=blocking,
-            opportunity=opportunity,
-            at_s=None if limit is None else self._break_s(c),
-            reward_delta=delta,
-            change=change,
-        )
-
-    def _fitting(self, c: int, target: int, opportunity: int) -> Reason:
-        breadth = self.search.breadth
-        if self.problem.target_reward[target] == 0.0:
-            detail = "The plan has room for it, but it earns nothing."
-        elif breadth is not None and not self._is_looked_at(c, opportunity, breadth):
-            return Reason(
-                code="not_considered",
-                certainty="heuristic",
-                detail="The plan has room for it, but the search looked at the first "
-                f"{breadth} tasks only (breadth), and it was none of those.",
-                opportunity=opportunity,
-            )
-        else:
-            detail = "The plan has room for it; the solver did not find this."
-        return Reason(
-            code="solver_limit", certainty="verified", detail=detail, opportunity=opportunity
-        )
-
-    def _is_looked_at(self, c: int, opportunity: int, breadth: int) -> bool:
-        """Return whether it is in A(s) after the action of the plan that it would follow."""
-        plan, k = self.planned.sequence, int(self.forced.first[c])
-        model = Model(
-            track=self.planned.track,
-            target_reward=self.problem.target_reward,
-            guidance=Guidance(1.0, 0.0, 0.0, 0.0),
-        )
-        last = int(plan.rows[k - 1]) if k else NO_TASK
-        images = plan.rows[:k][self.planned.track.is_contact[plan.rows[:k]] == 0]
-        state = State(
-            cursor=last,
-            last=last,
-            battery=float(plan.battery[k]),
-            recorder=float(plan.recorder[k]),
-            collected=frozenset(self.planned.track.place[images].tolist()),
-        )
-        return int(self.problem.local_row[opportunity]) in model.actions(state, breadth)
-
-    def _code(
-        self, c: int, limit: Literal["battery", "recorder"] | None, delta: float | None
-    ) -> ReasonCode:
-        if delta is not None and delta > 0.0:
-            return "solver_limit"
-        is_alone = self.forced.first[c] == self.forced.last[c]
-        if limit is not None and (is_alone or delta is None):
-            return limit
-        return "slew_conflict" if delta is None else "displaced_by"
-
-    def _certainty(self, delta: float | None) -> Certainty:
-        if not self.planned.is_sound:
-            return "heuristic"
-        is_weighed = delta is not None and delta <= 0.0
-        return "proven" if self.search.is_optimal and is_weighed else "verified"
-
-    def _break_s(self, c: int) -> float:
-        row = int(self.displaced.break_row[c])
-        track = self.planned.track
-        return float(track.data_end_s if row == AT_END else track.start_s[row])
-
-    def _detail(self, c: int, limit: str | None, delta: float | None, num_blocking: int) -> str:
-        said = []
-        if not self.planned.is_sound:
-            said.append("The plan breaks limits of this satellite as it is.")
-        if self.forced.first[c] < self.forced.last[c]:
-            said.append("The satellite cannot turn in time between it and planned actions.")
-        if np.isinf(self.forced.loss[c]):
-            said.append("One of those is pinned.")
-        if limit is not None:
-            said.append(f"With it the {limit} would reach its limit.")
-        if delta is not None:
-            actions = "1 action" if num_blocking == 1 else f"{num_blocking} actions"
-            change = f"changes by {delta:+g}" if delta else "stays the same"
-            said.append(f"It fits in place of {actions}; the reward {change}.")
-            if self.search.is_optimal and delta <= 0.0:
-                said.append("The plan is proven optimal: none with it earns more.")
-        return " ".join(said)

@@ -26,7 +26,8 @@ from planner_core.problem import (
     Problem,
     build_satellite_problem,
 )
-from planner_core.reasons import Change, Search, explain
+from planner_core.reason import Change, Search
+from planner_core.reasons import explain
 from planner_core.solvers import ForwardSearch, Milp, Rule
 from planner_core.solvers.base import Budget, Termination
 from planner_core.timeline import Timeline, replay
