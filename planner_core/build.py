@@ -21,6 +21,7 @@ from planner_core.orbits.earth_orientation import shipped
 from planner_core.orbits.eclipse import always_sunlit, sunlight
 from planner_core.orbits.ephemeris import Ephemeris, propagate
 from planner_core.orbits.places import Places, View, view
+from planner_core.pinning import pinned_problem
 from planner_core.problem import (
     ACCESS_FOUND,
     ACCESS_TOO_SHORT,
@@ -223,6 +224,8 @@ def build_problem(scenario: Scenario, computed: ScenarioOpportunities, budget: B
     ------
     Cancelled
         The budget was spent first.
+    InvalidScenario
+        A pin is impossible.
     """
     satellites = []
     for index, satellite in enumerate(scenario.satellites):
@@ -240,7 +243,7 @@ def build_problem(scenario: Scenario, computed: ScenarioOpportunities, budget: B
         )
     _go_on(budget, 1.0, "compile")
     stations = scenario.ground_stations
-    return Problem(
+    problem = Problem(
         horizon_s=scenario.horizon.duration_s,
         use_resources=scenario.use_resources,
         dynamics=scenario.dynamics,
@@ -253,6 +256,7 @@ def build_problem(scenario: Scenario, computed: ScenarioOpportunities, budget: B
         opportunities=computed.opportunities,
         satellites=tuple(satellites),
     )
+    return pinned_problem(scenario, problem)
 
 
 def check_propagation(scenario: Scenario) -> None:

@@ -50,6 +50,11 @@ def transitive_closure(problem: Problem, satellite: SatelliteProblem) -> Transit
     return replace(satellite.transitions, bits=_closure_bits(order))
 
 
+def is_transitive(problem: Problem) -> bool:
+    """Return whether no satellite gains by way of tasks what it cannot reach directly."""
+    return all(transitive_closure(problem, s) is s.transitions for s in problem.satellites)
+
+
 @kernel
 def _turns_slower_than_it_tracks(
     start_s: np.ndarray,

@@ -14,6 +14,8 @@ Horizon
     The span that is planned; instants inside it are seconds from its start.
 Epoch
     The instant an element set is given for.
+Pin
+    What a plan must hold, or must not; see ``planner_core.pins``.
 Off-nadir angle
     At the satellite, between nadir and the line of sight. *Elevation* is measured at the ground.
 Slew, settle
@@ -31,6 +33,7 @@ from datetime import UTC, datetime, timedelta
 from typing import Literal
 
 from planner_core.errors import InvalidScenario
+from planner_core.pins import Pins
 
 Dynamics = Literal["physical", "paper"]
 Nadir = Literal["geodetic", "geocentric"]
@@ -383,6 +386,7 @@ class Scenario:
     collect_spacing_s: float | None = None
     continuous_starts: bool = False
     allow_old_elements: bool = False
+    pins: Pins = field(default_factory=Pins)
     warnings: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
@@ -405,6 +409,12 @@ class Scenario:
                     f"The {what} id {value!r} appears twice.",
                     pointer=f"/{what}s/{position}/id",
                 )
+        self.pins.check(
+            {s.id for s in self.satellites},
+            {t.id for t in self.targets},
+            {g.id for g in self.ground_stations},
+            has_contacts=self.use_resources,
+        )
 
 
 def _first_duplicate(ids: Iterable[str]) -> tuple[int, str] | None:

@@ -35,3 +35,9 @@ class Plan:
                 )
             )
         )
+
+    def with_kept(self, problem: Problem) -> Plan:
+        """Return the plan with all that must be taken, at its own times."""
+        taken = {action.opportunity for action in self.actions}
+        missing = [row for row in problem.kept_rows.tolist() if row not in taken]
+        return Plan(tuple(sorted((*self.actions, *Plan.of(problem, missing).actions))))

@@ -7,7 +7,8 @@ with a sparse table of which of them may follow each other.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Final
 
@@ -32,6 +33,8 @@ ACCESS_FOUND: Final = 0
 NEVER_VISIBLE: Final = 1
 OUTSIDE_LIMITS: Final = 2
 ACCESS_TOO_SHORT: Final = 3
+RULED_OUT: Final = 4
+"""Geometry would allow it; what the scenario pins leaves no opportunity."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -147,6 +150,11 @@ class SatelliteProblem:
         Rows of the scenario's table that belong to this satellite, ascending. Shape ``(m,)``.
     sunlight
         Only what ``eclipse_aware`` needs; the whole horizon otherwise.
+    event_s
+        Starts of all opportunities of the satellite in the scenario, those that pins or a
+        search leave out included: the events of ``dynamics: paper``. Ascending.
+    event
+        For each row its place in ``event_s``. Shape ``(m,)``.
     """
 
     id: str
@@ -160,9 +168,74 @@ class SatelliteProblem:
     end_s: Floats
     transitions: Transitions
     sunlight: Sunlight
+    event_s: Floats
+    event: Ints
 
     def __len__(self) -> int:
         return len(self.rows)
+
+    @property
+    def previous_event_s(self) -> Floats:
+        """When the event before each row was; 0 before the first. Shape ``(m,)``."""
+        return np.concatenate([[0.0], self.event_s])[self.event]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Kept:
+    """A row that every plan must take, and the pin (JSON pointer) that says so."""
+
+    row: int
+    pointer: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Blocked:
+    """A span in which a satellite may not do tasks of some kinds."""
+
+    satellite: int
+    start_s: float
+    end_s: float
+    kinds: frozenset[int]
+    pointer: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Struck:
+    """A collect that pins rule out.
+
+    Attributes
+    ----------
+    row
+        Of the scenario's table, which the problem no longer has.
+    kept
+        Rows of the problem that it cannot stand beside; none where it is ruled out itself.
+    """
+
+    row: int
+    satellite: int
+    start_s: float
+    kept: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pinned:
+    """What the scenario pins, in terms of the problem.
+
+    Attributes
+    ----------
+    skipped
+        Rows that no plan may take, as long as they are in the table.
+    forbidden
+        Targets that no plan may collect.
+    struck
+        By target, the collects that were ruled out.
+    """
+
+    kept: tuple[Kept, ...] = ()
+    skipped: frozenset[int] = frozenset()
+    blocked: tuple[Blocked, ...] = ()
+    forbidden: frozenset[int] = frozenset()
+    struck: Mapping[int, tuple[Struck, ...]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -177,6 +250,10 @@ class Problem:
         Why a target has no opportunity, or ``ACCESS_FOUND``. Shape ``(num_targets,)``.
     station_antennas
         How many satellites each station serves at a time. Shape ``(num_stations,)``.
+    pinned
+        Opportunities that pins rule out are not in the table; those to be kept are named here.
+    origin
+        Row of each opportunity in the scenario's table, where that is another one. Shape ``(n,)``.
     """
 
     horizon_s: float
@@ -190,6 +267,21 @@ class Problem:
     station_antennas: Ints
     opportunities: Opportunities
     satellites: tuple[SatelliteProblem, ...]
+    pinned: Pinned = Pinned()
+    origin: Ints | None = None
+
+    @cached_property
+    def kept_rows(self) -> Ints:
+        """Return the rows that every plan must take, ascending."""
+        return np.array(sorted(kept.row for kept in self.pinned.kept), dtype=np.int32)
+
+    def kept_local(self, satellite: SatelliteProblem) -> Ints:
+        """Return the local rows that a satellite must take, ascending."""
+        return np.flatnonzero(np.isin(satellite.rows, self.kept_rows)).astype(np.int32)
+
+    def scenario_row(self, row: int) -> int:
+        """Return the row of an opportunity in the scenario's table, which names it to users."""
+        return row if self.origin is None else int(self.origin[row])
 
     @cached_property
     def local_row(self) -> Ints:
@@ -223,8 +315,15 @@ def build_satellite_problem(
     agility: Agility,
     resources: Resources,
     sunlight: Sunlight,
+    events: tuple[Floats, Ints] | None = None,
 ) -> SatelliteProblem:
-    """Return one satellite's view of the table, with its transitions worked out."""
+    """Return one satellite's view of the table, with its transitions worked out.
+
+    Parameters
+    ----------
+    events
+        ``event_s`` and ``event``, where there are more of them than opportunities.
+    """
     rows = np.flatnonzero(opportunities.satellite == index).astype(np.int32)
     start_s, end_s = opportunities.start_s[rows], opportunities.end_s[rows]
     return SatelliteProblem(
@@ -241,6 +340,8 @@ def build_satellite_problem(
             start_s, end_s, opportunities.los_start[rows], opportunities.los_end[rows], agility
         ),
         sunlight=sunlight,
+        event_s=start_s if events is None else events[0],
+        event=np.arange(len(rows), dtype=np.int32) if events is None else events[1],
     )
 
 

@@ -1,244 +1,124 @@
-"""Why a target is not in a plan: first what geometry proves, then what the plan blocks.
+"""Why a target is not in a plan: first what geometry and pins prove, then what the plan blocks.
 
-For each target left out, each of its opportunities is put into the final plan and checked
-against the tasks around it and against battery and recorder to the end of the horizon.
+For each target left out, each of its opportunities is forced into the final plan: what it
+displaces, which limit would break and when, and what that does to the reward. All targets are
+done at once, with the arithmetic of ``planner_core.track``; ``planner_core.explanation`` goes
+through one target's opportunities with the referee itself.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Mapping
+from typing import Final, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
-from planner_core.jit import kernel
+from planner_core.displacing import displace_each
+from planner_core.forcing import FITS, Forced, PlannedSatellite, force_each
 from planner_core.plan import Plan
 from planner_core.problem import (
     ACCESS_TOO_SHORT,
+    COLLECT,
     NEVER_VISIBLE,
     OUTSIDE_LIMITS,
     Floats,
     Ints,
+    Longs,
     Problem,
 )
+from planner_core.reason import (
+    UNKNOWN_SEARCH,
+    Change,
+    Outcome,
+    Reason,
+    ReasonCode,
+    Search,
+    TargetOutcome,
+)
+from planner_core.reason_teller import Teller
 from planner_core.timeline import Timeline
-from planner_core.track import NO_TASK, STRICT, Track, compile_track, take
 
-Outcome = Literal["downlinked", "collected", "unscheduled", "excluded"]
-ReasonCode = Literal["no_access", "slew_conflict", "battery", "recorder", "solver_limit"]
-Certainty = Literal["proven", "verified", "heuristic"]
-
-_NO_ACCESS = {
+NO_ACCESS: Final = {
     NEVER_VISIBLE: "No satellite rises above its horizon during the planning horizon.",
     OUTSIDE_LIMITS: "It is visible, but never within the limits of the sensor and its own.",
     ACCESS_TOO_SHORT: "Every access is shorter than its collect.",
 }
+_EXCLUDED: Final = "A pin forbids it."
+_BLOCKED: Final = "Pins rule all its opportunities out."
+_ROUNDED: Final = 1e4  # fractions of capacity are stated to as many parts
+_SURE: Final = 2e-9  # of capacity: a stated limit is not touched
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Reason:
-    """Why a target is left out.
-
-    Attributes
-    ----------
-    blocking
-        Positions in ``plan.actions`` of the actions in its way.
-    opportunity
-        The opportunity that the reason speaks of, where it is one.
-    at_s
-        When the limit would break, where one would.
-    """
-
-    code: ReasonCode
-    certainty: Certainty
-    detail: str
-    blocking: tuple[int, ...] = ()
-    opportunity: int | None = None
-    at_s: float | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TargetOutcome:
-    """What became of one target; ``position`` is that of the action that collected it."""
-
-    target: int
-    outcome: Outcome
-    position: int | None
-    satellite: int | None
-    reason: Reason | None
-
-
-def explain(problem: Problem, plan: Plan, timeline: Timeline) -> tuple[TargetOutcome, ...]:
+def explain(
+    problem: Problem, plan: Plan, timeline: Timeline, search: Search = UNKNOWN_SEARCH
+) -> tuple[TargetOutcome, ...]:
     """Return every target exactly once, with its outcome and, if left out, a true reason."""
-    planned = [_Planned.of(problem, plan, index) for index in range(len(problem.satellites))]
-    blamed = {
-        position: violation.code for violation in timeline.violations
-        for position in violation.blamed
-    }  # fmt: skip
+    reasons = _settled_reasons(problem, plan, timeline)
+    left = [
+        target
+        for target in range(len(problem.target_ids))
+        if target not in timeline.collected and target not in reasons
+    ]
+    reasons |= _forced_reasons(problem, plan, timeline, search, np.array(left, dtype=np.int64))
     outcomes = []
     for target in range(len(problem.target_ids)):
-        collected = timeline.collected.get(target)
+        collected, reason = timeline.collected.get(target), reasons.get(target)
+        outcome: Outcome = "unscheduled"
         if collected is not None:
-            outcomes.append(
-                TargetOutcome(
-                    target=target,
-                    outcome="downlinked" if collected.is_downlinked else "collected",
-                    position=collected.position,
-                    satellite=collected.satellite,
-                    reason=None,
-                )
-            )
-            continue
-        reason = _reason(problem, planned, blamed, target)
+            outcome = "downlinked" if collected.is_downlinked else "collected"
+        elif reason is not None and reason.code == "excluded":
+            outcome = "excluded"
         outcomes.append(
             TargetOutcome(
-                target=target, outcome="unscheduled", position=None, satellite=None, reason=reason
+                target=target,
+                outcome=outcome,
+                position=None if collected is None else collected.position,
+                satellite=None if collected is None else collected.satellite,
+                reason=None if collected is not None else reason,
             )
         )
     return tuple(outcomes)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Planned:
-    """One satellite's share of the plan: its rows in order, and the state before each."""
-
-    track: Track
-    rows: Ints
-    positions: tuple[int, ...]
-    battery: Floats
-    recorder: Floats
-
-    @classmethod
-    def of(cls, problem: Problem, plan: Plan, index: int) -> _Planned:
-        satellite = problem.satellites[index]
-        table = problem.opportunities
-        positions = tuple(
-            p for p, a in enumerate(plan.actions) if table.satellite[a.opportunity] == index
-        )
-        rows = problem.local_row[
-            np.array([plan.actions[p].opportunity for p in positions], dtype=np.int64)
-        ]
-        track = compile_track(problem, satellite, np.zeros(len(satellite), dtype=np.uint8))
-        battery = np.empty(len(rows) + 1)
-        recorder = np.empty(len(rows) + 1)
-        _replay_states(track, rows, battery, recorder)
-        return cls(track=track, rows=rows, positions=positions, battery=battery, recorder=recorder)
+def _settled_reasons(problem: Problem, plan: Plan, timeline: Timeline) -> dict[int, Reason]:
+    """Return the reasons that need no trial: pins, geometry, and collects that do not count."""
+    reasons: dict[int, Reason] = {}
+    positions = {action.opportunity: p for p, action in enumerate(plan.actions)}
+    for target in np.flatnonzero(np.diff(problem.target_opportunities[1]) == 0).tolist():
+        reasons[target] = _without_opportunity(problem, positions, target)
+    blamed = {
+        position: violation.code for violation in timeline.violations
+        for position in violation.blamed
+    }  # fmt: skip
+    for position, code in blamed.items():
+        row = plan.actions[position].opportunity
+        target = int(problem.opportunities.place[row])
+        if problem.opportunities.kind[row] == COLLECT and target not in timeline.collected:
+            reasons[target] = _broken(position, row, code)
+    return reasons
 
 
-@kernel
-def _replay_states(track: Track, rows: Ints, battery: Floats, recorder: Floats) -> None:
-    """Fill in the state after 0, 1, ... tasks."""
-    battery[0], recorder[0] = track.battery_start, track.recorder_start
-    last = NO_TASK
-    for k in range(len(rows)):
-        battery[k + 1], recorder[k + 1], _ = take(track, last, rows[k], battery[k], recorder[k])
-        last = rows[k]
-
-
-_FITS = -1
-_AT_END = -2
-
-
-@kernel
-def _first_break(
-    track: Track, rows: Ints, k: int, row: int, battery: float, recorder: float
-) -> tuple[int, bool]:
-    """Return where a limit breaks with ``row`` inserted before task ``k``, and if it is power.
-
-    A row, ``_AT_END`` (telemetry fills the recorder after the last task) or ``_FITS``.
-    """
-    last = rows[k - 1] if k > 0 else NO_TASK
-    battery, recorder, is_within = take(track, last, row, battery, recorder)
-    if not is_within:
-        return row, battery <= track.battery_min + STRICT
-    last = row
-    for i in range(k, len(rows)):
-        battery, recorder, is_within = take(track, last, rows[i], battery, recorder)
-        if not is_within:
-            return rows[i], battery <= track.battery_min + STRICT
-        last = rows[i]
-    idle_s = max(0.0, track.data_end_s - track.data_from_s[last])
-    if recorder + track.telemetry_per_s * idle_s >= track.recorder_max - STRICT:
-        return _AT_END, False
-    return _FITS, False
-
-
-def _reason(
-    problem: Problem,
-    planned: Sequence[_Planned],
-    blamed: Mapping[int, str],
-    target: int,
-) -> Reason:
-    collects = problem.collects_of(target)
-    if len(collects) == 0:
-        detail = _NO_ACCESS[int(problem.target_access[target])]
+def _without_opportunity(problem: Problem, positions: Mapping[int, int], target: int) -> Reason:
+    if target in problem.pinned.forbidden:
+        return Reason(code="excluded", certainty="proven", detail=_EXCLUDED)
+    detail = NO_ACCESS.get(int(problem.target_access[target]))
+    if detail is not None:
         return Reason(code="no_access", certainty="proven", detail=detail)
-    blocked: Reason | None = None
-    short: Reason | None = None
-    for opportunity in (int(c) for c in collects):
-        satellite = planned[problem.opportunities.satellite[opportunity]]
-        row = int(problem.local_row[opportunity])
-        found = _tried(problem, satellite, opportunity, row, blamed)
-        if found.code == "solver_limit":
-            return found
-        if found.code in ("battery", "recorder"):
-            short = short or found
-        elif blocked is None or len(found.blocking) < len(blocked.blocking):
-            blocked = found
-    reason = short or blocked
-    assert reason is not None
-    return reason
-
-
-def _tried(
-    problem: Problem,
-    satellite: _Planned,
-    opportunity: int,
-    row: int,
-    blamed: Mapping[int, str],
-) -> Reason:
-    """Return what keeps one opportunity out of the final plan."""
-    track, rows = satellite.track, satellite.rows
-    k = int(np.searchsorted(rows, row))
-    if k < len(rows) and rows[k] == row:
-        return _broken(satellite.positions[k], opportunity, blamed)
-    blockers = _blockers(problem, satellite, opportunity, row, k)
-    if blockers:
-        return Reason(
-            code="slew_conflict",
-            certainty="verified",
-            detail=f"Each of its {len(problem.collects_of(int(track.place[row])))} opportunities "
-            "lies too close to a planned action for the satellite to turn in time.",
-            blocking=blockers,
-            opportunity=opportunity,
-        )
-    if problem.use_resources:
-        where, is_battery = _first_break(
-            track, rows, k, row, satellite.battery[k], satellite.recorder[k]
-        )
-        if where != _FITS:
-            at_s = track.data_end_s if where == _AT_END else float(track.start_s[where])
-            after = "after it" if where != row else "with it"
-            name = "battery" if is_battery else "recorder"
-            return Reason(
-                code="battery" if is_battery else "recorder",
-                certainty="verified",
-                detail=f"The plan has no room for it: {after} the {name} would reach its limit.",
-                opportunity=opportunity,
-                at_s=at_s,
-            )
+    kept = {row for struck in problem.pinned.struck.get(target, ()) for row in struck.kept}
+    if not kept:
+        return Reason(code="excluded", certainty="proven", detail=_BLOCKED)
     return Reason(
-        code="solver_limit",
-        certainty="verified",
-        detail="The plan has room for it; the solver did not find this.",
-        opportunity=opportunity,
+        code="slew_conflict",
+        certainty="proven",
+        detail="Each of its opportunities lies too close to an action that a pin keeps, or in "
+        "an interval that one blocks.",
+        blocking=tuple(sorted(positions[row] for row in kept if row in positions)),
     )
 
 
-def _broken(position: int, opportunity: int, blamed: Mapping[int, str]) -> Reason:
+def _broken(position: int, opportunity: int, code: str) -> Reason:
     """Return the reason of a collect that is in the plan but earns nothing."""
-    code = blamed.get(position, "solver_limit")
     known: Mapping[str, ReasonCode] = {
         "battery": "battery", "recorder": "recorder", "slew": "slew_conflict",
         "overlap": "slew_conflict",
@@ -252,21 +132,164 @@ def _broken(position: int, opportunity: int, blamed: Mapping[int, str]) -> Reaso
     )
 
 
-def _blockers(
-    problem: Problem, satellite: _Planned, opportunity: int, row: int, k: int
-) -> tuple[int, ...]:
-    """Return the planned actions that the opportunity cannot follow, or that cannot follow it."""
-    transitions = problem.satellites[problem.opportunities.satellite[opportunity]].transitions
-    found = []
-    # Neighbours decide where turning is transitive; further ones matter only past a short task.
-    for j in range(k - 1, -1, -1):
-        if not transitions.allows(int(satellite.rows[j]), row):
-            found.append(satellite.positions[j])
-        elif j < k - 1:
-            break
-    for j in range(k, len(satellite.rows)):
-        if not transitions.allows(row, int(satellite.rows[j])):
-            found.append(satellite.positions[j])
-        elif j > k:
-            break
-    return tuple(sorted(found))
+def earned_by(problem: Problem, plan: Plan, timeline: Timeline) -> Floats:
+    """Return what the plan loses with each of its actions."""
+    table = problem.opportunities
+    earned = np.zeros(len(plan.actions))
+    images = [
+        int(table.place[a.opportunity])
+        for a in plan.actions
+        if table.kind[a.opportunity] == COLLECT
+    ]
+    times = np.bincount(images, minlength=len(problem.target_ids))
+    for target, collected in timeline.collected.items():
+        # Another image of it would count instead.
+        if times[target] == 1:
+            earned[collected.position] = problem.target_reward[target]
+    return earned
+
+
+class _Tried(NamedTuple):
+    """All opportunities of the targets at hand, target after target; shape ``(n,)``."""
+
+    rows: Ints
+    first: Longs
+    satellite: Ints
+    forced: Forced
+
+
+def _forced_reasons(
+    problem: Problem, plan: Plan, timeline: Timeline, search: Search, targets: Longs
+) -> dict[int, Reason]:
+    if len(targets) == 0:
+        return {}
+    earned = earned_by(problem, plan, timeline)
+    planned = [
+        PlannedSatellite.of(problem, plan, index, earned)
+        for index in range(len(problem.satellites))
+    ]
+    tried = _try_all(problem, planned, targets)
+    chosen = _chosen(tried)
+    changes = _Changes.of(problem, tried)
+    satellite = tried.satellite[chosen]
+    reasons: dict[int, Reason] = {}
+    for one in planned:
+        own = np.flatnonzero(satellite == one.index)
+        if len(own) == 0:
+            continue
+        picked = chosen[own]
+        forced = Forced._make(column[picked] for column in tried.forced)
+        rows = problem.local_row[tried.rows[picked]]
+        displaced = displace_each(one, rows, forced)
+        teller = Teller(problem, one, forced, displaced, search)
+        for c, at in enumerate(own):
+            target = int(targets[at])
+            row = int(tried.rows[picked[c]])
+            reasons[target] = teller.reason(c, target, row, changes.smallest(int(at)))
+    return reasons
+
+
+def _try_all(problem: Problem, planned: list[PlannedSatellite], targets: Longs) -> _Tried:
+    collects, offsets = problem.target_opportunities
+    counts = offsets[targets + 1] - offsets[targets]
+    first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+    within = np.arange(first[-1]) - np.repeat(first[:-1], counts)
+    rows = collects[np.repeat(offsets[targets], counts) + within]
+    satellite = problem.opportunities.satellite[rows]
+    parts = []
+    order = np.argsort(satellite, kind="stable")
+    for one in planned:
+        own = rows[satellite == one.index]
+        parts.append(force_each(problem, one, problem.local_row[own]))
+    columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
+    back = np.empty(len(order), dtype=np.int64)
+    back[order] = np.arange(len(order))
+    return _Tried(rows, first, satellite, Forced._make(column[back] for column in columns))
+
+
+def _chosen(tried: _Tried) -> Longs:
+    """Return for each target the opportunity that comes closest: the reason speaks of it.
+
+    What fits comes first, then what only a limit keeps out, then what costs least reward.
+    """
+    forced = tried.forced
+    is_free = forced.first == forced.last
+    rank = np.where(is_free, 0, 2) + (forced.broken != FITS)
+    rank[np.isinf(forced.loss)] = 4
+    return _first_of_each(tried.first, forced.loss, rank)
+
+
+def _first_of_each(first: Longs, *keys: npt.NDArray[np.generic]) -> Longs:
+    """Return in each group what comes first by the last key, then the one before it."""
+    group = np.repeat(np.arange(len(first) - 1), np.diff(first))
+    return np.lexsort((*keys, group))[first[:-1]]
+
+
+class _Changes(NamedTuple):
+    """For each target the smallest change of settings that would let it in, if there is any.
+
+    ``size`` is relative, and infinite where there is none; shape ``(num_targets,)``.
+    """
+
+    rows: Ints
+    satellite: Ints
+    size: Floats
+    values: dict[str, Floats]
+
+    @classmethod
+    def of(cls, problem: Problem, tried: _Tried) -> _Changes:
+        forced, satellite = tried.forced, tried.satellite
+        agility = [s.agility for s in problem.satellites]
+        resources = [s.resources for s in problem.satellites]
+        now = {
+            "slew_rate_deg_s": np.array([a.slew_rate_deg_s for a in agility]),
+            "settle_s": np.array([a.settle_s for a in agility]),
+            "battery_min_fraction": np.array([r.battery_min_fraction for r in resources]),
+            "recorder_max_fraction": np.array([r.recorder_max_fraction for r in resources]),
+        }
+        now = {name: values[satellite] for name, values in now.items()}
+        is_free = (forced.first == forced.last) & (forced.broken != FITS)
+        lowest = np.floor((forced.lowest - _SURE) * _ROUNDED) / _ROUNDED
+        highest = np.ceil((forced.highest + _SURE) * _ROUNDED) / _ROUNDED
+        can_be = is_free & (lowest > 0.0) & (highest < 1.0)
+        values = {
+            "slew_rate_deg_s": forced.rate_deg_s,
+            "settle_s": np.floor(forced.settle_s * 1000.0) / 1000.0,
+            "battery_min_fraction": np.where(
+                can_be & (lowest < now["battery_min_fraction"]), lowest, np.nan
+            ),
+            "recorder_max_fraction": np.where(
+                can_be & (highest > now["recorder_max_fraction"]), highest, np.nan
+            ),
+        }
+        size = {name: np.abs(values[name] / np.maximum(now[name], 1e-9) - 1.0) for name in values}
+        # Either agility alone is changed, by the smaller of the two, or the limits together.
+        is_settle = np.nan_to_num(size["settle_s"], nan=np.inf) < np.nan_to_num(
+            size["slew_rate_deg_s"], nan=np.inf
+        )
+        values["slew_rate_deg_s"] = np.where(is_settle, np.nan, values["slew_rate_deg_s"])
+        values["settle_s"] = np.where(is_settle, values["settle_s"], np.nan)
+        stack = np.stack([np.where(np.isnan(values[name]), -np.inf, size[name]) for name in values])
+        largest = stack.max(axis=0)
+        largest[largest == -np.inf] = np.inf
+        best = _first_of_each(tried.first, largest)
+        return cls(
+            rows=tried.rows[best],
+            satellite=satellite[best],
+            size=largest[best],
+            values={name: column[best] for name, column in values.items()},
+        )
+
+    def smallest(self, at: int) -> Change | None:
+        """Return the change of one target."""
+        if self.size[at] == np.inf:
+            return None
+        return Change(
+            opportunity=int(self.rows[at]),
+            satellite=int(self.satellite[at]),
+            settings={
+                name: float(values[at])
+                for name, values in self.values.items()
+                if not np.isnan(values[at])
+            },
+        )

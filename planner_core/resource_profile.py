@@ -130,19 +130,20 @@ def _integrate_events(
     r = satellite.resources
     taken: dict[int, list[int]] = {}
     for position, action in enumerate(actions):
-        taken.setdefault(int(problem.local_row[action.opportunity]), []).append(position)
-    sunlit_s: Floats = satellite.sunlight.seconds_until(satellite.start_s)
+        event = int(satellite.event[problem.local_row[action.opportunity]])
+        taken.setdefault(event, []).append(position)
+    sunlit_s: Floats = satellite.sunlight.seconds_until(satellite.event_s)
     point = Point(0.0, r.initial_battery_fraction, r.initial_recorder_fraction,
                   r.initial_recorder_fraction, 0.0)  # fmt: skip
     points = [point]
     before = [point] * len(actions)
     after = [point] * len(actions)
     previous_sunlit_s = 0.0
-    for row in range(len(satellite)):
-        t_s = float(satellite.start_s[row])
+    for event in range(len(satellite.event_s)):
+        t_s = float(satellite.event_s[event])
         telemetry = r.telemetry_per_s * (t_s - point.time_s)
-        if row not in taken:
-            charge = r.sunpoint_charge_per_s * (float(sunlit_s[row]) - previous_sunlit_s)
+        if event not in taken:
+            charge = r.sunpoint_charge_per_s * (float(sunlit_s[event]) - previous_sunlit_s)
             point = Point(
                 t_s,
                 min(1.0, point.battery + charge),
@@ -150,12 +151,12 @@ def _integrate_events(
                 point.recorded + telemetry,
                 point.removed,
             )
-        for position in taken.get(row, ()):
+        for position in taken.get(event, ()):
             before[position] = point
             point = _book(point, problem, satellite, actions[position], t_s, telemetry)
             after[position] = point
             telemetry = 0.0
-        previous_sunlit_s = float(sunlit_s[row])
+        previous_sunlit_s = float(sunlit_s[event])
         points.append(point)
     return Profile(points=tuple(points), before=tuple(before), after=tuple(after))
 

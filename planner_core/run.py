@@ -14,8 +14,9 @@ from planner_core.bounds.resource_bound import quick_bound
 from planner_core.build import ScenarioOpportunities, build_problem, compute_opportunities
 from planner_core.domain import Scenario
 from planner_core.problem import Problem
-from planner_core.reasons import TargetOutcome, explain
-from planner_core.solvers.base import Budget, Progress, Solution, Solver
+from planner_core.reason import Search, TargetOutcome
+from planner_core.reasons import explain
+from planner_core.solvers.base import Budget, Progress, Solution, Solver, Termination
 from planner_core.timeline import Timeline, replay
 
 log = logging.getLogger(__name__)
@@ -100,7 +101,11 @@ def plan_scenario(
             bound=bound.value if bound else None,
         )
     )
-    outcomes = explain(problem, solution.plan, timeline)
+    search = Search(
+        is_optimal=timeline.is_valid and solution.termination is Termination.OPTIMAL,
+        breadth=getattr(solver, "breadth", None),
+    )
+    outcomes = explain(problem, solution.plan, timeline, search)
     clock.append(time.perf_counter())
     access, compile_, solve, verify = (b - a for a, b in itertools.pairwise(clock))
     return Judged(

@@ -12,13 +12,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from planner_core.pinned_plan import breaches
 from planner_core.plan import Action, Plan
 from planner_core.problem import COLLECT, CONTACT, Floats, Problem
 from planner_core.resource_profile import Point, Profile, integrate, thin
 from planner_core.slew import INSTANT, TIME_TOLERANCE_S, angle_between_deg, slew_s
 
 Mode = Literal["collect", "contact", "sunpoint"]
-ViolationCode = Literal["window", "overlap", "slew", "station", "duplicate", "battery", "recorder"]
+ViolationCode = Literal[
+    "window", "overlap", "slew", "station", "duplicate", "battery", "recorder", "pin"
+]
 _AMOUNT_TOLERANCE = 1e-9  # of a recorder's capacity, in comparing sums of many pieces
 
 
@@ -161,6 +164,7 @@ def replay(problem: Problem, plan: Plan) -> Timeline:
         violations += found
         slews |= turns
     violations += _stations(problem, plan)
+    violations += [Violation(code="pin", **b._asdict()) for b in breaches(problem, plan)]
 
     profiles: list[Profile | None] = [None] * len(problem.satellites)
     if problem.use_resources:

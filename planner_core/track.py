@@ -46,18 +46,20 @@ STRICT: Final = 1e-9
 NO_TASK: Final = -1
 _SLACK: Final = 1e-12  # a fallback worked out backward must also hold when replayed forward
 _MAX_LABELS: Final = 8
-_MAX_CONTACTS_AHEAD: Final = 12
+_MAX_AHEAD: Final = 12
 
 
 class Track(NamedTuple):
     """One satellite's problem as plain arrays; shape ``(m,)`` unless said otherwise.
 
     ``first_offer`` is the first row of the same access: itself, unless the access offers several
-    collects to choose from. ``contacts`` lists the usable contact rows; ``contact_after[i]``
-    is the place in it of the first one after row ``i - 1`` (shape ``(m + 1,)``).
-    ``fallback_*`` hold, for each contact, up to eight pairs (battery needed, recorder
-    allowed) after it, from which the satellite can keep its limits to the end by contacts
-    alone; shape ``(num_contacts, 8)``.
+    collects to choose from. ``next_kept[i]`` is the first row from ``i`` on that must be taken, m
+    where there is none (shape ``(m + 1,)``). ``fallbacks`` lists the usable contact rows and
+    those that must be taken; ``fallback_after[i]`` is the place in it of the first one after
+    row ``i - 1`` (shape ``(m + 1,)``).
+    ``fallback_*`` hold, for each of them, up to eight pairs (battery needed, recorder
+    allowed) after it, from which the satellite can keep its limits to the end by these rows
+    alone; shape ``(num_fallbacks, 8)``.
     """
 
     start_s: Floats
@@ -85,8 +87,9 @@ class Track(NamedTuple):
     recorder_max: float
     battery_start: float
     recorder_start: float
-    contacts: Ints
-    contact_after: Ints
+    next_kept: Ints
+    fallbacks: Ints
+    fallback_after: Ints
     fallback_battery: Floats
     fallback_recorder: Floats
     is_guarded: bool
@@ -113,7 +116,10 @@ def compile_track(problem: Problem, satellite: SatelliteProblem, blocked: Bytes)
     """Return a satellite's arrays; ``blocked`` rows (shape ``(m,)``) may not be taken."""
     m = len(satellite)
     is_contact = (satellite.kind == CONTACT).astype(np.uint8)
-    contacts = np.flatnonzero((is_contact == 1) & (blocked == 0)).astype(np.int32)
+    is_kept = np.zeros(m, dtype=np.bool_)
+    is_kept[problem.kept_local(satellite)] = True
+    next_kept = np.where(np.append(is_kept, True), np.arange(m + 1), m)
+    fallbacks = np.flatnonzero((is_contact == 1) & (blocked == 0) | is_kept).astype(np.int32)
     access = problem.opportunities.access[satellite.rows]
     _, first_offer, offer_of = np.unique(access, return_index=True, return_inverse=True)
     track = Track(
@@ -129,10 +135,11 @@ def compile_track(problem: Problem, satellite: SatelliteProblem, blocked: Bytes)
         bits=satellite.transitions.bits,
         use_resources=problem.use_resources,
         **_resource_columns(problem, satellite, is_contact),
-        contacts=contacts,
-        contact_after=np.searchsorted(contacts, np.arange(m + 1)).astype(np.int32),
-        fallback_battery=np.full((len(contacts), _MAX_LABELS), np.inf),
-        fallback_recorder=np.full((len(contacts), _MAX_LABELS), -np.inf),
+        next_kept=np.minimum.accumulate(next_kept[::-1])[::-1].astype(np.int32),
+        fallbacks=fallbacks,
+        fallback_after=np.searchsorted(fallbacks, np.arange(m + 1)).astype(np.int32),
+        fallback_battery=np.full((len(fallbacks), _MAX_LABELS), np.inf),
+        fallback_recorder=np.full((len(fallbacks), _MAX_LABELS), -np.inf),
         is_guarded=problem.use_resources,
     )
     if not problem.use_resources:
@@ -152,7 +159,7 @@ def _resource_columns(
     duration_s = end_s - start_s
     sunlit = satellite.sunlight.seconds_until
     contact = is_contact == 1
-    previous_start_s = np.concatenate([[0.0], start_s[:-1]]) if len(start_s) else start_s
+    previous_start_s = satellite.previous_event_s
     telemetry = r.telemetry_per_s * duration_s
     physical = problem.dynamics == "physical"
     return {
@@ -167,8 +174,8 @@ def _resource_columns(
         + (telemetry if physical else 0.0),
         "data_end_s": problem.horizon_s
         if physical
-        else float(start_s[-1])
-        if len(start_s)
+        else float(satellite.event_s[-1])
+        if len(satellite.event_s)
         else 0.0,
         "charge_per_s": r.sunpoint_charge_per_s,
         "telemetry_per_s": r.telemetry_per_s,
@@ -202,21 +209,43 @@ def take(
     return max(0.0, battery), min(1.0, recorder), is_within
 
 
+@inlined
+def _ahead(track: Track, first: int, step: int, kept: int) -> int:
+    """Return the place of the fallback to look at in a step from ``first`` on; -1 for no more.
+
+    That is some contacts one after another up to the next task that must be taken, and that
+    task in any case.
+    """
+    end = len(track.fallbacks)
+    at = first + step
+    if kept < len(track.start_s):
+        end = track.fallback_after[kept] + 1
+        if step == _MAX_AHEAD:
+            return end - 1 if at < end else -1
+    return at if step < _MAX_AHEAD and at < end else -1
+
+
 @borrowing
 def is_safe(track: Track, last: int, cursor: int, battery: float, recorder: float) -> bool:
     """Return whether limits can be kept to the end from here by idling and contacts alone.
 
     Idle time only ever charges the battery, so the recorder is what fills up: either it has
     room for the telemetry to the end, or some contact after row ``cursor`` must be reached.
+    Tasks that must be taken count as contacts do, and none of them may be passed by.
     The check is sufficient, not necessary (it looks a limited number of contacts ahead).
     """
     data_from_s = track.data_from_s[last] if last >= 0 else 0.0
     room = track.recorder_max - 2.0 * STRICT - recorder
-    if track.telemetry_per_s * max(0.0, track.data_end_s - data_from_s) <= room:
+    m = len(track.start_s)
+    kept = track.next_kept[cursor + 1]
+    if kept == m and track.telemetry_per_s * max(0.0, track.data_end_s - data_from_s) <= room:
         return True
-    first = track.contact_after[cursor + 1]
-    for at in range(first, min(first + _MAX_CONTACTS_AHEAD, len(track.contacts))):
-        row = track.contacts[at]
+    first = track.fallback_after[cursor + 1]
+    for step in range(_MAX_AHEAD + 1):
+        at = _ahead(track, first, step, kept)
+        if at < 0:
+            return False
+        row = track.fallbacks[at]
         if track.telemetry_per_s * max(0.0, track.data_peak_s[row] - data_from_s) > room:
             return False
         if not may_follow(last, row, track.near_from, track.far_from, track.offset, track.bits):
@@ -236,18 +265,23 @@ def is_safe(track: Track, last: int, cursor: int, battery: float, recorder: floa
 @borrowing
 def _fill_fallbacks(track: Track) -> None:
     """Work backward over the contacts: what each must leave so that the rest can be kept."""
-    for at in range(len(track.contacts) - 1, -1, -1):
-        row = track.contacts[at]
+    m = len(track.start_s)
+    for at in range(len(track.fallbacks) - 1, -1, -1):
+        row = track.fallbacks[at]
+        kept = track.next_kept[row + 1]
         data_from_s = track.data_from_s[row]
         top = track.recorder_max - 2.0 * STRICT
         idle = top - track.telemetry_per_s * max(0.0, track.data_end_s - data_from_s)
         num_labels = 0
-        if idle >= 0.0:
+        if idle >= 0.0 and kept == m:
             track.fallback_battery[at, 0] = 0.0
             track.fallback_recorder[at, 0] = idle
             num_labels = 1
-        for after in range(at + 1, min(at + 1 + _MAX_CONTACTS_AHEAD, len(track.contacts))):
-            following = track.contacts[after]
+        for step in range(_MAX_AHEAD + 1):
+            after = _ahead(track, at + 1, step, kept)
+            if after < 0:
+                break
+            following = track.fallbacks[after]
             if not may_follow(
                 row, following, track.near_from, track.far_from, track.offset, track.bits
             ):
@@ -306,25 +340,34 @@ def next_action(
     """Return the first row from ``from_row`` on that may be taken after ``last``, or ``m``.
 
     This is A(s) of eq. 4, in time order. With ``is_hard`` an action must also keep the limits,
-    now and (see ``is_safe``) to the end of the horizon.
+    now and (see ``is_safe``) to the end of the horizon. It ends with the next task that must be
+    taken, and what that one could not follow is not in it.
     """
     # Rows that start before the last task ends need no look.
     first = from_row if last < 0 else max(from_row, track.near_from[last])
-    for row in range(first, len(track.start_s)):
-        if track.blocked[row] or not may_follow(
-            last, row, track.near_from, track.far_from, track.offset, track.bits
-        ):
+    m = len(track.start_s)
+    kept = track.next_kept[last + 1]
+    for row in range(first, min(m, kept + 1)):
+        if row != kept:
+            if track.blocked[row]:
+                continue
+            if unimaged_only and not track.is_contact[row] and collected[track.place[row]]:
+                continue
+            if kept < m and not may_follow(
+                row, kept, track.near_from, track.far_from, track.offset, track.bits
+            ):
+                continue
+        if not may_follow(last, row, track.near_from, track.far_from, track.offset, track.bits):
             continue
-        if unimaged_only and not track.is_contact[row] and collected[track.place[row]]:
-            continue
-        if track.use_resources and is_hard:
+        # Without a way to keep the limits, what must be taken comes before them.
+        if track.use_resources and is_hard and (row != kept or track.is_guarded):
             battery_after, recorder_after, is_within = take(track, last, row, battery, recorder)
             if not is_within or (
                 track.is_guarded and not is_safe(track, row, row, battery_after, recorder_after)
             ):
                 continue
         return row
-    return len(track.start_s)
+    return m
 
 
 @inlined
@@ -347,7 +390,9 @@ def is_repeated(track: Track, chosen: Ints, begin: int, end: int, row: int) -> b
 def may_wait(
     track: Track, last: int, cursor: int, battery: float, recorder: float, is_hard: bool
 ) -> bool:
-    """Return whether sun-pointing past row ``cursor`` leaves a way to keep the limits."""
+    """Return whether sun-pointing past row ``cursor`` leaves a way to keep pins and limits."""
+    if track.next_kept[last + 1] == cursor:
+        return False
     if not (track.use_resources and is_hard and track.is_guarded):
         return True
     return is_safe(track, last, cursor, battery, recorder)

@@ -8,7 +8,7 @@ from typing import Any
 
 from planner_core import __version__
 from planner_core.orbits.sgp4_record import GRAVITY
-from planner_core.reasons import TargetOutcome
+from planner_core.reason import Change, TargetOutcome
 from planner_core.run import Judged
 from planner_core.timeline import JudgedAction, Resourceline, Violation, plan_sha256
 from service.instants import instant_text
@@ -171,7 +171,7 @@ class Documents:
             "end": self._instant(action.end_s),
             "target_id": target_id,
             "station_id": station_id,
-            "opportunity_id": None if row is None else f"o{row}",
+            "opportunity_id": self._opportunity_id(row),
             "off_nadir_deg": off_nadir_deg,
             "azimuth_deg": azimuth_deg,
             "slew": None
@@ -185,6 +185,16 @@ class Documents:
             "battery_fraction_end": _rounded(action.battery_end),
             "recorder_fraction_end": _rounded(action.recorder_end),
         }
+
+    def _change(self, change: Change) -> Document:
+        found: Document = {"opportunity_id": self._opportunity_id(change.opportunity)}
+        if change.satellite is None:
+            return found | {"drop_actions": [self._action_ids[p] for p in change.drop]}
+        satellite_id = self.judged.problem.satellites[change.satellite].id
+        return found | {"satellite_id": satellite_id} | dict(change.settings)
+
+    def _opportunity_id(self, row: int | None) -> str | None:
+        return None if row is None else f"o{self.judged.problem.scenario_row(row)}"
 
     def _curves(self, line: Resourceline) -> Document:
         return {
@@ -215,9 +225,10 @@ class Documents:
                 "code": found.code,
                 "certainty": found.certainty,
                 "blocking_actions": [self._action_ids[p] for p in found.blocking],
-                "opportunity_id": None if found.opportunity is None else f"o{found.opportunity}",
+                "opportunity_id": self._opportunity_id(found.opportunity),
                 "at": None if found.at_s is None else self._instant(found.at_s),
-                "change": None,
+                "reward_delta": found.reward_delta,
+                "change": None if found.change is None else self._change(found.change),
                 "detail": found.detail,
             }
         return {

@@ -9,13 +9,13 @@ from __future__ import annotations
 import json
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Discriminator, Field, StringConstraints, Tag, model_validator
+from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
 from planner_core.domain import Dynamics, LookSide, Nadir, OrbitDirection
 from service.api.shapes import Body, Instant, Name
+from service.pin_inputs import Id, PinsIn
 
-Id = Annotated[str, StringConstraints(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")]
 NonNegative = Annotated[float, Field(ge=0)]
 Positive = Annotated[float, Field(gt=0)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
@@ -205,6 +205,7 @@ class Question(Body):
         description="Plan with element sets that are more than 30 days from their epoch "
         "(low orbits), which is refused otherwise.",
     )
+    pins: PinsIn = PinsIn()
 
 
 class ScenarioIn(Question):

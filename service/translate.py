@@ -44,6 +44,7 @@ from service.inputs import (
     ScenarioFile,
     TargetIn,
 )
+from service.pin_inputs import pins_from
 
 _SECONDS_PER_HOUR = 3600.0
 
@@ -126,6 +127,8 @@ def canonical_of_file(file: ScenarioFile) -> str:
     for target in document["targets"]:
         if target["catalog_id"] is None:
             del target["catalog_id"]
+    if not any(document["pins"].values()):
+        del document["pins"]
     return json.dumps(document, sort_keys=True, separators=(",", ":"), allow_nan=False)
 
 
@@ -141,6 +144,7 @@ def scenario_from_file(file: ScenarioFile) -> Scenario:
         collect_spacing_s=file.collect_spacing_s,
         continuous_starts=file.continuous_starts,
         allow_old_elements=file.allow_old_elements,
+        pins=pins_from(file.pins),
     )
 
 

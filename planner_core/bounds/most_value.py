@@ -107,6 +107,8 @@ def most_value(
                     lowest = min(lowest, own_low[i, y])
                     highest = max(highest, own_high[i, y])
         if lowest > highest or lowest + gained > top:
+            if network.is_kept[k]:
+                _forget(k, top, idle, low, high, own_low, own_high)
             continue
         lowest, highest = lowest + gained, min(top, highest + gained)
         own = np.full((num_levels, highest - lowest + 1), none)
@@ -119,6 +121,8 @@ def most_value(
                 own, lowest, own_low[k], own_high[k],
             )  # fmt: skip
         _tidy(own, lowest, own_low[k], own_high[k], after_need[k], credit, goal, best_so_far)
+        if network.is_kept[k]:
+            _forget(k, top, idle, low, high, own_low, own_high)
         if not keeps_labels:
             continue
         for y in range(num_levels):
@@ -146,6 +150,16 @@ def most_value(
 
 
 @kernel
+def _forget(
+    k: int, top: int, idle: Floats, low: Ints, high: Ints, own_low: Ints, own_high: Ints
+) -> None:
+    """Drop all labels of paths that do not take row ``k``, where that one must be taken."""
+    idle[:] = -np.inf
+    low[:], high[:] = top + 1, -1
+    own_low[:k], own_high[:k] = top + 1, -1
+
+
+@kernel
 def _longer(values: np.ndarray, length: int) -> np.ndarray:
     longer = np.empty(length, dtype=values.dtype)
     longer[: len(values)] = values
@@ -162,14 +176,18 @@ def path_of(network: Network, levels: DataLevels, weight: Ints, labels: Labels, 
     m = len(weight)
     rows = np.empty(m, dtype=np.int32)
     length = 0
+    first_kept = 0
+    while first_kept < m and not network.is_kept[first_kept]:
+        first_kept += 1
     k, level, energy = m, levels.end, -np.inf
     while True:
-        if value == 0 and _leads_to(network, levels, k, levels.start, network.energy_start,
-                                    level, energy):  # fmt: skip
+        is_start = value == 0 and k <= first_kept
+        if is_start and _leads_to(network, levels, k, levels.start, network.energy_start,
+                                  level, energy):  # fmt: skip
             break
         found = -1
         i = k - 1
-        while i >= 0 and found < 0:
+        while i >= 0 and found < 0 and not (i + 1 < k and network.is_kept[i + 1]):
             if labels.first[i + 1] > labels.first[i] and _may_be_next(network, i, k):
                 for at in range(labels.first[i], labels.first[i + 1]):
                     if labels.value[at] == value and _leads_to(

@@ -35,11 +35,12 @@ class Network(NamedTuple):
 
     ``near_rows[near_first[i] : near_first[i + 1]]`` are the rows below ``idle_from[i]`` that
     may follow ``i``; ``straight_*`` list the same arcs by the later row. ``by_idle`` has all
-    rows in order of ``idle_from``.
+    rows in order of ``idle_from``. A path that passes by a row with ``is_kept`` is none.
     """
 
     place: Ints
     is_contact: np.ndarray
+    is_kept: np.ndarray
     idle_from: Ints
     by_idle: Ints
     near_first: Longs
@@ -84,6 +85,7 @@ def _network(problem: Problem, satellite: SatelliteProblem, slack: float) -> Net
     return Network(
         place=track.place,
         is_contact=track.is_contact,
+        is_kept=np.isin(satellite.rows, problem.kept_rows),
         idle_from=idle_from,
         by_idle=np.argsort(idle_from, kind="stable").astype(np.int32),
         near_first=near_first,
@@ -151,6 +153,7 @@ def part_of(network: Network, rows: Ints) -> Network:
     return Network(
         network.place[rows],
         network.is_contact[rows],
+        network.is_kept[rows],
         idle_from,
         np.argsort(idle_from, kind="mergesort").astype(np.int32),
         first,

@@ -6,6 +6,7 @@ in order, and only what keeps the limits is taken (``feasibility``).
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
@@ -64,6 +65,7 @@ class Graph:
                 _, path = links.longest(weight)
             else:
                 path = links.longest_with_history(weight, track.place)
+            path = _with_kept(problem, turn, path)
             if problem.use_resources and self.feasibility == "hard":
                 off_path = track.is_contact == 0
                 off_path[path] = False
@@ -76,3 +78,13 @@ class Graph:
             return path
 
         return plan_in_turn(problem, budget, plan_turn)
+
+
+def _with_kept(problem: Problem, turn: Turn, path: list[int]) -> list[int]:
+    """Return the path with what must be taken, or the rule's where that does not fit in."""
+    kept = problem.kept_local(turn.satellite).tolist()
+    whole = sorted({*path, *kept})
+    if all(turn.satellite.transitions.allows(a, b) for a, b in itertools.pairwise(whole)):
+        return whole
+    rows = rule_plan(turn.track, turn.collected.copy(), True, True, CONTACT_ABOVE, NOTHING_TAKEN)
+    return [int(row) for row in rows if row in kept or not turn.track.is_contact[row]]

@@ -56,6 +56,10 @@ def improved(
                 problem.target_reward[np.minimum(satellite.place, len(holder) - 1)],
                 0.0,
             )
+            # What must be taken is worth more than all else, so that no move drops it.
+            kept = problem.kept_local(satellite)
+            kept = kept[satellite.kind[kept] == COLLECT]
+            worth[kept] += 1.0 + float(problem.target_reward.sum())
             _improve(
                 order_of(satellite.transitions), worth, satellite.place, own, holder, draws,
                 _MOVES_AT_A_TIME, budget.stop,

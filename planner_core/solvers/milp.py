@@ -13,6 +13,7 @@ from typing import ClassVar, Final
 import numpy as np
 
 from planner_core.bounds.bound import Bound, rounded_bound
+from planner_core.comparable import is_transitive
 from planner_core.plan import Plan
 from planner_core.problem import COLLECT, Floats, Problem
 from planner_core.solvers.base import Budget, Constraint, Progress, Solution, Termination
@@ -84,7 +85,7 @@ class Milp:
 
     def solve(self, problem: Problem, budget: Budget, seed: int) -> Solution:
         """Return the best plan; the same one for the same seed where the budget suffices."""
-        if self.formulation == "antichain" and not problem.use_resources:
+        if self.formulation == "antichain" and is_free(problem):
             effort = Effort(
                 moves_per_task=self.moves_per_task, max_rounds=self.cut_rounds, max_parts=0
             )
@@ -119,6 +120,14 @@ class Milp:
         if self.formulation == "antichain":
             _cut(engine, problem, model, self.cut_rounds, watch)
         return engine.search(best.columns(problem), self.gap, _HEURISTIC_EFFORT, watch)
+
+
+def is_free(problem: Problem) -> bool:
+    """Return whether the search without resources applies: agility alone counts.
+
+    Pins fit in by themselves only where turning is transitive.
+    """
+    return not problem.use_resources and (not problem.pinned.kept or is_transitive(problem))
 
 
 def _starts(problem: Problem, budget: Budget) -> list[Plan]:
@@ -175,6 +184,7 @@ def _repaired(problem: Problem, plan: Plan) -> Plan:
             if table.satellite[action.opportunity] == first.satellite
             and table.kind[action.opportunity] == COLLECT
             and action.start_s <= first.at_s
+            and action.opportunity not in problem.kept_rows
         ]
         if not before:
             return plan

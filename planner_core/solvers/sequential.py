@@ -44,16 +44,17 @@ def plan_in_turn(problem: Problem, budget: Budget, plan_turn: PlanTurn) -> Solut
     table = problem.opportunities
     collected = np.zeros(len(problem.target_ids), dtype=np.uint8)
     taken: list[int] = []
-    for index, satellite in enumerate(problem.satellites):
+    for step, index in enumerate(_order(problem)):
+        satellite = problem.satellites[index]
         reward_before = float(problem.target_reward[collected == 1].sum())
 
         def report(
-            fraction: float, reward: float, index: int = index, so_far: float = reward_before
+            fraction: float, reward: float, step: int = step, so_far: float = reward_before
         ) -> None:
             budget.report(
                 Progress(
                     phase="solve",
-                    fraction=(index + fraction) / len(problem.satellites),
+                    fraction=(step + fraction) / len(problem.satellites),
                     reward=so_far + reward,
                 )
             )
@@ -72,6 +73,12 @@ def plan_in_turn(problem: Problem, budget: Budget, plan_turn: PlanTurn) -> Solut
     return Solution(plan=Plan.of(problem, taken), termination=termination)
 
 
+def _order(problem: Problem) -> list[int]:
+    """Return the satellites in turn: first those that must take something, and so need contacts."""
+    is_bound = [bool(len(problem.kept_local(s))) for s in problem.satellites]
+    return sorted(range(len(is_bound)), key=lambda index: not is_bound[index])
+
+
 def _rest_by_rule(track: Track, collected: Bytes, taken: list[int]) -> list[int]:
     """Return what the rule adds to a search that was cut short, so that no hour stays empty."""
     rows = np.array(taken, dtype=np.int32)
@@ -79,10 +86,16 @@ def _rest_by_rule(track: Track, collected: Bytes, taken: list[int]) -> list[int]
 
 
 def blocked_rows(problem: Problem, satellite: SatelliteProblem, taken: list[int]) -> Bytes:
-    """Return 1 for each contact of ``satellite`` whose station is busy with others' contacts."""
+    """Return 1 for each contact of ``satellite`` whose station is busy with others' contacts.
+
+    Those are contacts in ``taken``, and what the other satellites must take.
+    """
     blocked = np.zeros(len(satellite), dtype=np.uint8)
     table = problem.opportunities
-    booked: Ints = np.asarray([i for i in taken if table.kind[i] == CONTACT], dtype=np.int32)
+    elsewhere = set(problem.kept_rows.tolist()) - set(satellite.rows.tolist())
+    booked: Ints = np.array(
+        sorted(i for i in elsewhere.union(taken) if table.kind[i] == CONTACT), dtype=np.int32
+    )
     if len(booked) == 0:
         return blocked
     for row in np.flatnonzero(satellite.kind == CONTACT):
@@ -93,4 +106,5 @@ def blocked_rows(problem: Problem, satellite: SatelliteProblem, taken: list[int]
         )
         antennas = problem.station_antennas[satellite.place[row]]
         blocked[row] = int(overlaps.sum()) >= antennas
+    blocked[problem.kept_local(satellite)] = 0
     return blocked

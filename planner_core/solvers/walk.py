@@ -49,7 +49,7 @@ def naive_select_action(
         row = next_action(
             track, last, row + 1, battery, recorder, is_hard, collected, unimaged_only
         )
-        if row == m or not track.use_resources:
+        if row == m or not track.use_resources or row == track.next_kept[last + 1]:
             break
         battery_after, recorder_after, _ = take(track, last, row, battery, recorder)
         if follows_code:

@@ -180,6 +180,25 @@ KINDS: dict[str, ProblemKind] = {
         "At some time of the horizon a satellite in low orbit is more than 30 days from the epoch "
         "of its element set. Give newer elements, or allow_old_elements.",
     ),
+    "unknown_target": ProblemKind(422, "Unknown target", "The scenario has no target of this id."),
+    "pin_without_opportunity": ProblemKind(
+        422,
+        "Nothing to be kept",
+        "No opportunity is what the pin names. GET /v1/scenarios/{id}/opportunities lists them.",
+    ),
+    "pin_ambiguous": ProblemKind(
+        422, "Ambiguous pin", "Several opportunities are what the pin names: give its start."
+    ),
+    "pins_conflict": ProblemKind(
+        422,
+        "Pins exclude each other",
+        "No plan can honour this pin together with another one; the detail says which and why.",
+    ),
+    "pin_breaks_limits": ProblemKind(
+        422,
+        "A kept action breaks the limits",
+        "Whatever else is planned, battery or recorder would reach its limit.",
+    ),
     "idempotency_key_reused": ProblemKind(
         422, "Idempotency key reused", "The key was used for another request; choose a new one."
     ),

@@ -27,6 +27,7 @@ from service.api.shapes import Instant, etag_of, matches
 from service.db.rows import ScenarioRow
 from service.inputs import ScenarioFile, ScenarioIn
 from service.opportunities import Described, OpportunityReader
+from service.pin_inputs import PinsIn
 
 router = APIRouter(prefix="/v1/scenarios", tags=["scenarios"])
 
@@ -64,6 +65,7 @@ class ScenarioOut(BaseModel):
     collect_spacing_s: float | None
     continuous_starts: bool
     allow_old_elements: bool
+    pins: PinsIn = PinsIn()
     counts: Counts
     warnings: list[str] = Field(description="About the age of orbits, for people.")
     created_at: Instant

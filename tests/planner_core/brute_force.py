@@ -6,18 +6,24 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from planner_core.plan import Plan
-from planner_core.problem import COLLECT, Problem
+from planner_core.problem import COLLECT, Pinned, Problem
 from planner_core.timeline import replay
 
 
 def best_reward(problem: Problem) -> float:
-    """Return the highest reward of any valid plan, judged by the referee.
+    """Return the highest reward of any valid plan, judged by the referee; 0 where none is."""
+    best = best_plan(problem)
+    return 0.0 if best is None else replay(problem, best).reward
+
+
+def best_plan(problem: Problem) -> Plan | None:
+    """Return a valid plan of the highest reward, judged by the referee, if there is any.
 
     The referee first says which two tasks a satellite cannot do one right after the other.
     Plans without such a pair are judged from the one that would earn most downwards.
     """
     table = problem.opportunities
-    free = replace(problem, use_resources=False)
+    free = replace(problem, use_resources=False, pinned=Pinned())
     may_follow = {
         (a, b)
         for a in range(len(table))
@@ -32,10 +38,10 @@ def best_reward(problem: Problem) -> float:
 
     plans = sorted(_chains(problem, may_follow, (), 0), key=worth, reverse=True)
     for rows in plans:
-        timeline = replay(problem, Plan.of(problem, rows))
-        if timeline.is_valid:
-            return timeline.reward
-    return 0.0  # not even the empty plan is valid
+        plan = Plan.of(problem, rows)
+        if replay(problem, plan).is_valid:
+            return plan
+    return None
 
 
 def _chains(

@@ -65,7 +65,7 @@ class SatelliteChoices:
 
         Answers -1 and no tasks where there is none. Targets may be collected again and again.
         """
-        rows = np.flatnonzero(allowed).astype(np.int32)
+        rows = np.flatnonzero(allowed | self.network.is_kept).astype(np.int32)
         nothing = rows[:0]
         if len(rows) == 0:
             return (0, nothing) if goal <= 0 else (-1, nothing)

@@ -15,7 +15,7 @@ import highspy
 import numpy as np
 
 from planner_core.plan import Plan
-from planner_core.problem import COLLECT, Bools, Floats, Problem
+from planner_core.problem import COLLECT, CONTACT, Bools, Floats, Problem
 from planner_core.solvers.base import Budget
 from planner_core.solvers.programs.antichains import violated_antichains
 from planner_core.solvers.programs.highs import CHAIN_TOLERANCE, Engine
@@ -121,8 +121,12 @@ class FixedContacts:
         self, problem: Problem, offered: Bools, contacts: tuple[int, ...], budget: Budget, seed: int
     ) -> None:
         self._problem = problem
+        must = problem.kept_rows.tolist()
+        contacts = tuple(
+            {*contacts, *(row for row in must if problem.opportunities.kind[row] == CONTACT)}
+        )
         kept = offered & (problem.opportunities.kind == COLLECT)
-        kept[list(contacts)] = True
+        kept[[*contacts, *must]] = True
         self._rows = np.flatnonzero(kept).astype(np.int32)
         self._model = plan_program(problem, "antichain", _CLEAR, self._rows)
         self._fix(np.isin(self._rows, contacts))

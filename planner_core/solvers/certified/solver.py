@@ -9,6 +9,7 @@ from planner_core.problem import Problem
 from planner_core.solvers.base import Budget, Constraint, Solution
 from planner_core.solvers.certified.resources import solve_with_resources
 from planner_core.solvers.free.search import Effort, solve_free
+from planner_core.solvers.milp import Milp, is_free
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,6 +43,8 @@ class Certified:
         """Return the best plan and its bound; the same for the same seed if time suffices."""
         if problem.use_resources:
             return solve_with_resources(problem, budget, seed, self.gap)
+        if not is_free(problem):
+            return Milp(gap=self.gap).solve(problem, budget, seed)
         return solve_free(
             problem, budget, seed, self.gap, Effort(moves_per_task=self.moves_per_task)
         )

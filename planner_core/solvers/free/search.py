@@ -23,7 +23,7 @@ from planner_core.bounds.certificate import (
 )
 from planner_core.bounds.lagrangian import default_steps, priced_bound
 from planner_core.bounds.network import network_of
-from planner_core.comparable import transitive_closure
+from planner_core.comparable import is_transitive
 from planner_core.plan import Plan
 from planner_core.problem import Bools, Floats, Ints, Problem
 from planner_core.restrict import restricted
@@ -76,7 +76,8 @@ class FreeSearch:
     def __init__(self, problem: Problem, budget: Budget, seed: int, gap: float) -> None:
         self.problem, self.budget, self.seed, self.gap = problem, budget, seed, gap
         self.unit = reward_unit(problem)
-        self.plan, self.reward = Plan(), 0.0
+        self.plan = Plan().with_kept(problem)
+        self.reward = replay(problem, self.plan).reward
         offered, _ = problem.target_opportunities
         targets = np.unique(problem.opportunities.place[offered])
         self.bound = float(problem.target_reward[targets].sum())
@@ -84,9 +85,7 @@ class FreeSearch:
         self.log: str | None = None
         self.tree: Refutation | None = None
         self.num_parts = 0
-        self.is_transitive = all(
-            transitive_closure(problem, s) is s.transitions for s in problem.satellites
-        )
+        self.is_transitive = is_transitive(problem)
         self._rows = np.arange(len(problem.opportunities), dtype=np.int32)
         self._rest = problem
         self._reported_s = 0.0
@@ -124,6 +123,8 @@ class FreeSearch:
 
     def offer(self, plan: Plan) -> bool:
         """Take a plan if it is better; return whether it is."""
+        # What must be taken fits beside all that is left, where turning is transitive.
+        plan = plan.with_kept(self.problem)
         timeline = replay(self.problem, plan)
         if not timeline.is_valid or timeline.reward <= self.reward:
             return False

@@ -72,15 +72,20 @@ def plan_program(
 
 
 def _variables(program: Program, problem: Problem, is_transitive: bool) -> Ints:
-    """Add x, and the objective: each target's reward once."""
+    """Add x, 1 for what must be taken, and the objective: each target's reward once."""
     table = problem.opportunities
     worth = _objective(problem)
+    kept = np.zeros(len(table), dtype=np.bool_)
+    kept[problem.kept_rows] = True
     if is_transitive:
         useful = (worth > 0.0) | ((table.kind == CONTACT) & problem.use_resources)
-        taken = program.add_columns(worth, upper=useful.astype(np.float64))
+        useful |= kept
+        taken = program.add_columns(
+            worth, lower=kept.astype(np.float64), upper=useful.astype(np.float64)
+        )
         _once_per_target(program, problem, taken)
         return taken
-    taken = program.add_columns(np.zeros(len(table)))
+    taken = program.add_columns(np.zeros(len(table)), lower=kept.astype(np.float64))
     _paid_once_per_target(program, problem, taken)
     return taken
 

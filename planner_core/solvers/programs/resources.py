@@ -118,11 +118,16 @@ def event_terms(satellite: SatelliteProblem) -> ResourceTerms:
     """Return the terms of ``dynamics: paper``: a taken event forgoes its segment's charge."""
     r = satellite.resources
     draw, gain = _task_totals(satellite)
-    charged = r.sunpoint_charge_per_s * satellite.sunlight.seconds_until(satellite.start_s)
+    sunlit = satellite.sunlight.seconds_until
+    charged = r.sunpoint_charge_per_s * sunlit(satellite.start_s)
+    forgone = charged - r.sunpoint_charge_per_s * sunlit(satellite.previous_event_s)
     floor = r.battery_min_fraction - charged
     telemetry = r.telemetry_per_s * satellite.start_s
+    # The recorder is fullest at the last event before the next task.
+    until_s = np.append(satellite.previous_event_s, satellite.event_s[-1])
+    top = r.recorder_max_fraction - r.telemetry_per_s * until_s
     return ResourceTerms(
-        energy_cost=draw + np.diff(charged, prepend=0.0),
+        energy_cost=draw + forgone,
         cap_cost=draw,
         full=1.0 - charged,
         battery_floor=floor,
@@ -130,8 +135,8 @@ def event_terms(satellite: SatelliteProblem) -> ResourceTerms:
         data_gain=gain,
         recorder_floor=-telemetry,
         recorder_floor_taken=-telemetry,
-        recorder_top=r.recorder_max_fraction - telemetry,
-        recorder_top_first=r.recorder_max_fraction,
+        recorder_top=top[1:],
+        recorder_top_first=float(top[0]),
     )
 
 

@@ -1,0 +1,195 @@
+"""What a forced opportunity displaces in all, so that battery and recorder last as well."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from planner_core.forcing import (
+    BATTERY,
+    FITS,
+    RECORDER,
+    Forced,
+    PlannedSatellite,
+    Sequence,
+    follows,
+    waited,
+)
+from planner_core.jit import borrowing
+from planner_core.problem import Bools, Bytes, Ints
+from planner_core.track import NO_TASK, STRICT, Track, take
+
+AT_END: Final = -2
+_MAX_DROPS: Final = 4
+_LOOK_BACK: Final = 30  # collects that may make room
+
+
+class Displaced(NamedTuple):
+    """What one opportunity displaces in all, so that it fits.
+
+    Attributes
+    ----------
+    dropped
+        Which tasks of the plan; shape ``(n, num_tasks)``.
+    is_settled
+        Whether the rest then keeps the limits; nothing more may be dropped otherwise.
+    broken, break_row
+        Which limit breaks first with only those in its way dropped, and at which task: a local
+        row, or ``AT_END``.
+    """
+
+    dropped: Bools
+    is_settled: Bools
+    broken: Bytes
+    break_row: Ints
+
+
+def displace_each(planned: PlannedSatellite, candidates: Ints, forced: Forced) -> Displaced:
+    """Return what these opportunities displace, battery and recorder included.
+
+    What is in the way goes first. Then collects that earn least and lie nearest ahead of the
+    break go, one by one, and those that turn out not to matter come back.
+    """
+    n = len(candidates)
+    displaced = Displaced(
+        dropped=np.zeros((n, len(planned.sequence.rows)), dtype=np.bool_),
+        is_settled=np.zeros(n, dtype=np.bool_),
+        broken=np.zeros(n, dtype=np.uint8),
+        break_row=np.full(n, AT_END, dtype=np.int32),
+    )
+    for c in range(n):
+        displaced.dropped[c, forced.first[c] : forced.last[c]] = True
+    drops = np.empty(_MAX_DROPS, dtype=np.int32)
+    _displace_each(planned.track, planned.sequence, candidates, forced, displaced, drops)
+    return displaced
+
+
+@borrowing
+def _displace_each(
+    track: Track,
+    plan: Sequence,
+    candidates: Ints,
+    forced: Forced,
+    displaced: Displaced,
+    drops: Ints,
+) -> None:
+    n = len(plan.rows)
+    dropped = displaced.dropped
+    for c in range(len(candidates)):
+        row, first = candidates[c], forced.first[c]
+        is_free = forced.loss[c] < np.inf
+        displaced.is_settled[c] = is_free
+        if not track.use_resources or forced.broken[c] == FITS:
+            continue
+        begin, end = first, forced.last[c]
+        at, broken = _first_break(track, plan, dropped, c, row, first, begin, end)
+        if at < 0:
+            continue
+        displaced.broken[c] = broken
+        if at != n:
+            displaced.break_row[c] = row if at == n + 1 else plan.rows[at]
+        num_drops = 0
+        while is_free and at >= 0 and num_drops < _MAX_DROPS:
+            until = first - 1 if at == n + 1 else min(at, n - 1)
+            found = _least(track, plan, dropped, c, row, first, until)
+            if found < 0:
+                break
+            dropped[c, found] = True
+            drops[num_drops] = found
+            num_drops += 1
+            begin, end = min(begin, found), max(end, found + 1)
+            at, broken = _first_break(track, plan, dropped, c, row, first, begin, end)
+        displaced.is_settled[c] = is_free and at < 0
+        for i in range(num_drops):
+            dropped[c, drops[i]] = False
+            if at >= 0 or i == num_drops - 1:
+                dropped[c, drops[i]] = at < 0
+                continue
+            is_needed = not _may_stand(track, plan, dropped, c, row, first, drops[i], True)
+            if not is_needed:
+                again, broken = _first_break(track, plan, dropped, c, row, first, begin, end)
+                is_needed = again >= 0
+            dropped[c, drops[i]] = is_needed
+
+
+@borrowing
+def _first_break(
+    track: Track, plan: Sequence, dropped: Bools, c: int, row: int, at: int, begin: int, end: int
+) -> tuple[int, int]:
+    """Return the task at which a limit breaks and which; n for the end, n + 1 for ``row``.
+
+    -1 and ``FITS`` where none does. ``row`` stands before task ``at``; other changes lie
+    between ``begin`` and ``end``.
+    """
+    n = len(plan.rows)
+    battery, recorder = plan.battery[begin], plan.recorder[begin]
+    last = plan.rows[begin - 1] if begin > 0 else NO_TASK
+    for i in range(begin, n + 1):
+        if i == at:
+            battery, recorder, is_within = take(track, last, row, battery, recorder)
+            if not is_within:
+                return n + 1, BATTERY if battery <= track.battery_min + STRICT else RECORDER
+            last = row
+        if i == n or dropped[c, i]:
+            continue
+        battery, recorder, is_within = take(track, last, plan.rows[i], battery, recorder)
+        if not is_within:
+            return i, BATTERY if battery <= track.battery_min + STRICT else RECORDER
+        last = plan.rows[i]
+        if i == max(at, end):
+            # Nothing changes from here on.
+            lowest = min(plan.cap[i], battery + plan.drop[i])
+            highest = max(plan.floor[i], recorder + plan.rise[i])
+            if lowest > track.battery_min + STRICT and highest < track.recorder_max - STRICT:
+                return -1, FITS
+    if recorder + waited(track, last, track.data_end_s) >= track.recorder_max - STRICT:
+        return n, RECORDER
+    return -1, FITS
+
+
+@borrowing
+def _least(
+    track: Track, plan: Sequence, dropped: Bools, c: int, row: int, at: int, until: int
+) -> int:
+    """Return the collect up to ``until`` that earns least, the latest of those; -1 for none."""
+    found, num_seen = -1, 0
+    i = until
+    while i >= 0 and num_seen < _LOOK_BACK:
+        if not (dropped[c, i] or plan.is_fixed[i] or track.is_contact[plan.rows[i]]):
+            num_seen += 1
+            is_less = found < 0 or plan.earned[i] < plan.earned[found]
+            if is_less and _may_stand(track, plan, dropped, c, row, at, i, False):
+                found = i
+        i -= 1
+    return found
+
+
+@borrowing
+def _may_stand(
+    track: Track,
+    plan: Sequence,
+    dropped: Bools,
+    c: int,
+    row: int,
+    at: int,
+    i: int,
+    is_taken: bool,
+) -> bool:
+    """Return whether the tasks around task ``i`` follow each other, with or without it."""
+    before, after = i - 1, i + 1
+    while before >= 0 and dropped[c, before]:
+        before -= 1
+    while after < len(plan.rows) and dropped[c, after]:
+        after += 1
+    previous = plan.rows[before] if before >= 0 else NO_TASK
+    following = plan.rows[after] if after < len(plan.rows) else NO_TASK
+    if before < at <= i:
+        previous = row
+    if i < at <= after:
+        following = row
+    if not is_taken:
+        return following < 0 or follows(track, previous, following)
+    return follows(track, previous, plan.rows[i]) and (
+        following < 0 or follows(track, plan.rows[i], following)
+    )

@@ -1,0 +1,127 @@
+"""One target left out, gone through opportunity by opportunity with the referee itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner_core.displacing import displace_each
+from planner_core.forcing import PlannedSatellite, force_each
+from planner_core.plan import Plan
+from planner_core.problem import Problem
+from planner_core.reason import UNKNOWN_SEARCH, Search, TargetOutcome
+from planner_core.reasons import earned_by, explain
+from planner_core.timeline import Timeline, Violation, replay
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Attempt:
+    """What the referee says of the plan with one more opportunity.
+
+    Attributes
+    ----------
+    opportunity
+        Row of the problem; None where pins have ruled it out.
+    scenario_row
+        Row of the scenario's table.
+    violations
+        What the plan then breaks and did not break before. None needed where it fits.
+    displaces
+        Positions in ``plan.actions`` of the actions that have to go for it.
+    is_settled
+        Whether the plan without those and with it is valid.
+    reward_delta
+        What that plan earns more, where it is valid.
+    ruled_out
+        Whether a pin rules it out; ``displaces`` are then kept actions in its way.
+    """
+
+    opportunity: int | None
+    scenario_row: int
+    satellite: int
+    start_s: float
+    violations: tuple[Violation, ...] = ()
+    displaces: tuple[int, ...] = ()
+    is_settled: bool = False
+    reward_delta: float | None = None
+    ruled_out: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Explanation:
+    """A target's outcome, and every opportunity that it had, in order of time."""
+
+    outcome: TargetOutcome
+    attempts: tuple[Attempt, ...]
+
+
+def explain_target(
+    problem: Problem, plan: Plan, timeline: Timeline, target: int, search: Search = UNKNOWN_SEARCH
+) -> Explanation:
+    """Return why one target is not in the plan, at length.
+
+    A target that is collected has no attempts.
+    """
+    outcome = explain(problem, plan, timeline, search)[target]
+    if target in timeline.collected:
+        return Explanation(outcome=outcome, attempts=())
+    attempts = [
+        *_forced(problem, plan, timeline, target),
+        *_ruled_out(problem, plan, target),
+    ]
+    attempts.sort(key=lambda attempt: (attempt.start_s, attempt.scenario_row))
+    return Explanation(outcome=outcome, attempts=tuple(attempts))
+
+
+def _forced(problem: Problem, plan: Plan, timeline: Timeline, target: int) -> list[Attempt]:
+    table = problem.opportunities
+    earned = earned_by(problem, plan, timeline)
+    own = [action.opportunity for action in plan.actions]
+    before = {_name(violation) for violation in timeline.violations}
+    attempts = []
+    collects = problem.collects_of(target)
+    collects = collects[~np.isin(collects, own)]
+    for index in np.unique(table.satellite[collects]):
+        rows = collects[table.satellite[collects] == index]
+        planned = PlannedSatellite.of(problem, plan, int(index), earned)
+        local = problem.local_row[rows]
+        displaced = displace_each(planned, local, force_each(problem, planned, local))
+        for c, row in enumerate(rows.tolist()):
+            dropped = np.flatnonzero(displaced.dropped[c])
+            positions = tuple(sorted(planned.positions[dropped].tolist()))
+            forced = replay(problem, Plan.of(problem, [*own, row]))
+            left = [r for position, r in enumerate(own) if position not in positions]
+            after = replay(problem, Plan.of(problem, [*left, row]))
+            attempts.append(
+                Attempt(
+                    opportunity=row,
+                    scenario_row=problem.scenario_row(row),
+                    satellite=int(index),
+                    start_s=float(table.start_s[row]),
+                    violations=tuple(v for v in forced.violations if _name(v) not in before),
+                    displaces=positions,
+                    is_settled=after.is_valid,
+                    reward_delta=after.reward - timeline.reward if after.is_valid else None,
+                )
+            )
+    return attempts
+
+
+def _name(violation: Violation) -> tuple[str, int, float]:
+    return violation.code, violation.satellite, violation.at_s
+
+
+def _ruled_out(problem: Problem, plan: Plan, target: int) -> list[Attempt]:
+    positions = {action.opportunity: p for p, action in enumerate(plan.actions)}
+    return [
+        Attempt(
+            opportunity=None,
+            scenario_row=struck.row,
+            satellite=struck.satellite,
+            start_s=struck.start_s,
+            displaces=tuple(sorted(positions[row] for row in struck.kept if row in positions)),
+            ruled_out=True,
+        )
+        for struck in problem.pinned.struck.get(target, ())
+    ]

@@ -1,0 +1,172 @@
+"""Pins: every solver honours them, exact ones to the last image; impossible ones are refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from planner_core.domain import Agility, Dynamics
+from planner_core.errors import Fault, InvalidScenario
+from planner_core.pinning import apply_pins
+from planner_core.problem import COLLECT, CONTACT, Blocked, Kept, Pinned, Problem
+from planner_core.solvers import Certified, ForwardSearch, Graph, Mcts, Milp, Rule
+from planner_core.solvers.base import Budget, Solver, Termination
+from planner_core.timeline import replay
+from tests.planner_core.brute_force import best_plan
+from tests.planner_core.problems import ECLIPSES, random_problem
+
+SEEDS = st.integers(0, 10**6)
+DYNAMICS = st.sampled_from(["physical", "paper"])
+HEURISTICS: list[Solver] = [
+    Rule(),
+    Rule(feasibility="penalty", contact_above_fraction=0.0),
+    Graph(),
+    Graph(path="longest", feasibility="penalty"),
+    ForwardSearch(),
+    ForwardSearch(depth=2, breadth=2, feasibility="penalty", unimaged_only=False),
+    Mcts(num_simulations=30, depth=8),
+    Mcts(num_simulations=20, depth=4, rollout="random", worthless="sunpoint"),
+]
+EXACT: list[Solver] = [Milp(), Milp(formulation="pairwise"), Certified()]
+
+
+def pinned_at_random(problem: Problem, seed: int, num_kept: int) -> Pinned:
+    """Return pins in terms of the whole table, possible or not."""
+    rng = np.random.default_rng(seed)
+    table = problem.opportunities
+    kept = rng.choice(len(table), size=min(num_kept, len(table)), replace=False)
+    start_s = float(rng.uniform(0, 900))
+    blocked = Blocked(
+        satellite=0,
+        start_s=start_s,
+        end_s=start_s + float(rng.uniform(10, 200)),
+        kinds=[frozenset({COLLECT}), frozenset({CONTACT}), frozenset({COLLECT, CONTACT})][
+            rng.integers(3)
+        ],
+        pointer="/pins/block/0",
+    )
+    forbidden = frozenset([int(rng.integers(len(problem.target_ids)))] * int(rng.integers(2)))
+    return Pinned(
+        kept=tuple(Kept(row=int(row), pointer=f"/pins/keep/{i}") for i, row in enumerate(kept)),
+        skipped=frozenset(rng.choice(len(table), size=int(rng.integers(2))).tolist()),
+        blocked=(blocked,) * int(rng.integers(2)),
+        forbidden=forbidden,
+    )
+
+
+def pinned_or_refused(whole: Problem, pinned: Pinned) -> tuple[Problem, Fault | None]:
+    """Return the problem with its pins, and what is wrong with them, if anything."""
+    try:
+        return apply_pins(whole, pinned), None
+    except InvalidScenario as error:
+        return whole, error.fault
+
+
+def drawn(seed: int, **more: Any) -> Problem:
+    rng = np.random.default_rng(seed)
+    return random_problem(
+        seed,
+        has_rewards=bool(rng.integers(2)),
+        sunlight=ECLIPSES if rng.integers(2) else None,
+        num_contacts=3,
+        num_targets=6,
+        **more,
+    )
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    seed=SEEDS,
+    dynamics=DYNAMICS,
+    use_resources=st.booleans(),
+    num_satellites=st.integers(1, 2),
+    num_kept=st.integers(0, 3),
+)
+def test_plans_with_pins_are_the_best_that_honour_them(
+    seed: int, dynamics: Dynamics, use_resources: bool, num_satellites: int, num_kept: int
+) -> None:
+    """Brute force goes through the whole table, and the referee alone tells it of the pins."""
+    whole = drawn(
+        seed, dynamics=dynamics, use_resources=use_resources, num_satellites=num_satellites
+    )
+    pinned = pinned_at_random(whole, seed, num_kept)
+    best = best_plan(replace(whole, pinned=pinned))
+    problem, fault = pinned_or_refused(whole, pinned)
+    if fault is not None:
+        # A second image of a target breaks nothing, but no plan has one.
+        assert best is None or "another image" in fault.detail
+        assert (fault.pointer or "").startswith("/pins/keep/")
+        return
+    if best is None:
+        # Two satellites may need the same antenna, which only a search can tell.
+        assert use_resources
+        assert num_satellites > 1 or best_plan(whole) is None
+        return
+    reward = replay(whole, best).reward
+    for solver in EXACT:
+        solution = solver.solve(problem, Budget(), 0)
+        timeline = replay(problem, solution.plan)
+        assert timeline.is_valid, (solver, timeline.violations)
+        assert timeline.reward == pytest.approx(reward), solver
+        assert solution.termination is Termination.OPTIMAL
+        assert solution.bound is not None
+        assert solution.bound == pytest.approx(reward, abs=1e-4)
+    for solver in HEURISTICS:
+        timeline = replay(problem, solver.solve(problem, Budget(), 0).plan)
+        assert timeline.reward <= reward + 1e-9 or not timeline.is_valid
+        assert not [v for v in timeline.violations if v.code == "pin"], solver
+        if num_satellites == 1 and getattr(solver, "feasibility", "hard") == "hard":
+            assert timeline.is_valid, (solver, timeline.violations)
+
+
+@settings(max_examples=60, deadline=None)
+@given(seed=SEEDS, dynamics=DYNAMICS, num_kept=st.integers(1, 5), use_resources=st.booleans())
+def test_crowded_plans_keep_what_is_pinned(
+    seed: int, dynamics: Dynamics, num_kept: int, use_resources: bool
+) -> None:
+    """Also where the budget is spent at once, and the rule plans all."""
+    whole = random_problem(
+        seed, dynamics=dynamics, use_resources=use_resources, num_satellites=2,
+        num_targets=20, num_collects=40, num_contacts=8, num_stations=2,
+    )  # fmt: skip
+    problem, fault = pinned_or_refused(whole, pinned_at_random(whole, seed, num_kept))
+    if fault is not None:
+        return
+    spent = Budget()
+    spent.cancel()
+    for solver in (*HEURISTICS, Certified()):
+        for budget in (Budget(), spent):
+            timeline = replay(problem, solver.solve(problem, budget, 0).plan)
+            assert not [v for v in timeline.violations if v.code == "pin"], solver
+
+
+@settings(max_examples=60, deadline=None)
+@given(seed=SEEDS, num_kept=st.integers(1, 2), use_resources=st.booleans())
+def test_a_satellite_that_turns_slower_than_it_tracks_honours_pins_too(
+    seed: int, num_kept: int, use_resources: bool
+) -> None:
+    whole = drawn(
+        seed,
+        use_resources=use_resources,
+        agility=Agility(slew_rate_deg_s=0.3),
+        max_turn_deg=40.0,
+    )
+    pinned = pinned_at_random(whole, seed, num_kept)
+    problem, fault = pinned_or_refused(whole, pinned)
+    if fault is not None:
+        return  # kept actions must follow each other directly, which brute force does not ask
+    best = best_plan(problem)
+    if best is None:
+        return
+    for solver in EXACT:
+        timeline = replay(problem, solver.solve(problem, Budget(), 0).plan)
+        assert timeline.is_valid, (solver, timeline.violations)
+        assert timeline.reward == pytest.approx(replay(problem, best).reward)
+    for solver in HEURISTICS:
+        timeline = replay(problem, solver.solve(problem, Budget(), 0).plan)
+        assert not [v for v in timeline.violations if v.code == "pin"], solver
