@@ -15,8 +15,8 @@ from collections.abc import Callable
 
 from benchmarks.missions import paper_scenario
 from planner_core.build import build_problem, compute_opportunities
-from planner_core.explanation import explain_target
-from planner_core.reasons import explain
+from planner_core.reasons.at_length import explain_target
+from planner_core.reasons.explain import explain
 from planner_core.solvers import ForwardSearch, Rule
 from planner_core.solvers.base import Budget, Solver
 from planner_core.timeline import replay

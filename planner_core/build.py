@@ -21,7 +21,7 @@ from planner_core.orbits.earth_orientation import shipped
 from planner_core.orbits.eclipse import always_sunlit, sunlight
 from planner_core.orbits.ephemeris import Ephemeris, propagate
 from planner_core.orbits.places import Places, View, view
-from planner_core.pinning import pinned_problem
+from planner_core.pins.pinning import pinned_problem
 from planner_core.problem import (
     ACCESS_FOUND,
     ACCESS_TOO_SHORT,

@@ -14,8 +14,8 @@ from planner_core.bounds.resource_bound import quick_bound
 from planner_core.build import ScenarioOpportunities, build_problem, compute_opportunities
 from planner_core.domain import Scenario
 from planner_core.problem import Problem
-from planner_core.reason import Search, TargetOutcome
-from planner_core.reasons import explain
+from planner_core.reasons.explain import explain
+from planner_core.reasons.reason import Search, TargetOutcome
 from planner_core.solvers.base import Budget, Progress, Solution, Solver, Termination
 from planner_core.timeline import Timeline, replay
 

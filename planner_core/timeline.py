@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from planner_core.pinned_plan import breaches
+from planner_core.pins.pinned_plan import breaches
 from planner_core.plan import Action, Plan
 from planner_core.problem import COLLECT, CONTACT, Floats, Problem
 from planner_core.resource_profile import Point, Profile, integrate, thin

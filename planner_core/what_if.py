@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from planner_core.displacing import displace_each
 from planner_core.domain import Satellite, Scenario
 from planner_core.errors import InvalidScenario
-from planner_core.forcing import PlannedSatellite, force_each
-from planner_core.pins import PinnedAction, Pins
+from planner_core.pins.pins import PinnedAction, Pins
 from planner_core.plan import Plan
 from planner_core.problem import Problem
-from planner_core.reasons import earned_by
+from planner_core.reasons.displacing import displace_each
+from planner_core.reasons.explain import earned_by
+from planner_core.reasons.forcing import PlannedSatellite, force_each
 from planner_core.timeline import replay
 
 Settings = Mapping[str, Any]

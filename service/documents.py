@@ -8,7 +8,7 @@ from typing import Any
 
 from planner_core import __version__
 from planner_core.orbits.sgp4_record import GRAVITY
-from planner_core.reason import Change, TargetOutcome
+from planner_core.reasons.reason import Change, TargetOutcome
 from planner_core.run import Judged
 from planner_core.timeline import JudgedAction, Resourceline, Violation, plan_sha256
 from service.instants import instant_text

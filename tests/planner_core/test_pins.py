@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from planner_core.domain import Agility, Dynamics
 from planner_core.errors import Fault, InvalidScenario
-from planner_core.pinning import apply_pins
+from planner_core.pins.pinning import apply_pins
 from planner_core.problem import COLLECT, CONTACT, Blocked, Kept, Pinned, Problem
 from planner_core.solvers import Certified, ForwardSearch, Graph, Mcts, Milp, Rule
 from planner_core.solvers.base import Budget, Solver, Termination

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from planner_core.domain import Agility, Dynamics
 from planner_core.errors import InvalidScenario
-from planner_core.pinning import apply_pins
+from planner_core.pins.pinning import apply_pins
 from planner_core.plan import Plan
 from planner_core.problem import (
     ACCESS_TOO_SHORT,
@@ -26,8 +26,8 @@ from planner_core.problem import (
     Problem,
     build_satellite_problem,
 )
-from planner_core.reason import Change, Search
-from planner_core.reasons import explain
+from planner_core.reasons.explain import explain
+from planner_core.reasons.reason import Change, Search
 from planner_core.solvers import ForwardSearch, Milp, Rule
 from planner_core.solvers.base import Budget, Termination
 from planner_core.timeline import Timeline, replay

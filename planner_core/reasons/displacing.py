@@ -6,7 +6,9 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from planner_core.forcing import (
+from planner_core.jit import borrowing
+from planner_core.problem import Bools, Bytes, Ints
+from planner_core.reasons.forcing import (
     BATTERY,
     FITS,
     RECORDER,
@@ -16,8 +18,6 @@ from planner_core.forcing import (
     follows,
     waited,
 )
-from planner_core.jit import borrowing
-from planner_core.problem import Bools, Bytes, Ints
 from planner_core.track import NO_TASK, STRICT, Track, take
 
 AT_END: Final = -2

@@ -15,7 +15,7 @@ import numpy as np
 from planner_core.build import compute_opportunities
 from planner_core.domain import Scenario, Sensor, Target
 from planner_core.errors import PropagationFailed
-from planner_core.pins import Pins
+from planner_core.pins.pins import Pins
 from planner_core.problem import COLLECT
 from planner_core.solvers.base import Budget
 

@@ -2,8 +2,8 @@
 
 For each target left out, each of its opportunities is forced into the final plan: what it
 displaces, which limit would break and when, and what that does to the reward. All targets are
-done at once, with the arithmetic of ``planner_core.track``; ``planner_core.explanation`` goes
-through one target's opportunities with the referee itself.
+done at once, with the arithmetic of ``planner_core.track``; ``at_length`` goes through one
+target's opportunities with the referee itself.
 """
 
 from __future__ import annotations
@@ -14,8 +14,6 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from planner_core.displacing import displace_each
-from planner_core.forcing import FITS, Forced, PlannedSatellite, force_each
 from planner_core.plan import Plan
 from planner_core.problem import (
     ACCESS_TOO_SHORT,
@@ -27,7 +25,9 @@ from planner_core.problem import (
     Longs,
     Problem,
 )
-from planner_core.reason import (
+from planner_core.reasons.displacing import displace_each
+from planner_core.reasons.forcing import FITS, Forced, PlannedSatellite, force_each
+from planner_core.reasons.reason import (
     UNKNOWN_SEARCH,
     Change,
     Outcome,
@@ -36,7 +36,7 @@ from planner_core.reason import (
     Search,
     TargetOutcome,
 )
-from planner_core.reason_teller import Teller
+from planner_core.reasons.teller import Teller
 from planner_core.timeline import Timeline
 
 NO_ACCESS: Final = {

@@ -1,7 +1,7 @@
 """What a scenario pins: actions that must be kept, and what is ruled out.
 
 Pins are written in the operator's words: names and instants, never the planner's numbers
-(``planner_core.pinning`` turns one into the other).
+(``planner_core.pins.pinning`` turns one into the other).
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ from planner_core.comparable import Order, are_comparable, order_of, transitive_
 from planner_core.domain import Scenario
 from planner_core.errors import InvalidScenario
 from planner_core.jit import kernel
-from planner_core.pins import PinnedAction
+from planner_core.pins.pins import PinnedAction
 from planner_core.plan import Plan
 from planner_core.problem import (
     ACCESS_FOUND,

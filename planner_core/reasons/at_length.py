@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner_core.displacing import displace_each
-from planner_core.forcing import PlannedSatellite, force_each
 from planner_core.plan import Plan
 from planner_core.problem import Problem
-from planner_core.reason import UNKNOWN_SEARCH, Search, TargetOutcome
-from planner_core.reasons import earned_by, explain
+from planner_core.reasons.displacing import displace_each
+from planner_core.reasons.explain import earned_by, explain
+from planner_core.reasons.forcing import PlannedSatellite, force_each
+from planner_core.reasons.reason import UNKNOWN_SEARCH, Search, TargetOutcome
 from planner_core.timeline import Timeline, Violation, replay
 
 

@@ -7,11 +7,11 @@ from typing import Final, Literal
 
 import numpy as np
 
-from planner_core.displacing import AT_END, Displaced
-from planner_core.forcing import BATTERY, RECORDER, Forced, PlannedSatellite
 from planner_core.model import Guidance, Model, State
 from planner_core.problem import Problem
-from planner_core.reason import Certainty, Change, Reason, ReasonCode, Search
+from planner_core.reasons.displacing import AT_END, Displaced
+from planner_core.reasons.forcing import BATTERY, RECORDER, Forced, PlannedSatellite
+from planner_core.reasons.reason import Certainty, Change, Reason, ReasonCode, Search
 from planner_core.track import NO_TASK
 
 _LIMITS: Final[dict[int, Literal["battery", "recorder"]]] = {

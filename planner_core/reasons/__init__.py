@@ -1,0 +1,1 @@
+"""Why a target is not in a plan, how certain that is, and what would let it in."""
