@@ -23,6 +23,7 @@ from service.api import (
     scenarios,
     solvers,
     target_catalogs,
+    timelines,
     webhooks,
 )
 from service.api.deps import check_request
@@ -50,6 +51,7 @@ ROUTERS = (
     target_catalogs.router,
     scenarios.router,
     jobs.router,
+    timelines.router,
     job_events.router,
     comparisons.router,
     solvers.router,
