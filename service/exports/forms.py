@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from service.exports import geojson
+from service.exports import geojson, table
 from service.exports.answered import Answered
 
 
@@ -31,6 +31,12 @@ class Form:
 
 
 FORMS: tuple[Form, ...] = (
+    Form(
+        suffix="csv",
+        media_type="text/csv",
+        about="one row for each action",
+        write=table.write,
+    ),
     Form(
         suffix="geojson",
         media_type="application/geo+json",
