@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from service.exports import geojson, table
+from service.exports import calendar, czml, geojson, openmct, table
 from service.exports.answered import Answered
 
 
@@ -42,5 +42,25 @@ FORMS: tuple[Form, ...] = (
         media_type="application/geo+json",
         about="targets with outcome, ground tracks, stations",
         write=geojson.write,
+    ),
+    Form(
+        suffix="czml",
+        media_type="application/json",  # CZML has no registered type; Cesium asks for none
+        about="satellites, targets and contacts for Cesium",
+        write=czml.write,
+        has_own_type=False,
+    ),
+    Form(
+        suffix="ics",
+        media_type="text/calendar",
+        about="contacts with alarms",
+        write=calendar.write,
+    ),
+    Form(
+        suffix="openmct.json",
+        media_type="application/json",
+        about="a plan file of Open MCT",
+        write=openmct.write,
+        has_own_type=False,
     ),
 )

@@ -18,6 +18,17 @@ from tests.missions import PAPER_ORBIT, Document, drawn_targets, paper_mission
 from tests.service.conftest import Service
 from tests.service.test_plan_job import run
 
+# A recorder that six images fill, so that there are many contacts.
+RESOURCES: Document = {
+    "battery_capacity_wh": 100.0,
+    "sunpoint_power_w": 60.0,
+    "collect_power_w": 40.0,
+    "contact_power_w": 20.0,
+    "recorder_capacity_mbit": 1000.0,
+    "collect_rate_mbit_s": 4.0,
+    "downlink_rate_mbit_s": 20.0,
+    "telemetry_rate_mbit_s": 0.002,
+}
 FINISHED_AT = datetime(2018, 12, 31, 18, tzinfo=UTC)
 
 
@@ -44,8 +55,12 @@ def mission_file(**flags: object) -> Document:
     mission = paper_mission(drawn_targets(60), **flags)
     second = PAPER_ORBIT | {"NORAD_CAT_ID": 2, "INCLINATION": 51.6, "MEAN_MOTION": 14.5}
     mission["satellites"] = [
-        {"id": "sat/1#a", "name": "=EYE, 1", "omm": PAPER_ORBIT},
-        {"name": 'EYE "2"', "omm": second},
+        {"id": "sat/1#a", "name": "=EYE, 1", "omm": PAPER_ORBIT, "resources": RESOURCES},
+        {
+            "name": 'EYE "2"',
+            "omm": second,
+            "resources": RESOURCES | {"initial_recorder_fraction": 0.6},
+        },
     ]
     mission["ground_stations"] = [
         *mission["ground_stations"],
