@@ -13,6 +13,7 @@ import planner_core
 from service.api import (
     audit_events,
     comparisons,
+    element_exports,
     ground_stations,
     job_events,
     jobs,
@@ -46,6 +47,7 @@ DESCRIPTION = (
 )
 
 ROUTERS = (
+    element_exports.router,
     satellites.router,
     ground_stations.router,
     target_catalogs.router,
