@@ -116,8 +116,8 @@ def _allow_pages(app: FastAPI, origins: Sequence[str]) -> None:
             "If-None-Match", "Last-Event-ID", "X-Request-ID",
         ],
         expose_headers=[
-            "ETag", "Idempotency-Replayed", "Link", "Location", "Retry-After",
-            "WWW-Authenticate", "X-Request-ID",
+            "Content-Disposition", "ETag", "Idempotency-Replayed", "Link", "Location",
+            "Retry-After", "WWW-Authenticate", "X-Request-ID",
         ],
     )  # fmt: skip
 
