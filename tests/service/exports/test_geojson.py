@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+from dataclasses import replace
 from datetime import datetime, timedelta
 from typing import Any
 
@@ -149,6 +150,18 @@ def test_tracks_are_sampled_every_half_minute_and_never_cross_the_map(
         assert max(steps) <= timedelta(seconds=30)
         for line in track["geometry"]["coordinates"]:
             assert np.abs(np.diff(np.array(line)[:, 0])).max() <= 90.0
+
+
+def test_a_track_that_stays_on_the_map_is_one_line(answered: Answered) -> None:
+    horizon = answered.scenario.horizon
+    soon = replace(horizon, end=horizon.start + timedelta(seconds=100))
+    short = replace(answered, scenario=replace(answered.scenario, horizon=soon))
+    collection = json.loads("".join(geojson.write(short)))
+    Draft202012Validator(RFC_7946).validate(collection)
+    for track in features(collection, "track"):
+        assert track["geometry"]["type"] == "LineString"
+        assert len(track["geometry"]["coordinates"]) == len(track["properties"]["times"]) == 5
+        assert track["properties"]["times"][-1] == "2019-01-01T00:01:40.000Z"
 
 
 def test_a_station_reaches_what_lies_inside_its_circle(collection: Document) -> None:
