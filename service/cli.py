@@ -25,6 +25,7 @@ FAILED = 1
 WRONG_INPUT = 2
 
 _LONGEST_DAYS = 3650
+_MOST_FAULTS = 20
 
 Command = Callable[[argparse.Namespace], int]
 
@@ -83,6 +84,10 @@ def _parser() -> argparse.ArgumentParser:
     demo.add_argument("--out", type=Path, default=Path("demo-output"), help="folder for timelines")
 
     _add_solve(_command(commands, "solve", _solve, "plan a scenario file, without a service"))
+
+    check = _command(commands, "check", _check, "have the referee judge a timeline of any origin")
+    check.add_argument("scenario", type=Path, metavar="SCENARIO.json")
+    check.add_argument("timeline", type=_timeline_file, metavar="TIMELINE.{json,csv}")
 
     _add_keys(_command(commands, "keys", None, "make, list and revoke API keys"))
     _add_plan(_command(commands, "plan", _plan, "have a service plan a scenario, and follow it"))
@@ -167,6 +172,13 @@ def _add_search(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--time-s", type=_positive, help="seconds after which the search stops")
     parser.add_argument("--out", type=Path, metavar="FILE", help="write the timeline here")
+
+
+def _timeline_file(text: str) -> Path:
+    path = Path(text)
+    if path.suffix.lower() not in (".json", ".csv"):
+        raise argparse.ArgumentTypeError(f"{text!r} must end in .json or .csv")
+    return path
 
 
 def _parameter(text: str) -> tuple[str, Any]:
@@ -319,6 +331,28 @@ def _solve(options: argparse.Namespace) -> int:
         raise _WrongInput(f"{place}: {error.detail}") from error
     except Cancelled:
         return _complain("stopped before there was a plan", FAILED)
+    except OSError as error:
+        raise _WrongInput(f"{error.filename}: {error.strerror}") from error
+
+
+def _check(options: argparse.Namespace) -> int:
+    from service.check import check_file
+    from service.exports.reading import UnreadableTimeline
+    from service.scenario_files import place_of
+
+    try:
+        return check_file(options.scenario, options.timeline)
+    except UnreadableTimeline as error:
+        lines = [
+            f"{options.timeline} {f'line {f.row}' if f.row else f.pointer or ''}".strip()
+            + f": {f.detail}"
+            for f in error.faults[:_MOST_FAULTS]
+        ]
+        left = len(error.faults) - len(lines)
+        raise _WrongInput("\n".join(lines + [f"{left} more"] * (left > 0))) from error
+    except PlannerError as error:
+        place = place_of(error.fault.pointer or "", options.scenario)
+        raise _WrongInput(f"{place}: {error.detail}") from error
     except OSError as error:
         raise _WrongInput(f"{error.filename}: {error.strerror}") from error
 

@@ -13,6 +13,7 @@ import planner_core
 from service.api import (
     audit_events,
     comparisons,
+    element_exports,
     ground_stations,
     job_events,
     jobs,
@@ -23,6 +24,7 @@ from service.api import (
     scenarios,
     solvers,
     target_catalogs,
+    timelines,
     webhooks,
 )
 from service.api.deps import check_request
@@ -46,11 +48,13 @@ DESCRIPTION = (
 )
 
 ROUTERS = (
+    element_exports.router,
     satellites.router,
     ground_stations.router,
     target_catalogs.router,
     scenarios.router,
     jobs.router,
+    timelines.router,
     job_events.router,
     comparisons.router,
     solvers.router,
@@ -121,8 +125,8 @@ def _allow_pages(app: FastAPI, origins: Sequence[str]) -> None:
             "If-None-Match", "Last-Event-ID", "X-Request-ID",
         ],
         expose_headers=[
-            "ETag", "Idempotency-Replayed", "Link", "Location", "Retry-After",
-            "WWW-Authenticate", "X-Request-ID",
+            "Content-Disposition", "ETag", "Idempotency-Replayed", "Link", "Location",
+            "Retry-After", "WWW-Authenticate", "X-Request-ID",
         ],
     )  # fmt: skip
 

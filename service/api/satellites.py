@@ -163,7 +163,7 @@ def get_satellite(
 ) -> SatelliteOut | Response:
     """Return one satellite with the element set in force."""
     with database.reading() as session:
-        shown = _shown(session, [_find(session, satellite_id)])[0]
+        shown = _shown(session, [find_satellite(session, satellite_id)])[0]
     return unless_known(request, response, shown)
 
 
@@ -173,7 +173,7 @@ def delete_satellite(
 ) -> None:
     """Delete a satellite. Scenarios that use it keep their copy."""
     with database.transaction() as session:
-        row = _find(session, satellite_id, to_change=True)
+        row = find_satellite(session, satellite_id, to_change=True)
         require_match(request, lambda: _shown(session, [row])[0])
         row.deleted_at = datetime.now(UTC)
         audit.record(session, "delete", "satellite", satellite_id)
@@ -195,7 +195,7 @@ def put_elements(
     """
     orbit = orbit_from(body)
     with database.transaction() as session:
-        row = _find(session, satellite_id, to_change=True)
+        row = find_satellite(session, satellite_id, to_change=True)
         require_match(request, lambda: _shown(session, [row])[0])
         _require_same_object(row, orbit.elements.norad_cat_id, body)
         store.add_elements(session, row.id, orbit.elements.epoch, orbit.stored)
@@ -211,12 +211,13 @@ def list_elements(
     """List all element sets of a satellite, the last stored first."""
     query = sa.select(ElementSetRow).where(ElementSetRow.satellite_id == satellite_id)
     with database.reading() as session:
-        _find(session, satellite_id)
+        find_satellite(session, satellite_id)
         page = newest_first(session, query, ElementSetRow.id, paging)
     return Listed(items=[_shown_elements(row) for row in page.rows], next=page.next)
 
 
-def _find(session: Session, satellite_id: str, *, to_change: bool = False) -> SatelliteRow:
+def find_satellite(session: Session, satellite_id: str, *, to_change: bool = False) -> SatelliteRow:
+    """Return a satellite, its row locked where it is to change; 404 where there is none."""
     row = session.get(SatelliteRow, satellite_id, with_for_update=to_change)
     if row is None or row.deleted_at is not None:
         raise ServiceError("not_found", f"There is no satellite {satellite_id!r}.")

@@ -24,6 +24,7 @@ from service.client.shapes import Json, Scenario, Stored
 from service.client.transport import Transport, path_of
 
 FINAL = frozenset({"succeeded", "failed", "cancelled", "expired"})
+_OPENMCT = ".openmct.json"
 
 
 class Job(Stored):
@@ -193,7 +194,8 @@ class Jobs:
         The file appears once it is complete; one that was there stays until then.
         """
         to = Path(file)
-        name = f"timeline{to.suffix.lower() or '.json'}"
+        suffix = _OPENMCT if to.name.lower().endswith(_OPENMCT) else to.suffix.lower()
+        name = f"timeline{suffix or '.json'}"
         self._transport.save(path_of("jobs", job_id, name), to)
         return to
 

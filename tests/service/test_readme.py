@@ -74,3 +74,17 @@ def test_every_command_of_the_page_on_the_api_works(tmp_path: Path) -> None:
     assert lines[9] == "412"
     assert 'slewline_jobs{state="succeeded"} 4.0' in lines
     assert lines[-2] == "unknown_solver"
+
+
+@needs_tools
+def test_every_command_of_the_page_on_exports_works(tmp_path: Path) -> None:
+    lines = [line.strip() for line in _output("docs/exports.md", tmp_path).splitlines()]
+    assert [line.split()[0] for line in (lines[1], lines[4], lines[7])] == [
+        "valid",
+        "valid",
+        "violations",
+    ]
+    assert lines[2] == lines[5]
+    assert lines[9].startswith("line 3: window: Polar-500")
+    assert lines[10] == "status 1"
+    assert "MEAN_MOTION = 15.24162312" in lines

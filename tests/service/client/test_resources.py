@@ -142,6 +142,10 @@ def test_a_mission_is_planned_and_read_back(whole: Client, folder: Path) -> None
         job.download(folder / "day.docx")
     assert refused.value.code == "not_acceptable"
     assert [path.name for path in folder.iterdir()] == ["day.json"]
+    plan = json.loads(job.download(folder / "day.openmct.json").read_text(encoding="utf-8"))
+    assert sum(map(len, plan.values())) == len(actions)
+    table = job.download(folder / "day.csv").read_text(encoding="utf-8")
+    assert len(table.splitlines()) == 1 + len(actions)
     file = whole.scenarios.file(scenario.id)
     inline = whole.jobs.submit(file, "rule")
     assert inline.scenario.id == scenario.id

@@ -1,0 +1,116 @@
+"""Satellites' orbits as Orbit Mean-Elements Messages: files that the import takes back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, Final
+
+from fastapi import APIRouter, Path, Request, Response
+from sqlalchemy.orm import Session
+
+from planner_core.orbits import omm_writing
+from planner_core.orbits.omm_writing import Outgoing
+from service import satellite_store as store
+from service.api.conditional import NOT_MODIFIED
+from service.api.deps import DatabaseDep
+from service.api.errors import problem_responses
+from service.api.problems import ServiceError
+from service.api.satellites import find_satellite
+from service.api.shapes import etag_of, matches
+from service.db.rows import SatelliteRow
+from service.inputs import OrbitIn
+from service.translate import orbit_from
+
+router = APIRouter(prefix="/v1/satellites", tags=["satellites"])
+
+_AT_ONCE: Final = 500
+
+
+@dataclass(frozen=True, slots=True)
+class _Form:
+    media_type: str
+    write: Callable[[Sequence[Outgoing]], str]
+
+
+_FORMS: Final = {
+    "json": _Form("application/json", omm_writing.write_json),
+    "csv": _Form("text/csv", omm_writing.write_csv),
+    "xml": _Form("application/xml", omm_writing.write_xml),
+    "kvn": _Form("text/plain", omm_writing.write_kvn),
+}
+_RESPONSES: Final[dict[int | str, dict[str, Any]]] = {
+    200: {
+        "description": "The messages.",
+        "content": {form.media_type: {} for form in _FORMS.values()},
+    },
+    **NOT_MODIFIED,
+    **problem_responses(406),
+}
+
+Suffix = Annotated[
+    str, Path(description=f"Form of the file: {', '.join(_FORMS)}.", examples=list(_FORMS))
+]
+
+
+@router.get("/omm.{suffix}", response_class=Response, responses=_RESPONSES)
+def get_all_omm(suffix: Suffix, database: DatabaseDep, request: Request) -> Response:
+    """Return the element set in force of every satellite, oldest satellite first.
+
+    `POST /v1/satellites/import` takes the file back, with the media type that it comes in.
+    """
+    form = _form_of(suffix)
+    with database.reading() as session:
+        rows = session.scalars(store.alive().order_by(SatelliteRow.id)).all()
+        messages = [
+            message
+            for first in range(0, len(rows), _AT_ONCE)
+            for message in _messages(session, rows[first : first + _AT_ONCE])
+        ]
+    return _answer(request, form, messages, f"satellites.omm.{suffix}")
+
+
+@router.get(
+    "/{satellite_id}/omm.{suffix}",
+    response_class=Response,
+    responses={**_RESPONSES, **problem_responses(404)},
+)
+def get_omm(satellite_id: str, suffix: Suffix, database: DatabaseDep, request: Request) -> Response:
+    """Return the element set in force of one satellite."""
+    with database.reading() as session:
+        row = find_satellite(session, satellite_id)
+        form = _form_of(suffix)
+        messages = _messages(session, [row])
+    return _answer(request, form, messages, f"{satellite_id}.omm.{suffix}")
+
+
+def _form_of(suffix: str) -> _Form:
+    if suffix not in _FORMS:
+        offered = ", ".join(f".{known}" for known in _FORMS)
+        raise ServiceError("not_acceptable", f"Element sets are offered as {offered}.")
+    return _FORMS[suffix]
+
+
+def _messages(session: Session, rows: Sequence[SatelliteRow]) -> list[Outgoing]:
+    in_force = store.in_force(session, [row.id for row in rows])
+    messages = []
+    for row in rows:
+        stored = in_force[row.id]
+        elements = orbit_from(OrbitIn(**stored.orbit)).elements
+        # A TLE has no name of its own.
+        named = replace(elements, name=elements.name or row.name)
+        messages.append(Outgoing(elements=named, created_at=stored.created_at))
+    return messages
+
+
+def _answer(
+    request: Request, form: _Form, messages: Sequence[Outgoing], file_name: str
+) -> Response:
+    text = form.write(messages)
+    headers = {
+        "ETag": etag_of(text),
+        "Content-Disposition": f'inline; filename="{file_name}"',
+    }
+    if matches(request.headers.get("if-none-match"), headers["ETag"]):
+        return Response(status_code=304, headers=headers)
+    return Response(text, media_type=form.media_type, headers=headers)

@@ -1,0 +1,109 @@
+"""``slewline check``: a timeline of any origin, judged by the referee against its scenario."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from planner_core.build import build_problem, compute_opportunities
+from planner_core.domain import Scenario
+from planner_core.problem import COLLECT, Problem
+from planner_core.solvers.base import Budget
+from planner_core.timeline import Timeline, plan_sha256, replay
+from service.exports.reading import READERS, Reading, plan_in
+from service.instants import instant_text
+from service.scenario_files import read_scenario
+from service.summary import table
+from service.translate import canonical, scenario_from_content, sha256_of
+
+_AGREED = 1e-6
+
+
+def check_file(scenario_path: Path, timeline_path: Path) -> int:
+    """Judge the plan in a file, print the verdict, and return 0 where it is valid, else 1.
+
+    Parameters
+    ----------
+    scenario_path
+        A self-contained scenario file.
+    timeline_path
+        A timeline as ``.json`` or ``.csv``: this service's own, an edited or a foreign one.
+
+    Raises
+    ------
+    PlannerError
+        Where the scenario is wrong.
+    UnreadableTimeline
+        Where the timeline is.
+    OSError
+        Where a file cannot be read.
+    """
+    content = canonical(read_scenario(scenario_path))
+    data = timeline_path.read_bytes()
+    suffix = timeline_path.suffix.lower()
+    records = READERS[suffix](data)
+    scenario = scenario_from_content(json.loads(content))
+    budget = Budget()
+    problem = build_problem(scenario, compute_opportunities(scenario, budget), budget)
+    reading = plan_in(records, scenario, problem)
+    verdict = replay(problem, reading.plan)
+    is_valid = verdict.is_valid and not reading.impossible
+    own_hash = plan_sha256(problem, reading.plan)
+    print(table([_HEADER, _row(problem, reading, verdict, is_valid=is_valid)]))
+    print(f"plan {own_hash}")
+    for line in _complaints(scenario, reading, verdict):
+        print(line)
+    if suffix == ".json":
+        claimed = json.loads(data)
+        for line in _differences(claimed, sha256_of(content), own_hash, verdict.reward):
+            print(line)
+    return 0 if is_valid else 1
+
+
+_HEADER = ("validity", "reward", "collects", "contacts", "battery", "recorder")
+
+
+def _row(
+    problem: Problem, reading: Reading, verdict: Timeline, *, is_valid: bool
+) -> tuple[str, ...]:
+    kinds = Counter(int(problem.opportunities.kind[a.opportunity]) for a in reading.plan.actions)
+    collects = kinds[COLLECT]
+    lowest, highest = verdict.battery_min, verdict.recorder_max
+    return (
+        "valid" if is_valid else "violations",
+        f"{verdict.reward:g}",
+        str(collects),
+        str(kinds.total() - collects),
+        "-" if lowest is None else f"{lowest:.1%}",
+        "-" if highest is None else f"{highest:.1%}",
+    )
+
+
+def _complaints(scenario: Scenario, reading: Reading, verdict: Timeline) -> Iterator[str]:
+    """Yield a line for each thing that is wrong with the plan, and where in the file it stands."""
+    for place, detail in reading.impossible:
+        yield f"{place}: window: {detail}"
+    for violation in verdict.violations:
+        places = ", ".join(reading.places[position] for position in violation.blamed)
+        satellite = scenario.satellites[violation.satellite].name
+        at = instant_text(scenario.horizon.instant(violation.at_s))
+        where = f"{places}: " if places else ""
+        yield f"{where}{violation.code}: {satellite}, {at}: {violation.detail}"
+
+
+def _differences(
+    claimed: Mapping[str, Any], scenario_sha256: str, own_hash: str, reward: float
+) -> Iterator[str]:
+    """Yield what a timeline document says of itself that is not so."""
+    said = claimed.get("scenario_sha256", scenario_sha256)
+    if said != scenario_sha256:
+        yield f"note: the file was made for another scenario, {said}"
+    if claimed.get("plan_sha256", own_hash) != own_hash:
+        yield f"note: the file gives the plan as {claimed['plan_sha256']}"
+    totals = claimed.get("totals")
+    told = totals.get("reward") if isinstance(totals, dict) else None
+    if isinstance(told, int | float) and abs(told - reward) > _AGREED * max(1.0, abs(reward)):
+        yield f"note: the file claims a reward of {told:g}"

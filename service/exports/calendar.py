@@ -1,0 +1,99 @@
+"""iCalendar (RFC 5545): the contacts, each with an alarm ten minutes before.
+
+A contact keeps its UID from plan to plan, so that a calendar moves an entry instead of adding
+one: the UID is made of satellite, station and the half hour of UTC that the pass's middle lies
+in. A satellite in low orbit comes back to a station after an hour and more, and newer elements
+move a pass by seconds. SEQUENCE and DTSTAMP tell when the plan was made: the newer one counts.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
+from typing import Final
+from uuid import NAMESPACE_URL, uuid5
+
+from icalendar import Alarm, Calendar, Event
+
+import planner_core
+from planner_core.domain import GroundStation
+from service.exports.answered import Answered, Document, in_chunks
+
+ALARM: Final = timedelta(minutes=10)
+
+_HALF_HOUR: Final = timedelta(minutes=30)
+_SECOND: Final = timedelta(seconds=1)
+_EPOCH: Final = datetime(2020, 1, 1, tzinfo=UTC)
+
+
+def write(answered: Answered) -> Iterator[str]:
+    """Yield the calendar of all contacts."""
+    return in_chunks(_parts(answered))
+
+
+def _parts(answered: Answered) -> Iterator[str]:
+    calendar = Calendar()
+    calendar.add("prodid", f"-//Slewline//{planner_core.__version__}//EN")
+    calendar.add("version", "2.0")
+    calendar.add("method", "PUBLISH")
+    calendar.add("name", "Contacts")
+    calendar.add("x-wr-calname", "Contacts")  # what calendars show that do not know NAME
+    head, end, _ = calendar.to_ical().decode().partition("END:VCALENDAR")
+    yield head
+    stations = {station.id: station for station in answered.scenario.ground_stations}
+    seen: Counter[str] = Counter()
+    for satellite, action in answered.each_action():
+        if action["mode"] == "contact":
+            event = _event(answered, satellite, action, stations[action["station_id"]], seen)
+            yield event.to_ical().decode()
+    yield end + "\r\n"
+
+
+def _event(
+    answered: Answered,
+    satellite: Document,
+    action: Document,
+    station: GroundStation,
+    seen: Counter[str],
+) -> Event:
+    start, end = (datetime.fromisoformat(action[name]) for name in ("start", "end"))
+    what = f"{satellite['name']} over {station.name}"
+    event = Event()
+    event.add("uid", _uid(satellite["id"], station.id, start + (end - start) / 2, seen))
+    event.add("sequence", (answered.finished_at - _EPOCH) // _SECOND)
+    event.add("dtstamp", answered.finished_at.replace(microsecond=0))
+    # Calendars know whole seconds: the entry covers the contact.
+    event.add("dtstart", start.replace(microsecond=0))
+    event.add("dtend", end.replace(microsecond=0) + _SECOND * (end.microsecond > 0))
+    event.add("summary", what)
+    event.add("location", station.name)
+    event.add("geo", (round(station.lat_deg, 6), round(_signed(station.lon_deg), 6)))
+    event.add("description", _description(answered.timeline, action))
+    event.add("categories", ["Contact"])
+    alarm = Alarm()
+    alarm.add("action", "DISPLAY")
+    alarm.add("trigger", -ALARM)
+    alarm.add("description", what)
+    event.add_component(alarm)
+    return event
+
+
+def _uid(satellite_id: str, station_id: str, middle: datetime, seen: Counter[str]) -> str:
+    # A mask may cut one pass in parts, which are contacts of their own.
+    key = json.dumps([satellite_id, station_id, (middle - _EPOCH) // _HALF_HOUR])
+    part = seen[key]
+    seen[key] += 1
+    return str(uuid5(NAMESPACE_URL, f"slewline:contact:{key}:{part}"))
+
+
+def _signed(lon_deg: float) -> float:
+    return lon_deg - 360.0 if lon_deg > 180.0 else lon_deg
+
+
+def _description(timeline: Document, action: Document) -> str:
+    return (
+        f"{action['start']} to {action['end']}, azimuth {action['azimuth_deg']:.0f} deg at the "
+        f"middle.\nAction {action['id']} of job {timeline['job']}."
+    )
