@@ -13,7 +13,6 @@ from fastapi.responses import JSONResponse
 from pydantic import BaseModel, Field, ValidationError
 from sqlalchemy.exc import SQLAlchemyError
 from starlette.exceptions import HTTPException
-from starlette.routing import Match
 
 from planner_core.errors import Fault, PlannerError
 from service.access.tokens import masked
@@ -24,7 +23,6 @@ from service.db.failures import why_unavailable
 PROBLEM_JSON = "application/problem+json"
 MAX_FAULTS = 100
 DATABASE_RETRY_S = 5
-_METHODS = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE")
 
 logger = logging.getLogger(__name__)
 
@@ -229,21 +227,15 @@ def _on_http_exception(request: Request, error: Exception) -> JSONResponse:
         code = "_".join(HTTPStatus(error.status_code).phrase.lower().split())
         return problem(request, code, error.detail, headers=error.headers, status=error.status_code)
     headers = dict(error.headers or {})
-    if error.status_code == 405:
-        headers["Allow"] = _allowed_methods(request)
+    if error.status_code == 405 and (methods := _documented_methods(request)):
+        headers["Allow"] = ", ".join(methods)
     return problem(request, code, _http_detail(request, error), headers=headers)
 
 
-def _allowed_methods(request: Request) -> str:
+def _documented_methods(request: Request) -> list[str]:
     # Each method is a route of its own, and the framework names those of the first one alone.
-    routes = request.app.routes
-    return ", ".join(
-        method
-        for method in _METHODS
-        if any(
-            route.matches({**request.scope, "method": method})[0] is Match.FULL for route in routes
-        )
-    )
+    path = getattr(request.scope.get("route"), "path", None)
+    return sorted(method.upper() for method in request.app.openapi()["paths"].get(path, ()))
 
 
 def _http_detail(request: Request, error: HTTPException) -> str:
