@@ -155,6 +155,7 @@ _CODES = {
     "too_long": "value_out_of_range",
     "string_too_short": "value_out_of_range",
     "string_too_long": "value_out_of_range",
+    "too_many_fields": "too_many_fields",
     "naive_time": "naive_time",
     "invalid_time": "invalid_time",
 }

@@ -73,7 +73,8 @@ class Probed:
     def served(self) -> set[tuple[str, str]]:
         """Return the operations that were done, not only refused."""
         contract = Contract(self.document)
-        calls = [json.loads(line) for line in self.log.read_text().splitlines()]
+        with self.log.open() as lines:
+            calls = [json.loads(line) for line in lines]
         found = [
             (call["method"], contract.operation(call["method"], call["path"]))
             for call in calls
