@@ -25,11 +25,12 @@ from service.api import (
     target_catalogs,
     webhooks,
 )
+from service.api.body_limit import BodyLimit
 from service.api.deps import check_request
 from service.api.errors import install_error_handlers
 from service.api.guard import Guard
 from service.api.idempotency import install_replay
-from service.api.middleware import BodyLimit, RequestContext
+from service.api.middleware import RequestContext
 from service.api.security_headers import SecurityHeaders
 from service.db.session import Database
 from service.opportunities import OpportunityReader

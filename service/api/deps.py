@@ -96,6 +96,9 @@ async def check_request(request: Request) -> None:
         for name in request.query_params
         if name not in known
     ]
+    # PostgreSQL's texts can hold any character but this one.
+    if any("\0" in text for text in (request.scope["path"], *request.query_params.values())):
+        faults.append(Fault(code="invalid_value", detail="No path or parameter holds a NUL."))
     if faults:
         raise refuse(faults)
     if route.body_field is not None and await request.body():

@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
 
 from service.api.shapes import Body, Instant, Name
 from service.db.rows import JobRow
-from service.inputs import ScenarioFile, ScenarioIn
+from service.inputs import Id, ScenarioFile, ScenarioIn
 from service.jobs.lease import JobState
 
 Outcome = Literal["downlinked", "collected", "unscheduled", "excluded"]
@@ -41,7 +41,7 @@ InlineScenario = Annotated[
 class QuestionIn(Body):
     """A scenario to plan, stored or sent along, and what a job of it may use."""
 
-    scenario_id: str | None = Field(None, description="A stored scenario.")
+    scenario_id: Id | None = Field(None, description="A stored scenario.")
     scenario: InlineScenario | None = Field(
         None,
         description="Instead of `scenario_id`: the body of `POST /v1/scenarios`, or a whole "
