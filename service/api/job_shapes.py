@@ -163,4 +163,9 @@ def shown(job: JobRow, scenario_sha256: str) -> JobOut:
 
 def etag_of_job(job: JobRow) -> str:
     """Return the ETag of a job's present form."""
-    return f'"{job.version}"'
+    return etag_of_version(job.version)
+
+
+def etag_of_version(version: int) -> str:
+    """Return the ETag of a job of this version."""
+    return f'"{version}"'

@@ -83,7 +83,7 @@ def _invalid_cursor() -> ServiceError:
     return ServiceError("invalid_cursor", "The cursor is not one that this list has given.")
 
 
-def _paging(
+async def _paging(
     request: Request,
     response: Response,
     cursor: Annotated[
