@@ -27,11 +27,12 @@ import sqlalchemy as sa
 
 from benchmarks import pollers
 from service import demo_mission
-from service.api.shapes import format_instant, parse_instant
+from service.api.shapes import parse_instant
 from service.db.rows import JobResultRow, JobRow
 from service.db.session import Database
 from service.demo import create_mission
 from service.ids import new_id
+from service.instants import instant_text
 
 RUNS = 9
 POLLS = 400
@@ -118,7 +119,7 @@ def submit_to_timeline(service: Served, mission: Json) -> None:
     cold = []
     for shift in range(1, RUNS + 1):
         horizon = {
-            name: format_instant(parse_instant(instant) + timedelta(minutes=shift))
+            name: instant_text(parse_instant(instant) + timedelta(minutes=shift))
             for name, instant in demo_mission.HORIZON.items()
         }
         scenario_id = post(service.client, "/v1/scenarios", question | {"horizon": horizon})["id"]
@@ -207,14 +208,11 @@ def many_jobs(service: Served, mission: Json) -> None:
 
 def copy_job(database: Database, job_id: str, copies: int) -> None:
     with database.transaction() as session:
-        for table, own in ((JobRow, JobRow.id), (JobResultRow, JobResultRow.job_id)):
-            columns = sa.inspect(table).columns
-            row = session.execute(sa.select(*columns).where(own == job_id)).one()._asdict()
-            if table is JobRow:
-                ids = [new_id() for _ in range(copies)]
-                row["label"] = "stored"
-            key = own.key
-            session.execute(sa.insert(table), [row | {key: copy} for copy in ids])
+        ids = [new_id() for _ in range(copies)]
+        for table, key in ((JobRow.__table__, "id"), (JobResultRow.__table__, "job_id")):
+            found = session.execute(sa.select(table).where(table.c[key] == job_id)).mappings().one()
+            changes = {"label": "stored"} if "label" in found else {}
+            session.execute(sa.insert(table), [found | changes | {key: copy} for copy in ids])  # type: ignore[operator]
 
 
 def uploads(service: Served) -> None:
