@@ -6,17 +6,18 @@ BIN := .venv/bin
 STAMP := .venv/.installed
 WARM := .venv/.warm
 KERNELS := $(shell grep -rlE '^@(kernel|borrowing|inlined)' planner_core --include=*.py)
-LOCK := $(UV) pip compile pyproject.toml --universal --python-version 3.11 --generate-hashes \
+LOCK := $(UV) pip compile --universal --python-version 3.11 --generate-hashes \
 	--no-emit-index-url
 PIP := $(BIN)/python -m pip -qq --disable-pip-version-check
 
-.PHONY: help setup demo serve test chaos check format lock paper paper-quick clean
+.PHONY: help setup demo serve test chaos fuzz check format lock paper paper-quick clean
 
 help:
 	@echo "make demo     plan a real-size mission through the service's own API, and end"
 	@echo "make serve    the same, and keep serving"
 	@echo "make test     every check and every test"
 	@echo "make chaos    500 jobs while processes are killed and databases fail (needs Debian and root)"
+	@echo "make fuzz     files made by coverage-guided fuzzing, against every parser (Linux)"
 	@echo "make check    lint, format, types, import contracts, examples in docstrings"
 	@echo "make setup    the environment in .venv (the others call it)"
 	@echo "make format   rewrite the sources in the one layout"
@@ -61,6 +62,11 @@ chaos: setup
 	$(BIN)/python -m pytest tests/service/jobs/chaos
 	.ci/postgresql $(BIN)/python -m pytest tests/service/jobs/chaos
 
+# The fuzzer has wheels for Linux alone, so it is no dependency of the project.
+fuzz: setup
+	@$(PIP) install --require-hashes -r tests/fuzz/requirements.lock
+	$(BIN)/python -m tests.fuzz.guided
+
 check: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -73,8 +79,9 @@ format: setup
 	$(BIN)/ruff format .
 
 lock:
-	$(LOCK) --extra dev --extra study --extra otel -o requirements.lock
-	$(LOCK) --extra otel --extra build -c requirements.lock -o docker/requirements.lock
+	$(LOCK) pyproject.toml --extra dev --extra study --extra otel -o requirements.lock
+	$(LOCK) pyproject.toml --extra otel --extra build -c requirements.lock -o docker/requirements.lock
+	$(LOCK) tests/fuzz/requirements.in -o tests/fuzz/requirements.lock
 
 # Both go on where they were stopped.
 paper: setup

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
+from pydantic import AfterValidator, Discriminator, FailFast, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
 from planner_core.domain import Dynamics, LookSide, Nadir, OrbitDirection
@@ -237,6 +237,7 @@ class FileTarget(TargetIn):
 class ScenarioFile(Question):
     """A self-contained scenario, as ``GET /v1/scenarios/{id}?expand=true`` answers it."""
 
-    satellites: list[FileSatellite] = Field(min_length=1)
-    targets: list[FileTarget] = Field(min_length=1)
-    ground_stations: list[FileGroundStation] = Field([])
+    # The first thing that is wrong is told: of a whole file of them each would take memory.
+    satellites: Annotated[list[FileSatellite], FailFast()] = Field(min_length=1, max_length=10_000)
+    targets: Annotated[list[FileTarget], FailFast()] = Field(min_length=1, max_length=1_000_000)
+    ground_stations: Annotated[list[FileGroundStation], FailFast()] = Field([], max_length=10_000)

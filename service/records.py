@@ -14,7 +14,7 @@ from typing import Any, Generic, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from planner_core.errors import Fault, PlannerError
-from service.api.errors import faults_of_validation
+from service.api.errors import faults_of_validation, refuse
 
 B = TypeVar("B", bound=BaseModel)
 
@@ -30,6 +30,8 @@ _ALIASES = {
     "longitude": "lon_deg",
 }
 _MISSPELT = 0.75
+_MOST_COLUMNS = 200
+_MOST_FAULTS = 10_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,20 +42,23 @@ class Record:
     ----------
     row
         Line of the file where it starts, for CSV.
+    pointer
+        Where its fields stand, for JSON.
     pointers
-        Where each field stands, for JSON; ``""`` is the record itself.
+        Where those stand that stand elsewhere.
     """
 
     fields: Mapping[str, object]
     row: int | None = None
+    pointer: str = ""
     pointers: Mapping[str, str] = field(default_factory=dict)
 
     def place(self, fault: Fault) -> Fault:
         """Return a fault of one field with its place in the file."""
         name = (fault.pointer or "").removeprefix("/").partition("/")[0]
         if self.row is None:
-            own = self.pointers.get(name) or f"{self.pointers.get('', '')}/properties/{name}"
-            return replace(fault, pointer=own)
+            own = f"{self.pointer}/{name}" if name else self.pointer
+            return replace(fault, pointer=self.pointers.get(name, own))
         detail = f"{name}: {fault.detail}" if name else fault.detail
         return replace(fault, row=self.row, pointer=None, detail=detail)
 
@@ -85,10 +90,17 @@ def check(
     ----------
     build
         Makes the domain's type of a body, which has the last word on its values.
+
+    Raises
+    ------
+    ServiceError
+        ``too_many_errors``: so many that it is another kind of file altogether.
     """
     good: list[Checked[B]] = []
     faults: list[Fault] = []
     for record in records:
+        if len(faults) > _MOST_FAULTS:
+            raise refuse(faults, code="too_many_errors")
         try:
             body = schema.model_validate(record.fields)
             build(body)
@@ -128,8 +140,10 @@ def first_of_each(
     return faults
 
 
-def read_csv(data: bytes, known: Collection[str], required: Collection[str]) -> Records:
-    """Return the records of a CSV file with a header.
+def read_csv(
+    data: bytes, known: Collection[str], required: Collection[str], *, most: int
+) -> Records:
+    """Return the records of a CSV file with a header, which may have ``most`` of them.
 
     Columns may stand in any order; ``lat``, ``latitude``, ``lon``, ``lng``, ``long`` and
     ``longitude`` are taken too. Other columns are ignored, unless they look like a misspelt
@@ -144,12 +158,17 @@ def read_csv(data: bytes, known: Collection[str], required: Collection[str]) -> 
         return Records(faults=(Fault(code="empty_file", detail="The file is empty."),))
     if isinstance(first, Fault):
         return Records(faults=(first,))
+    if len(first[1]) > _MOST_COLUMNS:
+        detail = f"The header has {len(first[1])} columns; {_MOST_COLUMNS} are the most."
+        return Records(faults=(Fault(code="malformed_csv", detail=detail, row=first[0]),))
     columns = [_ALIASES.get(c.strip().lower(), c.strip().lower()) for c in first[1]]
     faults = _faults_of_header(first[0], columns, known, required)
     if faults:
         return Records(faults=tuple(faults))
     records: list[Record] = []
-    for row in rows:
+    for number, row in enumerate(rows):
+        if number == most:
+            return _too_many_rows(most)
         if isinstance(row, Fault):
             faults.append(row)
         elif len(row[1]) != len(columns):
@@ -163,6 +182,11 @@ def read_csv(data: bytes, known: Collection[str], required: Collection[str]) -> 
         faults.append(Fault(code="empty_file", detail="The file has a header and no records."))
     ignored = tuple(column for column in columns if column not in known)
     return Records(records=tuple(records), faults=tuple(faults), ignored=ignored)
+
+
+def _too_many_rows(most: int) -> Records:
+    detail = f"The file holds more than {most} records; split it."
+    return Records(faults=(Fault(code="too_many_rows", detail=detail),))
 
 
 def _decoded(data: bytes) -> str | Fault:
@@ -218,7 +242,7 @@ def _value(column: str, cell: str) -> object:
     return float(cell) if _NUMBER.fullmatch(cell) else cell
 
 
-def read_geojson(data: bytes, known: Collection[str]) -> Records:
+def read_geojson(data: bytes, known: Collection[str], *, most: int) -> Records:
     """Return the points of a GeoJSON FeatureCollection (RFC 7946: longitude, latitude, altitude).
 
     Of a feature's properties those that are fields of ours count; others are ignored.
@@ -237,6 +261,8 @@ def read_geojson(data: bytes, known: Collection[str]) -> Records:
         return _no_collection("A FeatureCollection has a list of features.", "/features")
     if not features:
         return Records(faults=(Fault(code="empty_file", detail="The collection is empty."),))
+    if len(features) > most:
+        return _too_many_rows(most)
     found = [_feature(feature, f"/features/{i}", known) for i, feature in enumerate(features)]
     name = document.get("name")
     return Records(
@@ -269,13 +295,13 @@ def _feature(feature: object, pointer: str, known: Collection[str]) -> Record | 
         fields["id"] = feature["id"]
     if isinstance(fields.get("id"), int):
         fields["id"] = str(fields["id"])
-    pointers = {"": pointer, "lon_deg": f"{at}/0", "lat_deg": f"{at}/1"}
+    pointers = {"lon_deg": f"{at}/0", "lat_deg": f"{at}/1"}
     if len(position) == 3:
         pointers["alt_m"] = f"{at}/2"
     if "id" in feature or "id" not in fields:
         pointers["id"] = f"{pointer}/id"
     kept = {name: value for name, value in fields.items() if name in known and value is not None}
-    return Record(fields=kept, pointers=pointers)
+    return Record(fields=kept, pointer=f"{pointer}/properties", pointers=pointers)
 
 
 def _as_float(value: object) -> object:

@@ -77,12 +77,16 @@ def listen(host: str, port: int) -> socket.socket:
     """
     try:
         family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
-        return socket.create_server(address[:2], family=family, backlog=2048)
+        listener = socket.create_server(address[:2], family=family, backlog=2048)
     except OSError as error:
         raise CannotServe(
             f"Cannot listen on {host} port {port}: {error.strerror}. "
             "Give another --port; 0 takes a free one."
         ) from error
+    # Connections inherit this. asyncio sets it itself only where a socket names its protocol,
+    # and without it each answer's body waits for the client's delayed acknowledgement (40 ms).
+    listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    return listener
 
 
 def address_of(listener: socket.socket) -> str:

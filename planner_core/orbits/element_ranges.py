@@ -7,10 +7,12 @@ from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 
 from planner_core.domain import OrbitElements
-from planner_core.errors import InvalidElements
+from planner_core.errors import Fault, InvalidElements
 
 LARGEST_NORAD_CAT_ID = 999_999_999
 LONGEST_TEXT = 200
+MOST_SETS = 100_000
+"""Of one file; all that is in orbit is about a third of this."""
 # The largest drag term or derivative that a TLE can write; nothing real comes near it.
 _LARGEST_RATE = 1e9
 _FIRST_YEAR, _LAST_YEAR = 1957, 2199
@@ -41,6 +43,12 @@ def require_in_range(elements: OrbitElements, pointers: Mapping[str, str]) -> No
     if not _FIRST_YEAR <= year <= _LAST_YEAR:
         detail = f"epoch is in {year}, must be between {_FIRST_YEAR} and {_LAST_YEAR}"
         raise InvalidElements("value_out_of_range", detail, pointer=pointers["epoch"])
+
+
+def too_many_sets() -> Fault:
+    """Return the fault of a file that is refused for its size."""
+    detail = f"The file holds more than {MOST_SETS} element sets; split it"
+    return Fault("too_many_rows", detail)
 
 
 def is_plain_text(text: str) -> bool:

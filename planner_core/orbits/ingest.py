@@ -1,7 +1,8 @@
 """Files of element sets in any form we take: which form it is, and what stands in it.
 
 Codes of a file that cannot be read as a whole: ``unsupported_media_type``, ``empty_file``,
-``not_utf8``, ``not_json``, ``not_csv``, ``not_xml``, ``xml_forbidden``, ``no_elements``.
+``not_utf8``, ``not_json``, ``not_csv``, ``not_xml``, ``xml_forbidden``, ``no_elements``,
+``too_many_rows``.
 Codes of single sets: those of `tle.parse_tle` and `omm.elements_from_omm`, and
 ``tle_name``, ``csv_columns``, ``omm_syntax``, ``omm_unknown_keyword``, ``omm_duplicate_key``,
 ``omm_unit``, ``unsupported_message``, ``duplicate_element_set``.

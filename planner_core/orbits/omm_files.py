@@ -15,12 +15,13 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
-from xml.etree.ElementTree import Element, ParseError
+from xml.etree.ElementTree import Element, ParseError, TreeBuilder
 
 from defusedxml.common import DefusedXmlException
-from defusedxml.ElementTree import fromstring
+from defusedxml.ElementTree import DefusedXMLParser
 
 from planner_core.errors import Fault
+from planner_core.orbits.element_ranges import MOST_SETS, too_many_sets
 from planner_core.orbits.omm import REQUIRED_KEYS
 
 _METADATA = (
@@ -62,6 +63,9 @@ _COVARIANCE = re.compile(r"C[XYZ](_DOT)?_[XYZ](_DOT)?")
 _XML_GROUPS = frozenset(
     ("header", "body", "segment", "metadata", "data", "meanElements", "tleParameters")
 ).union(("spacecraftParameters", "covarianceMatrix", "userDefinedParameters"))
+_MOST_LINES = 1000
+_DEEPEST = 50
+_MOST_ELEMENTS = 30 * MOST_SETS
 _NDM_TEXTS = frozenset(("COMMENT", "MESSAGE_ID"))
 _LONGEST_SHOWN = 40
 
@@ -100,6 +104,8 @@ def read_json(text: str) -> Read:
         return [Message(fields=document, pointer="")], []
     if not isinstance(document, list):
         return [], [Fault("omm_syntax", "Expected an object or an array of objects", pointer="")]
+    if len(document) > MOST_SETS:
+        return [], [too_many_sets()]
     messages, faults = [], []
     for index, item in enumerate(document):
         if isinstance(item, dict):
@@ -123,7 +129,10 @@ def _read_records(reader: Any, messages: list[Message]) -> list[Fault]:
     header: list[str] = []
     faults = []
     end = 0
-    for cells in reader:
+    for number, cells in enumerate(reader):
+        if number > MOST_SETS:
+            messages.clear()
+            return [too_many_sets()]
         row, end = end + 1, reader.line_num
         if not any(cell.strip() for cell in cells):
             continue
@@ -161,7 +170,9 @@ def read_kvn(text: str) -> Read:
 def _sorted_out(read: Iterable[Message | Fault]) -> Read:
     messages: list[Message] = []
     faults: list[Fault] = []
-    for item in read:
+    for number, item in enumerate(read):
+        if number == MOST_SETS:
+            return [], [too_many_sets()]
         if isinstance(item, Message):
             messages.append(item)
         else:
@@ -170,6 +181,9 @@ def _sorted_out(read: Iterable[Message | Fault]) -> Read:
 
 
 def _kvn_message(lines: list[tuple[int, str]]) -> Message | Fault:
+    if len(lines) > _MOST_LINES:
+        detail = f"The message has more than {_MOST_LINES} lines"
+        return Fault("omm_syntax", detail, row=lines[0][0])
     draft = _Draft(row=lines[0][0])
     for row, line in lines:
         draft.add_line(row, line)
@@ -178,14 +192,15 @@ def _kvn_message(lines: list[tuple[int, str]]) -> Message | Fault:
 
 def _kvn_parts(text: str) -> Iterator[list[tuple[int, str]]]:
     lines: list[tuple[int, str]] = []
-    for row, line in enumerate(text.split("\n"), start=1):
+    for row, line in enumerate(io.StringIO(text), start=1):
         stripped = line.strip()
         if not stripped or stripped.split(maxsplit=1)[0] == "COMMENT":
             continue
         if stripped.startswith("CCSDS_") and lines:
             yield lines
             lines = []
-        lines.append((row, stripped))
+        if len(lines) <= _MOST_LINES:
+            lines.append((row, stripped))
     if lines:
         yield lines
 
@@ -196,7 +211,9 @@ def read_xml(data: bytes) -> Read:
     Document types are refused, and with them entities of every kind.
     """
     try:
-        root = fromstring(data, forbid_dtd=True)
+        parser = DefusedXMLParser(target=_Builder(), forbid_dtd=True)
+        parser.feed(data)
+        root: Element = parser.close()
     except DefusedXmlException:
         return [], [Fault("xml_forbidden", "The XML declares a document type or an entity")]
     except ParseError as error:
@@ -205,6 +222,30 @@ def read_xml(data: bytes) -> Read:
         return [], [Fault("not_xml", f"The text is not XML: {error}")]
     found = [root] if _tag(root) != "ndm" else [e for e in root if _tag(e) not in _NDM_TEXTS]
     return _sorted_out(_xml_message(element, f"/{at}") for at, element in enumerate(found))
+
+
+class _Builder(TreeBuilder):
+    """Builds a document that is neither deeper nor longer than one of messages can be."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._depth = 0
+        self._num_elements = 0
+
+    def start(self, tag: str, attrs: dict[str, str], /) -> Element:
+        """Open an element."""
+        self._depth += 1
+        self._num_elements += 1
+        if self._depth > _DEEPEST:
+            raise ValueError(f"elements are nested more than {_DEEPEST} deep")
+        if self._num_elements > _MOST_ELEMENTS:
+            raise ValueError(f"it has more than {_MOST_ELEMENTS} elements")
+        return super().start(tag, attrs)
+
+    def end(self, tag: str, /) -> Element:
+        """Close an element."""
+        self._depth -= 1
+        return super().end(tag)
 
 
 def _tag(element: Element) -> str:

@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+import io
+import itertools
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from planner_core.errors import Fault, InvalidElements
-from planner_core.orbits.element_ranges import LONGEST_TEXT, is_plain_text
+from planner_core.orbits.element_ranges import (
+    LONGEST_TEXT,
+    MOST_SETS,
+    is_plain_text,
+    too_many_sets,
+)
 from planner_core.orbits.tle import TleReading, read_tle
 
 _LONGEST_NAME = 24  # columns of a name line; a line this short is never an element line
 _LONGEST_SHOWN = 40
+_MOST_LINES = 3 * MOST_SETS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,14 +52,18 @@ def read_tle_text(text: str) -> tuple[list[TleRecord], list[Fault]]:
     text
         Lines end in LF.
     """
-    lines = [
-        _Line(row, line.rstrip())
-        for row, line in enumerate(text.split("\n"), start=1)
-        if line.strip() and not line.startswith("#")
-    ]
+    lines = list(itertools.islice(_lines(text), _MOST_LINES + 1))
+    if len(lines) > _MOST_LINES:
+        return [], [too_many_sets()]
     if not any(line.kind != "name" for line in lines):
         return [], [Fault("no_elements", "The text holds no line of an element set", row=1)]
     return _Grouping(lines).read()
+
+
+def _lines(text: str) -> Iterator[_Line]:
+    for row, line in enumerate(io.StringIO(text), start=1):
+        if line.strip() and not line.startswith("#"):
+            yield _Line(row, line.rstrip())
 
 
 class _Grouping:

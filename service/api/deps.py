@@ -20,12 +20,15 @@ from service.api.problems import ServiceError
 from service.db.session import Database
 from service.settings import Settings
 
+# What needs no thread is async: FastAPI runs everything else in one, which costs more than the
+# work itself.
 
-def _database(request: Request) -> Database:
+
+async def _database(request: Request) -> Database:
     return cast(Database, request.app.state.database)
 
 
-def _settings(request: Request) -> Settings:
+async def _settings(request: Request) -> Settings:
     return cast(Settings, request.app.state.settings)
 
 
@@ -33,22 +36,24 @@ async def _raw_body(request: Request) -> bytes:
     return await request.body()
 
 
-def _caller(request: Request) -> Caller:
+async def _caller(request: Request) -> Caller:
     return cast(Caller, request.state.caller)
-
-
-def _audit(request: Request) -> Audit:
-    return Audit(caller=_caller(request), request_id=request.state.request_id)
 
 
 DatabaseDep = Annotated[Database, Depends(_database)]
 SettingsDep = Annotated[Settings, Depends(_settings)]
 RawBodyDep = Annotated[bytes, Depends(_raw_body)]
 CallerDep = Annotated[Caller, Depends(_caller)]
+
+
+async def _audit(request: Request, caller: CallerDep) -> Audit:
+    return Audit(caller=caller, request_id=request.state.request_id)
+
+
 AuditDep = Annotated[Audit, Depends(_audit)]
 
 
-def admin_only(caller: CallerDep) -> None:
+async def admin_only(caller: CallerDep) -> None:
     """Refuse callers without the scope `admin`."""
     require_scope(caller, Scope.ADMIN)
 
@@ -96,6 +101,9 @@ async def check_request(request: Request) -> None:
         for name in request.query_params
         if name not in known
     ]
+    # PostgreSQL's texts can hold any character but this one.
+    if any("\0" in text for text in (request.scope["path"], *request.query_params.values())):
+        faults.append(Fault(code="invalid_value", detail="No path or parameter holds a NUL."))
     if faults:
         raise refuse(faults)
     if route.body_field is not None and await request.body():

@@ -155,6 +155,7 @@ _CODES = {
     "too_long": "value_out_of_range",
     "string_too_short": "value_out_of_range",
     "string_too_long": "value_out_of_range",
+    "too_many_fields": "too_many_fields",
     "naive_time": "naive_time",
     "invalid_time": "invalid_time",
 }
@@ -226,7 +227,16 @@ def _on_http_exception(request: Request, error: Exception) -> JSONResponse:
     if code is None:
         code = "_".join(HTTPStatus(error.status_code).phrase.lower().split())
         return problem(request, code, error.detail, headers=error.headers, status=error.status_code)
-    return problem(request, code, _http_detail(request, error), headers=error.headers)
+    headers = dict(error.headers or {})
+    if error.status_code == 405 and (methods := _documented_methods(request)):
+        headers["Allow"] = ", ".join(methods)
+    return problem(request, code, _http_detail(request, error), headers=headers)
+
+
+def _documented_methods(request: Request) -> list[str]:
+    # Each method is a route of its own, and the framework names those of the first one alone.
+    path = getattr(request.scope.get("route"), "path", None)
+    return sorted(method.upper() for method in request.app.openapi()["paths"].get(path, ()))
 
 
 def _http_detail(request: Request, error: HTTPException) -> str:

@@ -10,6 +10,7 @@ from fastapi import APIRouter, Request, Response
 from pydantic import BaseModel, Field
 from sqlalchemy.orm import Session
 
+from planner_core.errors import Fault
 from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
 from service.api.deps import AuditDep, DatabaseDep, RawBodyDep, require_media_type
 from service.api.errors import problem_responses
@@ -35,6 +36,7 @@ router = APIRouter(prefix="/v1/ground-stations", tags=["ground stations"])
 
 _CSV_COLUMNS = tuple(n for n in GroundStationIn.model_fields if n != "elevation_mask")
 _REQUIRED = ("name", "lat_deg", "lon_deg")
+_MOST_STATIONS = 10_000
 _IMPORT_TYPES = ("application/geo+json", "application/json", "text/csv")
 
 
@@ -90,21 +92,26 @@ def import_ground_stations(
     properties that are fields of a station count, others are ignored.
     """
     kind = require_media_type(request, *_IMPORT_TYPES)
-    found = (
-        read_csv(data, _CSV_COLUMNS, _REQUIRED)
-        if kind == "text/csv"
-        else read_geojson(data, GroundStationIn.model_fields)
-    )
-    good, faults = check(
-        found.records, GroundStationIn, lambda body: ground_station_from(body, "new")
-    )
-    faults = [*found.faults, *faults]
+    good, faults = read_stations(kind, data)
     refuse_if_asked(len(good), faults, on_error)
     with once.transaction() as session:
         items = _store(session, good)
         new = [item.id for item in items if item.status == "created"]
         audit.record(session, "create", "ground_station", *new)
         return once.keep(session, imported(items, faults))
+
+
+def read_stations(kind: str, data: bytes) -> tuple[list[Checked[GroundStationIn]], list[Fault]]:
+    """Return the stations of a file of this media type, and what is wrong with the others."""
+    found = (
+        read_csv(data, _CSV_COLUMNS, _REQUIRED, most=_MOST_STATIONS)
+        if kind == "text/csv"
+        else read_geojson(data, GroundStationIn.model_fields, most=_MOST_STATIONS)
+    )
+    good, faults = check(
+        found.records, GroundStationIn, lambda body: ground_station_from(body, "new")
+    )
+    return good, [*found.faults, *faults]
 
 
 @router.get("")

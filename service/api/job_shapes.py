@@ -10,6 +10,7 @@ from service.api.shapes import Body, Instant, Name
 from service.db.rows import JobRow
 from service.inputs import ScenarioFile, ScenarioIn
 from service.jobs.lease import JobState
+from service.pin_inputs import Id
 
 Outcome = Literal["downlinked", "collected", "unscheduled", "excluded"]
 
@@ -41,7 +42,7 @@ InlineScenario = Annotated[
 class QuestionIn(Body):
     """A scenario to plan, stored or sent along, and what a job of it may use."""
 
-    scenario_id: str | None = Field(None, description="A stored scenario.")
+    scenario_id: Id | None = Field(None, description="A stored scenario.")
     scenario: InlineScenario | None = Field(
         None,
         description="Instead of `scenario_id`: the body of `POST /v1/scenarios`, or a whole "
@@ -163,4 +164,9 @@ def shown(job: JobRow, scenario_sha256: str) -> JobOut:
 
 def etag_of_job(job: JobRow) -> str:
     """Return the ETag of a job's present form."""
-    return f'"{job.version}"'
+    return etag_of_version(job.version)
+
+
+def etag_of_version(version: int) -> str:
+    """Return the ETag of a job of this version."""
+    return f'"{version}"'

@@ -69,7 +69,7 @@ class CallCounters:
         self._seconds.labels(method, route).observe(seconds)
 
 
-def _counters(request: Request) -> CallCounters:
+async def _counters(request: Request) -> CallCounters:
     return cast(CallCounters, request.app.state.call_counters)
 
 

@@ -1,4 +1,4 @@
-"""What happens around every request: its id, its log line, the limit of its body."""
+"""What happens around every request: its id, its log line."""
 
 from __future__ import annotations
 
@@ -8,12 +8,9 @@ import time
 
 from opentelemetry import trace
 from starlette.datastructures import Headers, MutableHeaders
-from starlette.exceptions import HTTPException
-from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.access.callers import Caller
-from service.api.errors import problem
 from service.api.metrics import CallCounters
 from service.ids import new_id
 from service.logs import request_id
@@ -67,36 +64,3 @@ class RequestContext:
                     "key_id": caller.key_id if caller else None,
                 },
             )
-
-
-class BodyLimit:
-    """Refuse bodies over the limit: at once where the length is declared, else on the way."""
-
-    def __init__(self, app: ASGIApp, max_bytes: int):
-        self.app = app
-        self.max_bytes = max_bytes
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve one request."""
-        if scope["type"] != "http":
-            await self.app(scope, receive, send)
-            return
-        declared = Headers(scope=scope).get("content-length", "")
-        if declared.isdigit() and int(declared) > self.max_bytes:
-            response = problem(Request(scope), "body_too_large", self._detail())
-            await response(scope, receive, send)
-            return
-        received = 0
-
-        async def receive_within_limit() -> Message:
-            nonlocal received
-            message = await receive()
-            received += len(message.get("body", b""))
-            if received > self.max_bytes:
-                raise HTTPException(413, self._detail())
-            return message
-
-        await self.app(scope, receive_within_limit, send)
-
-    def _detail(self) -> str:
-        return f"The body is larger than {self.max_bytes} bytes."

@@ -15,6 +15,7 @@ from pydantic import BaseModel
 from service.api.errors import ProblemOut, problem_responses
 from service.api.examples import add_examples
 from service.api.guard import is_limited, is_open
+from service.api.links import add_links
 from service.api.target_catalogs import TargetCatalogIn
 from service.api.timeline_shapes import ProofOut, TimelineOut
 
@@ -109,6 +110,7 @@ def _with_problems(document: dict[str, Any]) -> dict[str, Any]:
                 }
                 response["headers"] = _HEADERS | of_status | response.get("headers", {})
     add_examples(document)
+    add_links(document)
     return document
 
 

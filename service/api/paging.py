@@ -71,16 +71,19 @@ def decode_cursor(cursor: str) -> str:
     """Return the key of a cursor; 422 ``invalid_cursor`` where it is none."""
     try:
         padded = cursor + "=" * (-len(cursor) % 4)
-        return base64.b64decode(padded, altchars=b"-_", validate=True).decode("ascii")
+        key = base64.b64decode(padded, altchars=b"-_", validate=True).decode("ascii")
     except (binascii.Error, ValueError):
         raise _invalid_cursor() from None
+    if not key.isprintable():
+        raise _invalid_cursor()
+    return key
 
 
 def _invalid_cursor() -> ServiceError:
     return ServiceError("invalid_cursor", "The cursor is not one that this list has given.")
 
 
-def _paging(
+async def _paging(
     request: Request,
     response: Response,
     cursor: Annotated[

@@ -132,7 +132,15 @@ KINDS: dict[str, ProblemKind] = {
     "invalid_cursor": ProblemKind(
         422, "Invalid cursor", "Cursors are opaque: take them from next, with the same filters."
     ),
-    "too_many_rows": ProblemKind(422, "Too many rows", "Split the file into several catalogues."),
+    "too_many_rows": ProblemKind(422, "Too many rows", "Split the file into several."),
+    "too_many_errors": ProblemKind(
+        422,
+        "Too many errors",
+        "It is probably another kind of file than it says; see the first.",
+    ),
+    "too_many_fields": ProblemKind(
+        422, "Too many fields", "An object of a body has far more fields than any has here."
+    ),
     "horizon_inverted": ProblemKind(
         422, "Horizon inverted", "The horizon must end later than it starts."
     ),

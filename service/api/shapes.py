@@ -15,11 +15,13 @@ from pydantic import (
     PlainSerializer,
     StringConstraints,
     WithJsonSchema,
+    model_validator,
 )
 from pydantic_core import PydanticCustomError
 
 from service.instants import instant_text
 
+_MOST_FIELDS = 1000
 _RFC3339 = re.compile(
     r"(\d{4}-\d\d-\d\d)[Tt ](\d\d:\d\d:\d\d)(?:\.(\d{1,9})\d*)?([Zz]|[+-]\d\d:\d\d)?"
 )
@@ -73,6 +75,18 @@ class Body(BaseModel):
     model_config = ConfigDict(
         extra="forbid", strict=True, frozen=True, allow_inf_nan=False, validate_default=False
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _is_no_dump(cls, value: object) -> object:
+        # Each field too many would be told of, which takes a hundred times its own memory.
+        if isinstance(value, dict) and len(value) > _MOST_FIELDS:
+            raise PydanticCustomError(
+                "too_many_fields",
+                "The object has {num_fields} fields; {most} are the most",
+                {"num_fields": len(value), "most": _MOST_FIELDS},
+            )
+        return value
 
 
 def etag_of(text: str) -> str:

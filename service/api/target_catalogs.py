@@ -43,6 +43,13 @@ class TargetCatalogIn(Body):
     targets: list[TargetIn] = Field(min_length=1, max_length=MAX_TARGETS)
 
 
+class _Listed(Body):
+    """The same, with targets that are still to be looked at one by one."""
+
+    name: Name
+    targets: list[dict[str, Any]] = Field(min_length=1, max_length=MAX_TARGETS)
+
+
 class TargetCatalogOut(BaseModel):
     """A catalogue; its targets have their own address."""
 
@@ -102,8 +109,7 @@ def create_target_catalog(
 ) -> CreatedCatalog:
     """Store a catalogue. One bad row refuses the whole of it; every bad row is named."""
     kind = require_media_type(request, *_TYPES)
-    found = _read(kind, data)
-    targets = _checked(found)
+    found, targets = read_targets(kind, data)
     with once.transaction() as session:
         row = _add(session, found.name or name or _UNNAMED, targets)
         audit.record(session, "create", "target_catalog", row.id)
@@ -112,12 +118,24 @@ def create_target_catalog(
         return once.keep(session, answer)
 
 
+def read_targets(kind: str, data: bytes) -> tuple[Records, list[TargetIn]]:
+    """Return what a file of this media type holds, and its targets.
+
+    Raises
+    ------
+    ServiceError
+        With every fault of the file, where there is any.
+    """
+    found = _read(kind, data)
+    return found, _checked(found)
+
+
 def _read(kind: str, data: bytes) -> Records:
     match kind:
         case "text/csv":
-            return read_csv(data, _COLUMNS, _REQUIRED)
+            return read_csv(data, _COLUMNS, _REQUIRED, most=MAX_TARGETS)
         case "application/geo+json":
-            return read_geojson(data, _COLUMNS)
+            return read_geojson(data, _COLUMNS, most=MAX_TARGETS)
     return _read_json(data)
 
 
@@ -127,22 +145,17 @@ def _read_json(data: bytes) -> Records:
     except (ValueError, RecursionError) as error:
         raise refuse([Fault(code="malformed_json", detail=f"No JSON: {error}"[:200])]) from None
     try:
-        body = TargetCatalogIn.model_validate(document)
+        body = _Listed.model_validate(document)
     except ValidationError as error:
         raise refuse(faults_of_validation(error, document)) from None
     records = tuple(
-        Record(
-            fields=target.model_dump(),
-            pointers={column: f"/targets/{position}/{column}" for column in _COLUMNS},
-        )
+        Record(fields=target, pointer=f"/targets/{position}")
         for position, target in enumerate(body.targets)
     )
     return Records(records=records, name=body.name)
 
 
 def _checked(found: Records) -> list[TargetIn]:
-    if len(found.records) > MAX_TARGETS:
-        raise ServiceError("too_many_rows", f"A catalogue holds at most {MAX_TARGETS} targets.")
     good, faults = check(found.records, TargetIn, target_from)
     faults += found.faults
     faults += first_of_each(good, lambda target: target.id, "duplicate_target_id", "id")

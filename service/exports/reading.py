@@ -23,6 +23,7 @@ from service.exports.table import unguarded
 from service.pin_inputs import Id
 from service.records import Checked, Record, Records, check, read_csv
 
+_MOST_ACTIONS: Final = 1_000_000
 _REQUIRED: Final = ("satellite_id", "mode", "start", "end", "target_id", "station_id")
 
 
@@ -65,7 +66,7 @@ class Reading:
 
 def records_of_csv(data: bytes) -> Records:
     """Return the rows of a table such as `table.write` makes; further columns do not matter."""
-    found = read_csv(data, _REQUIRED, _REQUIRED)
+    found = read_csv(data, _REQUIRED, _REQUIRED, most=_MOST_ACTIONS)
     # A plan may be empty; a file without a header is none.
     faults = [f for f in found.faults if f.code != "empty_file" or not data.strip()]
     records = tuple(

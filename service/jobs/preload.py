@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import logging
 
+from service.jobs import child, plan_job  # noqa: F401 - what a job's process begins with
 from service.jobs.warm import warm_up
 
 try:

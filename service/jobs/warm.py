@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from typing import Final
 
@@ -22,7 +23,7 @@ from planner_core.domain import (
     Target,
 )
 from planner_core.run import plan_scenario
-from planner_core.solvers import SOLVERS, Certified, Graph
+from planner_core.solvers import SOLVERS, Certified, Graph, Rule
 from planner_core.solvers.base import Budget, Solver
 
 _START: Final = datetime(2026, 1, 1, tzinfo=UTC)
@@ -39,6 +40,8 @@ def warm_up() -> None:
     """Plan tiny missions with every solver, so that all kernels are compiled and loaded."""
     over_the_globe = [(lat, lon) for lat in range(-80, 81, 20) for lon in range(-180, 180, 30)]
     _plan(_mission(over_the_globe, use_resources=True), [solver() for solver in SOLVERS.values()])
+    # Where a battery is low and a recorder full, reasons are looked for as nowhere else.
+    _plan(_mission(over_the_globe, use_resources=True, is_worn=True), [Rule()])
     # Near the pole targets are in each other's way: proofs need all there is to prove with.
     random = np.random.default_rng(0)
     crowd = zip(random.uniform(60, 85, 120), random.uniform(-180, 180, 120), strict=True)
@@ -52,7 +55,9 @@ def _plan(scenario: Scenario, solvers: Iterable[Solver]) -> None:
         opportunities = plan_scenario(scenario, solver, 0, Budget(), opportunities).opportunities
 
 
-def _mission(points: Iterable[tuple[float, float]], *, use_resources: bool) -> Scenario:
+def _mission(
+    points: Iterable[tuple[float, float]], *, use_resources: bool, is_worn: bool = False
+) -> Scenario:
     orbit = OrbitElements(
         name="WARM-UP",
         norad_cat_id=1,
@@ -66,6 +71,10 @@ def _mission(points: Iterable[tuple[float, float]], *, use_resources: bool) -> S
         mean_anomaly_deg=0.0,
     )
     resources = Resources.paper(orbit.period_s)
+    if is_worn:
+        resources = replace(
+            resources, initial_battery_fraction=0.31, initial_recorder_fraction=0.74
+        )
     return Scenario(
         horizon=Horizon(start=_START, end=_START + timedelta(hours=6)),
         satellites=(Satellite(id="warm-up", name="WARM-UP", orbit=orbit, resources=resources),),

@@ -27,6 +27,10 @@ def test_a_wrong_method_is_405_and_names_the_right_ones(client: httpx.Client) ->
     response = client.delete("/version")
     assert_problem(response, 405, "method_not_allowed")
     assert response.headers["allow"] == "GET"
+    assert client.patch("/v1/satellites").headers["allow"] == "GET, POST"
+    assert client.post("/v1/satellites/1/elements").headers["allow"] == "GET, PUT"
+    assert client.put("/v1/satellites/import").headers["allow"] == "POST"
+    assert client.post("/docs").headers["allow"] == "GET"
 
 
 def test_a_mistyped_query_parameter_is_refused_rather_than_ignored(client: httpx.Client) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -12,6 +13,7 @@ import httpx
 import psutil
 import pytest
 
+from service.server import listen
 from tests.service.serving import serving
 
 WITHIN_S = 60.0
@@ -32,6 +34,13 @@ def test_serve_says_once_when_it_is_ready_and_ends_cleanly(
         assert len(children) >= 1
         _, alive = psutil.wait_procs(children, timeout=WITHIN_S)
         assert alive == []
+
+
+def test_the_body_of_an_answer_does_not_wait_for_the_acknowledgement_of_its_head() -> None:
+    with listen("127.0.0.1", 0) as listener, socket.create_connection(listener.getsockname()):
+        connection, _ = listener.accept()
+        with connection:
+            assert connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY) == 1
 
 
 def test_api_alone_runs_no_worker(tmp_path: Path) -> None:

@@ -96,3 +96,13 @@ def test_owner_and_admin_may_cancel_it(door: Door) -> None:
         assert door.client.post(f"/v1/jobs/{job}/cancel", headers=key).status_code == 202
     with door.jobs.database.reading() as session:
         assert set(session.scalars(sa.select(JobRow.state))) == {"cancelled"}
+
+
+def test_a_job_of_another_owner_is_not_unchanged_either(door: Door) -> None:
+    own, stranger = door.key("submit", "ops"), door.key("submit", "science")
+    path = f"/v1/jobs/{door.submit(own)}"
+    for etag in (door.client.get(path, headers=own).headers["etag"], "*"):
+        known = {"If-None-Match": etag}
+        assert door.client.get(path, headers=own | known).status_code == 304
+        assert_problem(door.client.get(path, headers=stranger | known), 404, "not_found")
+        assert door.client.get(path, headers=known).status_code == 401

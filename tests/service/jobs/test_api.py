@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -366,3 +367,18 @@ def test_a_job_goes_from_post_to_timeline_by_a_real_worker(
     path = f"/v1/jobs/{simple}"
     jobs.until(lambda: client.get(path, params={"wait": 5}).json()["state"] == "succeeded")
     assert client.get(path + "/targets").json()["items"][0]["target_id"] == "t0"
+
+
+def test_a_nul_in_an_address_or_an_id_is_refused_on_every_database(client: httpx.Client) -> None:
+    nul = base64.urlsafe_b64encode(b"\0").decode()
+    for address in (
+        "/a%00b",
+        "/a%00b/timeline",
+        "?label=%00",
+        "?scenario_id=%00",
+        f"?cursor={nul}",
+    ):
+        response = client.get(f"/v1/jobs{address}")
+        assert response.status_code == 422, address
+    response = client.post("/v1/jobs", json={"scenario_id": "a\0b", "solver": "rule"})
+    assert_problem(response, 422, "invalid_value", "/scenario_id")

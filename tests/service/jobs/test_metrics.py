@@ -141,3 +141,16 @@ def test_the_database_measures_the_time_between_two_instants(jobs: Jobs) -> None
         for one, other, expected in ((start, end, 0.25), (end, start, -0.25), (end, end, 0.0)):
             measured = session.scalar(sa.select(seconds_between(one, other)))
             assert measured == pytest.approx(expected, abs=1e-3)
+
+
+def test_a_poll_that_finds_nothing_new_is_a_call_like_any_other(
+    client: httpx.Client, jobs: Jobs
+) -> None:
+    path = f"/v1/jobs/{posted(client, jobs)}"
+    etag = client.get(path).headers["etag"]
+    unchanged = client.get(path, headers={"If-None-Match": etag})
+    assert (unchanged.status_code, unchanged.headers["etag"]) == (304, etag)
+    labels = {"method": "GET", "route": "/v1/jobs/{job_id}"}
+    calls = read(client)
+    assert calls[sample("slewline_http_requests_total", status="304", **labels)] == 1.0
+    assert calls[sample("slewline_http_requests_total", status="200", **labels)] == 1.0

@@ -1,0 +1,273 @@
+"""What the running service costs (``python -m benchmarks.service [--database-url URL]``).
+
+Starts ``slewline serve`` as a process of its own on an empty database (a SQLite file, or the
+PostgreSQL database that is named) and measures it from outside. Prints times, and ratios of
+times taken in the same run, which mean more on a machine that does other things as well.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import random
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import timedelta
+from typing import Any
+
+import httpx
+import psutil
+import sqlalchemy as sa
+
+from benchmarks import pollers
+from service import demo_mission
+from service.api.shapes import parse_instant
+from service.db.rows import JobResultRow, JobRow
+from service.db.session import Database
+from service.demo import create_mission
+from service.ids import new_id
+from service.instants import instant_text
+
+RUNS = 9
+POLLS = 400
+NUM_DASHBOARDS = 200
+NUM_RUNNING = 50
+NUM_STORED = (100, 10_000)
+NUM_TARGETS = 20_000
+
+Json = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Served:
+    """The service, a client of it, and its process."""
+
+    client: httpx.Client
+    process: psutil.Process
+    database_url: str
+
+    def cpu_s(self) -> float:
+        """Return what the API's process has used; the workers are processes of their own."""
+        times = self.process.cpu_times()
+        return float(times.user + times.system)
+
+
+@contextmanager
+def served(database_url: str, workers: int) -> Iterator[Served]:
+    command = [sys.executable, "-m", "service", "serve", "--port", "0"]
+    command += ["--workers", str(workers), "--database-url", database_url]
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    )
+    assert process.stdout is not None
+    try:
+        url = process.stdout.readline().split()[-1]
+        with httpx.Client(base_url=url, timeout=120, trust_env=False) as client:
+            yield Served(client, psutil.Process(process.pid), database_url)
+    finally:
+        process.terminate()
+        process.wait()
+
+
+def post(client: httpx.Client, path: str, body: Json) -> Json:
+    answer = client.post(path, json=body)
+    answer.raise_for_status()
+    found: Json = answer.json()
+    return found
+
+
+def submit(client: httpx.Client, scenario_id: str, solver: str, **params: object) -> str:
+    body = {"scenario_id": scenario_id, "solver": solver, "params": params}
+    return str(post(client, "/v1/jobs", body)["id"])
+
+
+def wait(client: httpx.Client, job_id: str) -> Json:
+    """Return a job that has succeeded, and its timeline."""
+    job: Json = client.get(f"/v1/jobs/{job_id}").json()
+    while job["state"] in ("queued", "running"):
+        job = client.get(f"/v1/jobs/{job_id}?wait=10").json()
+    assert job["state"] == "succeeded", job
+    return job
+
+
+def median_s(work: Callable[[], object], runs: int = RUNS) -> float:
+    times = []
+    for _ in range(runs):
+        began = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - began)
+    return statistics.median(times)
+
+
+def plan(client: httpx.Client, scenario_id: str) -> None:
+    """Plan the mission, from the job's submission to the last byte of its timeline."""
+    job = wait(client, submit(client, scenario_id, "forward_search"))
+    client.get(job["links"]["timeline"]).raise_for_status()
+
+
+def submit_to_timeline(service: Served, mission: Json) -> None:
+    question = {
+        name: mission[name]
+        for name in ("satellite_ids", "target_catalog_ids", "ground_station_ids", "use_resources")
+    }
+    cold = []
+    for shift in range(1, RUNS + 1):
+        horizon = {
+            name: instant_text(parse_instant(instant) + timedelta(minutes=shift))
+            for name, instant in demo_mission.HORIZON.items()
+        }
+        scenario_id = post(service.client, "/v1/scenarios", question | {"horizon": horizon})["id"]
+        cold.append(median_s(lambda own=scenario_id: plan(service.client, own), 1))  # type: ignore[misc]
+    plan(service.client, mission["id"])
+    stored_s = median_s(lambda: plan(service.client, mission["id"]))
+    print(f"submit to timeline, 1,000 targets, forward search: p50 {statistics.median(cold):.3f} s "
+          f"for a new scenario (aim 1), {stored_s:.3f} s for a stored one (aim 0.4)")  # fmt: skip
+
+
+def polls(service: Served, mission: Json) -> None:
+    job_id = submit(service.client, mission["id"], "forward_search")
+    wait(service.client, job_id)
+    for name, path in (("job", f"/v1/jobs/{job_id}"), ("timeline", f"/v1/jobs/{job_id}/timeline")):
+        etag = service.client.get(path).headers["etag"]
+        full = cpu_of_polls(service, path, {}, 200)
+        unchanged = cpu_of_polls(service, path, {"If-None-Match": etag}, 304)
+        told = f"{full * 1e3:.2f} ms of the server's CPU time, 304 {unchanged * 1e3:.2f} ms"
+        print(f"poll of a {name}: {told}, {full / unchanged:.1f} times cheaper (aim 3)")
+
+
+def cpu_of_polls(service: Served, path: str, headers: dict[str, str], status: int) -> float:
+    def poll() -> None:
+        answer = service.client.get(path, headers=headers)
+        assert answer.status_code == status
+
+    for _ in range(20):
+        poll()
+    began_s = service.cpu_s()
+    for _ in range(POLLS):
+        poll()
+    return (service.cpu_s() - began_s) / POLLS
+
+
+def dashboards(service: Served, mission: Json, iterations: int) -> None:
+    """Compare a batch of jobs that nobody looks at with one that many look at."""
+    times: dict[bool, list[float]] = {False: [], True: []}
+    num_polls = 0
+    for is_watched in (False, True, True, False):
+        began = time.perf_counter()
+        ids = [
+            submit(service.client, mission["id"], "mcts", iterations=iterations)
+            for _ in range(NUM_RUNNING)
+        ]
+        if is_watched:
+            base_url = str(service.client.base_url)
+            with pollers.polling(base_url, ids, NUM_DASHBOARDS) as polled:
+                wait(service.client, ids[-1])
+                num_polls += polled()
+        else:
+            wait(service.client, ids[-1])
+        times[is_watched].append(time.perf_counter() - began)
+    alone_s, watched_s = sum(times[False]), sum(times[True])
+    print(f"{NUM_RUNNING} jobs: {alone_s / 2:.1f} s alone, {watched_s / 2:.1f} s beside "
+          f"{NUM_DASHBOARDS} dashboards ({num_polls / watched_s:.0f} polls a second), "
+          f"{100 * (watched_s / alone_s - 1):+.0f} % (aim at most +10)")  # fmt: skip
+
+
+def many_jobs(service: Served, mission: Json) -> None:
+    """Compare lists and polls with few and with many jobs stored."""
+    pattern = submit(service.client, mission["id"], "rule")
+    wait(service.client, pattern)
+    database = Database(service.database_url)
+    found: dict[int, list[float]] = {}
+    stored = 0
+    for num_jobs in NUM_STORED:
+        copy_job(database, pattern, num_jobs - stored)
+        stored = num_jobs
+        calls = (
+            "/v1/jobs",
+            "/v1/jobs?state=succeeded",
+            f"/v1/jobs?scenario_id={mission['id']}",
+            "/v1/jobs?label=stored",
+            f"/v1/jobs/{pattern}",
+        )
+        found[num_jobs] = [median_s(lambda own=c: service.client.get(own), 60) for c in calls]  # type: ignore[misc]
+    database.close()
+    few, many = (found[num_jobs] for num_jobs in NUM_STORED)
+    for name, few_s, many_s in zip(
+        ("list", "list by state", "list by scenario", "list by label", "poll"), few, many,
+        strict=True,
+    ):  # fmt: skip
+        print(f"{name} with {NUM_STORED[1]:,} jobs stored: {many_s * 1e3:.1f} ms, "
+              f"{many_s / few_s:.2f} times that with {NUM_STORED[0]}")  # fmt: skip
+
+
+def copy_job(database: Database, job_id: str, copies: int) -> None:
+    with database.transaction() as session:
+        ids = [new_id() for _ in range(copies)]
+        for kind, key in ((JobRow, "id"), (JobResultRow, "job_id")):
+            table = kind.__table__
+            found = session.execute(sa.select(table).where(table.c[key] == job_id)).mappings().one()
+            changes = {"label": "stored"} if "label" in found else {}
+            session.execute(sa.insert(kind), [{**found, **changes, key: copy} for copy in ids])
+
+
+def uploads(service: Served) -> None:
+    places = random.Random(0)
+    targets = [
+        {"id": f"t{n}", "lat_deg": places.uniform(-80, 80), "lon_deg": places.uniform(-180, 180)}
+        for n in range(NUM_TARGETS)
+    ]
+    rows = "".join(f"{t['id']},{t['lat_deg']},{t['lon_deg']}\n" for t in targets)
+    features = [
+        {
+            "type": "Feature",
+            "id": t["id"],
+            "geometry": {"type": "Point", "coordinates": [t["lon_deg"], t["lat_deg"]]},
+            "properties": {},
+        }
+        for t in targets
+    ]
+    send = service.client.post
+    path = "/v1/target-catalogs"
+    for name, kind, document in (
+        ("CSV", "text/csv", f"id,lat_deg,lon_deg\n{rows}"),
+        ("GeoJSON", "application/geo+json", {"type": "FeatureCollection", "features": features}),
+        ("JSON", "application/json", {"name": "Many", "targets": targets}),
+    ):
+        began = time.perf_counter()
+        if isinstance(document, str):
+            answer = send(path, content=document, headers={"Content-Type": kind})
+        else:
+            answer = send(path, json=document, headers={"Content-Type": kind})
+        answer.raise_for_status()
+        print(f"upload of {NUM_TARGETS:,} targets as {name}: "
+              f"{time.perf_counter() - began:.2f} s (aim 3)")  # fmt: skip
+
+
+def main() -> None:
+    """Measure all, on one database."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--database-url", help="an empty database; a SQLite file by default")
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--iterations", type=int, default=300, help="of each watched job")
+    chosen = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        database_url = chosen.database_url or f"sqlite:///{folder}/slewline.db"
+        print(f"{sa.make_url(database_url).get_backend_name()}, {os.cpu_count()} cores, "
+              f"{chosen.workers} workers, load {os.getloadavg()[0]:.1f}")  # fmt: skip
+        with served(database_url, chosen.workers) as service:
+            mission = create_mission(service.client)
+            submit_to_timeline(service, mission)
+            polls(service, mission)
+            uploads(service)
+            dashboards(service, mission, chosen.iterations)
+            many_jobs(service, mission)
+
+
+if __name__ == "__main__":
+    main()
