@@ -16,6 +16,7 @@ from service.api import (
     ground_stations,
     job_events,
     jobs,
+    me,
     meta,
     metrics,
     openapi,
@@ -31,6 +32,7 @@ from service.api.guard import Guard
 from service.api.idempotency import install_replay
 from service.api.middleware import BodyLimit, RequestContext
 from service.api.security_headers import SecurityHeaders
+from service.dashboard import routes as dashboard
 from service.db.session import Database
 from service.opportunities import OpportunityReader
 from service.settings import Settings
@@ -55,9 +57,11 @@ ROUTERS = (
     solvers.router,
     webhooks.router,
     audit_events.router,
+    me.router,
     meta.router,
     metrics.router,
     openapi.router,
+    dashboard.router,
 )
 
 

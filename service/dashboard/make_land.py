@@ -1,0 +1,64 @@
+"""Write the land outlines of the dashboard's map.
+
+They are those of Natural Earth 4.1.0, 1:110m (public domain), as the npm package world-atlas
+2.0.2 carries them in TopoJSON. To make the file again::
+
+    npm pack world-atlas@2.0.2 && tar -xzf world-atlas-2.0.2.tgz
+    python -m service.dashboard.make_land package/land-110m.json
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any, Final
+
+LAND_FILE: Final = Path(__file__).with_name("static") / "land.json"
+
+_DECIMALS: Final = 2  # of a degree: the scale of the outlines is coarser
+_CREDIT: Final = "Land: Natural Earth 4.1.0, 1:110m, public domain"
+
+Ring = list[list[float]]
+
+
+def rings_of(topology: dict[str, Any]) -> list[Ring]:
+    """Return every ring of the object ``land``: positions ``[lon_deg, lat_deg]``."""
+    arcs = [_positions(arc, topology["transform"]) for arc in topology["arcs"]]
+    rings = []
+    for geometry in topology["objects"]["land"]["geometries"]:
+        for polygon in geometry["arcs"]:
+            rings += [_joined(arcs, ring) for ring in polygon]
+    return rings
+
+
+def _positions(arc: list[list[int]], transform: dict[str, list[float]]) -> Ring:
+    # Quantised, and each position as the step from the one before.
+    (scale_x, scale_y), (first_x, first_y) = transform["scale"], transform["translate"]
+    x = y = 0
+    positions = []
+    for step_x, step_y in arc:
+        x, y = x + step_x, y + step_y
+        positions.append([x * scale_x + first_x, y * scale_y + first_y])
+    return positions
+
+
+def _joined(arcs: list[Ring], ring: list[int]) -> Ring:
+    joined: Ring = []
+    for index in ring:
+        # ~i stands for arc i, backwards. Each arc begins where the one before it ended.
+        arc = arcs[index] if index >= 0 else arcs[~index][::-1]
+        joined += arc[1:] if joined else arc
+    return joined
+
+
+def main(topojson: Path) -> None:
+    """Write the file from the package's one."""
+    rings = rings_of(json.loads(topojson.read_text(encoding="utf-8")))
+    flat = [[round(degrees, _DECIMALS) for at in ring for degrees in at] for ring in rings]
+    document = {"credit": _CREDIT, "rings": flat}
+    LAND_FILE.write_text(json.dumps(document, separators=(",", ":")) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
