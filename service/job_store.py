@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
+from datetime import datetime
 from typing import Any
 
 import sqlalchemy as sa
@@ -120,6 +121,29 @@ def hashes_of(session: Session, ids: Collection[str]) -> dict[str, str]:
 def timeline_of(session: Session, job_id: str) -> str | None:
     """Return a job's timeline document, or None where there is none (yet)."""
     return session.scalar(sa.select(JobResultRow.timeline).where(JobResultRow.job_id == job_id))
+
+
+def has_timeline(session: Session, job_id: str) -> bool:
+    """Return whether a job has an answer."""
+    wanted = sa.select(JobResultRow.job_id).where(JobResultRow.job_id == job_id)
+    return session.scalar(wanted) is not None
+
+
+def answer_of(session: Session, job_id: str) -> tuple[str, str, str, datetime]:
+    """Return a job's timeline, its targets, the scenario file planned, and when that was done."""
+    wanted = (
+        sa.select(
+            JobResultRow.timeline,
+            JobResultRow.targets,
+            ScenarioRow.content,
+            JobResultRow.created_at,
+        )
+        .join(JobRow, JobRow.id == JobResultRow.job_id)
+        .join(ScenarioRow, ScenarioRow.id == JobRow.scenario_id)
+        .where(JobResultRow.job_id == job_id)
+    )
+    timeline, targets, content, created_at = session.execute(wanted).one()
+    return timeline, targets, content, created_at
 
 
 def proof_of(session: Session, job_id: str) -> str | None:

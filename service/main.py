@@ -24,6 +24,7 @@ from service.api import (
     scenarios,
     solvers,
     target_catalogs,
+    timelines,
     webhooks,
 )
 from service.api.deps import check_request
@@ -52,6 +53,7 @@ ROUTERS = (
     target_catalogs.router,
     scenarios.router,
     jobs.router,
+    timelines.router,
     job_events.router,
     comparisons.router,
     solvers.router,

@@ -1,12 +1,11 @@
-"""Jobs: send one, watch it, cancel it, read its answer."""
+"""Jobs: send one, watch it, cancel it, run it again."""
 
 from __future__ import annotations
 
-import json
 import logging
 from typing import Annotated, Final
 
-from fastapi import APIRouter, Depends, Path, Query, Request, Response
+from fastapi import APIRouter, Depends, Query, Request, Response
 from sqlalchemy.exc import SQLAlchemyError
 
 from service import job_store as store
@@ -15,7 +14,7 @@ from service.api.conditional import NOT_MODIFIED
 from service.api.deps import AuditDep, CallerDep, DatabaseDep, SettingsDep, own_job_only
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
-from service.api.job_shapes import JobIn, JobOut, Outcome, TargetItem, etag_of_job, shown
+from service.api.job_shapes import JobIn, JobOut, etag_of_job, shown
 from service.api.job_wait import wait_for_change
 from service.api.paging import Listed, PagingDep, newest_first
 from service.api.problems import ServiceError
@@ -29,8 +28,6 @@ router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[Depends(own_j
 log = logging.getLogger(__name__)
 
 LONGEST_WAIT_S: Final = 30.0
-
-Suffix = Annotated[str, Path(description="Form of the answer; today `json`.", examples=["json"])]
 
 
 @router.post("", status_code=202, responses=problem_responses(503))
@@ -169,117 +166,9 @@ def rerun_job(
         return once.keep(session, intake.accepted(session, response, job))
 
 
-@router.get(
-    "/{job_id}/timeline",
-    responses={
-        200: {"content": {"application/json": {}}, "description": "The timeline document."},
-        **NOT_MODIFIED,
-        **problem_responses(404, 406, 409),
-    },
-)
-def get_timeline(job_id: str, database: DatabaseDep, request: Request) -> Response:
-    """Return the plan, judged: actions, resources, totals, violations."""
-    return _timeline(job_id, database, request, acceptable=_accepts_json(request))
-
-
-@router.get(
-    "/{job_id}/timeline.{suffix}",
-    responses={
-        200: {"content": {"application/json": {}}, "description": "The timeline document."},
-        **NOT_MODIFIED,
-        **problem_responses(404, 406, 409),
-    },
-)
-def get_timeline_as(
-    job_id: str, suffix: Suffix, database: DatabaseDep, request: Request
-) -> Response:
-    """Return the plan in the form that the suffix names, whatever `Accept` says."""
-    return _timeline(job_id, database, request, acceptable=suffix == "json")
-
-
-@router.get(
-    "/{job_id}/proof",
-    responses={
-        200: {"content": {"application/json": {}}, "description": "The proof document."},
-        **NOT_MODIFIED,
-        **problem_responses(404, 409),
-    },
-)
-def get_proof(job_id: str, database: DatabaseDep, request: Request) -> Response:
-    """Return what proves the bound of the timeline, or `null` where it has none.
-
-    `proof` names the argument and `value` the bound. `prices` holds a multiplier for each
-    target, in the order of the scenario: the dual function at these prices is the bound.
-    """
-    etag = f'"{job_id}"'
-    with database.reading() as session:
-        job = intake.find_job(session, job_id)
-        if store.timeline_of(session, job_id) is None:
-            raise _not_ready(job)
-        proof = store.proof_of(session, job_id)
-    if matches(request.headers.get("if-none-match"), etag):
-        return Response(status_code=304, headers={"ETag": etag})
-    return Response(proof or "null", media_type="application/json", headers={"ETag": etag})
-
-
-@router.get("/{job_id}/targets", responses=problem_responses(404, 409))
-def list_targets(
-    job_id: str,
-    database: DatabaseDep,
-    paging: PagingDep,
-    outcome: Annotated[Outcome | None, Query(description="Only this outcome.")] = None,
-    reason: Annotated[str | None, Query(description="Only this code of a reason.")] = None,
-) -> Listed[TargetItem]:
-    """List every target of the scenario once, with its outcome and why it was left out."""
-    with database.reading() as session:
-        job = intake.find_job(session, job_id)
-        targets = store.targets_of(session, job_id)
-    if targets is None:
-        raise _not_ready(job)
-    found = [
-        (position, target)
-        for position, target in enumerate(json.loads(targets))
-        if position > paging.after_number()
-        and outcome in (None, target["outcome"])
-        and reason in (None, (target["reason"] or {}).get("code"))
-    ]
-    page = paging.answer(found[: paging.limit + 1], lambda row: row[0])
-    return Listed(items=[TargetItem(**target) for _, target in page.rows], next=page.next)
-
-
 def _forget(queue: JobQueue, job: JobRow) -> None:
     try:
         queue.cancel(job.id, job.dispatch)
     except SQLAlchemyError:
         # A worker that takes it will find the job cancelled.
         log.warning("a cancelled job is still in the queue", extra={"job_id": job.id})
-
-
-def _accepts_json(request: Request) -> bool:
-    accepted = request.headers.get("accept", "*/*").split(",")
-    types = {part.partition(";")[0].strip().lower() for part in accepted}
-    return not types.isdisjoint({"*/*", "application/*", "application/json"})
-
-
-def _timeline(
-    job_id: str, database: DatabaseDep, request: Request, *, acceptable: bool
-) -> Response:
-    etag = f'"{job_id}"'  # a timeline never changes
-    with database.reading() as session:
-        job = intake.find_job(session, job_id)
-        if not acceptable:
-            raise ServiceError("not_acceptable", "The timeline is offered as application/json.")
-        timeline = store.timeline_of(session, job_id)
-    if timeline is None:
-        raise _not_ready(job)
-    if matches(request.headers.get("if-none-match"), etag):
-        return Response(status_code=304, headers={"ETag": etag})
-    return Response(timeline, media_type="application/json", headers={"ETag": etag})
-
-
-def _not_ready(job: JobRow) -> ServiceError:
-    if job.state in lease.ACTIVE:
-        headers = {"Retry-After": str(intake.ASK_AGAIN_S)}
-        return ServiceError("not_ready", f"The job is {job.state}.", headers=headers)
-    why = job.error["code"] if job.error else "it was stopped before it had a plan"
-    return ServiceError("not_ready", f"The job is {job.state} and left no answer: {why}.")

@@ -299,25 +299,6 @@ def test_the_proof_of_a_bound_is_kept_with_the_answer(client: httpx.Client, jobs
         assert client.get(path, headers=known).status_code == 304
 
 
-def test_the_timeline_comes_as_json_and_in_no_other_form_yet(
-    client: httpx.Client, jobs: Jobs
-) -> None:
-    job_id = posted(client, jobs)
-    finish(jobs, job_id)
-    path = f"/v1/jobs/{job_id}/timeline"
-    answer = client.get(path)
-    assert answer.headers["content-type"] == "application/json"
-    assert answer.json() == {"validity": "valid"}
-    known = {"If-None-Match": answer.headers["etag"]}
-    assert client.get(path, headers=known).status_code == 304
-    for accept in ("application/json", "text/csv, */*;q=0.1", "application/*"):
-        assert client.get(path, headers={"Accept": accept}).status_code == 200
-    assert client.get(path + ".json", headers={"Accept": "text/csv"}).status_code == 200
-    assert_problem(client.get(path, headers={"Accept": "text/csv"}), 406, "not_acceptable")
-    for suffix in ("csv", "geojson", "czml", "ics"):
-        assert_problem(client.get(f"{path}.{suffix}"), 406, "not_acceptable")
-
-
 def test_targets_are_listed_once_each_by_pages_and_filters(
     client: httpx.Client, jobs: Jobs
 ) -> None:

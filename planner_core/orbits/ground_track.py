@@ -1,0 +1,73 @@
+"""What maps show of a satellite: the points below it, and from where a station can reach it."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from planner_core.domain import GroundStation
+from planner_core.orbits import frames
+from planner_core.orbits.ephemeris import Ephemeris
+from planner_core.orbits.mask import mask_elevation_deg
+from planner_core.orbits.places import Places
+
+Floats = npt.NDArray[np.float64]
+
+
+def sub_points(ephemeris: Ephemeris, t_s: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return longitude (deg), latitude (deg) and altitude (m) of the satellite.
+
+    Parameters
+    ----------
+    t_s
+        Instants in the horizon. Shape ``(n,)``, as each part of the answer.
+    """
+    position_m, _ = ephemeris.state_itrf(t_s)
+    return frames.itrf_to_geodetic(position_m)
+
+
+def visibility_ring(
+    station: GroundStation, altitude_m: float, num_points: int = 72
+) -> tuple[Floats, Floats]:
+    """Return the border of the points over which a satellite stands within a station's limits.
+
+    Parameters
+    ----------
+    station
+        Its elevation mask and its least elevation both count.
+    altitude_m
+        Of the satellite above the ellipsoid; above the station's own.
+    num_points
+        How many directions of the compass to look in, from north over west.
+
+    Returns
+    -------
+    Longitude and latitude in degrees, counter-clockwise; the first point is not repeated.
+    Shape ``(num_points,)``.
+    """
+    azimuth_deg = np.linspace(0.0, -360.0, num_points, endpoint=False)
+    elevation_deg = np.full(num_points, station.min_elevation_deg)
+    if station.elevation_mask:
+        above = mask_elevation_deg(station.elevation_mask, azimuth_deg)
+        elevation_deg = np.maximum(elevation_deg, above)
+    azimuth, elevation = np.radians(azimuth_deg)[:, None], np.radians(elevation_deg)[:, None]
+    place = Places.of([station])
+    level = np.sin(azimuth) * place.east + np.cos(azimuth) * place.north
+    sight = np.cos(elevation) * level + np.sin(elevation) * place.up
+    lon_deg, lat_deg, _ = frames.itrf_to_geodetic(_at_altitude(place.position_m, sight, altitude_m))
+    return lon_deg, lat_deg
+
+
+def _at_altitude(start_m: Floats, direction: Floats, altitude_m: float) -> Floats:
+    """Return where rays from inside reach an altitude.
+
+    Points of one altitude lie on an ellipsoid to within metres: scaled to a unit sphere, that
+    is a quadratic equation.
+    """
+    axes_m = np.array([frames.EARTH_RADIUS_M] * 2 + [frames.EARTH_POLAR_RADIUS_M]) + altitude_m
+    p, d = start_m / axes_m, direction / axes_m
+    a = np.sum(d * d, axis=1)
+    half_b = np.sum(p * d, axis=1)
+    c = np.sum(p * p, axis=1) - 1.0
+    length_m = (np.sqrt(half_b**2 - a * c) - half_b) / a
+    return np.asarray(start_m + length_m[:, None] * direction)

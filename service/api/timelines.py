@@ -1,0 +1,174 @@
+"""What a job found: its timeline in several forms, its proof, and what became of each target."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import Annotated, Any, Final
+
+from fastapi import APIRouter, Depends, Path, Query, Request, Response
+from fastapi.responses import StreamingResponse
+
+import planner_core
+from service import job_store as store
+from service.api import job_intake as intake
+from service.api.accept import preferred
+from service.api.conditional import NOT_MODIFIED
+from service.api.deps import DatabaseDep, own_job_only
+from service.api.errors import problem_responses
+from service.api.job_shapes import Outcome, TargetItem
+from service.api.paging import Listed, PagingDep
+from service.api.problems import ServiceError
+from service.api.shapes import matches
+from service.db.rows import JobRow
+from service.db.session import Database
+from service.exports.answered import Answered
+from service.exports.forms import FORMS, Form
+from service.jobs import lease
+
+router = APIRouter(prefix="/v1/jobs", tags=["timelines"], dependencies=[Depends(own_job_only)])
+
+_JSON: Final = "application/json"
+_BY_SUFFIX: Final = {form.suffix: form for form in FORMS}
+_BY_TYPE: Final = {form.media_type: form for form in FORMS if form.has_own_type}
+_SUFFIXES: Final = ["json", *_BY_SUFFIX]
+
+_ABOUT = "; ".join(f"`{form.suffix}`: {form.about}" for form in FORMS)
+Suffix = Annotated[
+    str,
+    Path(description=f"Form of the answer. `json`: the document; {_ABOUT}.", examples=_SUFFIXES),
+]
+
+
+def _responses(forms: Sequence[Form]) -> dict[int | str, dict[str, Any]]:
+    """Return the entries of the OpenAPI document for a route that offers these forms and JSON."""
+    content: dict[str, Any] = {
+        media_type: {} for media_type in [_JSON, *(form.media_type for form in forms)]
+    }
+    headers = {
+        "Content-Disposition": {
+            "description": "A name to save it under.",
+            "schema": {"type": "string"},
+        }
+    }
+    return {
+        200: {"description": "The timeline.", "content": content, "headers": headers},
+        **NOT_MODIFIED,
+        **problem_responses(404, 406, 409),
+    }
+
+
+@router.get(
+    "/{job_id}/timeline", response_class=Response, responses=_responses(list(_BY_TYPE.values()))
+)
+def get_timeline(job_id: str, database: DatabaseDep, request: Request) -> Response:
+    """Return the plan, judged: actions, resources, totals, violations.
+
+    `Accept` chooses the form. The suffixes of the next call do too, and offer some more.
+    """
+    media_type = preferred(request.headers.get("accept"), [_JSON, *_BY_TYPE])
+    with database.reading() as session:
+        job = intake.find_job(session, job_id)
+    if media_type is None:
+        raise ServiceError(
+            "not_acceptable", f"The timeline is offered as {', '.join([_JSON, *_BY_TYPE])}."
+        )
+    return _answer(database, request, job, _BY_TYPE.get(media_type))
+
+
+@router.get("/{job_id}/timeline.{suffix}", response_class=Response, responses=_responses(FORMS))
+def get_timeline_as(
+    job_id: str, suffix: Suffix, database: DatabaseDep, request: Request
+) -> Response:
+    """Return the plan in the form that the suffix names, whatever `Accept` says."""
+    with database.reading() as session:
+        job = intake.find_job(session, job_id)
+    if suffix not in _SUFFIXES:
+        offered = ", ".join(f".{known}" for known in _SUFFIXES)
+        raise ServiceError("not_acceptable", f"The timeline is offered as {offered}.")
+    return _answer(database, request, job, _BY_SUFFIX.get(suffix))
+
+
+@router.get(
+    "/{job_id}/proof",
+    responses={
+        200: {"content": {_JSON: {}}, "description": "The proof document."},
+        **NOT_MODIFIED,
+        **problem_responses(404, 409),
+    },
+)
+def get_proof(job_id: str, database: DatabaseDep, request: Request) -> Response:
+    """Return what proves the bound of the timeline, or `null` where it has none.
+
+    `proof` names the argument and `value` the bound. `prices` holds a multiplier for each
+    target, in the order of the scenario: the dual function at these prices is the bound.
+    """
+    etag = f'"{job_id}"'
+    with database.reading() as session:
+        job = intake.find_job(session, job_id)
+        if store.timeline_of(session, job_id) is None:
+            raise _not_ready(job)
+        proof = store.proof_of(session, job_id)
+    if matches(request.headers.get("if-none-match"), etag):
+        return Response(status_code=304, headers={"ETag": etag})
+    return Response(proof or "null", media_type=_JSON, headers={"ETag": etag})
+
+
+@router.get("/{job_id}/targets", responses=problem_responses(404, 409))
+def list_targets(
+    job_id: str,
+    database: DatabaseDep,
+    paging: PagingDep,
+    outcome: Annotated[Outcome | None, Query(description="Only this outcome.")] = None,
+    reason: Annotated[str | None, Query(description="Only this code of a reason.")] = None,
+) -> Listed[TargetItem]:
+    """List every target of the scenario once, with its outcome and why it was left out."""
+    with database.reading() as session:
+        job = intake.find_job(session, job_id)
+        targets = store.targets_of(session, job_id)
+    if targets is None:
+        raise _not_ready(job)
+    found = [
+        (position, target)
+        for position, target in enumerate(json.loads(targets))
+        if position > paging.after_number()
+        and outcome in (None, target["outcome"])
+        and reason in (None, (target["reason"] or {}).get("code"))
+    ]
+    page = paging.answer(found[: paging.limit + 1], lambda row: row[0])
+    return Listed(items=[TargetItem(**target) for _, target in page.rows], next=page.next)
+
+
+def _answer(database: Database, request: Request, job: JobRow, form: Form | None) -> Response:
+    """Return a timeline in a form, or as the document itself."""
+    suffix = "json" if form is None else form.suffix
+    headers = {
+        "ETag": _etag(job.id, form),
+        "Vary": "Accept",
+        "Content-Disposition": f'inline; filename="timeline-{job.id}.{suffix}"',
+    }
+    with database.reading() as session:
+        if not store.has_timeline(session, job.id):
+            raise _not_ready(job)
+        if matches(request.headers.get("if-none-match"), headers["ETag"]):
+            return Response(status_code=304, headers=headers)
+        if form is None:
+            text = store.timeline_of(session, job.id)
+            return Response(text, media_type=_JSON, headers=headers)
+        stored = store.answer_of(session, job.id)
+    return StreamingResponse(
+        form.write(Answered.of(*stored)), media_type=form.media_type, headers=headers
+    )
+
+
+def _etag(job_id: str, form: Form | None) -> str:
+    # A timeline never changes; how it is written may, with the version of the service.
+    return f'"{job_id}"' if form is None else f'"{job_id}-{form.suffix}-{planner_core.__version__}"'
+
+
+def _not_ready(job: JobRow) -> ServiceError:
+    if job.state in lease.ACTIVE:
+        headers = {"Retry-After": str(intake.ASK_AGAIN_S)}
+        return ServiceError("not_ready", f"The job is {job.state}.", headers=headers)
+    why = job.error["code"] if job.error else "it was stopped before it had a plan"
+    return ServiceError("not_ready", f"The job is {job.state} and left no answer: {why}.")

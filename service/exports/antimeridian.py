@@ -1,0 +1,95 @@
+"""Lines and areas cut at the antimeridian, as RFC 7946 asks (section 3.1.9)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import antimeridian
+import numpy as np
+import numpy.typing as npt
+from shapely.geometry import Polygon, mapping
+
+Floats = npt.NDArray[np.float64]
+
+_OVER_THE_POLE_DEG = 90.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Piece:
+    """A part of a line that lies between -180 and 180 degrees. Shape ``(n,)`` each."""
+
+    lon_deg: Floats
+    lat_deg: Floats
+    t_s: Floats
+
+
+def pieces_of_line(lon_deg: Floats, lat_deg: Floats, t_s: Floats) -> Iterator[Piece]:
+    """Yield a line in pieces that end where it leaves the map, and begin where it comes back.
+
+    A step of more than a quarter of a turn passes a pole, where all longitudes meet: there the
+    line leaves the map at the top or at the bottom.
+
+    Parameters
+    ----------
+    lon_deg
+        From -180 to 180. Shape ``(n,)``, as the others; ``n`` is 2 or more.
+    t_s
+        When the line is at each point.
+    """
+    step_deg = (np.diff(lon_deg) + 180.0) % 360.0 - 180.0
+    is_polar = np.abs(step_deg) > _OVER_THE_POLE_DEG
+    is_cut = is_polar | (np.abs(np.diff(lon_deg)) > 180.0)
+    first = 0
+    entry: tuple[float, float, float] | None = None
+    for row in np.flatnonzero(is_cut).tolist():
+        if is_polar[row]:
+            pole_deg = float(np.copysign(90.0, lat_deg[row]))
+            at_s = float(t_s[row] + t_s[row + 1]) / 2.0
+            leave = (float(lon_deg[row]), pole_deg, at_s)
+            arrive = (float(lon_deg[row + 1]), pole_deg, at_s)
+        else:
+            edge_deg = float(np.copysign(180.0, lon_deg[row]))
+            # A step from 180 to -180 goes nowhere.
+            share = (edge_deg - lon_deg[row]) / (step_deg[row] or 1.0)
+            crossing_deg = float(lat_deg[row] + share * (lat_deg[row + 1] - lat_deg[row]))
+            at_s = float(t_s[row] + share * (t_s[row + 1] - t_s[row]))
+            leave = (edge_deg, crossing_deg, at_s)
+            arrive = (-edge_deg, crossing_deg, at_s)
+        yield _piece(lon_deg, lat_deg, t_s, slice(first, row + 1), entry, leave)
+        first, entry = row + 1, arrive
+    yield _piece(lon_deg, lat_deg, t_s, slice(first, len(lon_deg)), entry, None)
+
+
+def _piece(
+    lon_deg: Floats,
+    lat_deg: Floats,
+    t_s: Floats,
+    rows: slice,
+    entry: tuple[float, float, float] | None,
+    leave: tuple[float, float, float] | None,
+) -> Piece:
+    columns = np.stack([lon_deg[rows], lat_deg[rows], t_s[rows]], axis=1)
+    ends = [np.array(end).reshape(-1, 3) for end in (entry or (), leave or ())]
+    whole = np.concatenate([ends[0], columns, ends[1]])
+    return Piece(lon_deg=whole[:, 0], lat_deg=whole[:, 1], t_s=whole[:, 2])
+
+
+def area(lon_deg: Floats, lat_deg: Floats, decimals: int) -> dict[str, Any]:
+    """Return the GeoJSON geometry inside a ring; one round a pole holds the pole.
+
+    Parameters
+    ----------
+    lon_deg, lat_deg
+        Counter-clockwise. Shape ``(n,)``.
+    """
+    ring = Polygon(np.stack([lon_deg, lat_deg], axis=1))
+    geometry = mapping(antimeridian.fix_polygon(ring))
+    return {"type": geometry["type"], "coordinates": _rounded(geometry["coordinates"], decimals)}
+
+
+def _rounded(coordinates: Any, decimals: int) -> Any:
+    if isinstance(coordinates, float):
+        return round(coordinates, decimals)
+    return [_rounded(part, decimals) for part in coordinates]

@@ -1,0 +1,160 @@
+"""GeoJSON (RFC 7946): targets with their outcome, ground tracks, stations and where they reach."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator
+
+import numpy as np
+import numpy.typing as npt
+
+from planner_core.domain import GroundStation, Horizon, Satellite
+from planner_core.orbits.ephemeris import Ephemeris, propagate
+from planner_core.orbits.ground_track import sub_points, visibility_ring
+from service.exports.answered import Answered, Document, compact, in_chunks, listed
+from service.exports.antimeridian import Piece, area, pieces_of_line
+
+TRACK_STEP_S = 30.0
+_DECIMALS = 4  # of a degree: eleven metres
+_CLASS_KM = 10.0
+
+
+def write(answered: Answered) -> Iterator[str]:
+    """Yield a FeatureCollection; each feature's property ``kind`` says what it is."""
+    return in_chunks(_parts(answered))
+
+
+def _parts(answered: Answered) -> Iterator[str]:
+    timeline = answered.timeline
+    head = {name: timeline[name] for name in ("job", "scenario_sha256", "plan_sha256", "horizon")}
+    yield f'{{"type":"FeatureCollection",{compact(head)[1:-1]},"features":[\n'
+    yield from listed(compact(feature) for feature in _features(answered))
+    yield "\n]}\n"
+
+
+def _features(answered: Answered) -> Iterator[Document]:
+    yield from _targets(answered)
+    yield from _stations(answered)
+    horizon = answered.scenario.horizon
+    reaches: dict[float, list[str]] = {}
+    for satellite in answered.scenario.satellites:
+        path = propagate(satellite, horizon)
+        yield _track(satellite, horizon, path)
+        reaches.setdefault(_altitude_class_km(path), []).append(satellite.id)
+    for station in answered.scenario.ground_stations:
+        for altitude_km, satellite_ids in sorted(reaches.items()):
+            yield _reach(station, altitude_km, satellite_ids)
+
+
+def _feature(kind: str, own_id: str, geometry: Document, properties: Document) -> Document:
+    return {
+        "type": "Feature",
+        "id": f"{kind}/{own_id}",
+        "geometry": geometry,
+        "properties": {"kind": kind, **properties},
+    }
+
+
+def _point(lon_deg: float, lat_deg: float) -> Document:
+    # Catalogues may count longitudes to 360.
+    lon = lon_deg - 360.0 if lon_deg > 180.0 else lon_deg
+    return {"type": "Point", "coordinates": [round(lon, 7), round(lat_deg, 7)]}
+
+
+def _targets(answered: Answered) -> Iterator[Document]:
+    for target, told in zip(answered.scenario.targets, answered.targets, strict=True):
+        action = answered.actions.get(told["action_id"] or "")
+        reason = told["reason"]
+        yield _feature(
+            "target",
+            target.id,
+            _point(target.lon_deg, target.lat_deg),
+            {
+                "target_id": target.id,
+                "target_catalog_id": target.catalog_id,
+                "outcome": told["outcome"],
+                "reason": reason and reason["code"],
+                "reason_detail": reason and reason["detail"],
+                "action_id": told["action_id"],
+                "satellite_id": told["satellite_id"],
+                "start": action and action["start"],
+                "end": action and action["end"],
+                "reward": target.reward,
+            },
+        )
+
+
+def _stations(answered: Answered) -> Iterator[Document]:
+    contacts = Counter(action["station_id"] for _, action in answered.each_action())
+    for station in answered.scenario.ground_stations:
+        yield _feature(
+            "station",
+            station.id,
+            _point(station.lon_deg, station.lat_deg),
+            {
+                "station_id": station.id,
+                "name": station.name,
+                "min_elevation_deg": station.min_elevation_deg,
+                "antennas": station.antennas,
+                "contacts": contacts[station.id],
+            },
+        )
+
+
+def _track(satellite: Satellite, horizon: Horizon, path: Ephemeris) -> Document:
+    num_steps = max(1, math.ceil(horizon.duration_s / TRACK_STEP_S - 1e-9))
+    t_s = np.linspace(0.0, horizon.duration_s, num_steps + 1)
+    lon_deg, lat_deg, _ = sub_points(path, t_s)
+    pieces = list(pieces_of_line(lon_deg, lat_deg, t_s))
+    lines = [_coordinates(piece) for piece in pieces]
+    times = [_instants(horizon, piece.t_s) for piece in pieces]
+    is_one = len(pieces) == 1
+    return _feature(
+        "track",
+        satellite.id,
+        {
+            "type": "LineString" if is_one else "MultiLineString",
+            "coordinates": lines[0] if is_one else lines,
+        },
+        {
+            "satellite_id": satellite.id,
+            "name": satellite.name,
+            "norad_cat_id": satellite.orbit.norad_cat_id,
+            "times": times[0] if is_one else times,
+        },
+    )
+
+
+def _coordinates(piece: Piece) -> list[list[float]]:
+    points = np.stack([piece.lon_deg, piece.lat_deg], axis=1).round(_DECIMALS)
+    coordinates: list[list[float]] = points.tolist()
+    return coordinates
+
+
+def _instants(horizon: Horizon, t_s: npt.NDArray[np.float64]) -> list[str]:
+    """Return the texts of many instants at once; `instant_text` of each would take seconds."""
+    start = np.datetime64(horizon.instant(0.0).replace(tzinfo=None), "ms")
+    instants = start + np.rint(t_s * 1000.0).astype("timedelta64[ms]")
+    texts: list[str] = np.datetime_as_string(instants, timezone="UTC").tolist()
+    return texts
+
+
+def _altitude_class_km(path: Ephemeris) -> float:
+    _, _, altitude_m = sub_points(path, path.node_s)
+    return float(max(1.0, np.rint(altitude_m.mean() / 1000.0 / _CLASS_KM)) * _CLASS_KM)
+
+
+def _reach(station: GroundStation, altitude_km: float, satellite_ids: list[str]) -> Document:
+    ring = visibility_ring(station, altitude_km * 1000.0)
+    return _feature(
+        "visibility",
+        f"{station.id}/{altitude_km:g}",
+        area(*ring, _DECIMALS),
+        {
+            "station_id": station.id,
+            "altitude_km": altitude_km,
+            "min_elevation_deg": station.min_elevation_deg,
+            "satellite_ids": satellite_ids,
+        },
+    )

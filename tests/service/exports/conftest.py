@@ -1,0 +1,118 @@
+"""One planned mission for all exports, and a service that has it as a finished job."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+import httpx
+import pytest
+import sqlalchemy as sa
+
+from service.db.rows import JobResultRow, JobRow, ScenarioRow
+from service.exports.answered import Answered
+from service.ids import new_id
+from service.translate import canonical, sha256_of
+from tests.missions import PAPER_ORBIT, Document, drawn_targets, paper_mission
+from tests.service.conftest import Service
+from tests.service.test_plan_job import run
+
+FINISHED_AT = datetime(2018, 12, 31, 18, tzinfo=UTC)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mission:
+    """A scenario file in its canonical form, and the stored texts of its plan."""
+
+    content: str
+    timeline: str
+    targets: str
+
+    @property
+    def document(self) -> Document:
+        document: Document = json.loads(self.timeline)
+        return document
+
+    @property
+    def answered(self) -> Answered:
+        return Answered.of(self.timeline, self.targets, self.content, FINISHED_AT)
+
+
+def mission_file(**flags: object) -> Document:
+    """Return two satellites, 60 targets, a polar station and one at the antimeridian."""
+    mission = paper_mission(drawn_targets(60), **flags)
+    second = PAPER_ORBIT | {"NORAD_CAT_ID": 2, "INCLINATION": 51.6, "MEAN_MOTION": 14.5}
+    mission["satellites"] = [
+        {"id": "sat/1#a", "name": "=EYE, 1", "omm": PAPER_ORBIT},
+        {"name": 'EYE "2"', "omm": second},
+    ]
+    mission["ground_stations"] = [
+        *mission["ground_stations"],
+        {"name": "Suva", "lat_deg": -18.1, "lon_deg": 178.4, "elevation_mask": [[0, 5], [180, 20]]},
+    ]
+    mission["targets"] += [
+        {"id": "-1+1", "lat_deg": 60.0, "lon_deg": 190.0},
+        {"id": '\'=late, "pole"', "lat_deg": -89.5, "lon_deg": 0.0, "reward": 2.5},
+        {"id": "@out of reach", "lat_deg": 10.0, "lon_deg": 20.0, "off_nadir_max_deg": 1.0},
+    ]
+    return mission
+
+
+@pytest.fixture(scope="session")
+def mission() -> Mission:
+    file = mission_file()
+    answer = run(file, "rule")
+    return Mission(content=canonical(file), timeline=answer.timeline, targets=answer.targets)
+
+
+@pytest.fixture
+def answered(mission: Mission) -> Answered:
+    return mission.answered
+
+
+@pytest.fixture
+def job_path(service: Service, mission: Mission) -> str:
+    """Store the mission as a job that has succeeded; return its address."""
+    scenario_id, job_id = new_id(), new_id()
+    with service.database.transaction() as session:
+        session.add(
+            ScenarioRow(
+                id=scenario_id,
+                sha256=sha256_of(mission.content),
+                name=None,
+                summary={},
+                content=mission.content,
+                created_at=FINISHED_AT,
+            )
+        )
+        session.flush()
+        session.execute(
+            sa.insert(JobRow).values(
+                id=job_id,
+                scenario_id=scenario_id,
+                state="succeeded",
+                solver="rule",
+                params={},
+                seed=0,
+                limits={},
+                priority=5,
+                dispatched_at=FINISHED_AT,
+                created_at=FINISHED_AT,
+                finished_at=FINISHED_AT,
+            )
+        )
+        session.execute(
+            sa.insert(JobResultRow).values(
+                job_id=job_id,
+                timeline=mission.timeline,
+                targets=mission.targets,
+                created_at=FINISHED_AT,
+            )
+        )
+    return f"/v1/jobs/{job_id}"
+
+
+@pytest.fixture
+def client(service: Service) -> httpx.Client:
+    return service.client
