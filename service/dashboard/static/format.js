@@ -64,3 +64,11 @@ export function gapOf(reward, bound) {
 export function short(id) {
   return id.slice(-8);
 }
+
+/**
+ * @param {number} count
+ * @param {string} noun in the singular
+ */
+export function counted(count, noun) {
+  return `${count} ${noun}${count === 1 ? "" : "s"}`;
+}

@@ -16,7 +16,10 @@ export const MARGIN = { left: 120, right: 12 };
 const AXIS = 24;
 const REACH_PX = 4;
 
-/** Lanes of a row, as shares of its height from the top. */
+/**
+ * Lanes of a row, as shares of its height from the top.
+ * @type {Record<"collects" | "slews" | "opportunities" | "contacts" | "sunpoints", [number, number]>}
+ */
 const LANES = {
   collects: [0.08, 0.36],
   slews: [0.16, 0.28],
@@ -62,7 +65,8 @@ export class Gantt {
   }
 
   rowHeight() {
-    return this.plan.rows.length > 16 ? 40 : 56;
+    const { length } = this.plan.rows;
+    return length > 16 ? 40 : length > 4 ? 56 : 88;
   }
 
   /**
@@ -106,7 +110,7 @@ export class Gantt {
     const height = this.rowHeight();
     const painter = new LanePainter(pen, this.view, span);
     const place = (/** @type {keyof typeof LANES} */ lane) => {
-      const [from, to] = /** @type {[number, number]} */ (LANES[lane]);
+      const [from, to] = LANES[lane];
       return /** @type {[number, number]} */ ([top + from * height, (to - from) * height]);
     };
     painter.fill(row.eclipses, [top, height], colors.eclipse);

@@ -23,7 +23,6 @@ import { TimeView } from "./time_view.js";
 /** @typedef {import("./types.js").JobOut} JobOut */
 /** @typedef {import("./types.js").TargetItem} TargetItem */
 
-const FORMS = ["json", "csv", "geojson", "czml", "ics"];
 const jobId = decodeURIComponent(location.pathname.split("/").pop() ?? "");
 const jobPath = `/v1/jobs/${encodeURIComponent(jobId)}`;
 
@@ -180,21 +179,25 @@ function installUnused(plan, job, gantt) {
   });
 }
 
-function installDownload() {
+async function installDownload() {
   const choice = /** @type {HTMLSelectElement} */ (byId("download-form"));
-  fill(choice, ...FORMS.map((form) => h("option", { value: form }, form.toUpperCase())));
+  fill(choice, ...(await forms()).map((form) => h("option", { value: form }, form)));
   byId("download-place").hidden = false;
   byId("download").addEventListener("click", async () => {
     // Fetched rather than linked to, since a link cannot carry the key.
     const response = await call(`${jobPath}/timeline.${choice.value}`);
     const url = URL.createObjectURL(await response.blob());
-    h("a", { href: url, download: `timeline-${job8()}.${choice.value}` }).click();
+    h("a", { href: url, download: `timeline-${short(jobId)}.${choice.value}` }).click();
     setTimeout(() => URL.revokeObjectURL(url), 10_000);
   });
 }
 
-function job8() {
-  return short(jobId);
+/** @returns {Promise<string[]>} the forms in which the service offers timelines */
+async function forms() {
+  /** @type {{paths: Record<string, {get: {parameters: {name: string, schema: {examples?: string[]}}[]}}>}} */
+  const document = await get("/openapi.json");
+  const parameters = document.paths["/v1/jobs/{job_id}/timeline.{suffix}"]?.get.parameters ?? [];
+  return parameters.find((one) => one.name === "suffix")?.schema.examples ?? ["json"];
 }
 
 /** @param {JobOut} job */

@@ -3,6 +3,7 @@
 
 import { get, list, post } from "./api.js";
 import { byId, fill, h, notice } from "./dom.js";
+import { utc } from "./format.js";
 import { startPage, whileBusy } from "./page.js";
 import { installSatelliteForm } from "./satellite_form.js";
 import { aboutOf, titleOf } from "./scenarios.js";
@@ -56,7 +57,7 @@ function suggestStart() {
   const newest = Math.max(...epochs);
   const isFresh = epochs.length === 0 || Math.abs(Date.now() - newest) < FRESH_MS;
   const start = Math.ceil((isFresh ? Date.now() : newest) / HOUR_MS) * HOUR_MS;
-  input("horizon-start").value = new Date(start).toISOString().slice(0, 19);
+  input("horizon-start").value = utc(start);
   byId("horizon-about").textContent = isFresh
     ? "The next full hour."
     : "Near the epoch of the newest orbit chosen.";
@@ -116,9 +117,9 @@ async function scenarioId() {
   };
   if (chosen.satellite_ids.length === 0) throw new Error("Choose or upload at least one satellite.");
   if (chosen.target_catalog_ids.length === 0) throw new Error("Choose or upload at least one target catalogue.");
-  const start = Date.parse(`${input("horizon-start").value}Z`);
+  const start = instantOf(input("horizon-start").value);
   const length = Number(input("horizon-hours").value) * HOUR_MS;
-  if (!Number.isFinite(start)) throw new Error("Start: give a date and a time, in UTC.");
+  if (!Number.isFinite(start)) throw new Error("Start: give it as 2026-03-01 00:00:00, in UTC.");
   if (!(length > 0)) throw new Error("Length: give a number of hours.");
   /** @type {ScenarioOut} */
   const made = await post("/v1/scenarios", {
@@ -130,6 +131,15 @@ async function scenarioId() {
   });
   for (const warning of made.warnings) notice("warn", warning);
   return made.id;
+}
+
+/**
+ * Read an instant of UTC: a browser's own field would show it by the reader's country.
+ * @param {string} text
+ */
+function instantOf(text) {
+  const parts = /^(\d{4}-\d\d-\d\d)[T ](\d\d:\d\d(?::\d\d(?:\.\d+)?)?) ?(?:Z|UTC)?$/.exec(text.trim());
+  return parts === null ? NaN : Date.parse(`${parts[1]}T${parts[2]}Z`);
 }
 
 function question() {

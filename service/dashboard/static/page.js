@@ -3,7 +3,7 @@
 
 import { get, Problem } from "./api.js";
 import { byId, fill, h, notice } from "./dom.js";
-import { utcLabelled } from "./format.js";
+import { counted, utcLabelled } from "./format.js";
 import { adoptKeyFromLink, installKeyDialog, showCaller } from "./key.js";
 
 const ASK_HEALTH_MS = 15_000;
@@ -40,7 +40,7 @@ async function watchHealth() {
   const status = byId("service-status");
   for (;;) {
     const text = await get("/health/ready").then(
-      (/** @type {{workers: number}} */ ready) => `Service: ready, ${ready.workers} workers`,
+      (/** @type {{workers: number}} */ ready) => `Service: ready, ${counted(ready.workers, "worker")}`,
       (error) => (error instanceof Problem ? `Service: ${error.message}` : "Service: no answer"),
     );
     status.textContent = text;

@@ -2,7 +2,7 @@
 /** Names of scenarios, read once each. */
 
 import { get, Problem } from "./api.js";
-import { short, utc } from "./format.js";
+import { counted, short, utc } from "./format.js";
 
 /** @type {Map<string, Promise<import("./types.js").ScenarioOut | null>>} */
 const known = new Map();
@@ -29,7 +29,8 @@ export function titleOf(one) {
 export function aboutOf(one) {
   const { satellites, targets, ground_stations: stations } = one.counts;
   const span = `${utc(one.horizon.start)} to ${utc(one.horizon.end)} UTC`;
-  return `${satellites} satellites, ${targets} targets, ${stations} stations; ${span}`;
+  const counts = [counted(satellites, "satellite"), counted(targets, "target"), counted(stations, "station")];
+  return `${counts.join(", ")}; ${span}`;
 }
 
 /** @param {string} id */
