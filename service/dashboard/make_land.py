@@ -11,8 +11,12 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
+
+import antimeridian
 
 LAND_FILE: Final = Path(__file__).with_name("static") / "land.json"
 
@@ -52,9 +56,30 @@ def _joined(arcs: list[Ring], ring: list[int]) -> Ring:
     return joined
 
 
+def flat_rings(rings: list[Ring]) -> Iterator[Ring]:
+    """Cut rings where they cross the antimeridian or go round a pole: a flat map has edges."""
+    for ring in rings:
+        if all(abs(b[0] - a[0]) < 180.0 for a, b in pairwise(ring)):
+            yield ring
+            continue
+        polygon = {"type": "Polygon", "coordinates": [ring]}
+        fixed = antimeridian.fix_geojson(
+            polygon, fix_winding=True, force_south_pole=_is_round_pole(ring)
+        )
+        parts = [fixed["coordinates"]] if fixed["type"] == "Polygon" else fixed["coordinates"]
+        for part in parts:
+            yield from ([list(position) for position in own] for own in part)
+
+
+def _is_round_pole(ring: Ring) -> bool:
+    # Steps the short way round add up to a full turn about a pole, and to nothing elsewhere.
+    steps = ((b[0] - a[0] + 180.0) % 360.0 - 180.0 for a, b in pairwise(ring))
+    return abs(sum(steps)) > 180.0
+
+
 def main(topojson: Path) -> None:
     """Write the file from the package's one."""
-    rings = rings_of(json.loads(topojson.read_text(encoding="utf-8")))
+    rings = flat_rings(rings_of(json.loads(topojson.read_text(encoding="utf-8"))))
     flat = [[round(degrees, _DECIMALS) for at in ring for degrees in at] for ring in rings]
     document = {"credit": _CREDIT, "rings": flat}
     LAND_FILE.write_text(json.dumps(document, separators=(",", ":")) + "\n", encoding="utf-8")

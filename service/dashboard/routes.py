@@ -36,13 +36,13 @@ def new_page(request: Request) -> Response:
 
 
 @router.get("/jobs/{job_id}")
-def job_page(job_id: str, request: Request) -> Response:
+def job_page(request: Request) -> Response:
     """Return the page of one job; whether there is such a job the API will say."""
     return _page(request, "job")
 
 
 @router.get("/comparisons/{comparison_id}")
-def comparison_page(comparison_id: str, request: Request) -> Response:
+def comparison_page(request: Request) -> Response:
     """Return the page of one comparison."""
     return _page(request, "comparison")
 

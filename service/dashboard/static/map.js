@@ -11,6 +11,8 @@ import { positionAt } from "./geography.js";
 /** @typedef {import("./geography.js").Place} Place */
 /** @typedef {import("./canvas.js").Colors} Colors */
 
+/** @typedef {CanvasRenderingContext2D | OffscreenCanvasRenderingContext2D} Pen */
+
 const REACH_PX = 8;
 const TRACK_MS = 50 * 60_000;
 const OUTCOMES = ["excluded", "unscheduled", "collected", "downlinked"];
@@ -32,6 +34,8 @@ export class WorldMap {
     this.selection = selection;
     this.zoom = 1;
     this.center = { lon: 0, lat: 0 };
+    /** @type {{told: string, picture: OffscreenCanvas} | null} */
+    this.drawnGround = null;
     this.byOutcome = new Map(
       OUTCOMES.map((name) => [name, geography.targets.filter((target) => target.outcome === name)]),
     );
@@ -77,24 +81,43 @@ export class WorldMap {
    * @param {Colors} colors
    */
   draw(pen, width, height, colors) {
-    pen.fillStyle = colors.sea ?? "";
-    pen.fillRect(0, 0, width, height);
-    this.drawLand(pen, colors);
-    this.drawCircles(pen, colors);
+    pen.drawImage(this.ground(width, height, colors), 0, 0, width, height);
     const t = this.cursor();
     for (const track of this.geography.tracks) this.drawTrack(pen, track, t, colors);
-    for (const outcome of OUTCOMES) {
-      const size = Math.min(2.2 + this.zoom / 2, 5);
-      for (const target of this.byOutcome.get(outcome) ?? []) this.drawTarget(pen, target, size, colors);
-    }
-    for (const station of this.geography.stations) this.drawStation(pen, station, colors);
     this.drawSelected(pen, colors);
     pen.fillStyle = colors.ink ?? "";
     pen.fillText(`Satellites at ${utcLabelled(t)}`, 8, height - 10);
   }
 
   /**
-   * @param {CanvasRenderingContext2D} pen
+   * Return the picture of all that time and selection do not change, drawn once a zoom.
+   * @param {number} width
+   * @param {number} height
+   * @param {Colors} colors
+   */
+  ground(width, height, colors) {
+    const { lon, lat } = this.center;
+    const told = [width, height, devicePixelRatio, this.zoom, lon, lat, colors.sea].join();
+    if (this.drawnGround?.told === told) return this.drawnGround.picture;
+    const picture = new OffscreenCanvas(width * devicePixelRatio, height * devicePixelRatio);
+    const pen = /** @type {OffscreenCanvasRenderingContext2D} */ (picture.getContext("2d"));
+    pen.scale(devicePixelRatio, devicePixelRatio);
+    pen.font = this.canvas.pen.font;
+    pen.fillStyle = colors.sea ?? "";
+    pen.fillRect(0, 0, width, height);
+    this.drawLand(pen, colors);
+    this.drawCircles(pen, colors);
+    const size = Math.min(2.2 + this.zoom / 2, 5);
+    for (const outcome of OUTCOMES) {
+      for (const target of this.byOutcome.get(outcome) ?? []) this.drawTarget(pen, target, size, colors);
+    }
+    for (const station of this.geography.stations) this.drawStation(pen, station, colors);
+    this.drawnGround = { told, picture };
+    return picture;
+  }
+
+  /**
+   * @param {Pen} pen
    * @param {Colors} colors
    */
   drawLand(pen, colors) {
@@ -124,7 +147,7 @@ export class WorldMap {
   }
 
   /**
-   * @param {CanvasRenderingContext2D} pen
+   * @param {Pen} pen
    * @param {Colors} colors
    */
   drawCircles(pen, colors) {
@@ -173,7 +196,7 @@ export class WorldMap {
 
   /**
    * Shapes differ as well as colours: disc, square, ring, cross.
-   * @param {CanvasRenderingContext2D} pen
+   * @param {Pen} pen
    * @param {Place} target
    * @param {number} size
    * @param {Colors} colors
@@ -203,7 +226,7 @@ export class WorldMap {
   }
 
   /**
-   * @param {CanvasRenderingContext2D} pen
+   * @param {Pen} pen
    * @param {Place} station
    * @param {Colors} colors
    */

@@ -30,7 +30,23 @@ export function showTables(plan, selection) {
   const curves = plan.rows.filter((row) => row.curves !== null).map(curveSection);
   const eclipses = plan.rows.filter((row) => row.eclipses.start.length > 0).map(eclipseSection);
   const targets = section("All targets", plan.targets.length, () => targetTable(plan, selection));
-  fill(byId("tables"), targets, ...satellites, ...curves, ...eclipses);
+  fill(
+    byId("tables"),
+    targets,
+    group("Actions", satellites),
+    group("Battery and recorder", curves),
+    group("Eclipses", eclipses),
+  );
+}
+
+/**
+ * @param {string} title
+ * @param {HTMLElement[]} sections
+ */
+function group(title, sections) {
+  if (sections.length < 2) return sections[0];
+  const about = `${title} of ${sections.length} satellites`;
+  return h("details", { class: "group" }, h("summary", {}, about), ...sections);
 }
 
 /**

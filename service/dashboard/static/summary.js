@@ -2,7 +2,7 @@
 /** What a plan is worth: its figures, and before all else what is wrong with it. */
 
 import { bar, byId, fill, h } from "./dom.js";
-import { duration, number, percent, utc } from "./format.js";
+import { counted, duration, number, percent, utc } from "./format.js";
 
 /** @typedef {import("./plan.js").Plan} Plan */
 
@@ -33,7 +33,16 @@ export function showSummary(plan, selection) {
     h("div", {}, h("dt", {}, name), h("dd", { "data-figure": String(name).toLowerCase() }, h("strong", {}, value), note && h("small", {}, note))),
   ]);
   fill(byId("summary"), ...items);
-  fill(byId("warnings"), ...timeline.warnings.map((text) => h("p", { class: "notice warn" }, text)));
+  showWarnings(timeline.warnings);
+}
+
+/** @param {string[]} warnings */
+function showWarnings(warnings) {
+  if (warnings.length === 0) return;
+  const items = h("ul", {}, ...warnings.map((text) => h("li", {}, text)));
+  const title = h("summary", {}, counted(warnings.length, "warning"), ": ", warnings[0]);
+  const isShort = warnings.length === 1;
+  fill(byId("warnings"), h("div", { class: "notice warn" }, isShort ? warnings[0] : h("details", {}, title, items)));
 }
 
 /** @param {import("./types.js").Totals} totals */
