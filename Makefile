@@ -8,13 +8,15 @@ WARM := .venv/.warm
 KERNELS := $(shell grep -rlE '^@(kernel|borrowing|inlined)' planner_core --include=*.py)
 PIP := $(BIN)/python -m pip -qq --disable-pip-version-check
 
-.PHONY: help setup demo serve test chaos check format lock paper paper-quick clean
+.PHONY: help setup demo serve test chaos browser screenshots check format lock paper paper-quick clean
 
 help:
 	@echo "make demo     plan a real-size mission through the service's own API, and end"
 	@echo "make serve    the same, and keep serving"
 	@echo "make test     every check and every test"
 	@echo "make chaos    500 jobs while processes are killed and databases fail (needs Debian and root)"
+	@echo "make browser  the dashboard in a real browser (needs Chromium, or Debian and root)"
+	@echo "make screenshots  the pictures of the dashboard in docs/images (likewise)"
 	@echo "make check    lint, format, types, import contracts, examples in docstrings"
 	@echo "make setup    the environment in .venv (the others call it)"
 	@echo "make format   rewrite the sources in the one layout"
@@ -58,6 +60,12 @@ chaos: export SLEWLINE_TEST_CHAOS_JOBS ?= 500
 chaos: setup
 	$(BIN)/python -m pytest tests/service/jobs/chaos
 	.ci/postgresql $(BIN)/python -m pytest tests/service/jobs/chaos
+
+browser: setup
+	.ci/browser $(BIN)/python -m pytest tests/service/dashboard/browser
+
+screenshots: setup
+	.ci/browser $(BIN)/python -m tests.service.dashboard.browser.screenshots
 
 check: setup
 	$(BIN)/ruff check .

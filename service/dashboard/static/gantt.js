@@ -41,6 +41,8 @@ export class Gantt {
     this.selection = selection;
     /** @type {Map<string, Lane<OpportunityOut>>} unused opportunities by satellite */
     this.opportunities = new Map();
+    /** @type {Map<string, Lane<OpportunityOut>>} those of the selected target, by satellite */
+    this.ofTarget = new Map();
     /** @type {Set<string>} */
     this.blocking = new Set();
     const label =
@@ -120,6 +122,8 @@ export class Gantt {
     painter.fill(row.contacts, place("contacts"), colors.contact);
     const unused = this.opportunities.get(row.id);
     if (unused) painter.outline(unused, place("opportunities"), { color: colors.soft, width: 1 }, () => true);
+    const ofTarget = this.ofTarget.get(row.id);
+    if (ofTarget) painter.outline(ofTarget, place("opportunities"), { color: colors.chosen, width: 2 }, () => true);
     const { actionId, targetId } = this.selection.now;
     const isChosen = (/** @type {Action} */ a) => a.id === actionId || (targetId !== null && a.target_id === targetId);
     const isBlocking = (/** @type {Action} */ a) => this.blocking.has(a.id);
@@ -177,7 +181,8 @@ export class Gantt {
    */
   hover(x, y) {
     const found = this.locate(x, y);
-    const unused = found && this.opportunities.get(found.row.id)?.nearest(found.t, found.reach);
+    const lanes = found ? [this.ofTarget.get(found.row.id), this.opportunities.get(found.row.id)] : [];
+    const unused = found && lanes.map((lane) => lane?.nearest(found.t, found.reach)).find((one) => one);
     const isOnUnused = found && found.y >= LANES.opportunities[0] && found.y <= LANES.opportunities[1];
     const action = this.actionAt(x, y);
     const text = isOnUnused && unused ? tellOpportunity(unused) : action && tellAction(action);
@@ -267,7 +272,7 @@ export function drawAxis(pen, view, width, bottom, colors) {
     pen.fillStyle = colors.line ?? "";
     pen.fillRect(x, 0, 1, bottom + 4);
     pen.fillStyle = colors.soft ?? "";
-    pen.fillText(text, Math.min(x + 3, width - 70), bottom + 13);
+    if (x + 3 + pen.measureText(text).width <= width) pen.fillText(text, x + 3, bottom + 13);
   }
   pen.fillStyle = colors.soft ?? "";
   pen.fillText("UTC", 4, bottom + 13);
@@ -300,5 +305,5 @@ export function tellAction(action) {
 /** @param {OpportunityOut} one */
 function tellOpportunity(one) {
   const what = one.target_id ?? one.station_id ?? "";
-  return `unused ${one.kind} ${what}: ${utc(one.start)} to ${utc(one.end).slice(11)} UTC, ${number(one.off_nadir_deg)}° off nadir`;
+  return `opportunity, ${one.kind} ${what}: ${utc(one.start)} to ${utc(one.end).slice(11)} UTC, ${number(one.off_nadir_deg)}° off nadir`;
 }

@@ -2,6 +2,7 @@
 /** Opportunities of a scenario, asked for when somebody wants to see them. */
 
 import { list, pause, Problem } from "./api.js";
+import { Lane } from "./plan.js";
 
 /** @typedef {import("./types.js").OpportunityOut} OpportunityOut */
 
@@ -25,4 +26,18 @@ export async function opportunitiesOf(scenarioId, of, onPage = () => {}) {
       await pause(5000);
     }
   }
+}
+
+/**
+ * Return opportunities as lanes of a chart.
+ * @param {OpportunityOut[]} items
+ * @returns {Map<string, Lane<OpportunityOut>>} by satellite
+ */
+export function lanesOf(items) {
+  const ids = new Set(items.map((one) => one.satellite_id));
+  const spansOf = (/** @type {string} */ id) =>
+    items
+      .filter((one) => one.satellite_id === id)
+      .map((one) => ({ start: Date.parse(one.start), end: Date.parse(one.end), of: one }));
+  return new Map([...ids].map((id) => [id, new Lane(spansOf(id))]));
 }

@@ -23,7 +23,7 @@ export function showTables(plan, selection) {
     return section(about, satellite.actions.length, () => {
       const table = actionTable(plan, selection, about);
       table.show(satellite.actions);
-      selection.onChange(({ actionId }) => table.mark(new Set(actionId ? [actionId] : [])));
+      markSelected(table, selection, ({ actionId }) => actionId);
       return table.element;
     });
   });
@@ -114,8 +114,23 @@ function targetTable(plan, selection) {
     (/** @type {TargetItem} */ item) => item.target_id,
   );
   table.show(plan.targets);
-  selection.onChange(({ targetId }) => table.mark(new Set(targetId ? [targetId] : [])));
+  markSelected(table, selection, ({ targetId }) => targetId);
   return table.element;
+}
+
+/**
+ * Keep the line of what is selected marked, also of what was selected before there was a table.
+ * @param {PagedTable<any>} table
+ * @param {Selection} selection
+ * @param {(selected: import("./selection.js").Selected) => string | null} keyOf
+ */
+function markSelected(table, selection, keyOf) {
+  const mark = (/** @type {import("./selection.js").Selected} */ selected) => {
+    const key = keyOf(selected);
+    table.mark(new Set(key === null ? [] : [key]));
+  };
+  selection.onChange(mark);
+  mark(selection.now);
 }
 
 /** @param {Row} row */

@@ -4,7 +4,7 @@
 import { byId, fill, h } from "./dom.js";
 import { number, percent, utc, utcLabelled } from "./format.js";
 import { blockersOf, changeOf } from "./left_out.js";
-import { opportunitiesOf } from "./opportunities.js";
+import { lanesOf, opportunitiesOf } from "./opportunities.js";
 import { showError } from "./page.js";
 
 /** @typedef {import("./types.js").OpportunityOut} OpportunityOut */
@@ -22,6 +22,7 @@ export function watchSelection(plan, selection, scenarioId, gantt) {
     const action = plan.actions.get(actionId ?? "");
     const item = plan.target.get(targetId ?? "");
     gantt.blocking = new Set(item?.reason?.blocking_actions ?? []);
+    gantt.ofTarget = new Map();
     if (!action && !item) {
       fill(byId("selected"), h("p", { class: "hint" }, "Nothing selected."));
       return;
@@ -32,7 +33,14 @@ export function watchSelection(plan, selection, scenarioId, gantt) {
     fill(byId("selected"), list, place);
     if (item) {
       const mine = asked;
-      tellOpportunities(plan, selection, scenarioId, item.target_id, place, () => mine === asked).catch(showError);
+      opportunitiesOf(scenarioId, { target_id: item.target_id })
+        .then(({ items }) => {
+          if (mine !== asked) return;
+          gantt.ofTarget = lanesOf(items);
+          gantt.canvas.redraw();
+          tellOpportunities(plan, item.target_id, items, place);
+        })
+        .catch(showError);
     }
     if (action) gantt.view.reveal(Date.parse(action.start), Date.parse(action.end));
   });
@@ -80,15 +88,11 @@ function actionFacts(plan, action, satelliteId) {
 
 /**
  * @param {import("./plan.js").Plan} plan
- * @param {import("./selection.js").Selection} selection
- * @param {string} scenarioId
  * @param {string} targetId
+ * @param {OpportunityOut[]} items
  * @param {HTMLElement} place
- * @param {() => boolean} isWanted
  */
-async function tellOpportunities(plan, selection, scenarioId, targetId, place, isWanted) {
-  const { items } = await opportunitiesOf(scenarioId, { target_id: targetId });
-  if (!isWanted()) return;
+function tellOpportunities(plan, targetId, items, place) {
   const used = new Set((plan.actionsOf.get(targetId) ?? []).map((id) => plan.actions.get(id)?.opportunity_id));
   const rows = items.slice(0, 100).map((one) =>
     h(
