@@ -43,7 +43,7 @@ class Browser:
 
     def run(self, script: str, *arguments: object) -> Any:
         """Return what a function body in JavaScript returns."""
-        return self.driver.execute_script(script, *arguments)  # type: ignore[no-untyped-call]
+        return self.driver.execute_script(script, *arguments)
 
     def find(self, selector: str) -> WebElement:
         """Return the one element."""
@@ -51,8 +51,12 @@ class Browser:
 
     def text(self, selector: str) -> str:
         """Return the text that is seen of an element; "" where there is none."""
-        found = self.driver.find_elements("css selector", selector)
-        return found[0].text if found else ""
+        # In one step: pages replace elements while they are looked at.
+        script = """
+          const found = document.querySelector(arguments[0]);
+          return found?.checkVisibility() ? found.innerText.trim() : "";
+        """
+        return str(self.run(script, selector))
 
     def click(self, selector: str) -> None:
         """Click an element as soon as it can be."""

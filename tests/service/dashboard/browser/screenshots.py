@@ -45,9 +45,7 @@ def take(browser: Browser, name: str, height: int, top: str = "header") -> None:
         top,
     )
     # Canvases are drawn anew at their new width.
-    browser.driver.execute_async_script(  # type: ignore[no-untyped-call]
-        "const [done] = arguments; setTimeout(done, 500);"
-    )
+    browser.driver.execute_async_script("const [done] = arguments; setTimeout(done, 500);")
     path = FOLDER / f"{name}.png"
     browser.driver.save_screenshot(str(path))
     size = path.stat().st_size

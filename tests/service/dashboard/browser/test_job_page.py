@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 from datetime import datetime
+from functools import partial
 from typing import Any
 
 import httpx
@@ -102,10 +103,14 @@ def test_an_action_clicked_in_the_chart_is_selected_everywhere(
     assert browser.text("#selected-target") == alone["target_id"]
     assert browser.text("#selected-action").startswith(alone["id"])
     for plot, count in before.items():
-        browser.wait(lambda p=plot, c=count: browser.drawn(p) > c, f"{plot} not drawn again")
+        browser.wait(partial(is_drawn_again, browser, plot, count), f"{plot} not drawn again")
     browser.wait(lambda: "taken" in browser.text("#selected table"), "no opportunities")
     browser.click("#tables > details:nth-of-type(1) > summary")
     browser.wait(lambda: alone["target_id"] in browser.text("#tables tr.marked"))
+
+
+def is_drawn_again(browser: Browser, plot: str, before: int) -> bool:
+    return browser.drawn(plot) > before
 
 
 def gap_around(collects: list[Json], action: Json) -> float:
@@ -165,13 +170,12 @@ def test_unused_opportunities_come_on_demand(
     )
     browser.wait(lambda: "unused" in browser.text("#unused-status"))
     used = {a["opportunity_id"] for a in satellite["actions"]} - {None}
-    total, cursor = 0, ""
-    while cursor is not None:
-        page = api.get(
-            f"/v1/scenarios/{job['scenario']['id']}/opportunities?limit=500"
-            + (f"&cursor={cursor}" if cursor else "")
-        ).json()
-        total, cursor = total + len(page["items"]), page["next"]
+    path = f"/v1/scenarios/{job['scenario']['id']}/opportunities?limit=500"
+    page = api.get(path).json()
+    total = len(page["items"])
+    while page["next"]:
+        page = api.get(f"{path}&cursor={page['next']}").json()
+        total += len(page["items"])
     assert browser.text("#unused-status") == f"{total - len(used)} unused"
 
 
@@ -198,7 +202,7 @@ def test_the_tables_hold_every_action_and_every_target(
     for number, count in ((1, 1000), (2, len(timeline["satellites"][0]["actions"]))):
         section = f"#tables > details:nth-of-type({number})"
         browser.click(f"{section} > summary")
-        browser.wait(lambda s=section: browser.text(f"{s} tbody tr"))
+        browser.wait(partial(browser.text, f"{section} tbody tr"))
         browser.click(f"{section} .pager button:last-child")
         rows = "return document.querySelectorAll(arguments[0]).length"
         shown = browser.run(rows, f"{section} tbody tr")

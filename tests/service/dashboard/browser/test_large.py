@@ -37,7 +37,7 @@ def test_a_large_timeline_is_shown_whole_and_moved_through(
     timeline = api.get(f"{path}/timeline").json()
     num_actions = sum(len(one["actions"]) for one in timeline["satellites"])
     assert num_actions > 4000
-    bars = browser.driver.execute_async_script(MOVES)  # type: ignore[no-untyped-call]
+    bars = browser.driver.execute_async_script(MOVES)
     assert len(bars) == 10  # each move was drawn
     width = browser.run("return document.querySelector('#gantt canvas').clientWidth")
     assert min(bars) > 0
