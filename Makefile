@@ -10,7 +10,8 @@ LOCK := $(UV) pip compile --universal --python-version 3.11 --generate-hashes \
 	--no-emit-index-url
 PIP := $(BIN)/python -m pip -qq --disable-pip-version-check
 
-.PHONY: help setup demo serve test chaos fuzz check format lock paper paper-quick clean
+.PHONY: help setup demo serve test chaos fuzz browser screenshots check format lock paper \
+	paper-quick clean
 
 help:
 	@echo "make demo     plan a real-size mission through the service's own API, and end"
@@ -18,6 +19,8 @@ help:
 	@echo "make test     every check and every test"
 	@echo "make chaos    500 jobs while processes are killed and databases fail (needs Debian and root)"
 	@echo "make fuzz     files made by coverage-guided fuzzing, against every parser (Linux)"
+	@echo "make browser  the dashboard in a real browser (needs Chromium, or Debian and root)"
+	@echo "make screenshots  the pictures of the dashboard in docs/images (likewise)"
 	@echo "make check    lint, format, types, import contracts, examples in docstrings"
 	@echo "make setup    the environment in .venv (the others call it)"
 	@echo "make format   rewrite the sources in the one layout"
@@ -66,6 +69,12 @@ chaos: setup
 fuzz: setup
 	@$(PIP) install --require-hashes -r tests/fuzz/requirements.lock
 	$(BIN)/python -m tests.fuzz.guided
+
+browser: setup
+	.ci/browser $(BIN)/python -m pytest tests/service/dashboard/browser
+
+screenshots: setup
+	.ci/browser $(BIN)/python -m tests.service.dashboard.browser.screenshots
 
 check: setup
 	$(BIN)/ruff check .

@@ -60,7 +60,7 @@ class ScenarioOpportunities:
     target_access
         Why a target has no collect, or ``ACCESS_FOUND``. Shape ``(num_targets,)``.
     sunlight
-        One per satellite.
+        One per satellite, whether its battery minds the shadow or not.
     warnings
         Sentences for people.
     """
@@ -141,8 +141,7 @@ def compute_opportunities(scenario: Scenario, budget: Budget) -> ScenarioOpportu
                 _note(closeness, path, places[kind], found, placed[0])
             parts.append(tasks.rows_of(index, kind, found, num_accesses, placed))
             num_accesses += len(found)
-        aware = scenario.use_resources and satellite.resources.eclipse_aware
-        lit.append(sunlight(path) if aware else always_sunlit(scenario.horizon.duration_s))
+        lit.append(sunlight(path))
     described = tasks.Described(
         tasks.in_order(
             parts, [t.id for t in scenario.targets], [s.id for s in scenario.ground_stations]
@@ -230,6 +229,8 @@ def build_problem(scenario: Scenario, computed: ScenarioOpportunities, budget: B
     satellites = []
     for index, satellite in enumerate(scenario.satellites):
         _go_on(budget, index / len(scenario.satellites), "compile")
+        sees_shadow = scenario.use_resources and satellite.resources.eclipse_aware
+        everywhere = always_sunlit(scenario.horizon.duration_s)
         satellites.append(
             build_satellite_problem(
                 index,
@@ -238,7 +239,7 @@ def build_problem(scenario: Scenario, computed: ScenarioOpportunities, budget: B
                 name=satellite.name,
                 agility=satellite.agility,
                 resources=satellite.resources,
-                sunlight=computed.sunlight[index],
+                sunlight=computed.sunlight[index] if sees_shadow else everywhere,
             )
         )
     _go_on(budget, 1.0, "compile")

@@ -96,6 +96,16 @@ class Sunlight:
     enter_s: Floats
     exit_s: Floats
 
+    def gaps(self, horizon_s: float) -> list[tuple[float, float]]:
+        """Return the times in shadow, from 0 to the end of the horizon.
+
+        >>> Sunlight(enter_s=np.array([0.0, 50.0]), exit_s=np.array([10.0, 60.0])).gaps(80.0)
+        [(10.0, 50.0), (60.0, 80.0)]
+        """
+        starts = [0.0, *self.exit_s.tolist()]
+        ends = [*self.enter_s.tolist(), horizon_s]
+        return [(start, end) for start, end in zip(starts, ends, strict=True) if start < end]
+
     def seconds_until(self, t_s: Floats) -> Floats:
         """Return the sunlit seconds between 0 and each instant.
 

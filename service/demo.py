@@ -61,7 +61,8 @@ def run_demo(settings: Settings, *, folder: Path, keep_serving: bool = False) ->
         with httpx.Client(base_url=url, trust_env=False, timeout=60.0) as client:
             status = _plan_mission(client, folder)
         if keep_serving:
-            print(f"\nStill serving at {url} (its calls: {url}/docs). Ctrl-C ends it.", flush=True)
+            print(f"\nStill serving at {url} (the dashboard; calls: {url}/docs).", flush=True)
+            print("Ctrl-C ends it.", flush=True)
             _wait_for_interrupt()
     return status
 

@@ -56,8 +56,11 @@ class Documents:
         runtime = judged.runtime_s
         number = 0
         satellites = []
-        for satellite, line in zip(
-            judged.problem.satellites, judged.timeline.satellites, strict=True
+        for satellite, line, lit in zip(
+            judged.problem.satellites,
+            judged.timeline.satellites,
+            judged.opportunities.sunlight,
+            strict=True,
         ):
             actions = []
             for action in line.actions:
@@ -68,6 +71,10 @@ class Documents:
                     "id": satellite.id,
                     "name": satellite.name,
                     "actions": actions,
+                    "eclipses": [
+                        {"start": self._instant(start_s), "end": self._instant(end_s)}
+                        for start_s, end_s in lit.gaps(judged.problem.horizon_s)
+                    ],
                     "resources": None
                     if line.resources is None
                     else {

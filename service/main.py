@@ -17,6 +17,7 @@ from service.api import (
     ground_stations,
     job_events,
     jobs,
+    me,
     meta,
     metrics,
     openapi,
@@ -35,6 +36,7 @@ from service.api.idempotency import install_replay
 from service.api.middleware import RequestContext
 from service.api.security_headers import SecurityHeaders
 from service.api.unchanged import UnchangedJobs
+from service.dashboard import routes as dashboard
 from service.db.session import Database
 from service.opportunities import OpportunityReader
 from service.settings import Settings
@@ -62,9 +64,11 @@ ROUTERS = (
     solvers.router,
     webhooks.router,
     audit_events.router,
+    me.router,
     meta.router,
     metrics.router,
     openapi.router,
+    dashboard.router,
 )
 
 

@@ -20,8 +20,11 @@ from service.api.problems import ServiceError
 from service.db.session import Database
 from service.settings import Settings
 
-OPEN: Final = ("/health", "/version", "/docs", "/openapi.json", "/problems")
-"""What anybody may read, with all below it."""
+OPEN: Final = (
+    "/health", "/version", "/docs", "/openapi.json", "/problems",
+    "/new", "/jobs", "/comparisons", "/static",
+)  # fmt: skip
+"""What anybody may read, with all below it: the dashboard's pages get their data by calls."""
 
 _UNLIMITED: Final = "/health"
 _READING: Final = ("GET", "HEAD", "OPTIONS")
@@ -33,8 +36,10 @@ def is_open(path: str) -> bool:
 
     >>> is_open("/health/live"), is_open("/docs"), is_open("/docs-of-mine"), is_open("/v1/jobs")
     (True, True, False, False)
+    >>> is_open("/"), is_open("//v1/jobs")
+    (True, False)
     """
-    return any(_is_below(path, root) for root in OPEN)
+    return path == "/" or any(_is_below(path, root) for root in OPEN)
 
 
 def is_limited(path: str) -> bool:

@@ -266,11 +266,17 @@ def test_contacts_exist_only_with_resources() -> None:
     assert CONTACT not in without.kind
 
 
-def test_eclipses_are_worked_out_only_for_who_asks() -> None:
+def test_eclipses_are_known_of_all_and_count_only_for_who_asks() -> None:
     plain = satellite()
     aware = replace(plain, id="aware", resources=replace(plain.resources, eclipse_aware=True))
-    lit = compute_opportunities(scenario(satellites=(plain, aware)), Budget()).sunlight
-    assert (lit[0].enter_s.tolist(), lit[0].exit_s.tolist()) == ([0.0], [86400.0])
+    asked = scenario(satellites=(plain, aware))
+    found = compute_opportunities(asked, Budget())
+    problem = build_problem(asked, found, Budget())
+    counted = problem.satellites[0].sunlight
+    assert (counted.enter_s.tolist(), counted.exit_s.tolist()) == ([0.0], [86400.0])
+    assert problem.satellites[1].sunlight is found.sunlight[1]
+    lit = found.sunlight
+    assert lit[0].enter_s.tolist() == lit[1].enter_s.tolist()
     assert len(lit[1].enter_s) >= 15
     sunlit_s = float((lit[1].exit_s - lit[1].enter_s).sum())
     assert 0.6 < sunlit_s / 86400.0 < 0.9

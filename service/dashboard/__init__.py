@@ -1,0 +1,1 @@
+"""The pages that people see: static HTML, and scripts that call the public API."""

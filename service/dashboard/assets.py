@@ -1,0 +1,83 @@
+"""The dashboard's files as they are served: read once, named by what they hold."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from string import Template
+from typing import Final
+
+_HERE: Final = Path(__file__).parent
+_MEDIA_TYPES: Final = {
+    ".css": "text/css; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".json": "application/json",
+    ".svg": "image/svg+xml",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Asset:
+    """One file."""
+
+    content: bytes
+    media_type: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Assets:
+    """All files of one version of the dashboard.
+
+    Attributes
+    ----------
+    version
+        Hash of the static files. It is part of their address, so that a page never runs the
+        scripts of another version and a browser may keep them for ever.
+    static, pages
+        By name.
+    """
+
+    version: str
+    static: dict[str, Asset]
+    pages: dict[str, Asset]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Page:
+    title: str
+    script: str
+
+
+_PAGES: Final = {
+    "jobs": _Page(title="Jobs", script="jobs_page.js"),
+    "new": _Page(title="New plan", script="new_page.js"),
+    "job": _Page(title="Job", script="job_page.js"),
+    "comparison": _Page(title="Comparison", script="comparison_page.js"),
+}
+
+
+@cache
+def load_assets() -> Assets:
+    """Return the files that ship with this version."""
+    static = {
+        path.name: Asset(content=path.read_bytes(), media_type=_MEDIA_TYPES[path.suffix])
+        for path in sorted((_HERE / "static").iterdir())
+        if path.suffix in _MEDIA_TYPES
+    }
+    digest = hashlib.sha256()
+    for name, asset in static.items():
+        digest.update(f"{name} {len(asset.content)}\n".encode() + asset.content)
+    version = digest.hexdigest()[:16]
+    pages = {name: _page(name, page, version) for name, page in _PAGES.items()}
+    return Assets(version=version, static=static, pages=pages)
+
+
+def _page(name: str, page: _Page, version: str) -> Asset:
+    layout = Template((_HERE / "pages" / "layout.html").read_text(encoding="utf-8"))
+    main = (_HERE / "pages" / f"{name}.html").read_text(encoding="utf-8")
+    filled = layout.substitute(
+        title=page.title, static=f"/static/{version}", script=page.script, main=main.strip()
+    )
+    return Asset(content=filled.encode(), media_type="text/html; charset=utf-8")

@@ -1,0 +1,89 @@
+"""Write the land outlines of the dashboard's map.
+
+They are those of Natural Earth 4.1.0, 1:110m (public domain), as the npm package world-atlas
+2.0.2 carries them in TopoJSON. To make the file again::
+
+    npm pack world-atlas@2.0.2 && tar -xzf world-atlas-2.0.2.tgz
+    python -m service.dashboard.make_land package/land-110m.json
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, Final
+
+import antimeridian
+
+LAND_FILE: Final = Path(__file__).with_name("static") / "land.json"
+
+_DECIMALS: Final = 2  # of a degree: the scale of the outlines is coarser
+_CREDIT: Final = "Land: Natural Earth 4.1.0, 1:110m, public domain"
+
+Ring = list[list[float]]
+
+
+def rings_of(topology: dict[str, Any]) -> list[Ring]:
+    """Return every ring of the object ``land``: positions ``[lon_deg, lat_deg]``."""
+    arcs = [_positions(arc, topology["transform"]) for arc in topology["arcs"]]
+    rings = []
+    for geometry in topology["objects"]["land"]["geometries"]:
+        for polygon in geometry["arcs"]:
+            rings += [_joined(arcs, ring) for ring in polygon]
+    return rings
+
+
+def _positions(arc: list[list[int]], transform: dict[str, list[float]]) -> Ring:
+    # Quantised, and each position as the step from the one before.
+    (scale_x, scale_y), (first_x, first_y) = transform["scale"], transform["translate"]
+    x = y = 0
+    positions = []
+    for step_x, step_y in arc:
+        x, y = x + step_x, y + step_y
+        positions.append([x * scale_x + first_x, y * scale_y + first_y])
+    return positions
+
+
+def _joined(arcs: list[Ring], ring: list[int]) -> Ring:
+    joined: Ring = []
+    for index in ring:
+        # ~i stands for arc i, backwards. Each arc begins where the one before it ended.
+        arc = arcs[index] if index >= 0 else arcs[~index][::-1]
+        joined += arc[1:] if joined else arc
+    return joined
+
+
+def flat_rings(rings: list[Ring]) -> Iterator[Ring]:
+    """Cut rings where they cross the antimeridian or go round a pole: a flat map has edges."""
+    for ring in rings:
+        if all(abs(b[0] - a[0]) < 180.0 for a, b in pairwise(ring)):
+            yield ring
+            continue
+        polygon = {"type": "Polygon", "coordinates": [ring]}
+        fixed = antimeridian.fix_geojson(
+            polygon, fix_winding=True, force_south_pole=_is_round_pole(ring)
+        )
+        parts = [fixed["coordinates"]] if fixed["type"] == "Polygon" else fixed["coordinates"]
+        for part in parts:
+            yield from ([list(position) for position in own] for own in part)
+
+
+def _is_round_pole(ring: Ring) -> bool:
+    # Steps the short way round add up to a full turn about a pole, and to nothing elsewhere.
+    steps = ((b[0] - a[0] + 180.0) % 360.0 - 180.0 for a, b in pairwise(ring))
+    return abs(sum(steps)) > 180.0
+
+
+def main(topojson: Path) -> None:
+    """Write the file from the package's one."""
+    rings = flat_rings(rings_of(json.loads(topojson.read_text(encoding="utf-8"))))
+    flat = [[round(degrees, _DECIMALS) for at in ring for degrees in at] for ring in rings]
+    document = {"credit": _CREDIT, "rings": flat}
+    LAND_FILE.write_text(json.dumps(document, separators=(",", ":")) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

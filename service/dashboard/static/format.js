@@ -1,0 +1,74 @@
+// @ts-check
+/** Numbers and times as people read them. All times are UTC and say so. */
+
+/**
+ * @param {number | string | null | undefined} at milliseconds, or as the API writes instants
+ * @returns {string} such as `2026-03-01 12:00:05`; the column or label says UTC
+ */
+export function utc(at) {
+  if (at == null) return "";
+  return new Date(at).toISOString().replace("T", " ").slice(0, 19);
+}
+
+/** @param {number | string | null | undefined} at */
+export function utcLabelled(at) {
+  return at == null ? "" : `${utc(at)} UTC`;
+}
+
+/**
+ * @param {number | null | undefined} value
+ * @param {number} [digits]
+ */
+export function number(value, digits = 1) {
+  if (value == null || !Number.isFinite(value)) return "–";
+  const text = value.toFixed(digits);
+  return digits > 0 ? text.replace(/\.?0+$/, "") : text;
+}
+
+/** @param {number | null | undefined} fraction */
+export function percent(fraction) {
+  return fraction == null ? "–" : `${(fraction * 100).toFixed(1)}%`;
+}
+
+/** @param {number | null | undefined} seconds */
+export function duration(seconds) {
+  if (seconds == null || !Number.isFinite(seconds)) return "–";
+  if (seconds < 10) return `${seconds.toFixed(2)} s`;
+  if (seconds < 120) return `${seconds.toFixed(0)} s`;
+  const minutes = Math.floor(seconds / 60);
+  if (minutes < 120) return `${minutes} min ${Math.round(seconds - minutes * 60)} s`;
+  return `${Math.floor(minutes / 60)} h ${minutes % 60} min`;
+}
+
+/**
+ * Seconds between two instants; to now where the later one is missing.
+ * @param {string | null} from
+ * @param {string | null} to
+ */
+export function secondsBetween(from, to) {
+  if (from === null) return null;
+  return ((to === null ? Date.now() : Date.parse(to)) - Date.parse(from)) / 1000;
+}
+
+/**
+ * Reward against bound, as the timeline defines the gap.
+ * @param {number | null | undefined} reward
+ * @param {number | null | undefined} bound
+ */
+export function gapOf(reward, bound) {
+  if (reward == null || bound == null) return null;
+  return bound > 0 ? Math.max(0, (bound - reward) / bound) : 0;
+}
+
+/** A name for an id that has none: its last, random part. @param {string} id */
+export function short(id) {
+  return id.slice(-8);
+}
+
+/**
+ * @param {number} count
+ * @param {string} noun in the singular
+ */
+export function counted(count, noun) {
+  return `${count} ${noun}${count === 1 ? "" : "s"}`;
+}

@@ -1,0 +1,383 @@
+// @ts-check
+/** The map: land, stations with their circles, tracks, targets by outcome. Plate carree. */
+
+import { Canvas } from "./canvas.js";
+import { h } from "./dom.js";
+import { utcLabelled } from "./format.js";
+import { firstAbove } from "./plan.js";
+import { positionAt } from "./geography.js";
+
+/** @typedef {import("./geography.js").Geography} Geography */
+/** @typedef {import("./geography.js").Place} Place */
+/** @typedef {import("./canvas.js").Colors} Colors */
+
+/** @typedef {CanvasRenderingContext2D | OffscreenCanvasRenderingContext2D} Pen */
+
+const REACH_PX = 8;
+const TRACK_MS = 50 * 60_000;
+const OUTCOMES = ["excluded", "unscheduled", "collected", "downlinked"];
+
+export class WorldMap {
+  /**
+   * @param {HTMLElement} host
+   * @param {Geography} geography
+   * @param {number[][]} land
+   * @param {import("./plan.js").Plan} plan
+   * @param {import("./time_view.js").TimeView} view
+   * @param {import("./selection.js").Selection} selection
+   */
+  constructor(host, geography, land, plan, view, selection) {
+    this.geography = geography;
+    this.land = land;
+    this.plan = plan;
+    this.view = view;
+    this.selection = selection;
+    this.zoom = 1;
+    this.center = { lon: 0, lat: 0 };
+    /** @type {{told: string, picture: OffscreenCanvas} | null} */
+    this.drawnGround = null;
+    this.byOutcome = new Map(
+      OUTCOMES.map((name) => [name, geography.targets.filter((target) => target.outcome === name)]),
+    );
+    const label =
+      "Map of targets by outcome, ground tracks around the chosen time, and stations with the " +
+      "circles in which they see a satellite. The table of targets holds the same data.";
+    this.canvas = new Canvas(host, label, (pen, width, height, colors) => this.draw(pen, width, height, colors));
+    this.tip = h("div", { class: "tip", hidden: true });
+    host.append(this.tip);
+    view.onChange(() => this.canvas.redraw());
+    selection.onChange(() => this.canvas.redraw());
+    this.takeInput();
+  }
+
+  /** The instant that satellites are shown at: of the selection, else now, else the view's. */
+  cursor() {
+    const action = this.plan.actions.get(this.selection.now.actionId ?? "");
+    if (action) return (Date.parse(action.start) + Date.parse(action.end)) / 2;
+    const now = Date.now();
+    if (now >= this.view.start && now <= this.view.end) return now;
+    return (this.view.start + this.view.end) / 2;
+  }
+
+  scale() {
+    return (this.canvas.element.clientWidth / 360) * this.zoom;
+  }
+
+  /**
+   * @param {number} lon
+   * @param {number} lat
+   * @returns {[number, number]}
+   */
+  xy(lon, lat) {
+    const { clientWidth: width, clientHeight: height } = this.canvas.element;
+    const scale = this.scale();
+    return [width / 2 + (lon - this.center.lon) * scale, height / 2 - (lat - this.center.lat) * scale];
+  }
+
+  /**
+   * @param {CanvasRenderingContext2D} pen
+   * @param {number} width
+   * @param {number} height
+   * @param {Colors} colors
+   */
+  draw(pen, width, height, colors) {
+    pen.drawImage(this.ground(width, height, colors), 0, 0, width, height);
+    const t = this.cursor();
+    for (const track of this.geography.tracks) this.drawTrack(pen, track, t, colors);
+    this.drawSelected(pen, colors);
+    pen.fillStyle = colors.ink ?? "";
+    pen.fillText(`Satellites at ${utcLabelled(t)}`, 8, height - 10);
+  }
+
+  /**
+   * Return the picture of all that time and selection do not change, drawn once a zoom.
+   * @param {number} width
+   * @param {number} height
+   * @param {Colors} colors
+   */
+  ground(width, height, colors) {
+    const { lon, lat } = this.center;
+    const told = [width, height, devicePixelRatio, this.zoom, lon, lat, colors.sea].join();
+    if (this.drawnGround?.told === told) return this.drawnGround.picture;
+    const picture = new OffscreenCanvas(width * devicePixelRatio, height * devicePixelRatio);
+    const pen = /** @type {OffscreenCanvasRenderingContext2D} */ (picture.getContext("2d"));
+    pen.scale(devicePixelRatio, devicePixelRatio);
+    pen.font = this.canvas.pen.font;
+    pen.fillStyle = colors.sea ?? "";
+    pen.fillRect(0, 0, width, height);
+    this.drawLand(pen, colors);
+    this.drawCircles(pen, colors);
+    const size = Math.min(2.2 + this.zoom / 2, 5);
+    for (const outcome of OUTCOMES) {
+      for (const target of this.byOutcome.get(outcome) ?? []) this.drawTarget(pen, target, size, colors);
+    }
+    for (const station of this.geography.stations) this.drawStation(pen, station, colors);
+    this.drawnGround = { told, picture };
+    return picture;
+  }
+
+  /**
+   * @param {Pen} pen
+   * @param {Colors} colors
+   */
+  drawLand(pen, colors) {
+    pen.beginPath();
+    for (const ring of this.land) {
+      for (let i = 0; i < ring.length; i += 2) {
+        const [x, y] = this.xy(/** @type {number} */ (ring[i]), /** @type {number} */ (ring[i + 1]));
+        if (i === 0) pen.moveTo(x, y);
+        else pen.lineTo(x, y);
+      }
+      pen.closePath();
+    }
+    pen.fillStyle = colors.land ?? "";
+    pen.fill("evenodd");
+    pen.strokeStyle = colors.line ?? "";
+    pen.lineWidth = 0.5;
+    pen.beginPath();
+    for (let lon = -180; lon <= 180; lon += 30) {
+      pen.moveTo(...this.xy(lon, -90));
+      pen.lineTo(...this.xy(lon, 90));
+    }
+    for (let lat = -90; lat <= 90; lat += 30) {
+      pen.moveTo(...this.xy(-180, lat));
+      pen.lineTo(...this.xy(180, lat));
+    }
+    pen.stroke();
+  }
+
+  /**
+   * @param {Pen} pen
+   * @param {Colors} colors
+   */
+  drawCircles(pen, colors) {
+    pen.strokeStyle = colors.contact ?? "";
+    pen.lineWidth = 1;
+    pen.setLineDash([3, 3]);
+    for (const { rings } of this.geography.circles) {
+      for (const ring of rings) {
+        pen.beginPath();
+        ring.forEach(([lon, lat], i) => (i === 0 ? pen.moveTo(...this.xy(lon, lat)) : pen.lineTo(...this.xy(lon, lat))));
+        pen.stroke();
+      }
+    }
+    pen.setLineDash([]);
+  }
+
+  /**
+   * @param {CanvasRenderingContext2D} pen
+   * @param {import("./geography.js").Track} track
+   * @param {number} t
+   * @param {Colors} colors
+   */
+  drawTrack(pen, track, t, colors) {
+    const isChosen = track.satelliteId === this.selection.now.satelliteId;
+    pen.strokeStyle = (isChosen ? colors.chosen : colors.soft) ?? "";
+    pen.lineWidth = isChosen ? 2 : 1;
+    pen.beginPath();
+    for (const { time, lon, lat } of track.pieces) {
+      const first = Math.max(firstAbove(time, t - TRACK_MS) - 1, 0);
+      for (let i = first; i < time.length && /** @type {number} */ (time[i]) <= t + TRACK_MS; i++) {
+        const [x, y] = this.xy(/** @type {number} */ (lon[i]), /** @type {number} */ (lat[i]));
+        if (i === first) pen.moveTo(x, y);
+        else pen.lineTo(x, y);
+      }
+    }
+    pen.stroke();
+    const at = positionAt(track, t);
+    if (at === null) return;
+    const [x, y] = this.xy(at.lon, at.lat);
+    pen.fillStyle = (isChosen ? colors.chosen : colors.ink) ?? "";
+    pen.beginPath();
+    pen.arc(x, y, 4, 0, 2 * Math.PI);
+    pen.fill();
+    pen.fillText(track.name, x + 7, y);
+  }
+
+  /**
+   * Shapes differ as well as colours: disc, square, ring, cross.
+   * @param {Pen} pen
+   * @param {Place} target
+   * @param {number} size
+   * @param {Colors} colors
+   */
+  drawTarget(pen, target, size, colors) {
+    const [x, y] = this.xy(target.lon, target.lat);
+    const { clientWidth: width, clientHeight: height } = this.canvas.element;
+    if (x < -9 || y < -9 || x > width + 9 || y > height + 9) return;
+    const color = colors[target.outcome] ?? "";
+    pen.fillStyle = color;
+    pen.strokeStyle = color;
+    pen.lineWidth = 1.2;
+    pen.beginPath();
+    if (target.outcome === "collected") {
+      pen.fillRect(x - size * 0.9, y - size * 0.9, size * 1.8, size * 1.8);
+    } else if (target.outcome === "excluded") {
+      pen.moveTo(x - size, y - size);
+      pen.lineTo(x + size, y + size);
+      pen.moveTo(x - size, y + size);
+      pen.lineTo(x + size, y - size);
+      pen.stroke();
+    } else {
+      pen.arc(x, y, size, 0, 2 * Math.PI);
+      if (target.outcome === "downlinked") pen.fill();
+      else pen.stroke();
+    }
+  }
+
+  /**
+   * @param {Pen} pen
+   * @param {Place} station
+   * @param {Colors} colors
+   */
+  drawStation(pen, station, colors) {
+    const [x, y] = this.xy(station.lon, station.lat);
+    pen.fillStyle = colors.contact ?? "";
+    pen.beginPath();
+    pen.moveTo(x, y - 6);
+    pen.lineTo(x + 5.5, y + 4);
+    pen.lineTo(x - 5.5, y + 4);
+    pen.fill();
+    pen.fillStyle = colors.ink ?? "";
+    pen.fillText(station.name, x + 8, y + 1);
+  }
+
+  /**
+   * @param {CanvasRenderingContext2D} pen
+   * @param {Colors} colors
+   */
+  drawSelected(pen, colors) {
+    const { targetId, actionId } = this.selection.now;
+    const stationId = this.plan.actions.get(actionId ?? "")?.station_id ?? null;
+    const chosen =
+      this.geography.targets.find((place) => place.id === targetId) ??
+      this.geography.stations.find((place) => place.id === stationId);
+    if (!chosen) return;
+    const [x, y] = this.xy(chosen.lon, chosen.lat);
+    pen.strokeStyle = colors.chosen ?? "";
+    pen.fillStyle = colors.ink ?? "";
+    pen.lineWidth = 3;
+    pen.beginPath();
+    pen.arc(x, y, 10, 0, 2 * Math.PI);
+    pen.stroke();
+    pen.fillText(chosen.name, x + 14, y - 8);
+  }
+
+  /**
+   * @param {number} x
+   * @param {number} y
+   * @returns {Place | null}
+   */
+  targetAt(x, y) {
+    let best = null;
+    let least = REACH_PX;
+    for (const target of this.geography.targets) {
+      const [tx, ty] = this.xy(target.lon, target.lat);
+      const away = Math.hypot(tx - x, ty - y);
+      if (away < least) [best, least] = [target, away];
+    }
+    return best;
+  }
+
+  /**
+   * @param {number} factor
+   * @param {number} [x] the point that stays where it is
+   * @param {number} [y]
+   */
+  zoomBy(factor, x = this.canvas.element.clientWidth / 2, y = this.canvas.element.clientHeight / 2) {
+    const { clientWidth: width, clientHeight: height } = this.canvas.element;
+    const before = this.scale();
+    this.zoom = Math.min(Math.max(this.zoom * factor, 1), 40);
+    const shrink = 1 / before - 1 / this.scale();
+    this.center.lon += (x - width / 2) * shrink;
+    this.center.lat -= (y - height / 2) * shrink;
+    this.keepInside();
+  }
+
+  keepInside() {
+    const half = 180 / this.zoom;
+    this.center.lon = Math.min(Math.max(this.center.lon, half - 180), 180 - half);
+    this.center.lat = Math.min(Math.max(this.center.lat, half / 2 - 90), 90 - half / 2);
+    this.canvas.redraw();
+  }
+
+  takeInput() {
+    const { element } = this.canvas;
+    /** @type {{x: number, y: number, hasMoved: boolean} | null} */
+    let grip = null;
+    element.addEventListener("pointerdown", (event) => {
+      grip = { x: event.offsetX, y: event.offsetY, hasMoved: false };
+      element.setPointerCapture(event.pointerId);
+    });
+    element.addEventListener("pointermove", (event) => {
+      if (grip === null) {
+        this.hover(event.offsetX, event.offsetY);
+        return;
+      }
+      const [dx, dy] = [event.offsetX - grip.x, event.offsetY - grip.y];
+      if (!grip.hasMoved && Math.hypot(dx, dy) < 4) return;
+      grip = { x: event.offsetX, y: event.offsetY, hasMoved: true };
+      this.center.lon -= dx / this.scale();
+      this.center.lat += dy / this.scale();
+      this.keepInside();
+    });
+    element.addEventListener("pointerup", (event) => {
+      if (grip && !grip.hasMoved) this.click(event.offsetX, event.offsetY);
+      grip = null;
+    });
+    element.addEventListener("pointerleave", () => {
+      this.tip.hidden = true;
+    });
+    element.addEventListener("dblclick", (event) => this.zoomBy(2, event.offsetX, event.offsetY));
+    element.addEventListener(
+      "wheel",
+      (event) => {
+        if (!event.ctrlKey && !event.metaKey) return; // the page scrolls
+        event.preventDefault();
+        this.zoomBy(2 ** (-event.deltaY / 200), event.offsetX, event.offsetY);
+      },
+      { passive: false },
+    );
+    element.addEventListener("keydown", (event) => this.key(event));
+  }
+
+  /** @param {KeyboardEvent} event */
+  key(event) {
+    const step = 30 / this.zoom;
+    const moves = /** @type {Record<string, () => void>} */ ({
+      ArrowLeft: () => (this.center.lon -= step),
+      ArrowRight: () => (this.center.lon += step),
+      ArrowUp: () => (this.center.lat += step),
+      ArrowDown: () => (this.center.lat -= step),
+      "+": () => this.zoomBy(1.5),
+      "-": () => this.zoomBy(1 / 1.5),
+    });
+    const move = moves[event.key];
+    if (!move) return;
+    event.preventDefault();
+    move();
+    this.keepInside();
+  }
+
+  /**
+   * @param {number} x
+   * @param {number} y
+   */
+  hover(x, y) {
+    const target = this.targetAt(x, y);
+    this.tip.hidden = target === null;
+    this.tip.textContent = target && `${target.id}: ${target.outcome}`;
+    this.tip.style.left = `${Math.min(x + 12, this.canvas.element.clientWidth - 200)}px`;
+    this.tip.style.top = `${y + 14}px`;
+  }
+
+  /**
+   * @param {number} x
+   * @param {number} y
+   */
+  click(x, y) {
+    const target = this.targetAt(x, y);
+    if (target) this.selection.select(this.plan.aboutTarget(target.id));
+    else this.selection.clear();
+  }
+}

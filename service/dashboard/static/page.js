@@ -1,0 +1,97 @@
+// @ts-check
+/** What every page does: key, clock, state of the service, errors that nobody caught. */
+
+import { get, Problem } from "./api.js";
+import { byId, fill, h, notice } from "./dom.js";
+import { counted, utcLabelled } from "./format.js";
+import { adoptKeyFromLink, installKeyDialog, showCaller } from "./key.js";
+
+const ASK_HEALTH_MS = 15_000;
+
+/**
+ * Start a page; what it fails with is shown.
+ * @param {() => Promise<void>} show
+ */
+export async function startPage(show) {
+  installKeyDialog();
+  const cameByLink = adoptKeyFromLink();
+  addEventListener("unhandledrejection", (event) => {
+    event.preventDefault();
+    showError(event.reason);
+  });
+  tick();
+  setInterval(tick, 1000);
+  try {
+    showCaller(await get("/v1/me"), cameByLink);
+    watchHealth();
+    await show();
+  } catch (error) {
+    showError(error);
+  }
+}
+
+function tick() {
+  const clock = byId("clock");
+  clock.textContent = utcLabelled(Date.now());
+  clock.setAttribute("datetime", new Date().toISOString());
+}
+
+async function watchHealth() {
+  const status = byId("service-status");
+  for (;;) {
+    const text = await get("/health/ready").then(
+      (/** @type {{workers: number}} */ ready) => `Service: ready, ${counted(ready.workers, "worker")}`,
+      (error) => (error instanceof Problem ? `Service: ${error.message}` : "Service: no answer"),
+    );
+    status.textContent = text;
+    status.classList.toggle("bad", !text.includes("ready,"));
+    await new Promise((resolve) => setTimeout(resolve, ASK_HEALTH_MS));
+  }
+}
+
+/** @param {unknown} error */
+export function showError(error) {
+  notice("bad", ...describe(error));
+}
+
+/**
+ * Return an error as elements: what is wrong, and where in the file or form.
+ * @param {unknown} error
+ * @returns {(HTMLElement | string)[]}
+ */
+export function describe(error) {
+  if (!(error instanceof Problem)) {
+    return [error instanceof Error ? error.message : String(error)];
+  }
+  const parts = [h("strong", {}, error.message)];
+  const faults = error.errors.filter((fault) => fault.detail !== error.message || fault.row);
+  if (faults.length > 0) {
+    const shown = faults.slice(0, 20).map((fault) => {
+      const place = fault.row ? `Line ${fault.row}: ` : fault.pointer ? `${fault.pointer}: ` : "";
+      return h("li", {}, place + fault.detail);
+    });
+    if (faults.length > 20) shown.push(h("li", {}, `and ${faults.length - 20} more`));
+    parts.push(h("ul", {}, ...shown));
+  }
+  const why = h("a", { href: `/problems/${error.code}` }, error.code);
+  parts.push(h("small", {}, "Code ", why, `, request ${error.requestId}`));
+  return parts;
+}
+
+/**
+ * Do what a button asks for; the button waits, and the form shows what went wrong.
+ * @param {HTMLButtonElement} button
+ * @param {HTMLElement} place where errors are told
+ * @param {() => Promise<void>} work
+ */
+export async function whileBusy(button, place, work) {
+  button.disabled = true;
+  fill(place);
+  try {
+    await work();
+  } catch (error) {
+    fill(place, h("div", { class: "notice bad", role: "alert" }, h("div", {}, ...describe(error))));
+  } finally {
+    button.disabled = false;
+  }
+}

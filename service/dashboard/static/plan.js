@@ -1,0 +1,194 @@
+// @ts-check
+/** A timeline made ready for drawing: times as numbers, actions by lane and in order. */
+
+/** @typedef {import("./types.js").Timeline} Timeline */
+/** @typedef {import("./types.js").Action} Action */
+/** @typedef {import("./types.js").TargetItem} TargetItem */
+
+/**
+ * Spans in order of time.
+ * @template T
+ */
+export class Lane {
+  /** @param {{start: number, end: number, of: T}[]} spans */
+  constructor(spans) {
+    spans.sort((a, b) => a.start - b.start);
+    this.start = Float64Array.from(spans, (span) => span.start);
+    this.end = Float64Array.from(spans, (span) => span.end);
+    this.of = spans.map((span) => span.of);
+    // Spans of a broken plan may overlap: ends are searched in a form that only rises.
+    this.lastEnd = Float64Array.from(this.end);
+    for (let i = 1; i < this.lastEnd.length; i++) {
+      this.lastEnd[i] = Math.max(/** @type {number} */ (this.lastEnd[i]), /** @type {number} */ (this.lastEnd[i - 1]));
+    }
+  }
+
+  /**
+   * Return the index of the first span that may reach past an instant.
+   * @param {number} t
+   */
+  firstPast(t) {
+    return firstAbove(this.lastEnd, t);
+  }
+
+  /**
+   * Return what lies at an instant, or nearest to it within a reach.
+   * @param {number} t
+   * @param {number} reach
+   * @returns {T | null}
+   */
+  nearest(t, reach) {
+    let best = null;
+    let least = reach;
+    for (let i = this.firstPast(t - reach); i < this.start.length; i++) {
+      const start = /** @type {number} */ (this.start[i]);
+      if (start > t + reach) break;
+      const away = Math.max(start - t, t - /** @type {number} */ (this.end[i]), 0);
+      if (away <= least && (best === null || away < least)) {
+        least = away;
+        best = /** @type {T} */ (this.of[i]);
+      }
+    }
+    return best;
+  }
+}
+
+/**
+ * Index of the first value above a limit, in an ascending array.
+ * @param {ArrayLike<number>} values
+ * @param {number} limit
+ */
+export function firstAbove(values, limit) {
+  let low = 0;
+  let high = values.length;
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (/** @type {number} */ (values[middle]) > limit) high = middle;
+    else low = middle + 1;
+  }
+  return low;
+}
+
+/**
+ * @typedef {object} Row
+ * @property {string} id
+ * @property {string} name
+ * @property {Lane<Action>} collects
+ * @property {Lane<Action>} contacts
+ * @property {Lane<Action>} sunpoints
+ * @property {Lane<Action>} slews
+ * @property {Lane<null>} eclipses
+ * @property {Curves | null} curves
+ */
+
+/**
+ * @typedef {object} Curves
+ * @property {Float64Array} time
+ * @property {number[]} battery
+ * @property {number[]} recorder
+ * @property {number} batteryMin
+ * @property {number} recorderMax
+ */
+
+/** A judged plan and its targets. */
+export class Plan {
+  /**
+   * @param {Timeline} timeline
+   * @param {TargetItem[]} targets
+   */
+  constructor(timeline, targets) {
+    this.timeline = timeline;
+    this.start = Date.parse(timeline.horizon.start);
+    this.end = Date.parse(timeline.horizon.end);
+    /** @type {Map<string, Action>} */
+    this.actions = new Map();
+    /** @type {Map<string, string>} */
+    this.satelliteOf = new Map();
+    /** @type {Map<string, string[]>} */
+    this.actionsOf = new Map();
+    this.targets = targets;
+    this.target = new Map(targets.map((item) => [item.target_id, item]));
+    this.rows = timeline.satellites.map((satellite) => this.row(satellite));
+  }
+
+  /**
+   * @param {import("./types.js").TimelineSatellite} satellite
+   * @returns {Row}
+   */
+  row(satellite) {
+    for (const action of satellite.actions) {
+      this.actions.set(action.id, action);
+      this.satelliteOf.set(action.id, satellite.id);
+      if (action.target_id !== null) {
+        const known = this.actionsOf.get(action.target_id) ?? [];
+        this.actionsOf.set(action.target_id, [...known, action.id]);
+      }
+    }
+    const lane = (/** @type {string} */ mode) =>
+      new Lane(satellite.actions.filter((action) => action.mode === mode).map(spanOf));
+    const turning = satellite.actions.filter((action) => action.slew && action.slew.needed_s > 0);
+    return {
+      id: satellite.id,
+      name: satellite.name,
+      collects: lane("collect"),
+      contacts: lane("contact"),
+      sunpoints: lane("sunpoint"),
+      slews: new Lane(turning.map(slewOf)),
+      eclipses: new Lane(
+        (satellite.eclipses ?? []).map(({ start, end }) => ({ start: Date.parse(start), end: Date.parse(end), of: null })),
+      ),
+      curves: curvesOf(satellite.resources),
+    };
+  }
+
+  /**
+   * Return what a selection is about: the action, its target, its satellite.
+   * @param {string} actionId
+   */
+  about(actionId) {
+    const action = this.actions.get(actionId);
+    return {
+      actionId,
+      targetId: action?.target_id ?? null,
+      satelliteId: this.satelliteOf.get(actionId) ?? null,
+    };
+  }
+
+  /** @param {string} targetId */
+  aboutTarget(targetId) {
+    const item = this.target.get(targetId);
+    const actionId = item?.action_id ?? this.actionsOf.get(targetId)?.[0] ?? null;
+    return { actionId, targetId, satelliteId: item?.satellite_id ?? null };
+  }
+
+  /** @param {string} id */
+  satelliteName(id) {
+    return this.rows.find((row) => row.id === id)?.name ?? id;
+  }
+}
+
+/** @param {Action} action */
+export function spanOf(action) {
+  return { start: Date.parse(action.start), end: Date.parse(action.end), of: action };
+}
+
+/** The turn is shown as late as it can be. @param {Action} action */
+function slewOf(action) {
+  const end = Date.parse(action.start);
+  return { start: end - (action.slew?.needed_s ?? 0) * 1000, end, of: action };
+}
+
+/**
+ * @param {import("./types.js").ResourceCurves | null} resources
+ * @returns {Curves | null}
+ */
+function curvesOf(resources) {
+  if (resources === null) return null;
+  return {
+    time: Float64Array.from(resources.time, (at) => Date.parse(at)),
+    battery: resources.battery_fraction,
+    recorder: resources.recorder_fraction,
+    batteryMin: resources.battery_min_fraction,
+    recorderMax: resources.recorder_max_fraction,
+  };
+}

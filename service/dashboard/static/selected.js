@@ -1,0 +1,120 @@
+// @ts-check
+/** All there is to say about what is selected. */
+
+import { byId, fill, h } from "./dom.js";
+import { number, percent, utc, utcLabelled } from "./format.js";
+import { blockersOf, changeOf } from "./left_out.js";
+import { lanesOf, opportunitiesOf } from "./opportunities.js";
+import { showError } from "./page.js";
+
+/** @typedef {import("./types.js").OpportunityOut} OpportunityOut */
+
+/**
+ * @param {import("./plan.js").Plan} plan
+ * @param {import("./selection.js").Selection} selection
+ * @param {string} scenarioId
+ * @param {import("./gantt.js").Gantt} gantt
+ */
+export function watchSelection(plan, selection, scenarioId, gantt) {
+  let asked = 0;
+  selection.onChange(({ actionId, targetId, satelliteId }) => {
+    asked += 1;
+    const action = plan.actions.get(actionId ?? "");
+    const item = plan.target.get(targetId ?? "");
+    gantt.blocking = new Set(item?.reason?.blocking_actions ?? []);
+    gantt.ofTarget = new Map();
+    if (!action && !item) {
+      fill(byId("selected"), h("p", { class: "hint" }, "Nothing selected."));
+      return;
+    }
+    const facts = [...(item ? targetFacts(plan, selection, item) : []), ...(action ? actionFacts(plan, action, satelliteId) : [])];
+    const list = h("dl", { class: "facts" }, ...facts.flatMap(([name, value]) => [h("dt", {}, name), h("dd", {}, value)]));
+    const place = h("div", {});
+    fill(byId("selected"), list, place);
+    if (item) {
+      const mine = asked;
+      opportunitiesOf(scenarioId, { target_id: item.target_id })
+        .then(({ items }) => {
+          if (mine !== asked) return;
+          gantt.ofTarget = lanesOf(items);
+          gantt.canvas.redraw();
+          tellOpportunities(plan, item.target_id, items, place);
+        })
+        .catch(showError);
+    }
+    if (action) gantt.view.reveal(Date.parse(action.start), Date.parse(action.end));
+  });
+}
+
+/**
+ * @param {import("./plan.js").Plan} plan
+ * @param {import("./selection.js").Selection} selection
+ * @param {import("./types.js").TargetItem} item
+ * @returns {[string, import("./dom.js").Child][]}
+ */
+function targetFacts(plan, selection, item) {
+  /** @type {[string, import("./dom.js").Child][]} */
+  const facts = [["Target", h("strong", { id: "selected-target" }, item.target_id)], ["Outcome", item.outcome]];
+  const { reason } = item;
+  if (reason === null) return facts;
+  facts.push(["Reason", `${reason.code.replaceAll("_", " ")} (${reason.certainty})`], ["Why", reason.detail]);
+  if (reason.at !== null) facts.push(["At", utcLabelled(reason.at)]);
+  if (reason.blocking_actions.length > 0) facts.push(["Blocked by", blockersOf(plan, selection, reason)]);
+  if (reason.change !== null) facts.push(["Would be in with", changeOf(plan, reason.change)]);
+  return facts;
+}
+
+/**
+ * @param {import("./plan.js").Plan} plan
+ * @param {import("./types.js").Action} action
+ * @param {string | null} satelliteId
+ * @returns {[string, import("./dom.js").Child][]}
+ */
+function actionFacts(plan, action, satelliteId) {
+  const { slew } = action;
+  return [
+    ["Action", h("strong", { id: "selected-action" }, `${action.id}, ${action.mode}`)],
+    ["Satellite", satelliteId && plan.satelliteName(satelliteId)],
+    ...(action.station_id ? [/** @type {[string, string]} */ (["Station", action.station_id])] : []),
+    ["Start", utcLabelled(action.start)],
+    ["End", utcLabelled(action.end)],
+    ["Pointing", action.off_nadir_deg === null ? "at the sun" : `${number(action.off_nadir_deg)}° off nadir, azimuth ${number(action.azimuth_deg)}°`],
+    ["Slew before it", slew ? `${number(slew.angle_deg)}°: ${number(slew.needed_s)} s needed, ${number(slew.available_s)} s available` : "none"],
+    ["Reward", number(action.reward)],
+    ["Battery after it", percent(action.battery_fraction_end)],
+    ["Recorder after it", percent(action.recorder_fraction_end)],
+  ];
+}
+
+/**
+ * @param {import("./plan.js").Plan} plan
+ * @param {string} targetId
+ * @param {OpportunityOut[]} items
+ * @param {HTMLElement} place
+ */
+function tellOpportunities(plan, targetId, items, place) {
+  const used = new Set((plan.actionsOf.get(targetId) ?? []).map((id) => plan.actions.get(id)?.opportunity_id));
+  const rows = items.slice(0, 100).map((one) =>
+    h(
+      "tr",
+      { class: used.has(one.id) ? "marked" : "" },
+      h("td", {}, used.has(one.id) ? "taken" : "unused"),
+      h("td", {}, plan.satelliteName(one.satellite_id)),
+      h("td", {}, utc(one.start)),
+      h("td", {}, utc(one.end)),
+      h("td", { class: "number" }, number(one.off_nadir_deg)),
+      h("td", { class: "number" }, number(one.sun_elevation_deg)),
+      h("td", {}, one.eclipse ? "eclipse" : ""),
+    ),
+  );
+  const heads = ["", "Satellite", "Start (UTC)", "End (UTC)", "Off nadir, °", "Sun, °", "Light"];
+  const caption = `Opportunities of ${targetId}: ${items.length}${items.length > 100 ? ", the first 100" : ""}`;
+  fill(
+    place,
+    h(
+      "div",
+      { class: "scroll", tabindex: 0, role: "region", "aria-label": caption },
+      h("table", {}, h("caption", {}, caption), h("thead", {}, h("tr", {}, ...heads.map((text) => h("th", { scope: "col" }, text)))), h("tbody", {}, ...rows)),
+    ),
+  );
+}

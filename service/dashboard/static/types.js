@@ -1,0 +1,273 @@
+// @ts-check
+/**
+ * Shapes of the API's answers, as far as the pages use them. A test holds each of them against
+ * the OpenAPI document or a real timeline: names of types and properties must be the service's.
+ */
+
+/**
+ * @typedef {object} CallerOut
+ * @property {string} owner
+ * @property {"read" | "submit" | "admin"} scope
+ * @property {string | null} key_id
+ * @property {string | null} key_name
+ */
+
+/**
+ * @typedef {object} ProgressOut
+ * @property {string} phase
+ * @property {number} fraction
+ * @property {number | null} reward
+ * @property {number | null} bound
+ * @property {string} message
+ */
+
+/**
+ * @typedef {object} ScenarioRef
+ * @property {string} id
+ * @property {string} sha256
+ */
+
+/**
+ * @typedef {object} ErrorOut
+ * @property {string} code
+ * @property {string} detail
+ */
+
+/**
+ * @typedef {object} JobOut
+ * @property {string} id
+ * @property {string} state
+ * @property {ScenarioRef} scenario
+ * @property {string} solver
+ * @property {Record<string, unknown>} params
+ * @property {number} seed
+ * @property {number} attempt
+ * @property {string | null} label
+ * @property {ProgressOut | null} progress
+ * @property {string} created_at
+ * @property {string | null} started_at
+ * @property {string | null} finished_at
+ * @property {string | null} termination
+ * @property {ErrorOut | null} error
+ */
+
+/**
+ * @typedef {object} HorizonOut
+ * @property {string} start
+ * @property {string} end
+ */
+
+/**
+ * @typedef {object} Counts
+ * @property {number} satellites
+ * @property {number} targets
+ * @property {number} ground_stations
+ */
+
+/**
+ * @typedef {object} ScenarioOut
+ * @property {string} id
+ * @property {string | null} name
+ * @property {HorizonOut} horizon
+ * @property {Counts} counts
+ * @property {string[]} warnings
+ */
+
+/**
+ * @typedef {object} SatelliteOut
+ * @property {string} id
+ * @property {string} name
+ * @property {number} norad_cat_id
+ * @property {string} epoch
+ * @property {string} created_at
+ */
+
+/**
+ * @typedef {object} GroundStationOut
+ * @property {string} id
+ * @property {string} name
+ * @property {number} lat_deg
+ * @property {number} lon_deg
+ * @property {number} min_elevation_deg
+ */
+
+/**
+ * @typedef {object} TargetCatalogOut
+ * @property {string} id
+ * @property {string} name
+ * @property {number} num_targets
+ * @property {string} created_at
+ */
+
+/**
+ * @typedef {object} SolverOut
+ * @property {string} name
+ * @property {string} title
+ * @property {string} paper
+ * @property {string} kind
+ * @property {string[]} honours
+ * @property {Schema} params_schema
+ */
+
+/**
+ * @typedef {object} ComparedRun
+ * @property {string} job_id
+ * @property {string} state
+ * @property {string} solver
+ * @property {ProgressOut | null} progress
+ * @property {number | null} reward
+ * @property {number | null} bound
+ * @property {number | null} gap
+ * @property {number | null} collects
+ * @property {number | null} contacts
+ * @property {number | null} downlinked_mbit
+ * @property {number | null} downlinked_fraction
+ * @property {number | null} solve_s
+ * @property {number | null} runtime_s
+ * @property {string | null} validity
+ * @property {ErrorOut | null} error
+ */
+
+/**
+ * @typedef {object} ComparisonOut
+ * @property {string} id
+ * @property {string} state
+ * @property {ScenarioRef} scenario
+ * @property {string | null} label
+ * @property {string} created_at
+ * @property {ComparedRun[]} runs
+ */
+
+/**
+ * @typedef {object} OpportunityOut
+ * @property {string} id
+ * @property {string} satellite_id
+ * @property {string} kind
+ * @property {string | null} target_id
+ * @property {string | null} station_id
+ * @property {string} start
+ * @property {string} end
+ * @property {number} off_nadir_deg
+ * @property {number} elevation_deg
+ * @property {number} sun_elevation_deg
+ * @property {boolean} eclipse
+ */
+
+/**
+ * @typedef {object} TargetItem
+ * @property {string} target_id
+ * @property {string} outcome
+ * @property {string | null} action_id
+ * @property {string | null} satellite_id
+ * @property {Reason | null} reason
+ */
+
+/**
+ * A reason of `TargetItem`; `change` has further fields by its kind.
+ * @typedef {object} Reason
+ * @property {string} code
+ * @property {string} certainty
+ * @property {string[]} blocking_actions
+ * @property {string | null} opportunity_id
+ * @property {string | null} at
+ * @property {Record<string, unknown> | null} change
+ * @property {string} detail
+ */
+
+/**
+ * @typedef {object} Slew
+ * @property {number} angle_deg
+ * @property {number} needed_s
+ * @property {number} available_s
+ */
+
+/**
+ * @typedef {object} Action
+ * @property {string} id
+ * @property {"collect" | "contact" | "sunpoint"} mode
+ * @property {string} start
+ * @property {string} end
+ * @property {string | null} target_id
+ * @property {string | null} station_id
+ * @property {string | null} opportunity_id
+ * @property {number | null} off_nadir_deg
+ * @property {number | null} azimuth_deg
+ * @property {Slew | null} slew
+ * @property {number} reward
+ * @property {number | null} battery_fraction_end
+ * @property {number | null} recorder_fraction_end
+ */
+
+/**
+ * @typedef {object} ResourceCurves
+ * @property {string[]} time
+ * @property {number[]} battery_fraction
+ * @property {number[]} recorder_fraction
+ * @property {number} battery_min_fraction
+ * @property {number} recorder_max_fraction
+ */
+
+/**
+ * @typedef {object} TimelineSatellite
+ * @property {string} id
+ * @property {string} name
+ * @property {Action[]} actions
+ * @property {{start: string, end: string}[]} eclipses
+ * @property {ResourceCurves | null} resources
+ */
+
+/**
+ * @typedef {object} Violation
+ * @property {string} code
+ * @property {string} satellite_id
+ * @property {string} at
+ * @property {number} needed
+ * @property {number} available
+ * @property {string[]} actions
+ * @property {string} detail
+ */
+
+/**
+ * @typedef {object} Totals
+ * @property {number} reward
+ * @property {number | null} bound
+ * @property {number | null} gap
+ * @property {string | null} bound_proof
+ * @property {number} collects
+ * @property {number} contacts
+ * @property {Record<string, number>} targets
+ * @property {number | null} downlinked_mbit
+ * @property {number | null} downlinked_fraction
+ * @property {number | null} battery_min_fraction
+ * @property {number | null} recorder_max_fraction
+ */
+
+/**
+ * @typedef {object} Timeline
+ * @property {string} plan_sha256
+ * @property {{start: string, end: string}} horizon
+ * @property {string} termination
+ * @property {Record<string, number>} runtime_s
+ * @property {string} validity
+ * @property {Violation[]} violations
+ * @property {Totals} totals
+ * @property {string[]} warnings
+ * @property {TimelineSatellite[]} satellites
+ */
+
+/**
+ * The part of JSON Schema in which the service describes parameters.
+ * @typedef {object} Schema
+ * @property {string | string[]} [type]
+ * @property {unknown[]} [enum]
+ * @property {unknown} [default]
+ * @property {number} [minimum]
+ * @property {number} [exclusiveMinimum]
+ * @property {number} [maximum]
+ * @property {string} [description]
+ * @property {Schema[]} [anyOf]
+ * @property {Record<string, Schema>} [properties]
+ * @property {string[]} [required]
+ */
+
+export {};

@@ -1,0 +1,57 @@
+"""Missions of the browser's tests, sent through the API."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import httpx
+
+from service import demo, demo_mission
+from tests.service.factories import post, satellite, tle
+
+Json = dict[str, Any]
+WITHIN_S = 300.0
+
+
+def small_mission(api: httpx.Client) -> str:
+    """Store the demonstration's mission; return the id of its scenario."""
+    return str(demo.create_mission(api)["id"])
+
+
+def large_mission(api: httpx.Client) -> str:
+    """Store twelve satellites, 2,000 targets and a week; return the id of the scenario."""
+    satellites = [
+        post(
+            api,
+            "/v1/satellites",
+            satellite(name=f"EYE-{i + 1}", tle=tle(90100 + i, raan_deg=30.0 * i)),
+        )
+        for i in range(12)
+    ]
+    stations = [post(api, "/v1/ground-stations", one) for one in demo_mission.GROUND_STATIONS]
+    catalog = api.post(
+        "/v1/target-catalogs?name=Two+thousand",
+        content=demo_mission.targets_csv(2000),
+        headers={"Content-Type": "text/csv"},
+    ).json()
+    scenario = {
+        "name": "Twelve for a week",
+        "horizon": {"start": "2026-03-01T00:00:00Z", "end": "2026-03-08T00:00:00Z"},
+        "satellite_ids": [one["id"] for one in satellites],
+        "target_catalog_ids": [catalog["id"]],
+        "ground_station_ids": [one["id"] for one in stations],
+    }
+    return str(post(api, "/v1/scenarios", scenario)["id"])
+
+
+def planned(api: httpx.Client, scenario_id: str, solver: str = "rule") -> Json:
+    """Plan a scenario; return the job when it has ended."""
+    body = {"scenario_id": scenario_id, "solver": solver, "limits": {"time_s": 60}}
+    job = post(api, "/v1/jobs", body)
+    deadline_s = time.monotonic() + WITHIN_S
+    while job["state"] in ("queued", "running"):
+        assert time.monotonic() < deadline_s, job
+        job = api.get(f"/v1/jobs/{job['id']}?wait=10").json()
+    assert job["state"] == "succeeded", job["error"]
+    return job

@@ -1,0 +1,112 @@
+"""Pictures of the real pages for README and docs: ``make screenshots``."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Final
+
+import httpx
+
+from tests.service.dashboard.browser.conftest import PATIENCE_S, Browser, start_chromium
+from tests.service.dashboard.browser.missions import Json, planned, small_mission
+from tests.service.factories import post
+from tests.service.serving import serving
+
+FOLDER: Final = Path(__file__).resolve().parents[4] / "docs" / "images"
+LARGEST_BYTES: Final = 300_000
+WIDTH: Final = 1400
+
+
+@contextmanager
+def opened(url: str) -> Iterator[Browser]:
+    """Yield a browser on a service."""
+    driver = start_chromium()
+    try:
+        yield Browser(driver=driver, url=url)
+    finally:
+        driver.quit()
+
+
+def colors(browser: Browser, scheme: str) -> None:
+    """Ask for light or dark."""
+    media = [{"name": "prefers-color-scheme", "value": scheme}]
+    browser.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": media})
+
+
+def take(browser: Browser, name: str, height: int, top: str = "header") -> None:
+    """Write a picture of the page from an element on."""
+    browser.driver.set_window_size(WIDTH, height)
+    browser.run(
+        "document.activeElement.blur(); document.querySelector(arguments[0])"
+        ".scrollIntoView({block: 'start'})",
+        top,
+    )
+    # Canvases are drawn anew at their new width.
+    browser.driver.execute_async_script("const [done] = arguments; setTimeout(done, 500);")
+    path = FOLDER / f"{name}.png"
+    browser.driver.save_screenshot(str(path))
+    size = path.stat().st_size
+    assert size < LARGEST_BYTES, f"{path.name} has {size} bytes"
+    print(f"{path.relative_to(FOLDER.parents[1])}: {size // 1000} kB")
+
+
+def compared(api: httpx.Client, scenario_id: str) -> Json:
+    """Compare the solvers that are quick; return the comparison."""
+    names = ("rule", "graph", "forward_search", "mcts", "certified")
+    body = {
+        "scenario_id": scenario_id,
+        "runs": [{"solver": name} for name in names],
+        "label": "Which solver",
+        "limits": {"time_s": 15},
+    }
+    table = post(api, "/v1/comparisons", body)
+    while table["state"] == "running":
+        table = api.get(f"/v1/comparisons/{table['id']}").json()
+    return table
+
+
+def select_blocked(browser: Browser) -> None:
+    """Select a target that others displace: it has most to tell."""
+    browser.click("#left-out details[data-reason=slew_conflict] > summary")
+    browser.click("#left-out details[data-reason=slew_conflict] tbody tr button")
+    browser.wait(lambda: browser.text("#selected table"))
+
+
+def main() -> None:
+    """Plan the demonstration's mission and write the pictures."""
+    FOLDER.mkdir(exist_ok=True)
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        serving(Path(folder), "serve", "--workers", "2") as (_, line),
+        httpx.Client(base_url=line.split()[-1], timeout=PATIENCE_S, trust_env=False) as api,
+        opened(line.split()[-1]) as browser,
+    ):
+        scenario_id = small_mission(api)
+        job = planned(api, scenario_id, "forward_search")
+        table = compared(api, scenario_id)
+        colors(browser, "light")
+        browser.open(f"/jobs/{job['id']}")
+        browser.wait_for_answer()
+        select_blocked(browser)
+        take(browser, "job", 1290)
+        take(browser, "job-selected", 900, "#selected-card")
+        colors(browser, "dark")
+        take(browser, "job-dark", 1290)
+        colors(browser, "light")
+        browser.open(f"/comparisons/{table['id']}")
+        browser.wait(lambda: browser.text("#runs tbody tr:last-child meter") is not None)
+        browser.wait(lambda: "valid" in browser.text("#runs tbody"))
+        take(browser, "comparison", 640)
+        browser.open("/")
+        browser.wait(lambda: browser.text("#comparisons tbody tr"))
+        take(browser, "jobs", 760)
+        browser.open("/new")
+        browser.wait(lambda: browser.text("#satellites .choices label"))
+        take(browser, "new", 1360)
+
+
+if __name__ == "__main__":
+    main()
