@@ -45,9 +45,8 @@ def _responses(forms: Sequence[Form]) -> dict[int | str, dict[str, Any]]:
     """Return the entries of the OpenAPI document for a route that offers these forms and JSON."""
     content: dict[str, Any] = {form.media_type: {} for form in forms} | JSON_TIMELINE
     if _JSON in (form.media_type for form in forms):
-        content[_JSON] = {
-            "schema": {"anyOf": [JSON_TIMELINE[_JSON]["schema"], {"type": ["array", "object"]}]}
-        }
+        other = [{"type": "array"}, {"type": "object"}]
+        content[_JSON] = {"schema": {"anyOf": [JSON_TIMELINE[_JSON]["schema"], *other]}}
     headers = {
         "Content-Disposition": {
             "description": "A name to save it under.",
