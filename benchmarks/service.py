@@ -154,14 +154,14 @@ def cpu_of_polls(service: Served, path: str, headers: dict[str, str], status: in
     return (service.cpu_s() - began_s) / POLLS
 
 
-def dashboards(service: Served, mission: Json, iterations: int) -> None:
+def dashboards(service: Served, mission: Json, simulations: int) -> None:
     """Compare a batch of jobs that nobody looks at with one that many look at."""
     times: dict[bool, list[float]] = {False: [], True: []}
     num_polls = 0
     for is_watched in (False, True, True, False):
         began = time.perf_counter()
         ids = [
-            submit(service.client, mission["id"], "mcts", iterations=iterations)
+            submit(service.client, mission["id"], "mcts", num_simulations=simulations)
             for _ in range(NUM_RUNNING)
         ]
         if is_watched:
@@ -254,7 +254,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--database-url", help="an empty database; a SQLite file by default")
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--iterations", type=int, default=300, help="of each watched job")
+    parser.add_argument("--simulations", type=int, default=500, help="of each watched job")
     chosen = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         database_url = chosen.database_url or f"sqlite:///{folder}/slewline.db"
@@ -265,7 +265,7 @@ def main() -> None:
             submit_to_timeline(service, mission)
             polls(service, mission)
             uploads(service)
-            dashboards(service, mission, chosen.iterations)
+            dashboards(service, mission, chosen.simulations)
             many_jobs(service, mission)
 
 

@@ -151,11 +151,16 @@ class JobRow(Row):
     """
 
     __tablename__ = "job"
+    # A filtered list is read in order of the ids, and ends with its page.
+    __table_args__ = tuple(
+        sa.Index(f"ix_job_{column}_id", column, "id")
+        for column in ("scenario_id", "tenant", "state", "label")
+    )
 
     id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
-    scenario_id: Mapped[str] = mapped_column(sa.ForeignKey("scenario.id"), index=True)
-    tenant: Mapped[str] = mapped_column(sa.String(64), default="local", index=True)
-    state: Mapped[str] = mapped_column(sa.String(16), index=True)
+    scenario_id: Mapped[str] = mapped_column(sa.ForeignKey("scenario.id"))
+    tenant: Mapped[str] = mapped_column(sa.String(64), default="local")
+    state: Mapped[str] = mapped_column(sa.String(16))
     solver: Mapped[str] = mapped_column(sa.String(64))
     params: Mapped[Json]
     seed: Mapped[int] = mapped_column(sa.BigInteger)

@@ -1,0 +1,24 @@
+"""Lists of jobs take as long as their page, not as long as there are jobs."""
+
+from __future__ import annotations
+
+import pytest
+import sqlalchemy as sa
+
+from service import job_store
+from service.db.rows import JobRow
+from tests.service.conftest import Service
+
+
+@pytest.mark.parametrize("column", ["state", "scenario_id", "label", "tenant"])
+def test_a_filtered_list_is_read_in_order_from_an_index(service: Service, column: str) -> None:
+    page = job_store.matching(**{column: "x"}).where(JobRow.id < "y")
+    text = (
+        page.order_by(JobRow.id.desc())
+        .limit(51)
+        .compile(service.database.engine, compile_kwargs={"literal_binds": True})
+    )
+    with service.database.reading() as session:
+        steps = session.execute(sa.text(f"EXPLAIN QUERY PLAN {text}")).mappings()
+        plan = [step["detail"] for step in steps]
+    assert plan == [f"SEARCH job USING INDEX ix_job_{column}_id ({column}=? AND id<?)"]
