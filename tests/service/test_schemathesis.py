@@ -33,6 +33,13 @@ WITHIN_S = 60.0
 Ids = dict[str, list[str]]
 
 
+LUCK = {
+    ("POST", "/v1/jobs/{job_id}/cancel"),  # before the job has ended
+    ("POST", "/v1/webhooks/{webhook_id}/deliveries/{delivery_id}/redeliver"),  # before its deletion
+}
+"""Calls that may be refused throughout."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Probed:
     """A running service with something of everything in it.
