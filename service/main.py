@@ -13,6 +13,7 @@ import planner_core
 from service.api import (
     audit_events,
     comparisons,
+    explanations,
     ground_stations,
     job_events,
     jobs,
@@ -32,6 +33,7 @@ from service.api.idempotency import install_replay
 from service.api.middleware import BodyLimit, RequestContext
 from service.api.security_headers import SecurityHeaders
 from service.db.session import Database
+from service.explanations import Explainer
 from service.opportunities import OpportunityReader
 from service.settings import Settings
 from service.tracing import is_untraced
@@ -51,6 +53,7 @@ ROUTERS = (
     target_catalogs.router,
     scenarios.router,
     jobs.router,
+    explanations.router,
     job_events.router,
     comparisons.router,
     solvers.router,
@@ -93,6 +96,7 @@ def create_app(settings: Settings, queue: JobQueue | None = None) -> FastAPI:
     app.state.settings = settings
     app.state.database = Database(settings.database_url, settings.database_timeout_s)
     app.state.opportunities = OpportunityReader()
+    app.state.explainer = Explainer()
     app.state.queue = queue
     app.state.call_counters = metrics.CallCounters()
     for router in ROUTERS:
@@ -130,5 +134,6 @@ def _allow_pages(app: FastAPI, origins: Sequence[str]) -> None:
 @asynccontextmanager
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     yield
+    app.state.explainer.close()
     app.state.opportunities.close()
     app.state.database.close()

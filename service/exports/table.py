@@ -1,0 +1,86 @@
+"""CSV (RFC 4180): one row for each action, sun-pointing included.
+
+Spreadsheets run a cell that begins with =, +, - or @. Texts that do are written behind an
+apostrophe, as spreadsheets themselves show text, and so are those that begin with apostrophes
+and then such a sign: reading takes exactly one apostrophe away, and no id is lost.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Iterator
+from datetime import datetime
+from typing import Any
+
+from service.exports.answered import Answered, Document, in_chunks
+
+COLUMNS = (
+    "action_id", "satellite_id", "satellite_name", "mode", "start", "end", "duration_s",
+    "target_id", "station_id", "opportunity_id", "off_nadir_deg", "azimuth_deg",
+    "slew_angle_deg", "slew_needed_s", "slew_available_s", "reward",
+    "battery_fraction_end", "recorder_fraction_end",
+)  # fmt: skip
+
+_RISKY = re.compile(r"'*[=+\-@\t\r]")
+
+
+def write(answered: Answered) -> Iterator[str]:
+    """Yield the table, satellite by satellite, in order of start."""
+    return in_chunks(_lines(answered))
+
+
+def guarded(text: str | None) -> str | None:
+    """Return a text that no spreadsheet takes for a formula.
+
+    >>> guarded("=1+1"), guarded("'=1"), guarded("T-1"), guarded(None)
+    ("'=1+1", "''=1", 'T-1', None)
+    """
+    return f"'{text}" if text is not None and _RISKY.match(text) else text
+
+
+def unguarded(cell: str) -> str:
+    """Return the text that `guarded` was given.
+
+    >>> [unguarded(guarded(text)) for text in ("=1", "'=1", "'tis", "T-1")]
+    ['=1', "'=1", "'tis", 'T-1']
+    """
+    return cell[1:] if cell.startswith("'") and _RISKY.match(cell) else cell
+
+
+def _lines(answered: Answered) -> Iterator[str]:
+    yield _line(COLUMNS)
+    for satellite, action in answered.each_action():
+        yield _line(_cells(satellite, action))
+
+
+def _line(cells: tuple[Any, ...]) -> str:
+    line = io.StringIO(newline="")
+    csv.writer(line).writerow(cells)
+    return line.getvalue()
+
+
+def _cells(satellite: Document, action: Document) -> tuple[Any, ...]:
+    start, end = (datetime.fromisoformat(action[name]) for name in ("start", "end"))
+    slew = action["slew"] or {}
+    return (
+        action["id"],
+        guarded(satellite["id"]),
+        guarded(satellite["name"]),
+        action["mode"],
+        action["start"],
+        action["end"],
+        (end - start).total_seconds(),
+        guarded(action["target_id"]),
+        guarded(action["station_id"]),
+        action["opportunity_id"],
+        action["off_nadir_deg"],
+        action["azimuth_deg"],
+        slew.get("angle_deg"),
+        slew.get("needed_s"),
+        slew.get("available_s"),
+        action["reward"],
+        action["battery_fraction_end"],
+        action["recorder_fraction_end"],
+    )
