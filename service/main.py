@@ -15,6 +15,7 @@ from service.api import (
     comparisons,
     explanations,
     ground_stations,
+    job_diffs,
     job_events,
     jobs,
     meta,
@@ -25,6 +26,7 @@ from service.api import (
     solvers,
     target_catalogs,
     webhooks,
+    what_if,
 )
 from service.api.deps import check_request
 from service.api.errors import install_error_handlers
@@ -37,6 +39,7 @@ from service.explanations import Explainer
 from service.opportunities import OpportunityReader
 from service.settings import Settings
 from service.tracing import is_untraced
+from service.variations import Variations
 
 if TYPE_CHECKING:
     from service.jobs.queue import JobQueue
@@ -54,6 +57,8 @@ ROUTERS = (
     scenarios.router,
     jobs.router,
     explanations.router,
+    job_diffs.router,
+    what_if.router,
     job_events.router,
     comparisons.router,
     solvers.router,
@@ -97,6 +102,7 @@ def create_app(settings: Settings, queue: JobQueue | None = None) -> FastAPI:
     app.state.database = Database(settings.database_url, settings.database_timeout_s)
     app.state.opportunities = OpportunityReader()
     app.state.explainer = Explainer()
+    app.state.variations = Variations()
     app.state.queue = queue
     app.state.call_counters = metrics.CallCounters()
     for router in ROUTERS:
@@ -135,5 +141,6 @@ def _allow_pages(app: FastAPI, origins: Sequence[str]) -> None:
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     yield
     app.state.explainer.close()
+    app.state.variations.close()
     app.state.opportunities.close()
     app.state.database.close()
