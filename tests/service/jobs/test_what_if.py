@@ -140,6 +140,7 @@ def test_a_repeat_under_the_same_key_makes_one_job(mission: Mission, planned: Do
     mission.ended(first)
 
 
+BEFORE, A_YEAR_ON = "2018-01-01T00:00:00Z", "2020-01-01T00:00:00Z"
 LATE = {"station_id": "Svalbard", "start": "2019-01-01T23:00:00Z"}
 
 
@@ -166,8 +167,8 @@ LATE = {"station_id": "Svalbard", "start": "2019-01-01T23:00:00Z"}
             "value_out_of_range",
             "/relax/targets/hidden~1one/off_nadir_max_deg",
         ),
-        ({"relax": {"horizon_end": "2018-01-01T00:00:00Z"}}, "horizon_inverted", "/relax/horizon_end"),
-        ({"relax": {"horizon_end": "2020-01-01T00:00:00Z"}}, "horizon_too_long", "/relax/horizon_end"),
+        ({"relax": {"horizon_end": BEFORE}}, "horizon_inverted", "/relax/horizon_end"),
+        ({"relax": {"horizon_end": A_YEAR_ON}}, "horizon_too_long", "/relax/horizon_end"),
         ({"relax": {"drop_actions": ["a0"]}}, "unknown_action", "/relax/drop_actions/0"),
     ],
 )  # fmt: skip
