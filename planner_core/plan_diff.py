@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Final
@@ -93,18 +94,18 @@ class PlanDiff:
 def plan_diff(first: PlanView, second: PlanView) -> PlanDiff:
     """Return the difference of two plans; that of a plan and itself is empty."""
     before, after = _without_common(first.actions, second.actions)
-    pairs = sorted(
-        (abs(a.start - b.start), a, b) for a in before for b in after if _place(a) == _place(b)
-    )
+    there = _grouped(after, _place)
+    pairs = sorted((abs(a.start - b.start), a, b) for a in before for b in there.get(_place(a), ()))
     moved = []
+    gone, new = Counter(before), Counter(after)
     for _, a, b in pairs:
-        if a in before and b in after:
+        if gone[a] and new[b]:
             moved.append((a, b))
-            before.remove(a)
-            after.remove(b)
+            gone[a] -= 1
+            new[b] -= 1
     return PlanDiff(
-        added=tuple(after),
-        removed=tuple(before),
+        added=tuple(sorted(new.elements())),
+        removed=tuple(sorted(gone.elements())),
         moved=tuple(sorted(moved)),
         totals=_differences(first.totals, second.totals),
     )
@@ -114,23 +115,33 @@ def _without_common(
     first: tuple[PlannedAction, ...], second: tuple[PlannedAction, ...]
 ) -> tuple[list[PlannedAction], list[PlannedAction]]:
     """Return what either has and the other has not, up to the millisecond of rounding."""
-    left = list(second)
+    left = _grouped(second, _task)
     before = []
     for action in first:
-        same = next((other for other in left if _is_same(action, other)), None)
+        there = left.get(_task(action), [])
+        same = next((other for other in there if _is_at_same_time(action, other)), None)
         if same is None:
             before.append(action)
         else:
-            left.remove(same)
-    return before, left
+            there.remove(same)
+    return before, [action for there in left.values() for action in there]
 
 
-def _is_same(a: PlannedAction, b: PlannedAction) -> bool:
-    return (
-        (a.satellite_id, a.mode, a.place_id) == (b.satellite_id, b.mode, b.place_id)
-        and abs(a.start - b.start) <= _SAME_TIME
-        and abs(a.end - b.end) <= _SAME_TIME
-    )
+def _grouped(
+    actions: Iterable[PlannedAction], key: Callable[[PlannedAction], tuple[str, ...]]
+) -> dict[tuple[str, ...], list[PlannedAction]]:
+    groups: dict[tuple[str, ...], list[PlannedAction]] = {}
+    for action in actions:
+        groups.setdefault(key(action), []).append(action)
+    return groups
+
+
+def _is_at_same_time(a: PlannedAction, b: PlannedAction) -> bool:
+    return abs(a.start - b.start) <= _SAME_TIME and abs(a.end - b.end) <= _SAME_TIME
+
+
+def _task(action: PlannedAction) -> tuple[str, ...]:
+    return action.satellite_id, action.mode, action.place_id
 
 
 def _place(action: PlannedAction) -> tuple[str, ...]:

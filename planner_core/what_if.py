@@ -149,8 +149,8 @@ def what_if(scenario: Scenario, change: Change, problem: Problem, plan: Plan) ->
         _with_time(changed, problem, plan, action, f"/force/{i}")
         for i, action in enumerate(change.force)
     ]
-    whole = [a.target_id for a in change.forbid if _is_any_image(a) and a.target_id is not None]
-    skip = [action for action in change.forbid if not _is_any_image(action)]
+    whole = [a.target_id for a in change.forbid if is_any_image(a) and a.target_id is not None]
+    skip = [action for action in change.forbid if not is_any_image(action)]
     new = Pins(
         keep=(*pins.keep, *keep),
         skip=(*pins.skip, *skip),
@@ -160,7 +160,8 @@ def what_if(scenario: Scenario, change: Change, problem: Problem, plan: Plan) ->
     return replace(changed, pins=new)
 
 
-def _is_any_image(action: PinnedAction) -> bool:
+def is_any_image(action: PinnedAction) -> bool:
+    """Return whether a target is meant as a whole, at whatever time."""
     return action.target_id is not None and action.start is None and action.opportunity_id is None
 
 
@@ -168,7 +169,7 @@ def _with_time(
     scenario: Scenario, problem: Problem, plan: Plan, action: PinnedAction, pointer: str
 ) -> PinnedAction:
     """Return the action with a time, where it is any image of a target."""
-    if not _is_any_image(action):
+    if not is_any_image(action):
         return action
     if action.target_id not in problem.target_ids:
         raise _unknown("target", str(action.target_id), pointer)

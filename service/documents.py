@@ -8,18 +8,16 @@ from typing import Any
 
 from planner_core import __version__
 from planner_core.orbits.sgp4_record import GRAVITY
-from planner_core.reasons.reason import Change, TargetOutcome
 from planner_core.run import Judged
-from planner_core.timeline import JudgedAction, Resourceline, Violation, plan_sha256
+from planner_core.timeline import JudgedAction, Resourceline, plan_sha256
 from service.instants import instant_text
+from service.wording import Document, Wording
 
 SCHEMA_VERSION = "1.0"
 _COMPARED = (
     "reward", "bound", "gap", "bound_proof", "collects", "contacts", "downlinked_mbit",
     "downlinked_fraction",
 )  # fmt: skip
-
-Document = dict[str, Any]
 
 
 def figures_of(timeline: Document) -> Document:
@@ -34,19 +32,14 @@ def figures_of(timeline: Document) -> Document:
     }
 
 
-class Documents:
-    """Renders one judged plan; action ids run through all satellites, ``a1``, ``a2``, ..."""
+class Documents(Wording):
+    """Renders one judged plan."""
 
     def __init__(self, judged: Judged, *, job_id: str, scenario_sha256: str):
+        super().__init__(judged.scenario, judged.problem, judged.timeline)
         self.judged = judged
         self.job_id = job_id
         self.scenario_sha256 = scenario_sha256
-        actions = [a for s in judged.timeline.satellites for a in s.actions]
-        self._action_ids = {
-            action.position: f"a{number}"
-            for number, action in enumerate(actions, start=1)
-            if action.position is not None
-        }
 
     def timeline(
         self, *, solver: str, params: Mapping[str, Any], seed: int, termination: str
@@ -122,9 +115,6 @@ class Documents:
         """Return every target once, with outcome and reason."""
         return [self._target(outcome) for outcome in self.judged.outcomes]
 
-    def _instant(self, offset_s: float) -> str:
-        return instant_text(self.judged.scenario.horizon.instant(offset_s))
-
     def _totals(self) -> Document:
         judged, timeline = self.judged, self.judged.timeline
         outcomes = Counter(outcome.outcome for outcome in judged.outcomes)
@@ -193,58 +183,11 @@ class Documents:
             "recorder_fraction_end": _rounded(action.recorder_end),
         }
 
-    def _change(self, change: Change) -> Document:
-        found: Document = {"opportunity_id": self._opportunity_id(change.opportunity)}
-        if change.satellite is None:
-            return found | {"drop_actions": [self._action_ids[p] for p in change.drop]}
-        satellite_id = self.judged.problem.satellites[change.satellite].id
-        return found | {"satellite_id": satellite_id} | dict(change.settings)
-
-    def _opportunity_id(self, row: int | None) -> str | None:
-        return None if row is None else f"o{self.judged.problem.scenario_row(row)}"
-
     def _curves(self, line: Resourceline) -> Document:
         return {
             "time": [self._instant(float(t)) for t in line.time_s],
             "battery_fraction": [round(float(v), 9) for v in line.battery],
             "recorder_fraction": [round(float(v), 9) for v in line.recorder],
-        }
-
-    def _violation(self, violation: Violation) -> Document:
-        return {
-            "code": violation.code,
-            "satellite_id": self.judged.problem.satellites[violation.satellite].id,
-            "at": self._instant(violation.at_s),
-            "needed": violation.needed,
-            "available": violation.available,
-            "actions": [self._action_ids[p] for p in violation.blamed],
-            "detail": violation.detail,
-        }
-
-    def _target(self, outcome: TargetOutcome) -> Document:
-        judged = self.judged
-        target = judged.scenario.targets[outcome.target]
-        satellite = outcome.satellite
-        reason: Document | None = None
-        if outcome.reason is not None:
-            found = outcome.reason
-            reason = {
-                "code": found.code,
-                "certainty": found.certainty,
-                "blocking_actions": [self._action_ids[p] for p in found.blocking],
-                "opportunity_id": self._opportunity_id(found.opportunity),
-                "at": None if found.at_s is None else self._instant(found.at_s),
-                "reward_delta": found.reward_delta,
-                "change": None if found.change is None else self._change(found.change),
-                "detail": found.detail,
-            }
-        return {
-            "target_id": target.id,
-            "target_catalog_id": target.catalog_id,
-            "outcome": outcome.outcome,
-            "action_id": None if outcome.position is None else self._action_ids[outcome.position],
-            "satellite_id": None if satellite is None else judged.problem.satellites[satellite].id,
-            "reason": reason,
         }
 
 

@@ -87,13 +87,39 @@ class ResourcesIn(Body):
 Preset = Literal["paper", "paper_code"]
 
 
+class PresetResourcesIn(Body):
+    """A preset with other fractions than its own."""
+
+    preset: Preset
+    battery_min_fraction: Fraction = 0.3
+    initial_battery_fraction: Fraction = 1.0
+    recorder_max_fraction: Fraction = 0.75
+    initial_recorder_fraction: Fraction = 0.0
+    eclipse_aware: bool = Field(False, description="Charge only in sunlight.")
+
+
 def _form_of_resources(value: object) -> str:
+    if isinstance(value, PresetResourcesIn) or (isinstance(value, dict) and "preset" in value):
+        return "changed_preset"
     return "object" if isinstance(value, (dict, ResourcesIn)) else "preset"
 
 
+def _shortest(
+    resources: Preset | PresetResourcesIn | ResourcesIn,
+) -> Preset | PresetResourcesIn | ResourcesIn:
+    """Return a preset that changes nothing by its name alone: one question has one hash."""
+    if not isinstance(resources, PresetResourcesIn):
+        return resources
+    plain = PresetResourcesIn(preset=resources.preset)
+    return resources.preset if resources == plain else resources
+
+
 ResourcesField = Annotated[
-    Annotated[Preset, Tag("preset")] | Annotated[ResourcesIn, Tag("object")],
+    Annotated[Preset, Tag("preset")]
+    | Annotated[PresetResourcesIn, Tag("changed_preset")]
+    | Annotated[ResourcesIn, Tag("object")],
     Discriminator(_form_of_resources),
+    AfterValidator(_shortest),
 ]
 
 
@@ -132,7 +158,8 @@ class SatelliteIn(OrbitIn):
     resources: ResourcesField = Field(
         "paper",
         description="The satellite's own figures, or a preset: the paper's normalised spacecraft "
-        "with the rates of its text (paper) or of the authors' code (paper_code).",
+        "with the rates of its text (paper) or of the authors' code (paper_code); with fractions "
+        'of your own as {"preset": "paper", "battery_min_fraction": 0.2}.',
     )
 
 

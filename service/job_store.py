@@ -31,6 +31,8 @@ class JobSpec:
     label: str | None
     owner: str
     rerun_of: str | None = None
+    what_if_of: str | None = None
+    change: Mapping[str, Any] | None = None
 
 
 def spec_again(job: JobRow, owner: str) -> JobSpec:
@@ -65,6 +67,8 @@ def submit(session: Session, queue: JobQueue, spec: JobSpec) -> JobRow:
             priority=spec.priority,
             label=spec.label,
             rerun_of=spec.rerun_of,
+            what_if_of=spec.what_if_of,
+            change=sa.null() if spec.change is None else dict(spec.change),
             traceparent=tracing.note_queued(job_id),
             created_at=utc_now(),
             dispatched_at=utc_now(),

@@ -14,7 +14,9 @@ from service.api import (
     audit_events,
     comparisons,
     element_exports,
+    explanations,
     ground_stations,
+    job_diffs,
     job_events,
     jobs,
     me,
@@ -27,6 +29,7 @@ from service.api import (
     target_catalogs,
     timelines,
     webhooks,
+    what_if,
 )
 from service.api.body_limit import BodyLimit
 from service.api.deps import check_request
@@ -38,9 +41,11 @@ from service.api.security_headers import SecurityHeaders
 from service.api.unchanged import UnchangedJobs
 from service.dashboard import routes as dashboard
 from service.db.session import Database
+from service.explanations import Explainer
 from service.opportunities import OpportunityReader
 from service.settings import Settings
 from service.tracing import is_untraced
+from service.variations import Variations
 
 if TYPE_CHECKING:
     from service.jobs.queue import JobQueue
@@ -59,6 +64,9 @@ ROUTERS = (
     scenarios.router,
     jobs.router,
     timelines.router,
+    explanations.router,
+    job_diffs.router,
+    what_if.router,
     job_events.router,
     comparisons.router,
     solvers.router,
@@ -103,6 +111,8 @@ def create_app(settings: Settings, queue: JobQueue | None = None) -> FastAPI:
     app.state.settings = settings
     app.state.database = Database(settings.database_url, settings.database_timeout_s)
     app.state.opportunities = OpportunityReader()
+    app.state.explainer = Explainer()
+    app.state.variations = Variations()
     app.state.queue = queue
     app.state.call_counters = metrics.CallCounters()
     for router in ROUTERS:
@@ -141,5 +151,7 @@ def _allow_pages(app: FastAPI, origins: Sequence[str]) -> None:
 @asynccontextmanager
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     yield
+    app.state.explainer.close()
+    app.state.variations.close()
     app.state.opportunities.close()
     app.state.database.close()

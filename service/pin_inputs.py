@@ -56,8 +56,8 @@ class PinsIn(Body):
 def pins_from(body: PinsIn) -> Pins:
     """Return the pins of one body."""
     return Pins(
-        keep=tuple(_action(pinned) for pinned in body.keep),
-        skip=tuple(_action(pinned) for pinned in body.skip),
+        keep=tuple(action_from(pinned) for pinned in body.keep),
+        skip=tuple(action_from(pinned) for pinned in body.skip),
         block=tuple(
             BlockedInterval(
                 satellite_id=blocked.satellite_id,
@@ -71,5 +71,28 @@ def pins_from(body: PinsIn) -> Pins:
     )
 
 
-def _action(body: PinnedActionIn) -> PinnedAction:
+def pins_in(pins: Pins) -> PinsIn:
+    """Return the body of pins: what `pins_from` has made them of."""
+    return PinsIn(
+        keep=[_action_in(pinned) for pinned in pins.keep],
+        skip=[_action_in(pinned) for pinned in pins.skip],
+        block=[
+            BlockedIn(
+                satellite_id=blocked.satellite_id,
+                start=blocked.start,
+                end=blocked.end,
+                modes=list(blocked.modes),
+            )
+            for blocked in pins.block
+        ],
+        forbid=list(pins.forbid),
+    )
+
+
+def action_from(body: PinnedActionIn) -> PinnedAction:
+    """Return the action of one body."""
     return PinnedAction(**{name: getattr(body, name) for name in PinnedActionIn.model_fields})
+
+
+def _action_in(pinned: PinnedAction) -> PinnedActionIn:
+    return PinnedActionIn(**{name: getattr(pinned, name) for name in PinnedActionIn.model_fields})

@@ -39,6 +39,7 @@ from service.inputs import (
     HorizonIn,
     OrbitIn,
     Preset,
+    PresetResourcesIn,
     ResourcesIn,
     SatelliteIn,
     ScenarioFile,
@@ -240,11 +241,14 @@ _FIELDS_OF_RATES = {
 }
 
 
-def resources_from(body: Preset | ResourcesIn, period_s: float) -> Resources:
+def resources_from(body: Preset | PresetResourcesIn | ResourcesIn, period_s: float) -> Resources:
     """Return battery and recorder as fractions of their capacity per second.
 
     Presets depend on the orbital period.
     """
+    if isinstance(body, PresetResourcesIn):
+        changed = body.model_dump(exclude={"preset"})
+        return replace(resources_from(body.preset, period_s), **changed)
     if body == "paper":
         return Resources.paper(period_s)
     if body == "paper_code":

@@ -91,7 +91,7 @@ def problem(
         status=number,
         code=code,
         detail=_sendable(detail),
-        instance=masked(request.url.path),
+        instance=masked(request.scope["path"]),
         request_id=request.state.request_id,
         errors=[
             FaultOut(

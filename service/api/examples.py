@@ -44,6 +44,7 @@ BODIES: Final[dict[str, Any]] = {
         "scenario_id": _ID,
         "runs": [{"solver": "rule"}, {"solver": "forward_search", "params": {"depth": 2}}],
     },
+    "WhatIfIn": {"forbid": ["bern"], "relax": {"slew_rate_deg_s": 2.0}},
     "WebhookIn": {"url": "https://ops.example/slewline", "events": ["job.succeeded"]},
 }
 """By the name of the schema."""

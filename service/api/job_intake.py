@@ -103,6 +103,23 @@ def find_job(session: Session, job_id: str) -> JobRow:
     return job
 
 
+def not_ready(job: JobRow) -> ServiceError:
+    """Return the error for a job without an answer, yet or for good."""
+    if job.state in lease.ACTIVE:
+        headers = {"Retry-After": str(ASK_AGAIN_S)}
+        return ServiceError("not_ready", f"The job is {job.state}.", headers=headers)
+    why = job.error["code"] if job.error else "it was stopped before it had a plan"
+    return ServiceError("not_ready", f"The job is {job.state} and left no answer: {why}.")
+
+
+def find_timeline(session: Session, job: JobRow) -> str:
+    """Return a job's timeline document; 409 where there is none."""
+    timeline = store.timeline_of(session, job.id)
+    if timeline is None:
+        raise not_ready(job)
+    return timeline
+
+
 def shown_job(session: Session, job: JobRow) -> JobOut:
     """Return a job as clients see it."""
     return shown(job, store.scenario_hashes(session, [job])[job.scenario_id])

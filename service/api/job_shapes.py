@@ -115,6 +115,9 @@ class JobOut(BaseModel):
     finished_at: Instant | None
     termination: str | None = Field(description="Why the search ended.")
     error: ErrorOut | None
+    change: dict[str, Any] | None = Field(
+        None, description="Of a what-if: what was to be different from the job it varies."
+    )
     links: dict[str, str]
 
 
@@ -151,6 +154,7 @@ def shown(job: JobRow, scenario_sha256: str) -> JobOut:
         finished_at=job.finished_at,
         termination=job.termination,
         error=None if job.error is None else ErrorOut(**job.error),
+        change=job.change,
         links={
             "self": address,
             "timeline": f"{address}/timeline",
@@ -158,7 +162,8 @@ def shown(job: JobRow, scenario_sha256: str) -> JobOut:
             "events": f"{address}/events",
             "scenario": f"/v1/scenarios/{job.scenario_id}",
         }
-        | ({} if job.rerun_of is None else {"rerun_of": f"/v1/jobs/{job.rerun_of}"}),
+        | ({} if job.rerun_of is None else {"rerun_of": f"/v1/jobs/{job.rerun_of}"})
+        | ({} if job.what_if_of is None else {"what_if_of": f"/v1/jobs/{job.what_if_of}"}),
     )
 
 

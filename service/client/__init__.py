@@ -7,7 +7,10 @@ Client('http://127.0.0.1:8000')
 
 from service.client.answers import (
     Action,
+    Attempt,
     ComparedRun,
+    Explanation,
+    PlanDiff,
     Progress,
     SatelliteTimeline,
     TargetOutcome,
@@ -37,19 +40,24 @@ from service.client.shapes import (
     Target,
     TargetCatalog,
 )
+from service.client.webhooks import Delivery, Webhook
 
 __all__ = [
     "Action",
+    "Attempt",
     "Client",
     "ClientError",
     "ComparedRun",
     "Comparison",
+    "Delivery",
+    "Explanation",
     "Fault",
     "GroundStation",
     "Import",
     "Job",
     "JobFailed",
     "Opportunity",
+    "PlanDiff",
     "Progress",
     "Satellite",
     "SatelliteTimeline",
@@ -65,4 +73,5 @@ __all__ = [
     "Unreachable",
     "Violation",
     "WaitTimedOut",
+    "Webhook",
 ]

@@ -160,6 +160,69 @@ class TargetOutcome(Shape):
     reason: Reason | None = None
 
 
+class Attempt(Shape):
+    """One opportunity of a target, tried in the plan; ``displaces`` are ids of actions."""
+
+    opportunity_id: str
+    satellite_id: str
+    start: datetime
+    end: datetime
+    violations: tuple[Violation, ...]
+    displaces: tuple[str, ...]
+    fits_instead: bool
+    reward_delta: float | None
+    ruled_out: bool
+
+
+class Explanation(TargetOutcome):
+    """A target gone through opportunity by opportunity.
+
+    Each of ``access_changes`` would give it one, and can be the ``relax`` of a what-if.
+    """
+
+    opportunities: tuple[Attempt, ...]
+    access_changes: tuple[Json, ...]
+
+
+class Planned(Shape):
+    """A collect or a contact."""
+
+    satellite_id: str
+    mode: str
+    target_id: str | None
+    station_id: str | None
+    start: datetime
+    end: datetime
+
+
+class Moved(Shape):
+    """What is done at another time."""
+
+    before: Planned
+    after: Planned
+
+
+class TotalDiff(Shape):
+    """A figure that differs; ``delta`` is after less before."""
+
+    before: float | None
+    after: float | None
+    delta: float | None
+
+
+class PlanDiff(Shape):
+    """From the plan of the job ``before`` to that of the job ``after``."""
+
+    before: str
+    after: str
+    is_empty: bool
+    questions_differ_in: tuple[str, ...]
+    added: tuple[Planned, ...]
+    removed: tuple[Planned, ...]
+    moved: tuple[Moved, ...]
+    totals: dict[str, TotalDiff]
+
+
 class ComparedRun(Shape):
     """One line of a comparison; its figures are None until there is a timeline."""
 

@@ -20,6 +20,7 @@ from service.client.scenarios import Scenarios
 from service.client.shapes import Ready, Solver, Version
 from service.client.target_catalogs import TargetCatalogs
 from service.client.transport import Transport, path_of, read
+from service.client.webhooks import Webhooks
 
 DEFAULT_URL: Final = "http://127.0.0.1:8000"
 _KEY = re.compile(r"[\x21-\x7e]+")
@@ -45,6 +46,7 @@ class Client:
     scenarios: Scenarios
     jobs: Jobs
     comparisons: Comparisons
+    webhooks: Webhooks
 
     def __init__(
         self,
@@ -72,6 +74,7 @@ class Client:
         self.scenarios = Scenarios(self._transport)
         self.jobs = Jobs(self._transport)
         self.comparisons = Comparisons(self._transport)
+        self.webhooks = Webhooks(self._transport)
 
     @property
     def url(self) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -11,8 +11,10 @@ from typing import Any
 from pydantic import PrivateAttr, ValidationError
 
 from service.client.answers import (
+    Explanation,
     Failure,
     Limits,
+    PlanDiff,
     Progress,
     ScenarioRef,
     TargetOutcome,
@@ -45,6 +47,7 @@ class Job(Stored):
     finished_at: datetime | None
     termination: str | None
     error: Failure | None
+    change: Json | None = None
 
     _jobs: Jobs = PrivateAttr()
 
@@ -94,6 +97,14 @@ class Job(Stored):
     ) -> Iterator[TargetOutcome]:
         """Yield every target of the scenario with what became of it."""
         return self._jobs.targets(self.id, outcome=outcome, reason=reason)
+
+    def explanation(self, target_id: str) -> Explanation:
+        """Return why a target is in its plan or not, opportunity by opportunity."""
+        return self._jobs.explanation(self.id, target_id)
+
+    def what_if(self, **change: Any) -> Job:
+        """Queue the same question with a change; see ``Jobs.what_if``."""
+        return self._jobs.what_if(self.id, **change)
 
 
 class Jobs:
@@ -205,6 +216,44 @@ class Jobs:
         """Yield every target of the scenario with what became of it."""
         params = {"outcome": outcome, "reason": reason, "limit": 500}
         return self._transport.pages(path_of("jobs", job_id, "targets"), TargetOutcome, params)
+
+    def explanation(self, job_id: str, target_id: str) -> Explanation:
+        """Return why a target is in a plan or not, opportunity by opportunity."""
+        path = path_of("jobs", job_id, "targets", target_id, "explanation")
+        return self._transport.get(path, Explanation)
+
+    def what_if(
+        self,
+        job_id: str,
+        *,
+        force: Sequence[str | Mapping[str, Any]] = (),
+        forbid: Sequence[str | Mapping[str, Any]] = (),
+        relax: Mapping[str, Any] | None = None,
+        idempotency_key: str | None = None,
+        **other: Any,
+    ) -> Job:
+        """Queue the question of a job with a change.
+
+        Parameters
+        ----------
+        force, forbid
+            Ids of targets, or actions in words, as in ``pins``.
+        relax
+            Other values of settings; the ``change`` of a reason fits.
+        other
+            ``solver``, ``params``, ``seed``, ``limits``, ``priority``, ``label``, where they
+            are not those of the job.
+        """
+        body = {"force": list(force), "forbid": list(forbid), "relax": dict(relax or {}), **other}
+        path = path_of("jobs", job_id, "what-if")
+        return self._own(
+            self._transport.post(path, Job, json=body, idempotency_key=idempotency_key)
+        )
+
+    def diff(self, before: str | Job, after: str | Job) -> PlanDiff:
+        """Return what the second job's plan has that the first one's has not, and back."""
+        first, second = (job.id if isinstance(job, Job) else job for job in (before, after))
+        return self._transport.get(path_of("jobs", first, "diff", second), PlanDiff)
 
     def _read(self, text: str, etag: str | None = None) -> Job:
         try:

@@ -146,6 +146,7 @@ class JobRow(Row):
     ``dispatch`` counts how often it was handed to the queue; ``run`` counts starts and
     is the fencing token: only the holder of the current run may renew or finish.
     ``lost_runs`` counts the runs whose worker died.
+    ``what_if_of`` is the job that this one varies, and ``change`` says how.
     ``traceparent`` names the trace that the job was queued in, where there is one (W3C).
     ``version`` grows with every visible change and is the job's ETag.
     """
@@ -168,6 +169,8 @@ class JobRow(Row):
     priority: Mapped[int]
     label: Mapped[str | None]
     rerun_of: Mapped[str | None] = mapped_column(sa.String(36))
+    what_if_of: Mapped[str | None] = mapped_column(sa.String(36))
+    change: Mapped[Json | None]
     traceparent: Mapped[str | None] = mapped_column(sa.String(55))
     progress: Mapped[Json | None]
     termination: Mapped[str | None] = mapped_column(sa.String(32))

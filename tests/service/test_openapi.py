@@ -23,6 +23,7 @@ RARE = {
     "500": "a fault of the service",
     "503": "a full queue, or a service without a worker",
 }
+COLLECTIONS = {"other_id": "/v1/jobs"}
 
 
 class Client:
@@ -52,7 +53,7 @@ class Client:
                 continue
             name, slot = parameter["name"], "{" + parameter["name"] + "}"
             examples = parameter["schema"].get("examples") or parameter.get("examples")
-            collection = path.partition("/" + slot)[0]
+            collection = COLLECTIONS.get(name, path.partition("/" + slot)[0])
             value = examples[0] if examples else self.known(collection, name)
             if value is None:
                 return None
@@ -199,6 +200,12 @@ def test_a_client_of_the_document_alone_uses_every_operation(client: Client) -> 
             path = client.path(template, operation)
             assert path is not None
             assert client.http.post(path).status_code in (202, 409)
+        elif "{" in template:
+            path = client.path(template, operation)
+            assert path is not None
+            for media_type, body in client.bodies(operation):
+                answer = client.send("POST", path, media_type, body)
+                assert answer.status_code == 202, answer.text
     jobs = client.http.get("/v1/jobs").json()["items"]
     client.http.post(f"/v1/jobs/{jobs[0]['id']}/cancel")
     for template, operation in client.operations("delete"):

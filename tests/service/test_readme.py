@@ -71,8 +71,9 @@ def test_every_command_of_the_page_on_the_api_works(tmp_path: Path) -> None:
     assert first == again
     assert lines[6] == "2"
     assert [line.split()[0] for line in lines[7:9]] == ["rule", "forward_search"]
-    assert lines[9] == "412"
-    assert 'slewline_jobs{state="succeeded"} 4.0' in lines
+    assert lines[9:11] == ["collected", "quito"]
+    assert lines[11] == "412"
+    assert 'slewline_jobs{state="succeeded"} 5.0' in lines
     assert lines[-2] == "unknown_solver"
 
 

@@ -92,6 +92,10 @@ def rerun(client: httpx.Client) -> str:
     return post(client, f"/v1/jobs/{new_job(client)}/rerun", None)
 
 
+def what_if(client: httpx.Client) -> str:
+    return post(client, f"/v1/jobs/{new_job(client)}/what-if", {"forbid": ["t1"]})
+
+
 def compare(client: httpx.Client) -> str:
     return post(
         client, "/v1/comparisons", {"scenario": question(client), "runs": [{"solver": "rule"}]}
@@ -138,6 +142,7 @@ CHANGES: dict[tuple[str, str], tuple[Callable[[httpx.Client], str], str, str]] =
     ),
     ("post", "/v1/jobs"): (new_job, "create", "job"),
     ("post", "/v1/jobs/{job_id}/rerun"): (rerun, "create", "job"),
+    ("post", "/v1/jobs/{job_id}/what-if"): (what_if, "create", "job"),
     ("post", "/v1/comparisons"): (compare, "create", "comparison"),
     ("post", "/v1/webhooks"): (new_webhook, "create", "webhook"),
     ("delete", "/v1/webhooks/{webhook_id}"): (

@@ -56,6 +56,18 @@ def test_every_call_on_the_job_of_another_owner_finds_nothing(door: Door) -> Non
     assert door.jobs.job(job).state == "queued"
 
 
+def test_a_job_is_compared_with_none_of_another_owner(door: Door) -> None:
+    ops, stranger = door.key("submit", "ops"), door.key("submit", "science")
+    own, foreign = door.submit(ops), door.submit(stranger)
+    hidden = door.client.get(f"/v1/jobs/{own}/diff/{foreign}", headers=ops)
+    problem = assert_problem(hidden, 404, "not_found")
+    missing = door.client.get(f"/v1/jobs/{own}/diff/none", headers=ops)
+    assert problem["detail"] == missing.json()["detail"].replace("none", foreign)
+    boss = door.key("admin", "boss")
+    seen = door.client.get(f"/v1/jobs/{own}/diff/{foreign}", headers=boss)
+    assert_problem(seen, 409, "not_ready")
+
+
 def test_comparisons_belong_to_an_owner_as_jobs_do(door: Door) -> None:
     ops, stranger = door.key("submit", "ops"), door.key("submit", "science")
     boss = door.key("admin", "boss")

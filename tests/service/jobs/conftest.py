@@ -25,7 +25,9 @@ from service.jobs.queue import DbosQueue, migrate_queue
 from service.jobs.supervisor import environment_of
 from service.main import create_app
 from service.settings import Settings
+from tests.missions import Document
 from tests.service.conftest import checked_client, serve
+from tests.service.jobs.mission import Mission, running, small_mission
 from tests.service.jobs.work import WORK
 
 PATIENCE_S = 60.0
@@ -202,3 +204,16 @@ def workers(jobs: Jobs) -> Iterator[Workers]:
     for process in started.processes:
         process.kill()
         process.wait()
+
+
+@pytest.fixture(scope="session")
+def mission(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Mission]:
+    """A whole service with a worker, for all tests."""
+    with running(tmp_path_factory.mktemp("mission")) as mission:
+        yield mission
+
+
+@pytest.fixture(scope="session")
+def planned(mission: Mission) -> Document:
+    """A job that has planned the small mission; nobody changes it."""
+    return mission.plan(small_mission())

@@ -1,0 +1,117 @@
+"""What if: the question of a job once more, with one change."""
+
+from __future__ import annotations
+
+from typing import Any, Final, cast
+
+from fastapi import APIRouter, Depends, Request, Response
+from pydantic import Field
+
+from service import job_store as store
+from service import opportunity_store, scenario_store
+from service.api import job_intake as intake
+from service.api.deps import AuditDep, CallerDep, DatabaseDep, SettingsDep, own_job_only
+from service.api.errors import problem_responses
+from service.api.idempotency import OnceDep
+from service.api.job_shapes import JobOut, LimitsIn
+from service.api.shapes import Name
+from service.change_inputs import ChangeIn
+from service.db.rows import JobRow, ScenarioRow
+from service.opportunities import OpportunityReader
+from service.settings import Settings
+from service.variations import Asked, Variations
+
+router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[Depends(own_job_only)])
+
+_CHANGE: Final = set(ChangeIn.model_fields)
+
+
+class WhatIfIn(ChangeIn):
+    """A change to the question of a job. What is left out is as in that job."""
+
+    solver: str | None = Field(None, description="A name of `GET /v1/solvers`.")
+    params: dict[str, Any] | None = Field(
+        None, description="The solver's own; the others are its defaults."
+    )
+    seed: int | None = Field(None, ge=0, lt=2**63)
+    limits: LimitsIn = LimitsIn()
+    priority: int | None = Field(None, ge=0, le=9)
+    label: Name | None = None
+
+
+@router.post("/{job_id}/what-if", status_code=202, responses=problem_responses(404, 409, 503))
+def create_what_if(
+    job_id: str,
+    body: WhatIfIn,
+    database: DatabaseDep,
+    settings: SettingsDep,
+    once: OnceDep,
+    caller: CallerDep,
+    audit: AuditDep,
+    request: Request,
+    response: Response,
+) -> JobOut:
+    """Queue the question of a job with a change, as a scenario and a job of their own.
+
+    `links.what_if_of` leads to the job, `change` repeats what was asked, and
+    `GET /v1/jobs/{job_id}/diff/{other_id}` tells what came of it. A target is forced by the
+    image that the job's plan holds, or by the one that costs that plan least. What cannot be is
+    refused with its place in the body; working that out may take a while: 503 with
+    `Retry-After` asks to come back.
+    """
+    queue = intake.queue_of(request)
+    with database.reading() as session:
+        job = intake.find_job(session, job_id)
+        timeline = store.timeline_of(session, job_id)
+        scenario = session.get_one(ScenarioRow, job.scenario_id)
+        content, sha256 = scenario.content, scenario.sha256
+    if timeline is None and body.needs_plan:
+        raise intake.not_ready(job)
+    asked = Asked(
+        content=content,
+        timeline=timeline if body.needs_plan else None,
+        change=body,
+        max_horizon_days=settings.max_horizon_days,
+    )
+    solver, params = _solver(job, body)
+    time_s, memory_mb = _limits(job, body, settings)
+    reader = cast(OpportunityReader, request.app.state.opportunities)
+    described = reader.get(database, job.scenario_id, sha256)
+    varied = cast(Variations, request.app.state.variations).get(asked, described)
+    with once.transaction() as session:
+        intake.require_room(session, settings)
+        row, is_new = scenario_store.save(session, varied.frozen)
+        if is_new:
+            audit.record(session, "create", "scenario", row.id)
+            opportunity_store.save(session, row.sha256, varied.opportunity_block)
+        spec = store.JobSpec(
+            scenario_id=row.id,
+            solver=solver,
+            params=params,
+            seed=job.seed if body.seed is None else body.seed,
+            time_s=time_s,
+            memory_mb=memory_mb,
+            priority=job.priority if body.priority is None else body.priority,
+            label=job.label if body.label is None else body.label,
+            owner=caller.owner,
+            what_if_of=job_id,
+            change=body.model_dump(mode="json", include=_CHANGE, exclude_unset=True),
+        )
+        made = store.submit(session, queue, spec)
+        audit.record(session, "create", "job", made.id)
+        return once.keep(session, intake.accepted(session, response, made))
+
+
+def _solver(job: JobRow, body: WhatIfIn) -> tuple[str, dict[str, Any]]:
+    """Return the solver and all its parameters: those of the job belong to its solver."""
+    solver = body.solver or job.solver
+    if body.params is None and solver == job.solver:
+        return solver, dict(job.params)
+    return solver, intake.all_params(solver, body.params or {})
+
+
+def _limits(job: JobRow, body: WhatIfIn, settings: Settings) -> tuple[float, int]:
+    given = body.limits.model_dump(exclude_none=True)
+    if not given:
+        return job.limits["time_s"], job.limits["memory_mb"]
+    return intake.limits_of(LimitsIn(**job.limits | given), settings)

@@ -1,0 +1,92 @@
+"""Faults of a changed scenario, told where their cause stands in the change that was sent."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+
+from planner_core.errors import PlannerError
+from planner_core.pins.pins import PinnedAction, Pins
+from planner_core.what_if import is_any_image
+from service.change_inputs import ChangeIn
+from service.pin_inputs import PinnedActionIn
+
+_PIN = re.compile(r"/pins/(keep|skip)/(\d+)")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Places:
+    """Where each pin of the changed scenario comes from; None for one of the scenario before."""
+
+    keep: tuple[str | None, ...]
+    skip: tuple[str | None, ...]
+
+    @classmethod
+    def of(
+        cls,
+        pins: Pins,
+        forbid: Sequence[PinnedAction],
+        force: Sequence[PinnedAction],
+        num_dropped: int,
+    ) -> Places:
+        """Return those of ``planner_core.what_if``: the new ones follow those there were."""
+        skipped = [f"/forbid/{i}" for i, one in enumerate(forbid) if not is_any_image(one)]
+        dropped = [f"/relax/drop_actions/{i}" for i in range(num_dropped)]
+        return cls(
+            keep=(*[None] * len(pins.keep), *(f"/force/{i}" for i in range(len(force)))),
+            skip=(*[None] * len(pins.skip), *skipped, *dropped),
+        )
+
+    @classmethod
+    def of_body(cls, force: Sequence[PinnedAction], forbid: Sequence[PinnedAction]) -> Places:
+        """Return those of all that the body itself names."""
+        return cls(
+            keep=tuple(f"/force/{i}" for i in range(len(force))),
+            skip=tuple(f"/forbid/{i}" for i in range(len(forbid))),
+        )
+
+    def place(self, pin: re.Match[str]) -> str | None:
+        """Return where a pin comes from."""
+        places: tuple[str | None, ...] = getattr(self, pin[1])
+        return places[int(pin[2])]
+
+
+@contextmanager
+def pointing_into(change: ChangeIn, places: Places) -> Iterator[None]:
+    """Let faults of pins point into the change."""
+    try:
+        yield
+    except PlannerError as error:
+        fault = error.fault
+        pin = _PIN.match(fault.pointer or "")
+        detail = _PIN.sub(lambda found: places.place(found) or found[0], fault.detail)
+        pointer = fault.pointer
+        if pin is not None:
+            pointer = places.place(pin)
+            if pointer is None:
+                detail = f"{pin[0]} of the job's scenario: {detail}"
+            elif _is_object(change, pointer):
+                pointer += (fault.pointer or "")[pin.end() :]
+        error.fault = replace(fault, pointer=pointer, detail=detail)
+        raise
+
+
+@contextmanager
+def pointing_into_relax() -> Iterator[None]:
+    """Let faults of a relaxed file point into ``relax``."""
+    try:
+        yield
+    except PlannerError as error:
+        of_horizon = (error.fault.pointer or "").startswith("/horizon")
+        pointer = "/relax/horizon_end" if of_horizon else "/relax"
+        error.fault = replace(error.fault, pointer=pointer)
+        raise
+
+
+def _is_object(change: ChangeIn, pointer: str) -> bool:
+    """Return whether an action is written out there, and not named by an id alone."""
+    _, name, number = pointer.split("/")[:3]
+    actions = {"force": change.force, "forbid": change.forbid}.get(name)
+    return actions is not None and isinstance(actions[int(number)], PinnedActionIn)

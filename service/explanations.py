@@ -1,0 +1,116 @@
+"""One target explained at length, as a document: every opportunity, and what would give it one."""
+
+from __future__ import annotations
+
+import planner_core
+from planner_core.plan import Plan
+from planner_core.problem import Opportunities
+from planner_core.reasons.access_changes import AccessChange, access_changes
+from planner_core.reasons.at_length import Attempt, explain_target
+from planner_core.solvers.base import Budget
+from service.background import Background
+from service.instants import instant_text
+from service.opportunities import Described
+from service.rebuilt import Rebuilt, rebuild
+from service.wording import Document, Wording
+
+_KEPT = 200
+_KEPT_JOBS = 2
+
+
+class Explainer:
+    """Explains targets beside the requests; the jobs looked at last stay compiled."""
+
+    def __init__(self) -> None:
+        told = "The explanation is being worked out."
+        self._background = Background("explanations", kept=_KEPT, told=told)
+        # Only the thread of the background touches these.
+        self._jobs: dict[str, Rebuilt] = {}
+
+    def get(self, job_id: str, described: Described, timeline: str, target: int) -> Document:
+        """Return what there is to say of a target; 503 ``still_computing`` where it takes long."""
+
+        def work(budget: Budget) -> Document:
+            job = self._jobs.pop(job_id, None) or rebuild(described, timeline, budget)
+            self._jobs[job_id] = job
+            for oldest in list(self._jobs)[:-_KEPT_JOBS]:
+                del self._jobs[oldest]
+            return _Words(job).document(target, budget)
+
+        return self._background.get(f"{job_id}/{target}", work)
+
+    def close(self) -> None:
+        """Stop the work under way."""
+        self._background.close()
+
+
+def version_of(job_id: str, target_id: str) -> str:
+    """Return what names an explanation: it follows from the job and this version alone."""
+    return f"{planner_core.__version__}/{job_id}/{target_id}"
+
+
+class _Words(Wording):
+    def __init__(self, job: Rebuilt):
+        super().__init__(job.scenario, job.problem, job.timeline)
+        self.job = job
+        self._own = {action.opportunity: p for p, action in enumerate(job.plan.actions)}
+
+    def document(self, target: int, budget: Budget) -> Document:
+        job = self.job
+        found = explain_target(job.problem, job.plan, job.timeline, target, job.search)
+        reason = found.outcome.reason
+        is_hidden = reason is not None and reason.code == "no_access"
+        changes = access_changes(job.scenario, target, budget) if is_hidden else ()
+        return {
+            **self._target(found.outcome),
+            "opportunities": [self._attempt(attempt) for attempt in found.attempts],
+            "access_changes": [self._access_change(target, change) for change in changes],
+        }
+
+    def _attempt(self, attempt: Attempt) -> Document:
+        table: Opportunities = self.job.computed.opportunities
+        return {
+            "opportunity_id": f"o{attempt.scenario_row}",
+            "satellite_id": self.problem.satellites[attempt.satellite].id,
+            "start": self._instant(attempt.start_s),
+            "end": self._instant(float(table.end_s[attempt.scenario_row])),
+            "violations": self._violations(attempt),
+            "displaces": [self._action_ids[p] for p in attempt.displaces],
+            "fits_instead": attempt.is_settled,
+            "reward_delta": attempt.reward_delta,
+            "ruled_out": attempt.ruled_out,
+        }
+
+    def _violations(self, attempt: Attempt) -> list[Document]:
+        if attempt.opportunity is None:
+            return []
+        # They blame actions by their place in the plan with this one in it.
+        forced = Plan.of(self.problem, [*self._own, attempt.opportunity]).actions
+        ids = {
+            place: self._action_ids[self._own[action.opportunity]]
+            for place, action in enumerate(forced)
+            if action.opportunity in self._own
+        }
+        return [self._violation(violation, ids) for violation in attempt.violations]
+
+    def _access_change(self, target: int, change: AccessChange) -> Document:
+        """Return a change in the words of a what-if's ``relax``."""
+        satellite, own = self.scenario.satellites[change.satellite], self.scenario.targets[target]
+        said: Document = {"satellite_id": satellite.id}
+        if isinstance(change.value, datetime):
+            return said | {"horizon_end": instant_text(change.value)}
+        setting = {change.setting: change.value}
+        if change.setting == "collect_s":
+            return said | {"targets": {own.id: setting}}
+        if _is_narrower(getattr(satellite.sensor, change.setting), change):
+            said |= setting
+        if _is_narrower(getattr(own, change.setting), change):
+            said["targets"] = {own.id: setting}
+        return said
+
+
+def _is_narrower(limit: object, change: AccessChange) -> bool:
+    """Return whether a limit is tighter than what the change needs."""
+    if isinstance(limit, float | int) and isinstance(change.value, float):
+        return limit < change.value if "_max" in change.setting else limit > change.value
+    return limit is not None and limit != change.value

@@ -1,0 +1,107 @@
+"""A scenario file with other values of some settings; what is refused points into the change."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from planner_core.errors import InvalidScenario, PlannerError
+from service.change_inputs import PART_OF, RelaxIn
+from service.inputs import ScenarioFile, TargetIn
+from service.instants import instant_text
+from service.translate import read_file, scenario_from_file
+
+_OF_TARGETS = TargetIn.model_fields.keys() - {"id", "lat_deg", "lon_deg", "alt_m"}
+
+
+def relaxed_file(file: ScenarioFile, relax: RelaxIn) -> ScenarioFile:
+    """Return the file with other settings.
+
+    Raises
+    ------
+    InvalidScenario, InvalidElements
+        Nothing of that name, or a value that cannot be; with a pointer into ``/relax``.
+    """
+    relaxing = _Relaxing(file)
+    relaxing.set_satellites(relax)
+    relaxing.set_targets(relax.targets)
+    if relax.horizon_end is not None:
+        relaxing.set(("horizon",), "end", instant_text(relax.horizon_end), "/relax/horizon_end")
+    return relaxing.checked()
+
+
+class _Relaxing:
+    """A file under change, and where in the body each of its new values stands."""
+
+    def __init__(self, file: ScenarioFile):
+        self._document: dict[str, Any] = file.model_dump(mode="json")
+        self._places: dict[str, str] = {}
+
+    def set(self, path: tuple[str | int, ...], name: str, value: object, place: str) -> None:
+        part: Any = self._document
+        for step in path:
+            part = part[step]
+        part[name] = value
+        self._places["/".join(["", *map(str, path), name])] = place
+
+    def set_satellites(self, relax: RelaxIn) -> None:
+        ids = [satellite["id"] for satellite in self._document["satellites"]]
+        if relax.satellite_id is not None and relax.satellite_id not in ids:
+            raise _unknown("satellite", relax.satellite_id, "/relax/satellite_id")
+        for own_id in relax.satellites:
+            if own_id not in ids:
+                raise _unknown("satellite", own_id, f"/relax/satellites/{_escaped(own_id)}")
+        for index, own_id in enumerate(ids):
+            if relax.satellite_id in (None, own_id):
+                self._set_satellite(index, relax.settings, "/relax")
+            at = f"/relax/satellites/{_escaped(own_id)}"
+            self._set_satellite(index, relax.satellites.get(own_id, {}), at)
+
+    def _set_satellite(self, index: int, settings: Mapping[str, object], at: str) -> None:
+        satellite = self._document["satellites"][index]
+        for name, value in settings.items():
+            part = PART_OF.get(name)
+            if part is None:
+                raise _unknown_setting(name, at)
+            if isinstance(satellite[part], str):
+                satellite[part] = {"preset": satellite[part]}
+            self.set(("satellites", index, part), name, value, f"{at}/{_escaped(name)}")
+
+    def set_targets(self, targets: Mapping[str, Mapping[str, object]]) -> None:
+        index = {target["id"]: i for i, target in enumerate(self._document["targets"])}
+        for own_id, settings in targets.items():
+            at = f"/relax/targets/{_escaped(own_id)}"
+            if own_id not in index:
+                raise _unknown("target", own_id, at)
+            for name, value in settings.items():
+                if name not in _OF_TARGETS:
+                    raise _unknown_setting(name, at)
+                self.set(("targets", index[own_id]), name, value, f"{at}/{name}")
+
+    def checked(self) -> ScenarioFile:
+        try:
+            file = read_file(self._document)
+            scenario_from_file(file)
+        except PlannerError as error:
+            pointer = error.fault.pointer or ""
+            if not pointer.startswith("/pins"):
+                error.fault = replace(error.fault, pointer=self._places.get(pointer, "/relax"))
+            raise
+        return file
+
+
+def _unknown(what: str, own_id: str, pointer: str) -> InvalidScenario:
+    return InvalidScenario(
+        f"unknown_{what}", f"The scenario has no {what} {own_id!r}.", pointer=pointer
+    )
+
+
+def _unknown_setting(name: str, at: str) -> InvalidScenario:
+    return InvalidScenario(
+        "unknown_field", f"There is no setting {name!r}.", pointer=f"{at}/{_escaped(name)}"
+    )
+
+
+def _escaped(name: str) -> str:
+    return name.replace("~", "~0").replace("/", "~1")
