@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from datetime import datetime
+
 import planner_core
 from planner_core.plan import Plan
 from planner_core.problem import Opportunities
