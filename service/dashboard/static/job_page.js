@@ -40,6 +40,8 @@ startPage(async () => {
     if (!byId("progress-card").hidden) {
       chart ??= new ProgressChart();
       chart.show(job);
+      // Of a job that was over at once there is no course to show.
+      if (FINAL.has(job.state)) byId("progress-card").hidden = chart.points.length < 3;
     }
   });
   const job = /** @type {JobOut | null} */ (last);
@@ -208,11 +210,10 @@ async function showOthers(job) {
   const rows = items.map((one) => {
     const { progress } = one;
     const isThis = one.id === job.id;
-    const name = one.label ?? short(one.id);
     return h(
       "tr",
       { class: isThis ? "marked" : "" },
-      h("th", { scope: "row" }, isThis ? `${name} (this one)` : h("a", { href: `/jobs/${one.id}` }, name)),
+      h("th", { scope: "row" }, isThis ? "this one" : h("a", { href: `/jobs/${one.id}` }, one.label ?? short(one.id))),
       h("td", {}, one.solver),
       h("td", {}, h("span", { class: `state ${one.state}` }, one.state)),
       h("td", { class: "number" }, number(progress?.reward)),

@@ -15,6 +15,9 @@ import { positionAt } from "./geography.js";
 
 const REACH_PX = 8;
 const TRACK_MS = 50 * 60_000;
+/** Names of more stations would cover the map, unless it is shown this near. */
+const FEW_STATIONS = 10;
+const NEAR = 3;
 const OUTCOMES = ["excluded", "unscheduled", "collected", "downlinked"];
 
 export class WorldMap {
@@ -238,8 +241,9 @@ export class WorldMap {
     pen.lineTo(x + 5.5, y + 4);
     pen.lineTo(x - 5.5, y + 4);
     pen.fill();
+    const hasRoom = this.geography.stations.length <= FEW_STATIONS || this.zoom >= NEAR;
     pen.fillStyle = colors.ink ?? "";
-    pen.fillText(station.name, x + 8, y + 1);
+    if (hasRoom) pen.fillText(station.name, x + 8, y + 1);
   }
 
   /**

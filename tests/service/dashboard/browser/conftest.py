@@ -60,7 +60,11 @@ class Browser:
 
     def click(self, selector: str) -> None:
         """Click an element as soon as it can be."""
-        self.wait(lambda: self.find(selector).is_enabled() and self.find(selector).is_displayed())
+        script = """
+          const found = document.querySelector(arguments[0]);
+          return found?.checkVisibility() && !found.disabled;
+        """
+        self.wait(lambda: self.run(script, selector), f"nothing to click at {selector}")
         self.run("arguments[0].scrollIntoView({block: 'center'})", self.find(selector))
         self.find(selector).click()
 

@@ -70,8 +70,11 @@ def compared(api: httpx.Client, scenario_id: str) -> Json:
 
 def select_blocked(browser: Browser) -> None:
     """Select a target that others displace: it has most to tell."""
-    browser.click("#left-out details[data-reason=slew_conflict] > summary")
-    browser.click("#left-out details[data-reason=slew_conflict] tbody tr button")
+    displaced = "[data-reason=displaced_by]"
+    is_there = browser.driver.find_elements("css selector", displaced)
+    group = f"#left-out details{displaced if is_there else '[data-reason=slew_conflict]'}"
+    browser.click(f"{group} > summary")
+    browser.click(f"{group} tbody tr button")
     browser.wait(lambda: browser.text("#selected table"))
 
 
