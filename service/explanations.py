@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from datetime import datetime
+
 import planner_core
 from planner_core.plan import Plan
 from planner_core.problem import Opportunities
@@ -97,8 +99,8 @@ class _Words(Wording):
         """Return a change in the words of a what-if's ``relax``."""
         satellite, own = self.scenario.satellites[change.satellite], self.scenario.targets[target]
         said: Document = {"satellite_id": satellite.id}
-        if change.setting == "horizon_end":
-            return said | {"horizon_end": instant_text(change.value)}
+        if isinstance(change.value, datetime):
+            return said | {change.setting: instant_text(change.value)}
         setting = {change.setting: change.value}
         if change.setting == "collect_s":
             return said | {"targets": {own.id: setting}}
