@@ -100,7 +100,7 @@ class _Words(Wording):
         satellite, own = self.scenario.satellites[change.satellite], self.scenario.targets[target]
         said: Document = {"satellite_id": satellite.id}
         if isinstance(change.value, datetime):
-            return said | {"horizon_end": instant_text(change.value)}
+            return said | {change.setting: instant_text(change.value)}
         setting = {change.setting: change.value}
         if change.setting == "collect_s":
             return said | {"targets": {own.id: setting}}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any
 
@@ -12,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.domain import Resources
-from planner_core.errors import PlannerError
+from planner_core.errors import InvalidScenario, PlannerError
 from service.translate import canonical, scenario_from_content, sha256_of
 from tests.service.factories import ground_station, satellite, target, tle
 
@@ -180,3 +181,27 @@ json_values = st.recursive(
 def test_any_json_is_read_or_refused_never_worse(where: str, value: object) -> None:
     with contextlib.suppress(PlannerError):
         scenario_from_content(file(**{where: value}))
+
+
+def test_a_preset_takes_fractions_of_its_own_and_one_question_has_one_hash() -> None:
+    plain, changed = file(), file()
+    plain["satellites"][0]["resources"] = {"preset": "paper"}
+    assert canonical(plain) == canonical(changed)
+    own: dict[str, Any] = {
+        "preset": "paper_code",
+        "battery_min_fraction": 0.2,
+        "eclipse_aware": True,
+    }
+    changed["satellites"][0]["resources"] = own
+    text = canonical(changed)
+    assert canonical(json.loads(text)) == text
+    (made,) = scenario_from_content(changed).satellites
+    preset = Resources.paper_code(made.orbit.period_s)
+    assert made.resources == replace(preset, battery_min_fraction=0.2, eclipse_aware=True)
+    own["collect_power_w"] = 3.0
+    with pytest.raises(InvalidScenario) as refused:
+        canonical(changed)
+    fault = refused.value.fault
+    assert (fault.code, fault.pointer) == (
+        "unknown_field", "/satellites/0/resources/collect_power_w",
+    )  # fmt: skip
