@@ -20,7 +20,7 @@ from planner_core.plan import Action, Plan
 from planner_core.problem import COLLECT, CONTACT, Opportunities, Problem
 from service.api.shapes import Body, Instant
 from service.exports.table import unguarded
-from service.inputs import Id
+from service.pin_inputs import Id
 from service.records import Checked, Record, Records, check, read_csv
 
 _REQUIRED: Final = ("satellite_id", "mode", "start", "end", "target_id", "station_id")
