@@ -189,6 +189,9 @@ KINDS: dict[str, ProblemKind] = {
         "of its element set. Give newer elements, or allow_old_elements.",
     ),
     "unknown_target": ProblemKind(422, "Unknown target", "The scenario has no target of this id."),
+    "unknown_action": ProblemKind(
+        422, "Unknown action", "The job's timeline has no collect or contact of this id."
+    ),
     "pin_without_opportunity": ProblemKind(
         422,
         "Nothing to be kept",
