@@ -118,6 +118,8 @@ def compute_opportunities(scenario: Scenario, budget: Budget) -> ScenarioOpportu
     ------
     PropagationFailed
         SGP4 stops before the end of the horizon.
+    InvalidScenario
+        There are too many.
     Cancelled
         The budget was spent first; there is no partial answer.
     """
@@ -128,7 +130,7 @@ def compute_opportunities(scenario: Scenario, budget: Budget) -> ScenarioOpportu
     closeness = np.zeros(len(scenario.targets), dtype=np.int64)
     parts: list[tasks.Columns] = []
     lit: list[Sunlight] = []
-    num_accesses = 0
+    num_accesses = num_rows = 0
     num_steps = 2 * len(scenario.satellites)
     for index, satellite in enumerate(scenario.satellites):
         _go_on(budget, index / num_steps)
@@ -141,6 +143,8 @@ def compute_opportunities(scenario: Scenario, budget: Budget) -> ScenarioOpportu
                 _note(closeness, path, places[kind], found, placed[0])
             parts.append(tasks.rows_of(index, kind, found, num_accesses, placed))
             num_accesses += len(found)
+            num_rows += len(placed[0])
+            tasks.check_number(num_rows)
         lit.append(sunlight(path))
     described = tasks.Described(
         tasks.in_order(

@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from planner_core.access import Accesses
 from planner_core.domain import GroundStation, Nadir, Target
+from planner_core.errors import InvalidScenario
 from planner_core.orbits.ephemeris import Ephemeris
 from planner_core.orbits.places import Places, View, line_of_sight_teme, view
 from planner_core.problem import COLLECT, Opportunities
@@ -26,6 +27,8 @@ Longs = npt.NDArray[np.int64]
 Placed = tuple[Longs, Longs, Longs]
 Columns = dict[str, npt.NDArray[Any]]
 
+MOST_OPPORTUNITIES: Final = 10_000_000
+"""Of one scenario: their table takes two gigabytes while it is made."""
 _MS_PER_S: Final = 1000
 _CHUNK: Final = 16_384  # rows whose intermediate results fit the processor's cache
 _SEEN: Final = (
@@ -37,6 +40,22 @@ _SEEN: Final = (
     "range_m",
     "sun_elevation_deg",
 )
+
+
+def check_number(num_opportunities: int) -> None:
+    """Refuse more opportunities than fit a machine's memory.
+
+    Raises
+    ------
+    InvalidScenario
+        ``too_many_opportunities``.
+    """
+    if num_opportunities > MOST_OPPORTUNITIES:
+        raise InvalidScenario(
+            "too_many_opportunities",
+            f"The scenario offers more than {MOST_OPPORTUNITIES} opportunities: plan fewer "
+            "satellites, targets or days, or give a longer collect_spacing_s.",
+        )
 
 
 def place_collects(
@@ -69,6 +88,7 @@ def _spaced(row: Longs, start_ms: Longs, room_ms: Longs, step_ms: float) -> tupl
     last_ms = np.minimum(np.rint(regular * step_ms).astype(np.int64), room_ms)
     extra = (room_ms - last_ms > 1).astype(np.int64)
     counts = regular + 1 + extra
+    check_number(int(counts.sum()))
     of = np.repeat(np.arange(len(row)), counts)
     k = np.arange(len(of)) - np.repeat(np.cumsum(counts) - counts, counts)
     into_ms = np.minimum(np.rint(k * step_ms).astype(np.int64), room_ms[of])

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
 from typing import Any, TypeVar
 
 import sqlalchemy as sa
@@ -27,6 +27,7 @@ from service.inputs import (
     ScenarioFile,
     ScenarioIn,
 )
+from service.scenario_limits import ScenarioLimits
 from service.translate import canonical_of_file, horizon_from, scenario_from_file, sha256_of
 
 R = TypeVar("R", SatelliteRow, TargetCatalogRow, GroundStationRow)
@@ -50,7 +51,7 @@ class FrozenScenario:
     summary: dict[str, Any]
 
 
-def freeze(database: Database, body: ScenarioIn, *, max_horizon_days: float) -> FrozenScenario:
+def freeze(database: Database, body: ScenarioIn, limits: ScenarioLimits) -> FrozenScenario:
     """Return the frozen form of a question over what is stored. Stores nothing.
 
     Raises
@@ -58,21 +59,22 @@ def freeze(database: Database, body: ScenarioIn, *, max_horizon_days: float) -> 
     InvalidScenario
         ``unknown_satellite``, ``unknown_target_catalog``, ``unknown_ground_station``,
         ``duplicate_satellite_id``, ``duplicate_target_catalog_id``, ``duplicate_target_id``,
-        ``duplicate_ground_station_id``, ``horizon_inverted``, ``horizon_too_long``; each with
-        a pointer into the body.
+        ``duplicate_ground_station_id``, ``horizon_inverted``, ``horizon_too_long``,
+        ``scenario_too_large``; with a pointer into the body.
     PropagationFailed
         SGP4 cannot carry a satellite through the horizon.
     """
-    _check_horizon(body, max_horizon_days)
     with database.reading() as session:
+        num_targets = _num_targets(session, body.target_catalog_ids)
+        limits.check(horizon_from(body.horizon), len(body.satellite_ids), num_targets)
         file = _expanded(session, body)
     with _named_by_ids():
-        return freeze_file(file, max_horizon_days=max_horizon_days)
+        return freeze_file(file, limits)
 
 
-def freeze_file(file: ScenarioFile, *, max_horizon_days: float) -> FrozenScenario:
+def freeze_file(file: ScenarioFile, limits: ScenarioLimits) -> FrozenScenario:
     """Return the frozen form of a file that `translate.read_file` has made; errors as above."""
-    _check_horizon(file, max_horizon_days)
+    limits.check(horizon_from(file.horizon), len(file.satellites), len(file.targets))
     scenario = scenario_from_file(file)
     check_propagation(scenario)
     check_element_age(scenario)
@@ -118,15 +120,11 @@ def _named_by_ids() -> Iterator[None]:
         raise
 
 
-def _check_horizon(body: Question, max_horizon_days: float) -> None:
-    horizon = horizon_from(body.horizon)
-    if horizon.end - horizon.start > timedelta(days=max_horizon_days):
-        days = horizon.duration_s / 86400.0
-        raise InvalidScenario(
-            "horizon_too_long",
-            f"The horizon has {days:.2f} days; the limit is {max_horizon_days:g}.",
-            pointer="/horizon/end",
-        )
+def _num_targets(session: Session, catalog_ids: Sequence[str]) -> int:
+    """Return how many targets catalogues hold, without reading them."""
+    total = sa.func.coalesce(sa.func.sum(TargetCatalogRow.num_targets), 0)
+    wanted = sa.select(total).where(TargetCatalogRow.id.in_(set(catalog_ids)))
+    return int(session.scalars(wanted).one())
 
 
 def _expanded(session: Session, body: ScenarioIn) -> ScenarioFile:

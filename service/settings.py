@@ -13,6 +13,7 @@ from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from service.access.static_keys import StaticKeys
 from service.db.postgresql import DEFAULT_TIMEOUT_S
+from service.scenario_limits import ScenarioLimits
 
 _REQUESTS_PER_S: Final = 50.0
 _ORIGIN = re.compile(r"https?://[A-Za-z0-9.-]+(:\d+)?|https?://\[[0-9A-Fa-f:]+\](:\d+)?")
@@ -38,6 +39,8 @@ class Settings(BaseSettings):
     workers: int = Field(2, ge=0, le=64)
     max_body_mb: float = Field(32.0, gt=0)
     max_horizon_days: float = Field(31.0, gt=0)
+    max_targets: int = Field(200_000, ge=1)
+    max_satellite_target_days: float = Field(20e6, gt=0)
     lease_s: float = Field(15.0, gt=0)
     heartbeat_s: float = Field(0.5, gt=0)
     reconcile_s: float = Field(2.0, gt=0)
@@ -45,6 +48,7 @@ class Settings(BaseSettings):
     default_time_s: float = Field(300.0, gt=0)
     max_time_s: float = Field(3600.0, gt=0)
     default_memory_mb: int = Field(2048, ge=64)
+    max_memory_mb: int = Field(16_384, ge=64)
     queue_poll_s: float = Field(0.1, gt=0)
     max_queued: int = Field(10_000, ge=1)
     max_running_per_tenant: int = Field(64, ge=1)
@@ -56,6 +60,15 @@ class Settings(BaseSettings):
     rate_limit_per_s: float | None = Field(None, ge=0, allow_inf_nan=False)
     rate_limit_burst: int = Field(200, ge=1)
     cors_origins: str = ""
+
+    @property
+    def scenario_limits(self) -> ScenarioLimits:
+        """Return how large a scenario may be."""
+        return ScenarioLimits(
+            horizon_days=self.max_horizon_days,
+            num_targets=self.max_targets,
+            satellite_target_days=self.max_satellite_target_days,
+        )
 
     @property
     def is_local(self) -> bool:

@@ -45,7 +45,7 @@ def all_params(solver: str, params: Mapping[str, Any]) -> dict[str, Any]:
 
 def frozen(database: Database, settings: Settings, body: QuestionIn) -> FrozenScenario | None:
     """Return the inline scenario of a body, ready to be stored; None where it names one."""
-    scenario, days = body.scenario, settings.max_horizon_days
+    scenario, limits = body.scenario, settings.scenario_limits
     if (scenario is None) == (body.scenario_id is None):
         detail = "Give either scenario_id or scenario."
         if scenario is None:
@@ -53,10 +53,10 @@ def frozen(database: Database, settings: Settings, body: QuestionIn) -> FrozenSc
         raise refuse([Fault(code="invalid_value", detail=detail, pointer="/scenario")])
     with inside("/scenario"):
         if isinstance(scenario, ScenarioIn):
-            return scenario_store.freeze(database, scenario, max_horizon_days=days)
+            return scenario_store.freeze(database, scenario, limits)
         if isinstance(scenario, ScenarioFile):
             file = read_file(scenario.model_dump(mode="json"))
-            return scenario_store.freeze_file(file, max_horizon_days=days)
+            return scenario_store.freeze_file(file, limits)
     return None
 
 
@@ -82,7 +82,11 @@ def limits_of(limits: LimitsIn, settings: Settings) -> tuple[float, int]:
     if time_s > settings.max_time_s:
         detail = f"{time_s:g} s is more than the {settings.max_time_s:g} s that a job may take."
         raise refuse([Fault(code="value_out_of_range", detail=detail, pointer="/limits/time_s")])
-    return time_s, settings.default_memory_mb if limits.memory_mb is None else limits.memory_mb
+    memory_mb = settings.default_memory_mb if limits.memory_mb is None else limits.memory_mb
+    if memory_mb > settings.max_memory_mb:
+        detail = f"{memory_mb} MB are more than the {settings.max_memory_mb} that a job may hold."
+        raise refuse([Fault(code="value_out_of_range", detail=detail, pointer="/limits/memory_mb")])
+    return time_s, memory_mb
 
 
 def require_room(session: Session, settings: Settings, num_jobs: int = 1) -> None:

@@ -147,6 +147,17 @@ KINDS: dict[str, ProblemKind] = {
     "horizon_too_long": ProblemKind(
         422, "Horizon too long", "Plan a shorter span, or raise SLEWLINE_MAX_HORIZON_DAYS."
     ),
+    "scenario_too_large": ProblemKind(
+        422,
+        "Scenario too large",
+        "Plan fewer satellites, targets or days, or raise SLEWLINE_MAX_TARGETS or "
+        "SLEWLINE_MAX_SATELLITE_TARGET_DAYS.",
+    ),
+    "too_many_opportunities": ProblemKind(
+        422,
+        "Too many opportunities",
+        "Plan fewer satellites, targets or days, or give a longer collect_spacing_s.",
+    ),
     "unknown_satellite": ProblemKind(422, "Unknown satellite", "No satellite has this id."),
     "unknown_target_catalog": ProblemKind(
         422, "Unknown target catalogue", "No target catalogue has this id."

@@ -123,7 +123,7 @@ def create_scenario(
 
     The same content again, under whatever name, answers 200 with the scenario that is there.
     """
-    frozen = store.freeze(database, body, max_horizon_days=settings.max_horizon_days)
+    frozen = store.freeze(database, body, settings.scenario_limits)
     with once.transaction() as session:
         row, is_new = store.save(session, frozen)
         if is_new:

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from planner_core.access import Accesses
 from planner_core.domain import GroundStation, Target
-from planner_core.opportunities import place_collects, place_contacts
+from planner_core.errors import InvalidScenario
+from planner_core.opportunities import MOST_OPPORTUNITIES, place_collects, place_contacts
 
 
 def accesses(*windows_ms: tuple[int, int]) -> Accesses:
@@ -94,3 +95,10 @@ def test_a_contact_is_the_whole_access_if_it_lasts_long_enough() -> None:
     station = GroundStation(id="s", name="s", lat_deg=0.0, lon_deg=0.0, min_contact_s=60.0)
     row, start, end = place_contacts(accesses((0, 59_999), (70_000, 130_000)), [station])
     assert (row.tolist(), start.tolist(), end.tolist()) == ([1], [70_000], [130_000])
+
+
+def test_more_collects_than_memory_holds_are_refused_before_they_are_made() -> None:
+    month = accesses((0, 31 * 86_400_000))
+    with pytest.raises(InvalidScenario, match=f"more than {MOST_OPPORTUNITIES}") as refused:
+        place_collects(month, target(), 0.001)
+    assert refused.value.code == "too_many_opportunities"

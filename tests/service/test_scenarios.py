@@ -12,11 +12,13 @@ import pytest
 import sqlalchemy as sa
 
 from planner_core.build import compute_opportunities
+from planner_core.errors import InvalidScenario
 from planner_core.problem import Opportunities
 from planner_core.solvers.base import Budget
 from service import opportunity_store
 from service.db.rows import OpportunitySetRow, ScenarioRow
-from service.translate import canonical, scenario_from_content
+from service.scenario_store import freeze_file
+from service.translate import canonical, read_file, scenario_from_content
 from tests.service.conftest import Service
 from tests.service.factories import EPOCH, ground_station, post, satellite, target, tle
 from tests.service.problems import assert_problem
@@ -181,6 +183,38 @@ def test_a_bad_question_is_named_by_its_pointer(
     response = service.client.post(PATH, json=question(service.client) | change)
     assert_problem(response, 422, code, pointer)
     assert count(service, ScenarioRow) == 0
+
+
+@pytest.mark.parametrize(
+    ("limits", "words"),
+    [
+        ({"max_targets": 107}, "The scenario has 108 targets; 107 are the most."),
+        (
+            {"max_satellite_target_days": 26.9},
+            "1 satellites times 108 targets times 0.25 days are 27; the limit is 26.9.",
+        ),
+    ],
+)
+def test_a_scenario_that_is_too_large_is_refused_before_it_is_read(
+    service: Service, limits: dict[str, float], words: str
+) -> None:
+    asked = question(service.client)
+    file = get(service.client, post(service.client, PATH, asked)["links"]["file"]).json()
+    settings = service.settings.model_copy(update=limits)
+    service.app.state.settings = settings
+    problem = assert_problem(
+        service.client.post(PATH, json=asked | {"name": "Again"}), 422, "scenario_too_large"
+    )
+    assert problem["detail"] == words
+    with pytest.raises(InvalidScenario, match=words):
+        freeze_file(read_file(file), settings.scenario_limits)
+
+
+def test_a_spacing_that_makes_too_many_opportunities_is_refused(client: httpx.Client) -> None:
+    asked = question(client, collect_spacing_s=1e-6)
+    asked["target_catalog_ids"] = [catalog(client, *(target(id=f"t{n}") for n in range(2000)))]
+    path = post(client, PATH, asked)["links"]["opportunities"]
+    assert_problem(client.get(path), 422, "too_many_opportunities")
 
 
 def test_naming_a_satellite_twice_is_refused(client: httpx.Client) -> None:

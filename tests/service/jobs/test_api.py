@@ -117,6 +117,7 @@ def test_a_job_is_taken_and_shown_whole(client: httpx.Client, jobs: Jobs) -> Non
         ({"scenario_id": None}, "missing_field", "/scenario_id"),
         ({"limits": {"time_s": 0}}, "value_out_of_range", "/limits/time_s"),
         ({"limits": {"time_s": 1e9}}, "value_out_of_range", "/limits/time_s"),
+        ({"limits": {"memory_mb": 16_385}}, "value_out_of_range", "/limits/memory_mb"),
         ({"limits": {"cpu": 1}}, "unknown_field", "/limits/cpu"),
         ({"priority": 10}, "value_out_of_range", "/priority"),
         ({"seed": -1}, "value_out_of_range", "/seed"),
