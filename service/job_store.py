@@ -15,6 +15,7 @@ from service.db.clock import utc_now
 from service.db.rows import JobResultRow, JobRow, ScenarioRow
 from service.ids import new_id
 from service.jobs.queue import JobQueue
+from service.logs import request_id
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,6 +70,7 @@ def submit(session: Session, queue: JobQueue, spec: JobSpec) -> JobRow:
             rerun_of=spec.rerun_of,
             what_if_of=spec.what_if_of,
             change=sa.null() if spec.change is None else dict(spec.change),
+            request_id=request_id.get(),
             traceparent=tracing.note_queued(job_id),
             created_at=utc_now(),
             dispatched_at=utc_now(),

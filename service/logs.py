@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import logging
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from contextvars import ContextVar
 from datetime import UTC, datetime
 
@@ -21,6 +23,17 @@ _STANDARD = frozenset(vars(logging.makeLogRecord({}))) | {"message", "asctime", 
 def _trace_id() -> str | None:
     context = trace.get_current_span().get_span_context()
     return trace.format_trace_id(context.trace_id) if context.is_valid else None
+
+
+@contextmanager
+def about_job(job: str, request: str | None) -> Iterator[None]:
+    """Name a job, and the request that it came with, in each line of this thread."""
+    tokens = job_id.set(job), request_id.set(request)
+    try:
+        yield
+    finally:
+        job_id.reset(tokens[0])
+        request_id.reset(tokens[1])
 
 
 class JsonFormatter(logging.Formatter):

@@ -147,6 +147,7 @@ class JobRow(Row):
     is the fencing token: only the holder of the current run may renew or finish.
     ``lost_runs`` counts the runs whose worker died.
     ``what_if_of`` is the job that this one varies, and ``change`` says how.
+    ``request_id`` names the request that it came with, for the logs of its worker.
     ``traceparent`` names the trace that the job was queued in, where there is one (W3C).
     ``version`` grows with every visible change and is the job's ETag.
     """
@@ -171,6 +172,7 @@ class JobRow(Row):
     rerun_of: Mapped[str | None] = mapped_column(sa.String(36))
     what_if_of: Mapped[str | None] = mapped_column(sa.String(36))
     change: Mapped[Json | None]
+    request_id: Mapped[str | None] = mapped_column(sa.String(64))
     traceparent: Mapped[str | None] = mapped_column(sa.String(55))
     progress: Mapped[Json | None]
     termination: Mapped[str | None] = mapped_column(sa.String(32))

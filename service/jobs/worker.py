@@ -10,6 +10,7 @@ import socket
 import threading
 from collections.abc import Callable
 from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from typing import Final, TypeVar
 
 import sqlalchemy as sa
@@ -30,6 +31,7 @@ from service.jobs.queue import DbosConsumer, DbosQueue
 from service.jobs.reconcile import Reconciler
 from service.jobs.renewal import Renewal
 from service.jobs.runner import Abandoned, Limits, Order, Runner, Work
+from service.logs import about_job
 from service.settings import Settings
 from service.stopping import StopRequest
 from service.tracing import JobSpan
@@ -124,12 +126,16 @@ class Worker:
             held = lease.start(session, job_id, dispatch, lease_s=self._settings.lease_s)
         if held is None:
             return
-        request, traceparent = self._insist(
+        request, origin = self._insist(
             self._database.reading, lambda session: _request(session, job_id, held.run)
         )
-        with tracing.running(
-            traceparent, job_id=job_id, run=held.run, solver=request.solver
-        ) as span:
+        named: dict[str, str | int] = {"job_id": job_id, "run": held.run, "solver": request.solver}
+        if origin.request_id is not None:
+            named["request_id"] = origin.request_id
+        with (
+            about_job(job_id, origin.request_id),
+            tracing.running(origin.traceparent, **named) as span,
+        ):
             self._run(held, request, span)
 
     def _run(self, held: Lease, request: PlanRequest, span: JobSpan) -> None:
@@ -151,10 +157,9 @@ class Worker:
             renewal.end()
         span.enter_phase("store")
         self._conclude(held, request, ending)
-        if isinstance(ending, Abandoned):
-            span.note_end("abandoned")
-        else:
-            span.note_end(outcome_of(ending).state, failed=isinstance(ending, Refused))
+        state = "abandoned" if isinstance(ending, Abandoned) else outcome_of(ending).state
+        span.note_end(state, failed=isinstance(ending, Refused))
+        log.info("a run ended", extra={"run": held.run, "solver": request.solver, "state": state})
 
     def _renew(self, held: Lease, progress: Progress | None) -> Order:
         report = None if progress is None else dataclasses.asdict(progress)
@@ -251,7 +256,15 @@ def outcome_of(ending: Ending) -> Outcome:
     )
 
 
-def _request(session: Session, job_id: str, run: int) -> tuple[PlanRequest, str | None]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Origin:
+    """Where a job came from, for logs and traces."""
+
+    request_id: str | None
+    traceparent: str | None
+
+
+def _request(session: Session, job_id: str, run: int) -> tuple[PlanRequest, _Origin]:
     wanted = (
         sa.select(JobRow, ScenarioRow.sha256, ScenarioRow.content)
         .join(ScenarioRow, ScenarioRow.id == JobRow.scenario_id)
@@ -270,7 +283,7 @@ def _request(session: Session, job_id: str, run: int) -> tuple[PlanRequest, str 
         opportunity_block=opportunity_store.load(session, sha256),
         bound=bound_store.load(session, sha256),
     )
-    return request, job.traceparent
+    return request, _Origin(request_id=job.request_id, traceparent=job.traceparent)
 
 
 def _raise_unless_it_passes(error: SQLAlchemyError, consequence: str) -> None:

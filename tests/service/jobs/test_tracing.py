@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import itertools
 import json
 import logging
@@ -97,10 +98,33 @@ def test_one_trace_leads_from_the_request_to_the_phases_of_its_job(
     assert attributes(request) == {"request_id": "r-1"}
     assert attributes(queued) == {"request_id": "r-1", "job_id": job_id}
     assert attributes(run) == {
-        "job_id": job_id, "run": 1, "solver": "forward_search", "state": "succeeded",
+        "job_id": job_id, "request_id": "r-1", "run": 1, "solver": "forward_search",
+        "state": "succeeded",
     }  # fmt: skip
     for name in ("solve", "store"):
         assert parent(found[name]) == run.context.span_id
+
+
+def test_the_workers_log_names_job_and_request(
+    client: httpx.Client, jobs: Jobs, worker: Worker
+) -> None:
+    lines = io.StringIO()
+    handler = logging.StreamHandler(lines)
+    handler.setFormatter(JsonFormatter())
+    of_workers = logging.getLogger("service.jobs.worker")
+    level = of_workers.level
+    of_workers.addHandler(handler)
+    of_workers.setLevel(logging.INFO)
+    try:
+        client.headers.update({"X-Request-ID": "r-2"})
+        job_id = posted(client, jobs, solver="rule")
+        worker.handle(job_id, 1)
+    finally:
+        of_workers.removeHandler(handler)
+        of_workers.setLevel(level)
+    (line,) = [json.loads(text) for text in lines.getvalue().splitlines()]
+    assert (line["job_id"], line["request_id"]) == (job_id, "r-2")
+    assert (line["run"], line["solver"], line["state"]) == (1, "rule", "succeeded")
 
 
 def test_phases_follow_each_other_and_a_failure_is_marked(
