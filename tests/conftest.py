@@ -11,13 +11,15 @@ _ROOT = Path(__file__).resolve().parents[1]
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Keep the tests of the service together: they start servers and workers of their own.
+    """Keep tests of the service together that start servers and workers of their own.
 
-    Where tests run in several processes (``--dist loadgroup``), one takes all of these.
+    Where tests run in several processes (``--dist loadgroup``), one takes each of these groups.
     """
+    service = _ROOT / "tests" / "service"
     for item in items:
-        if _ROOT / "tests" / "service" in item.path.parents:
-            item.add_marker(pytest.mark.xdist_group("service"))
+        if service in item.path.parents:
+            part = item.path.relative_to(service).parts[0]
+            item.add_marker(pytest.mark.xdist_group("jobs" if part == "jobs" else "service"))
 
 
 @pytest.fixture(scope="session")

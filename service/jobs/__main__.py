@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import atexit
 import logging
 import os
 import signal
@@ -53,7 +54,8 @@ def run_worker(settings: Settings, work: Work, *, supervisor: int | None = None)
     # what we do not need: it would hold up an ordinary exit for minutes.
     if spans is not None:
         spans.shutdown()
-    logging.shutdown()
+    # The folder of the fork server's socket is removed here, among other things.
+    atexit._run_exitfuncs()
     os._exit(status)
 
 

@@ -103,16 +103,16 @@ def test_a_wrong_option_is_named(
     assert named in capsys.readouterr().err
 
 
-def test_every_wrong_field_of_the_file_is_named(
+def test_the_wrong_fields_of_the_first_wrong_target_are_named(
     folder: Path, content: dict[str, Any], capsys: pytest.CaptureFixture[str]
 ) -> None:
     content["targets"][1]["lat_deg"] = 91.0
-    content["targets"][3]["reward"] = "much"
+    content["targets"][1]["reward"] = "much"
     path = _write(folder, content)
     assert main(["plan", path, "--solver", "rule"]) == WRONG_INPUT
     printed = capsys.readouterr().err
     assert f"{path} /targets/1/lat_deg: " in printed
-    assert f"{path} /targets/3/reward: " in printed
+    assert f"{path} /targets/1/reward: " in printed
 
 
 @pytest.mark.parametrize("text", ["{", "[]", None])

@@ -26,7 +26,7 @@ TIMELINE = EMPTY | {"job": "one", "termination": "optimal"}
 KEYS = {
     "id", "state", "scenario", "solver", "params", "seed", "limits", "attempt", "priority",
     "label", "progress", "created_at", "started_at", "finished_at", "termination", "error",
-    "links",
+    "links", "change",
 }  # fmt: skip
 
 TARGETS = [
