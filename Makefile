@@ -55,7 +55,7 @@ demo: setup
 serve: setup
 	@$(BIN)/slewline demo --serve
 
-# The service's tests in one process, all others beside them in the other.
+# The service's tests in groups, so that few servers and workers run at a time.
 test: check
 	$(BIN)/python -m pytest -n 2 --dist loadgroup
 
