@@ -23,6 +23,7 @@ from service.opportunities import Described
 from service.pin_inputs import pins_in
 from service.rebuilt import stored_plan
 from service.relaxing import relaxed_file
+from service.scenario_limits import ScenarioLimits
 from service.scenario_store import FrozenScenario, freeze_file
 from service.translate import read_file, scenario_from_file, sha256_of
 
@@ -44,7 +45,7 @@ class Asked:
     content: str
     timeline: str | None
     change: ChangeIn
-    max_horizon_days: float
+    limits: ScenarioLimits
 
     @property
     def key(self) -> str:
@@ -102,7 +103,7 @@ def vary(asked: Asked, described: Described, budget: Budget) -> Variation:
 
 def _freeze(file: ScenarioFile, asked: Asked) -> FrozenScenario:
     unnamed = file.model_copy(update={"name": None})
-    return freeze_file(unnamed, max_horizon_days=asked.max_horizon_days)
+    return freeze_file(unnamed, asked.limits)
 
 
 def _opportunities(

@@ -71,7 +71,7 @@ def create_what_if(
         content=content,
         timeline=timeline if body.needs_plan else None,
         change=body,
-        max_horizon_days=settings.max_horizon_days,
+        limits=settings.scenario_limits,
     )
     solver, params = _solver(job, body)
     time_s, memory_mb = _limits(job, body, settings)
