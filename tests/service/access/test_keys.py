@@ -135,7 +135,7 @@ def test_every_call_asks_each_scope_for_what_it_needs(door: Door) -> None:
             status = door.client.request(method, address, headers=key).status_code
             is_enough = list(keys).index(scope) >= list(keys).index(needed)
             assert (status != 403) == is_enough, (method, path, scope)
-            assert status != 401
+            assert status not in (401, 500), (method, path)
             allowed[scope] += is_enough
     assert 10 < allowed["read"] < allowed["submit"] < allowed["admin"]
 

@@ -31,6 +31,19 @@ from tests.service.jobs.mission import Mission, running, small_mission
 from tests.service.jobs.work import WORK
 
 PATIENCE_S = 60.0
+SUMMARY = {
+    "horizon": {"start": "2026-03-01T00:00:00Z", "end": "2026-03-02T00:00:00Z"},
+    **dict.fromkeys(("satellite_ids", "target_catalog_ids", "ground_station_ids"), ()),
+    "use_resources": False,
+    "dynamics": "physical",
+    "collect_spacing_s": None,
+    "continuous_starts": False,
+    "allow_old_elements": False,
+    "counts": {"satellites": 0, "targets": 0, "ground_stations": 0},
+    "warnings": (),
+}
+"""Of a scenario without content, which can be listed and shown."""
+
 SERVER_URL = os.environ.get("SLEWLINE_TEST_SERVER_URL")
 """A PostgreSQL server that these tests may fill with databases; without it they use SQLite."""
 
@@ -174,7 +187,7 @@ def jobs(template_url: str, tmp_path: Path) -> Iterator[Jobs]:
     with database.transaction() as session:
         session.execute(
             sa.insert(ScenarioRow).values(
-                id=scenario_id, sha256="0" * 64, summary={}, content="{}", created_at=utc_now()
+                id=scenario_id, sha256="0" * 64, summary=SUMMARY, content="{}", created_at=utc_now()
             )
         )
     yield Jobs(
