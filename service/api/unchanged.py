@@ -72,6 +72,6 @@ class UnchangedJobs:
 
 
 def _newest(database: Database, job_id: str) -> tuple[int, str] | None:
-    with database.snapshot() as connection:
+    with database.asking() as connection:
         row = connection.execute(_NEWEST, {"job_id": job_id}).one_or_none()
         return None if row is None else (row.version, row.tenant)

@@ -29,6 +29,10 @@ class Database:
     def __init__(self, url: str, timeout_s: float = DEFAULT_TIMEOUT_S):
         self.engine = make_engine(url, timeout_s)
         self._reader = self.engine.execution_options(read_only=True)
+        self._asker = self._reader
+        if self.engine.dialect.name == "postgresql":
+            # Saves two journeys to the server.
+            self._asker = self._reader.execution_options(isolation_level="AUTOCOMMIT")
 
     @contextmanager
     def transaction(self) -> Iterator[Session]:
@@ -43,9 +47,9 @@ class Database:
             yield session
 
     @contextmanager
-    def snapshot(self) -> Iterator[sa.Connection]:
-        """Yield a connection for reading, where a session would cost more than what is read."""
-        with self._reader.begin() as connection:
+    def asking(self) -> Iterator[sa.Connection]:
+        """Yield a connection for one query that is quicker than a session is made."""
+        with self._asker.begin() as connection:
             yield connection
 
     def close(self) -> None:

@@ -24,6 +24,7 @@ SHAPED: Final = (
     "/v1/scenarios",
     "/v1/jobs",
     "/v1/comparisons",
+    "/v1/webhooks",
 )
 MEGABYTE: Final = 1_000_000
 
