@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from typing import Annotated, cast
 
@@ -100,6 +101,12 @@ async def check_request(request: Request) -> None:
         Fault(code="unknown_parameter", detail=f"There is no query parameter {name!r}.")
         for name in request.query_params
         if name not in known
+    ]
+    given = Counter(name for name, _ in request.query_params.multi_items())
+    faults += [
+        Fault(code="invalid_value", detail=f"The query parameter {name!r} is given {times} times.")
+        for name, times in given.items()
+        if times > 1
     ]
     # PostgreSQL's texts can hold any character but this one.
     if any("\0" in text for text in (request.scope["path"], *request.query_params.values())):

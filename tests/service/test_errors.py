@@ -38,6 +38,12 @@ def test_a_mistyped_query_parameter_is_refused_rather_than_ignored(client: httpx
     assert "vorsion" in str(body["detail"])
 
 
+def test_a_query_parameter_given_twice_is_refused(client: httpx.Client) -> None:
+    response = client.get("/v1/satellites?limit=1&limit=2")
+    body = assert_problem(response, 422, "invalid_value")
+    assert "'limit' is given 2 times" in str(body["detail"])
+
+
 @pytest.fixture
 def broken(settings: Settings) -> Iterator[httpx.Client]:
     """The real application with two routes that fail."""
