@@ -26,11 +26,11 @@ import psutil
 import sqlalchemy as sa
 
 from benchmarks import pollers
-from service import demo_mission
 from service.api.shapes import parse_instant
+from service.commands import demo_mission
+from service.commands.demo import create_mission
 from service.db.rows import JobResultRow, JobRow
 from service.db.session import Database
-from service.demo import create_mission
 from service.ids import new_id
 from service.instants import instant_text
 

@@ -43,9 +43,9 @@ from service.dashboard import routes as dashboard
 from service.db.session import Database
 from service.explanations import Explainer
 from service.opportunities import OpportunityReader
+from service.scenarios.variations import Variations
 from service.settings import Settings
 from service.tracing import is_untraced
-from service.variations import Variations
 
 if TYPE_CHECKING:
     from service.jobs.queue import JobQueue

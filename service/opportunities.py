@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from planner_core.build import ScenarioOpportunities, compute_opportunities
 from planner_core.domain import Scenario
 from planner_core.solvers.base import Budget
-from service import opportunity_store
 from service.background import Background
 from service.db.rows import ScenarioRow
 from service.db.session import Database
-from service.translate import scenario_from_content
+from service.scenarios.translate import scenario_from_content
+from service.stores import opportunity_store
 
 _KEPT = 4
 

@@ -6,7 +6,7 @@ from typing import Any, Final
 
 from planner_core.plan_diff import PlannedAction, PlanView
 from service.exports.reading import ActionIn, records_of_json
-from service.records import check
+from service.scenarios.records import check
 
 _FIGURES: Final = (
     "reward", "collects", "contacts", "downlinked_mbit", "downlinked_fraction",

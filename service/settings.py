@@ -13,7 +13,7 @@ from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from service.access.static_keys import StaticKeys
 from service.db.postgresql import DEFAULT_TIMEOUT_S
-from service.scenario_limits import ScenarioLimits
+from service.scenarios.scenario_limits import ScenarioLimits
 
 _REQUESTS_PER_S: Final = 50.0
 _ORIGIN = re.compile(r"https?://[A-Za-z0-9.-]+(:\d+)?|https?://\[[0-9A-Fa-f:]+\](:\d+)?")

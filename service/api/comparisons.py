@@ -10,8 +10,6 @@ from fastapi import APIRouter, Request, Response
 from pydantic import BaseModel, Field
 from sqlalchemy.orm import Session
 
-from service import comparison_store as store
-from service import job_store
 from service.api import job_intake as intake
 from service.api.conditional import NOT_MODIFIED, created, unless_known
 from service.api.deps import AuditDep, CallerDep, DatabaseDep, SettingsDep
@@ -21,11 +19,13 @@ from service.api.job_shapes import ErrorOut, ProgressOut, QuestionIn, ScenarioRe
 from service.api.paging import Listed, PagingDep, newest_first
 from service.api.problems import ServiceError
 from service.api.shapes import Instant
-from service.comparison_store import Run
 from service.db.rows import ComparisonRow
 from service.jobs import lease
 from service.jobs.lease import JobState
-from service.translate import inside
+from service.scenarios.translate import inside
+from service.stores import comparison_store as store
+from service.stores import job_store
+from service.stores.comparison_store import Run
 
 router = APIRouter(prefix="/v1/comparisons", tags=["comparisons"])
 

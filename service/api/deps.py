@@ -12,7 +12,6 @@ from fastapi.routing import APIRoute
 from starlette.concurrency import run_in_threadpool
 
 from planner_core.errors import Fault
-from service import job_store
 from service.access.audit import Audit
 from service.access.callers import Caller, Scope
 from service.api.errors import refuse
@@ -20,6 +19,7 @@ from service.api.guard import require_scope
 from service.api.problems import ServiceError
 from service.db.session import Database
 from service.settings import Settings
+from service.stores import job_store
 
 # What needs no thread is async: FastAPI runs everything else in one, which costs more than the
 # work itself.

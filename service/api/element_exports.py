@@ -11,7 +11,6 @@ from sqlalchemy.orm import Session
 
 from planner_core.orbits import omm_writing
 from planner_core.orbits.omm_writing import Outgoing
-from service import satellite_store as store
 from service.api.conditional import NOT_MODIFIED
 from service.api.deps import DatabaseDep
 from service.api.errors import problem_responses
@@ -19,8 +18,9 @@ from service.api.problems import ServiceError
 from service.api.satellites import find_satellite
 from service.api.shapes import etag_of, matches
 from service.db.rows import SatelliteRow
-from service.inputs import OrbitIn
-from service.translate import orbit_from
+from service.scenarios.inputs import OrbitIn
+from service.scenarios.translate import orbit_from
+from service.stores import satellite_store as store
 
 router = APIRouter(prefix="/v1/satellites", tags=["satellites"])
 

@@ -16,8 +16,8 @@ from service.api.problems import ServiceError
 from service.api.shapes import Instant, etag_of, matches
 from service.api.timeline_shapes import ViolationOut
 from service.explanations import Explainer, version_of
-from service.job_store import hashes_of
 from service.opportunities import OpportunityReader
+from service.stores.job_store import hashes_of
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[Depends(own_job_only)])
 

@@ -28,9 +28,9 @@ from service.api.problems import ServiceError
 from service.api.shapes import Instant
 from service.db.rows import GroundStationRow
 from service.ids import new_id
-from service.inputs import GroundStationIn
-from service.records import Checked, check, read_csv, read_geojson
-from service.translate import ground_station_from
+from service.scenarios.inputs import GroundStationIn
+from service.scenarios.records import Checked, check, read_csv, read_geojson
+from service.scenarios.translate import ground_station_from
 
 router = APIRouter(prefix="/v1/ground-stations", tags=["ground stations"])
 

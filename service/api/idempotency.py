@@ -13,11 +13,11 @@ from pydantic import BaseModel
 from sqlalchemy.orm import Session
 from starlette.concurrency import run_in_threadpool
 
-from service import idempotency_store as store
 from service.api.deps import CallerDep, DatabaseDep, SettingsDep
 from service.api.problems import ServiceError
 from service.db.session import Database
-from service.idempotency_store import KeptAnswer, Keyed
+from service.stores import idempotency_store as store
+from service.stores.idempotency_store import KeptAnswer, Keyed
 
 M = TypeVar("M", bound=BaseModel)
 

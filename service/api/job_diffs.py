@@ -9,7 +9,6 @@ from fastapi import APIRouter, Depends, Request, Response
 from pydantic import BaseModel, Field
 
 from planner_core.plan_diff import PlannedAction, plan_diff
-from service import job_store as store
 from service.api import job_intake as intake
 from service.api.conditional import NOT_MODIFIED
 from service.api.deps import CallerDep, DatabaseDep, own_job_only
@@ -17,6 +16,7 @@ from service.api.errors import problem_responses
 from service.api.problems import ServiceError
 from service.api.shapes import Instant, etag_of, matches
 from service.plan_views import view_of
+from service.stores import job_store as store
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[Depends(own_job_only)])
 

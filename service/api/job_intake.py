@@ -10,21 +10,21 @@ from sqlalchemy.orm import Session
 
 from planner_core.errors import Fault
 from planner_core.solvers import solver_class
-from service import job_store as store
-from service import scenario_store
 from service.access.audit import Audit
 from service.api.errors import refuse
 from service.api.job_shapes import JobOut, LimitsIn, QuestionIn, etag_of_job, shown
 from service.api.problems import ServiceError
 from service.db.rows import JobRow
 from service.db.session import Database
-from service.inputs import ScenarioFile, ScenarioIn
 from service.jobs import lease
 from service.jobs.queue import JobQueue
-from service.scenario_store import FrozenScenario
+from service.scenarios.inputs import ScenarioFile, ScenarioIn
+from service.scenarios.translate import inside, read_file
 from service.settings import Settings
 from service.solver_params import params_of, parse_params
-from service.translate import inside, read_file
+from service.stores import job_store as store
+from service.stores import scenario_store
+from service.stores.scenario_store import FrozenScenario
 
 ASK_AGAIN_S: Final = 1
 _QUEUE_FULL_S: Final = 30

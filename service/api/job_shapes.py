@@ -8,9 +8,9 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
 
 from service.api.shapes import Body, Instant, Name
 from service.db.rows import JobRow
-from service.inputs import ScenarioFile, ScenarioIn
 from service.jobs.lease import JobState
-from service.pin_inputs import Id
+from service.scenarios.inputs import ScenarioFile, ScenarioIn
+from service.scenarios.pin_inputs import Id
 
 Outcome = Literal["downlinked", "collected", "unscheduled", "excluded"]
 

@@ -8,13 +8,13 @@ from typing import Final
 
 from starlette.concurrency import run_in_threadpool
 
-from service import job_store as store
 from service.api.job_shapes import etag_of_job
 from service.api.problems import ServiceError
 from service.api.shapes import matches
 from service.db.rows import JobRow
 from service.db.session import Database
 from service.jobs import lease
+from service.stores import job_store as store
 
 LOOK_EVERY_S: Final = 0.1
 

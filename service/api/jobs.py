@@ -8,7 +8,6 @@ from typing import Annotated, Final
 from fastapi import APIRouter, Depends, Query, Request, Response
 from sqlalchemy.exc import SQLAlchemyError
 
-from service import job_store as store
 from service.api import job_intake as intake
 from service.api.conditional import NOT_MODIFIED
 from service.api.deps import AuditDep, CallerDep, DatabaseDep, SettingsDep, own_job_only
@@ -23,6 +22,7 @@ from service.db.rows import JobRow
 from service.jobs import lease
 from service.jobs.lease import JobState
 from service.jobs.queue import JobQueue
+from service.stores import job_store as store
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[Depends(own_job_only)])
 log = logging.getLogger(__name__)

@@ -29,10 +29,10 @@ from prometheus_client.core import (
 from starlette.types import Scope
 
 import planner_core
-from service import metrics_store
 from service.api.deps import DatabaseDep
 from service.db.session import Database
-from service.metrics_store import Snapshot
+from service.stores import metrics_store
+from service.stores.metrics_store import Snapshot
 
 router = APIRouter(tags=["operations"])
 

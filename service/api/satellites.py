@@ -13,7 +13,6 @@ from sqlalchemy.orm import Session
 
 from planner_core.errors import Fault
 from planner_core.orbits.ingest import read_elements
-from service import satellite_store as store
 from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
 from service.api.deps import AuditDep, DatabaseDep, RawBodyDep, require_media_type
 from service.api.errors import problem_responses, refuse
@@ -30,8 +29,9 @@ from service.api.paging import Listed, PagingDep, newest_first
 from service.api.problems import ServiceError
 from service.api.shapes import Instant
 from service.db.rows import ElementSetRow, SatelliteRow
-from service.inputs import AgilityIn, OrbitIn, ResourcesField, SatelliteIn, SensorIn
-from service.translate import orbit_from, satellite_from
+from service.scenarios.inputs import AgilityIn, OrbitIn, ResourcesField, SatelliteIn, SensorIn
+from service.scenarios.translate import orbit_from, satellite_from
+from service.stores import satellite_store as store
 
 router = APIRouter(prefix="/v1/satellites", tags=["satellites"])
 

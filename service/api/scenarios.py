@@ -16,7 +16,6 @@ from planner_core.build import view_at
 from planner_core.domain import Dynamics, Nadir
 from planner_core.orbits.places import View
 from planner_core.problem import COLLECT, CONTACT
-from service import scenario_store as store
 from service.api.conditional import NOT_MODIFIED, created, unless_known
 from service.api.deps import AuditDep, DatabaseDep, SettingsDep
 from service.api.errors import problem_responses
@@ -25,9 +24,10 @@ from service.api.paging import Listed, PagingDep, newest_first
 from service.api.problems import ServiceError
 from service.api.shapes import Instant, etag_of, matches
 from service.db.rows import ScenarioRow
-from service.inputs import ScenarioFile, ScenarioIn
 from service.opportunities import Described, OpportunityReader
-from service.pin_inputs import PinsIn
+from service.scenarios.inputs import ScenarioFile, ScenarioIn
+from service.scenarios.pin_inputs import PinsIn
+from service.stores import scenario_store as store
 
 router = APIRouter(prefix="/v1/scenarios", tags=["scenarios"])
 

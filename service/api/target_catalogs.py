@@ -22,9 +22,9 @@ from service.api.problems import ServiceError
 from service.api.shapes import Body, Instant, Name
 from service.db.rows import TargetCatalogRow, TargetRow
 from service.ids import new_id
-from service.inputs import TargetIn
-from service.records import Record, Records, check, first_of_each, read_csv, read_geojson
-from service.translate import target_from
+from service.scenarios.inputs import TargetIn
+from service.scenarios.records import Record, Records, check, first_of_each, read_csv, read_geojson
+from service.scenarios.translate import target_from
 
 router = APIRouter(prefix="/v1/target-catalogs", tags=["target catalogues"])
 

@@ -10,7 +10,6 @@ from fastapi import APIRouter, Depends, Path, Query, Request, Response
 from fastapi.responses import StreamingResponse
 
 import planner_core
-from service import job_store as store
 from service.api import job_intake as intake
 from service.api.accept import preferred
 from service.api.conditional import NOT_MODIFIED
@@ -26,6 +25,7 @@ from service.db.session import Database
 from service.exports.answered import Answered
 from service.exports.forms import FORMS, Form
 from service.jobs import lease
+from service.stores import job_store as store
 
 router = APIRouter(prefix="/v1/jobs", tags=["timelines"], dependencies=[Depends(own_job_only)])
 

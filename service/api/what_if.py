@@ -7,19 +7,19 @@ from typing import Any, Final, cast
 from fastapi import APIRouter, Depends, Request, Response
 from pydantic import Field
 
-from service import job_store as store
-from service import opportunity_store, scenario_store
 from service.api import job_intake as intake
 from service.api.deps import AuditDep, CallerDep, DatabaseDep, SettingsDep, own_job_only
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
 from service.api.job_shapes import JobOut, LimitsIn
 from service.api.shapes import Name
-from service.change_inputs import ChangeIn
 from service.db.rows import JobRow, ScenarioRow
 from service.opportunities import OpportunityReader
+from service.scenarios.change_inputs import ChangeIn
+from service.scenarios.variations import Asked, Variations
 from service.settings import Settings
-from service.variations import Asked, Variations
+from service.stores import job_store as store
+from service.stores import opportunity_store, scenario_store
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[Depends(own_job_only)])
 

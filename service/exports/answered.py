@@ -10,7 +10,7 @@ from functools import cached_property
 from typing import Any
 
 from planner_core.domain import Scenario
-from service.translate import scenario_from_content
+from service.scenarios.translate import scenario_from_content
 
 Document = dict[str, Any]
 

@@ -20,8 +20,8 @@ from planner_core.plan import Action, Plan
 from planner_core.problem import COLLECT, CONTACT, Opportunities, Problem
 from service.api.shapes import Body, Instant
 from service.exports.table import unguarded
-from service.pin_inputs import Id
-from service.records import Checked, Record, Records, check, read_csv
+from service.scenarios.pin_inputs import Id
+from service.scenarios.records import Checked, Record, Records, check, read_csv
 
 _MOST_ACTIONS: Final = 1_000_000
 _REQUIRED: Final = ("satellite_id", "mode", "start", "end", "target_id", "station_id")

@@ -13,7 +13,7 @@ from planner_core.run import plan_scenario
 from planner_core.solvers import solver_class
 from planner_core.solvers.base import Budget, Solver
 from service.documents import Documents, figures_of
-from service.translate import scenario_from_content
+from service.scenarios.translate import scenario_from_content
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -18,7 +18,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.orm import Session
 
 from planner_core.solvers.base import Progress
-from service import bound_store, opportunity_store, tracing
+from service import tracing
 from service.db.clock import utc_now
 from service.db.failures import why_unavailable
 from service.db.rows import JobRow, ScenarioRow, WorkerRow
@@ -34,6 +34,7 @@ from service.jobs.runner import Abandoned, Limits, Order, Runner, Work
 from service.logs import about_job
 from service.settings import Settings
 from service.stopping import StopRequest
+from service.stores import bound_store, opportunity_store
 from service.tracing import JobSpan
 from service.webhooks.courier import Courier
 

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 import yaml
 
-from service.cli import _parser
+from service.commands.cli import _parser
 from service.settings import Settings
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -25,8 +25,8 @@ _WATCHED: Final = (
     "planner_core.orbits.omm_files",
     "planner_core.orbits.tle",
     "planner_core.orbits.tle_file",
-    "service.records",
-    "service.translate",
+    "service.scenarios.records",
+    "service.scenarios.translate",
 )
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from service.cli import FAILED, OK, main
+from service.commands.cli import FAILED, OK, main
 from service.db.session import Database
 from service.settings import Settings
 

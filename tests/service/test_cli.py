@@ -13,7 +13,8 @@ from pathlib import Path
 import pytest
 import sqlalchemy as sa
 
-from service.cli import FAILED, OK, WRONG_INPUT, main
+from service.commands.bodies import FAILED, OK, WRONG_INPUT
+from service.commands.cli import main
 
 COMMANDS = (
     "serve", "api", "worker", "migrate", "backup", "demo", "solve", "plan", "keys", "openapi",
@@ -51,11 +52,20 @@ def test_wrong_usage_ends_with_status_2(arguments: list[str]) -> None:
 
 
 def test_help_loads_neither_the_web_framework_nor_the_compiler() -> None:
-    script = "import sys, service.cli; print(*sys.modules)"
+    script = "import sys, service.commands.cli; print(*sys.modules)"
     ran = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     loaded = set(ran.stdout.split())
-    assert "service.cli" in loaded
+    assert "service.commands.cli" in loaded
     assert loaded.isdisjoint({"fastapi", "numba", "numpy", "sqlalchemy", "dbos", "uvicorn"})
+
+
+@pytest.mark.parametrize("command", [["migrate"], ["keys", "list"], ["api", "--port", "0"]])
+def test_a_database_that_is_away_is_told_in_words(
+    command: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    nowhere = "postgresql+psycopg://nobody@127.0.0.1:1/none"
+    assert main([*command, "--database-url", nowhere]) == FAILED
+    assert capsys.readouterr().err.endswith("slewline: The database cannot be reached.\n")
 
 
 @pytest.mark.parametrize("command", ["serve", "api"])

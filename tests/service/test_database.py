@@ -13,11 +13,11 @@ import sqlalchemy as sa
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 
-from service import bound_store
 from service.db.migrate import upgrade
 from service.db.rows import BoundRow, Row, TargetCatalogRow, TargetRow, WorkerRow
 from service.db.session import Database, make_engine
 from service.ids import new_id
+from service.stores import bound_store
 
 
 def worker_row(name: str = "w") -> WorkerRow:

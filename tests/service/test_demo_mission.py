@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 
 from planner_core.orbits.omm import elements_from_omm
 from service.catalogs.wrs2 import wrs2_land_csv
-from service.demo_mission import HORIZON, SATELLITE, targets_csv
+from service.commands.demo_mission import HORIZON, SATELLITE, targets_csv
 
 
 def test_targets_are_a_thousand_different_shipped_scenes() -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from pydantic import SecretStr
 
-from service.cli import _parser
+from service.commands.cli import _parser
 from service.settings import Settings
 
 ROOT = Path(__file__).resolve().parents[2]

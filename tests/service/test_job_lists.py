@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 import sqlalchemy as sa
 
-from service import job_store
 from service.db.rows import JobRow
+from service.stores import job_store
 from tests.service.conftest import Service
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from service.translate import canonical, scenario_from_content, sha256_of
+from service.scenarios.translate import canonical, scenario_from_content, sha256_of
 from tests.missions import Document, drawn_targets, paper_mission
 from tests.service.conftest import Service
 from tests.service.factories import post

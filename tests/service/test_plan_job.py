@@ -14,7 +14,7 @@ from planner_core.build import build_problem, compute_opportunities
 from planner_core.solvers import SOLVERS
 from planner_core.solvers.base import Budget
 from service.jobs.plan_job import PlanAnswer, PlanRequest, run_plan_job
-from service.translate import canonical, scenario_from_content, sha256_of
+from service.scenarios.translate import canonical, scenario_from_content, sha256_of
 from tests import independent
 from tests.missions import Document, drawn_targets, paper_mission
 

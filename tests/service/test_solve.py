@@ -12,9 +12,9 @@ from typing import Any
 
 import pytest
 
-from service import demo_mission
-from service.cli import FAILED, OK, WRONG_INPUT, main
-from service.translate import canonical, sha256_of
+from service.commands import demo_mission
+from service.commands.cli import FAILED, OK, WRONG_INPUT, main
+from service.scenarios.translate import canonical, sha256_of
 
 
 @pytest.fixture(autouse=True)

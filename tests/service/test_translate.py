@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from planner_core.domain import Resources
 from planner_core.errors import InvalidScenario, PlannerError
-from service.translate import canonical, scenario_from_content, sha256_of
+from service.scenarios.translate import canonical, scenario_from_content, sha256_of
 from tests.service.factories import ground_station, satellite, target, tle
 
 

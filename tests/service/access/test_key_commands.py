@@ -9,7 +9,7 @@ import httpx
 import pytest
 import sqlalchemy as sa
 
-from service.cli import OK, WRONG_INPUT, main
+from service.commands.cli import OK, WRONG_INPUT, main
 from service.db.rows import AuditEventRow
 from service.db.session import Database
 from service.server import NoKey, require_key

@@ -9,7 +9,7 @@ import pytest
 
 from service.access.static_keys import StaticKeys
 from service.access.tokens import new_token
-from service.cli import WRONG_INPUT, main
+from service.commands.cli import WRONG_INPUT, main
 from service.jobs.supervisor import environment_of
 from service.logs import JsonFormatter
 from service.settings import Settings

@@ -15,10 +15,10 @@ from typing import Any
 
 import pytest
 
-from service import demo_mission
-from service.cli import FAILED, OK, WRONG_INPUT, main
 from service.client import Client
-from service.translate import canonical, sha256_of
+from service.commands import demo_mission
+from service.commands.cli import FAILED, OK, WRONG_INPUT, main
+from service.scenarios.translate import canonical, sha256_of
 from tests.service.client.trouble import Answer, proxy_before
 
 ENDLESS = ["--solver", "mcts", "--param", "num_simulations=20000", "--time-s", "600"]

@@ -12,8 +12,8 @@ import pytest
 from planner_core.solvers.base import Budget
 from service.jobs.plan_job import PlanRequest, run_plan_job
 from service.main import create_app
+from service.scenarios.translate import canonical
 from service.settings import Settings
-from service.translate import canonical
 from tests.missions import drawn_targets, paper_mission
 
 TYPES = Path(__file__).resolve().parents[3] / "service" / "dashboard" / "static" / "types.js"

@@ -13,7 +13,7 @@ import sqlalchemy as sa
 from service.db.rows import JobResultRow, JobRow, ScenarioRow
 from service.exports.answered import Answered
 from service.ids import new_id
-from service.translate import canonical, sha256_of
+from service.scenarios.translate import canonical, sha256_of
 from tests.missions import PAPER_ORBIT, Document, drawn_targets, paper_mission
 from tests.service.conftest import Service
 from tests.service.test_plan_job import run

@@ -17,11 +17,11 @@ from planner_core.domain import Scenario
 from planner_core.problem import Problem
 from planner_core.solvers.base import Budget
 from planner_core.timeline import plan_sha256, replay
-from service.cli import FAILED, OK, WRONG_INPUT, main
+from service.commands.cli import FAILED, OK, WRONG_INPUT, main
 from service.exports import table
 from service.exports.answered import Answered
 from service.exports.reading import READERS, Reading, UnreadableTimeline, plan_in
-from service.translate import canonical
+from service.scenarios.translate import canonical
 from tests.missions import Document, drawn_targets, paper_mission
 from tests.service.exports.conftest import FINISHED_AT, Mission
 from tests.service.test_plan_job import run

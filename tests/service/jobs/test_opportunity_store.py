@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from service import opportunity_store
+from service.stores import opportunity_store
 from tests.service.jobs.conftest import Jobs
 
 

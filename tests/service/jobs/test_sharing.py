@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import threading
 
-from service import bound_store, scenario_store
-from service.scenario_store import FrozenScenario
+from service.stores import bound_store, scenario_store
+from service.stores.scenario_store import FrozenScenario
 from tests.service.jobs.conftest import Jobs
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from service.solve import solve_file
+from service.commands.solve import solve_file
 from tests.missions import Document
 from tests.service.jobs.mission import HIDDEN, ODD, Mission, small_mission
 from tests.service.problems import assert_problem

@@ -7,7 +7,7 @@ from typing import Any
 
 import httpx
 
-from service import demo, demo_mission
+from service.commands import demo, demo_mission
 from tests.service.factories import post, satellite, tle
 
 Json = dict[str, Any]

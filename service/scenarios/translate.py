@@ -31,7 +31,7 @@ from planner_core.errors import InvalidScenario, PlannerError
 from planner_core.orbits.omm import elements_from_omm, omm_from_elements
 from planner_core.orbits.tle import read_tle
 from service.api.errors import faults_of_validation
-from service.inputs import (
+from service.scenarios.inputs import (
     FileGroundStation,
     FileSatellite,
     FileTarget,
@@ -45,7 +45,7 @@ from service.inputs import (
     ScenarioFile,
     TargetIn,
 )
-from service.pin_inputs import pins_from
+from service.scenarios.pin_inputs import pins_from
 
 _SECONDS_PER_HOUR = 3600.0
 

@@ -15,11 +15,10 @@ from sqlalchemy.orm import Session
 
 from planner_core.build import check_element_age, check_propagation, orbit_warnings
 from planner_core.errors import InvalidScenario, PlannerError
-from service import satellite_store
 from service.db.rows import GroundStationRow, SatelliteRow, ScenarioRow, TargetCatalogRow, TargetRow
 from service.db.session import Database
 from service.ids import new_id
-from service.inputs import (
+from service.scenarios.inputs import (
     FileGroundStation,
     FileSatellite,
     FileTarget,
@@ -27,8 +26,14 @@ from service.inputs import (
     ScenarioFile,
     ScenarioIn,
 )
-from service.scenario_limits import ScenarioLimits
-from service.translate import canonical_of_file, horizon_from, scenario_from_file, sha256_of
+from service.scenarios.scenario_limits import ScenarioLimits
+from service.scenarios.translate import (
+    canonical_of_file,
+    horizon_from,
+    scenario_from_file,
+    sha256_of,
+)
+from service.stores import satellite_store
 
 R = TypeVar("R", SatelliteRow, TargetCatalogRow, GroundStationRow)
 

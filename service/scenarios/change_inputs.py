@@ -9,8 +9,8 @@ from pydantic_core import PydanticCustomError
 
 from planner_core.pins.pins import PinnedAction
 from service.api.shapes import Body, Instant
-from service.inputs import AgilityIn, ResourcesIn, SensorIn
-from service.pin_inputs import Id, PinnedActionIn, action_from
+from service.scenarios.inputs import AgilityIn, ResourcesIn, SensorIn
+from service.scenarios.pin_inputs import Id, PinnedActionIn, action_from
 
 PART_OF: Final[dict[str, str]] = {
     **dict.fromkeys(AgilityIn.model_fields, "agility"),

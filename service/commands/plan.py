@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from service.client import Client, Job, JobFailed, ServiceError
-from service.progress_line import ProgressLine
-from service.summary import summary
+from service.commands.progress_line import ProgressLine
+from service.commands.summary import summary
 
 
 def plan(

@@ -10,11 +10,11 @@ from typing import Final, get_args
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
 
-from service import satellite_store
 from service.db.clock import seconds_between, utc_now
 from service.db.rows import JobRow, SatelliteRow, ScenarioRow, WebhookDeliveryRow, WorkerRow
 from service.jobs import lease
 from service.jobs.lease import JobState
+from service.stores import satellite_store
 from service.webhooks.outbox import DeliveryState
 
 ORBITS_OF_LAST_S: Final = 7 * 86400.0

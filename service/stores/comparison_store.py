@@ -9,12 +9,12 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
 
-from service import job_store
 from service.db.clock import utc_now
 from service.db.rows import ComparisonRow, ComparisonRunRow, JobResultRow, JobRow
 from service.ids import new_id
-from service.job_store import JobSpec
 from service.jobs.queue import JobQueue
+from service.stores import job_store
+from service.stores.job_store import JobSpec
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

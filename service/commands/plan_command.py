@@ -11,8 +11,8 @@ from typing import Final
 
 from planner_core.errors import PlannerError
 from service.client import Client, ServiceError
-from service.plan import plan
-from service.scenario_files import place_of, read_scenario, require_folder
+from service.commands.plan import plan
+from service.commands.scenario_files import place_of, read_scenario, require_folder
 
 _SUFFIXES: Final = (".json", ".csv", ".geojson", ".czml", ".ics")  # the service has the last word
 _OPTIONS: Final = {

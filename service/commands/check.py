@@ -13,11 +13,11 @@ from planner_core.domain import Scenario
 from planner_core.problem import COLLECT, Problem
 from planner_core.solvers.base import Budget
 from planner_core.timeline import Timeline, plan_sha256, replay
+from service.commands.scenario_files import read_scenario
+from service.commands.summary import table
 from service.exports.reading import READERS, Reading, plan_in
 from service.instants import instant_text
-from service.scenario_files import read_scenario
-from service.summary import table
-from service.translate import canonical, scenario_from_content, sha256_of
+from service.scenarios.translate import canonical, scenario_from_content, sha256_of
 
 _AGREED = 1e-6
 

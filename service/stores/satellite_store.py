@@ -13,8 +13,8 @@ from sqlalchemy.orm import Session, aliased
 from planner_core.orbits.ingest import Entry
 from service.db.rows import ElementSetRow, SatelliteRow
 from service.ids import new_id
-from service.inputs import AgilityIn, SatelliteIn, SensorIn
-from service.translate import Orbit
+from service.scenarios.inputs import AgilityIn, SatelliteIn, SensorIn
+from service.scenarios.translate import Orbit
 
 _LONGEST_NAME = 200
 

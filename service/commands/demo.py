@@ -16,9 +16,9 @@ from typing import IO, Any, Final
 
 import httpx
 
-from service import demo_mission
+from service.commands import demo_mission
+from service.commands.summary import HEADER, LEGEND, summary_row, table
 from service.settings import Settings
-from service.summary import HEADER, LEGEND, summary_row, table
 
 Json = dict[str, Any]
 

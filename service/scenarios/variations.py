@@ -16,16 +16,16 @@ from planner_core.solvers.base import Budget
 from planner_core.what_if import Change, what_if
 from service.api.shapes import parse_instant
 from service.background import Background
-from service.change_inputs import ChangeIn, pinned_action
-from service.change_pointers import Places, pointing_into, pointing_into_relax
-from service.inputs import ScenarioFile
 from service.opportunities import Described
-from service.pin_inputs import pins_in
 from service.rebuilt import stored_plan
-from service.relaxing import relaxed_file
-from service.scenario_limits import ScenarioLimits
-from service.scenario_store import FrozenScenario, freeze_file
-from service.translate import read_file, scenario_from_file, sha256_of
+from service.scenarios.change_inputs import ChangeIn, pinned_action
+from service.scenarios.change_pointers import Places, pointing_into, pointing_into_relax
+from service.scenarios.inputs import ScenarioFile
+from service.scenarios.pin_inputs import pins_in
+from service.scenarios.relaxing import relaxed_file
+from service.scenarios.scenario_limits import ScenarioLimits
+from service.scenarios.translate import read_file, scenario_from_file, sha256_of
+from service.stores.scenario_store import FrozenScenario, freeze_file
 
 _KEPT = 8
 

@@ -9,11 +9,11 @@ from datetime import datetime
 from service.access import key_store
 from service.access.audit import BY_COMMAND_LINE
 from service.access.callers import Scope
+from service.commands.summary import table
 from service.db.migrate import upgrade
 from service.db.rows import ApiKeyRow
 from service.db.session import Database
 from service.settings import Settings
-from service.summary import table
 
 _HEADER = ("id", "name", "owner", "scope", "made", "expires", "state")
 

@@ -11,11 +11,11 @@ from typing import Any, Final
 
 from planner_core.solvers import solver_class
 from planner_core.solvers.base import Budget
+from service.commands.scenario_files import read_scenario, require_folder
+from service.commands.summary import summary
 from service.jobs.plan_job import PlanAnswer, PlanRequest, run_plan_job
-from service.scenario_files import read_scenario, require_folder
+from service.scenarios.translate import canonical, sha256_of
 from service.solver_params import params_of, parse_params
-from service.summary import summary
-from service.translate import canonical, sha256_of
 
 _LOOK_EVERY_S: Final = 0.05
 

@@ -10,7 +10,7 @@ from sqlalchemy.orm import Session
 
 from service.db.clock import utc_now
 from service.db.rows import BoundRow
-from service.opportunity_store import VERSION
+from service.stores.opportunity_store import VERSION
 
 
 def load(session: Session, sha256: str) -> str | None:

@@ -14,7 +14,7 @@ from pydantic_core import PydanticCustomError
 
 from planner_core.domain import Dynamics, LookSide, Nadir, OrbitDirection
 from service.api.shapes import Body, Instant, Name
-from service.pin_inputs import Id, PinsIn
+from service.scenarios.pin_inputs import Id, PinsIn
 
 NonNegative = Annotated[float, Field(ge=0)]
 Positive = Annotated[float, Field(gt=0)]

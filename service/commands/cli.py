@@ -1,0 +1,198 @@
+"""The program ``slewline``: one command for each way to run the service."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import planner_core
+from service.access.callers import Scope, is_plain_name
+from service.commands import bodies
+from service.commands.bodies import FAILED, WRONG_INPUT, WrongInput, complain
+
+_LONGEST_DAYS = 3650
+
+Command = Callable[[argparse.Namespace], int]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit status: 0 well, 1 failed, 2 wrong input."""
+    options = _parser().parse_args(arguments)
+    command: Command = options.command
+    try:
+        return command(options)
+    except WrongInput as error:
+        return complain(str(error), WRONG_INPUT)
+    except KeyboardInterrupt:
+        return complain("interrupted", FAILED)
+    except Exception as error:
+        reason = bodies.why_database_failed(error)
+        if reason is None:
+            raise
+        return complain(reason, FAILED)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="slewline",
+        description="Operations planning for agile Earth-observation satellites.",
+        epilog="Each setting is also an environment variable: SLEWLINE_PORT and so on.",
+    )
+    parser.add_argument("--version", action="version", version=planner_core.__version__)
+    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+
+    serve = _command(commands, "serve", bodies.serve, "run the API and local workers")
+    _add_address(serve)
+    serve.add_argument("--workers", type=int, help="worker processes (2)")
+    _add_database(serve)
+
+    api = _command(commands, "api", bodies.api, "run the API alone")
+    _add_address(api)
+    _add_database(api)
+
+    worker = _command(commands, "worker", bodies.worker, "run one worker")
+    _add_database(worker)
+
+    migrate = _command(commands, "migrate", bodies.migrate, "create or update the database")
+    _add_database(migrate)
+
+    backup = _command(commands, "backup", bodies.backup, "copy a SQLite database that is in use")
+    backup.add_argument("file", type=Path, metavar="FILE", help="a new file")
+    _add_database(backup)
+
+    demo = _command(
+        commands, "demo", bodies.demo, "plan a real-size mission and print what came out"
+    )
+    demo.add_argument("--serve", action="store_true", help="keep serving afterwards")
+    demo.add_argument("--out", type=Path, default=Path("demo-output"), help="folder for timelines")
+
+    _add_solve(_command(commands, "solve", bodies.solve, "plan a scenario file, without a service"))
+
+    check = _command(
+        commands, "check", bodies.check, "have the referee judge a timeline of any origin"
+    )
+    check.add_argument("scenario", type=Path, metavar="SCENARIO.json")
+    check.add_argument("timeline", type=_timeline_file, metavar="TIMELINE.{json,csv}")
+
+    _add_keys(_command(commands, "keys", None, "make, list and revoke API keys"))
+    _add_plan(
+        _command(commands, "plan", bodies.plan, "have a service plan a scenario, and follow it")
+    )
+
+    _command(commands, "openapi", bodies.openapi, "print the description of the HTTP API")
+    return parser
+
+
+def _command(
+    commands: Any,
+    name: str,
+    run: Command | None,
+    help: str,  # noqa: A002
+) -> argparse.ArgumentParser:
+    parser: argparse.ArgumentParser = commands.add_parser(name, help=help, description=help)
+    parser.set_defaults(command=run)
+    return parser
+
+
+def _add_address(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--host", help="address to listen on (127.0.0.1)")
+    parser.add_argument("--port", type=int, help="port to listen on, 0 for a free one (8000)")
+
+
+def _add_database(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--database-url", help="SQLAlchemy URL (a SQLite file of the user)")
+
+
+def _add_keys(parser: argparse.ArgumentParser) -> None:
+    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+    create = _command(commands, "create", bodies.create_key, "make a key and print it, this once")
+    create.add_argument("--name", required=True, type=_plain_name, help="what the key is for")
+    create.add_argument("--owner", required=True, type=_plain_name, help="whose jobs it sees")
+    create.add_argument("--scope", required=True, choices=[scope.value for scope in Scope])
+    create.add_argument("--expires-days", type=_days, default=365.0, metavar="DAYS", help="(365)")
+    _add_database(create)
+    listing = _command(commands, "list", bodies.list_keys, "list all keys, without their secrets")
+    _add_database(listing)
+    revoke = _command(commands, "revoke", bodies.revoke_key, "make a key worthless at once")
+    revoke.add_argument("key_id", metavar="ID", help="the twelve digits after slw_")
+    _add_database(revoke)
+
+
+def _days(text: str) -> float:
+    days = _positive(text)
+    if days > _LONGEST_DAYS:
+        raise argparse.ArgumentTypeError(f"a key lasts at most {_LONGEST_DAYS} days")
+    return days
+
+
+def _plain_name(text: str) -> str:
+    if not is_plain_name(text):
+        raise argparse.ArgumentTypeError(f"{text!r} is not 1 to 64 letters, digits, ., _ and -")
+    return text
+
+
+def _add_solve(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("scenario", type=Path, metavar="SCENARIO.json")
+    _add_search(parser)
+
+
+def _add_plan(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("scenario", type=Path, nargs="?", metavar="SCENARIO.json")
+    parser.add_argument("--scenario-id", metavar="ID", help="a stored scenario, not a file")
+    _add_search(parser)
+    parser.add_argument("--url", help="the service (SLEWLINE_URL, or port 8000 of this machine)")
+    parser.add_argument(
+        "--key-env", metavar="NAME", help="environment variable with the API key (SLEWLINE_KEY)"
+    )
+    parser.add_argument("--label", help="a name for the job")
+    parser.add_argument("--priority", type=int, help="0 to 9, the most urgent (5)")
+    parser.add_argument(
+        "--detach", action="store_true", help="print the job's id and do not wait for it"
+    )
+
+
+def _add_search(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--solver", required=True, metavar="NAME")
+    parser.add_argument(
+        "--param", action="append", default=[], type=_parameter, metavar="KEY=VALUE",
+        help="a parameter of the solver, as JSON or as a word; may be repeated",
+    )  # fmt: skip
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--time-s", type=_positive, help="seconds after which the search stops")
+    parser.add_argument("--out", type=Path, metavar="FILE", help="write the timeline here")
+
+
+def _timeline_file(text: str) -> Path:
+    path = Path(text)
+    if path.suffix.lower() not in (".json", ".csv"):
+        raise argparse.ArgumentTypeError(f"{text!r} must end in .json or .csv")
+    return path
+
+
+def _parameter(text: str) -> tuple[str, Any]:
+    """Return name and value of ``KEY=VALUE``.
+
+    >>> _parameter("depth=3"), _parameter("feasibility=penalty")
+    (('depth', 3), ('feasibility', 'penalty'))
+    """
+    name, equals, value = text.partition("=")
+    if not equals or not name:
+        raise argparse.ArgumentTypeError(f"{text!r} is not KEY=VALUE")
+    try:
+        return name, json.loads(value)
+    except json.JSONDecodeError:
+        return name, value
+
+
+def _positive(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0.0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number above 0")
+    return value

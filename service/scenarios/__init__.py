@@ -1,0 +1,1 @@
+"""Scenarios as files and requests have them: read, checked, changed and translated for the core."""
