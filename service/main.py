@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
+from operator import attrgetter
 from typing import TYPE_CHECKING
 
 from fastapi import Depends, FastAPI
@@ -99,6 +100,8 @@ def create_app(settings: Settings, queue: JobQueue | None = None) -> FastAPI:
         lifespan=_lifespan,
         dependencies=[Depends(check_request)],
         redirect_slashes=False,
+        # What generated clients call an operation.
+        generate_unique_id_function=attrgetter("name"),
         # Spans where service.tracing has set them up; metrics and logs are our own.
         telemetry={
             "metrics": False,

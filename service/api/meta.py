@@ -97,7 +97,7 @@ def version() -> Version:
 
 
 @router.get("/problems/{code}", responses=problem_responses(404))
-def explain(code: Annotated[str, Path(examples=["tle-checksum"])]) -> ProblemExplained:
+def explain_problem(code: Annotated[str, Path(examples=["tle-checksum"])]) -> ProblemExplained:
     """Explain a problem code, written with hyphens or underscores."""
     name = code.replace("-", "_")
     if name not in KINDS:

@@ -43,7 +43,10 @@ Suffix = Annotated[
 
 def _responses(forms: Sequence[Form]) -> dict[int | str, dict[str, Any]]:
     """Return the entries of the OpenAPI document for a route that offers these forms and JSON."""
-    content: dict[str, Any] = {form.media_type: {} for form in forms} | JSON_TIMELINE
+    # JSON stands first: generated clients read the first form they know.
+    content: dict[str, Any] = JSON_TIMELINE | {
+        form.media_type: {} for form in forms if form.media_type != _JSON
+    }
     if _JSON in (form.media_type for form in forms):
         other = [{"type": "array"}, {"type": "object"}]
         content[_JSON] = {"schema": {"anyOf": [JSON_TIMELINE[_JSON]["schema"], *other]}}
@@ -117,7 +120,7 @@ def get_proof(job_id: str, database: DatabaseDep, request: Request) -> Response:
 
 
 @router.get("/{job_id}/targets", responses=problem_responses(404, 409))
-def list_targets(
+def list_outcomes(
     job_id: str,
     database: DatabaseDep,
     paging: PagingDep,

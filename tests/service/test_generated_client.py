@@ -1,0 +1,123 @@
+"""A client that a generator made of the OpenAPI document plans a mission, by a key."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from types import ModuleType
+from typing import Any
+
+import httpx
+import pytest
+
+from tests.missions import drawn_targets, paper_mission
+from tests.service.serving import serving
+
+PACKAGE = "made_slewline_client"
+SECRET = "s3cr3t-enough-for-a-test-of-40-characters"
+HALF_A_DAY = {"start": "2019-01-01T00:00:00Z", "end": "2019-01-01T12:00:00Z"}
+
+
+@pytest.fixture(scope="module")
+def service_url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    folder = tmp_path_factory.mktemp("service")
+    keys = f"robot:submit:{SECRET}"
+    with serving(folder, "serve", "--workers", "1", require_keys="true", api_keys=keys) as (
+        _,
+        line,
+    ):
+        yield line.split()[-1]
+
+
+@pytest.fixture(scope="module")
+def generated(service_url: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """Return the name of a package made of the document that the service shows."""
+    folder = tmp_path_factory.mktemp("generated")
+    document = folder / "openapi.json"
+    document.write_text(httpx.get(f"{service_url}/openapi.json", trust_env=False).text)
+    # It would format the files by a linter of its own choice.
+    (folder / "config.yml").write_text(json.dumps({"post_hooks": []}))
+    made = subprocess.run(
+        [sys.executable, "-m", "openapi_python_client", "generate", "--path", document,
+         "--output-path", folder / PACKAGE, "--meta", "none", "--config", folder / "config.yml"],
+        check=False, capture_output=True, text=True,
+    )  # fmt: skip
+    assert made.returncode == 0, made.stdout + made.stderr
+    sys.path.insert(0, str(folder))
+    yield PACKAGE
+    sys.path.remove(str(folder))
+    for name in [name for name in sys.modules if name.partition(".")[0] == PACKAGE]:
+        del sys.modules[name]
+
+
+def part(package: str, name: str) -> ModuleType:
+    return importlib.import_module(f"{package}.{name}")
+
+
+def test_a_generated_client_plans_a_mission(service_url: str, generated: str) -> None:
+    connection = part(generated, "client").AuthenticatedClient(
+        base_url=service_url,
+        token=SECRET,
+        raise_on_unexpected_status=True,
+        timeout=httpx.Timeout(120.0),
+        httpx_args={"trust_env": False},
+    )
+    with connection as client:
+        plan_a_mission(client, generated)
+
+
+def plan_a_mission(client: Any, generated: str) -> None:
+    models = part(generated, "models")
+
+    def call(operation: str, body: Any = None, **fields: Any) -> Any:
+        given = fields if body is None else fields | {"body": body}
+        return part(generated, f"api.{operation}").sync(client=client, **given)
+
+    mission = paper_mission(drawn_targets(40), horizon=HALF_A_DAY)
+    satellite_ids = [
+        call("satellites.create_satellite", models.SatelliteIn.from_dict(satellite)).id
+        for satellite in mission["satellites"]
+    ]
+    station_ids = [
+        call("ground_stations.create_ground_station", models.GroundStationIn.from_dict(station)).id
+        for station in mission["ground_stations"]
+    ]
+    targets = models.TargetCatalogIn.from_dict({"name": "draw", "targets": mission["targets"]})
+    catalog = call("target_catalogues.create_target_catalog", targets)
+    question = models.ScenarioIn.from_dict(
+        {
+            "horizon": mission["horizon"],
+            "satellite_ids": satellite_ids,
+            "ground_station_ids": station_ids,
+            "target_catalog_ids": [catalog.id],
+        }
+    )
+    scenario = call("scenarios.create_scenario", question)
+    job = call(
+        "jobs.create_job",
+        models.JobIn.from_dict({"scenario_id": scenario.id, "solver": "rule"}),
+        idempotency_key="generated-client",
+    )
+    while job.state in ("queued", "running"):
+        job = call("jobs.get_job", job_id=job.id, wait=20)
+    assert job.state == "succeeded"
+    timeline = call("timelines.get_timeline", job_id=job.id)
+    assert timeline.validity == "valid"
+    assert timeline.totals.collects == len(
+        [a for s in timeline.satellites for a in s.actions if a.mode == "collect"]
+    )
+    outcomes = call("timelines.list_outcomes", job_id=job.id, limit=100)
+    assert len(outcomes.items) == len(mission["targets"])
+
+
+def test_a_refusal_is_read_as_a_problem(service_url: str, generated: str) -> None:
+    keyless = part(generated, "client").Client(
+        base_url=service_url, raise_on_unexpected_status=True, httpx_args={"trust_env": False}
+    )
+    with keyless as client:
+        answer = part(generated, "api.jobs.list_jobs").sync_detailed(client=client)
+    assert answer.status_code == 401
+    assert answer.parsed.code == "authentication_required"
