@@ -11,7 +11,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 PERIOD_S = 1.0
-"""What ``Retry-After`` of an active job says."""
+"""Between two polls, unless ``Retry-After`` asks for more."""
 
 
 @contextmanager
@@ -42,7 +42,7 @@ async def _poll_all(
     base_url: str, job_ids: list[str], number: int, stop: Event, answers: Any
 ) -> None:
     clients = [
-        asyncio.create_task(_poll(base_url, job_ids[n % len(job_ids)], n / number, answers))
+        asyncio.create_task(_poll(base_url, job_ids, n % len(job_ids), n / number, answers))
         for n in range(number)
     ]
     while not stop.is_set():
@@ -52,18 +52,22 @@ async def _poll_all(
     await asyncio.gather(*clients, return_exceptions=True)
 
 
-async def _poll(base_url: str, job_id: str, phase: float, answers: Any) -> None:
+async def _poll(base_url: str, job_ids: list[str], at: int, phase: float, answers: Any) -> None:
+    """Look at a job until it has ended, then at the next one that has not."""
     address = urlsplit(base_url)
     await asyncio.sleep(phase * PERIOD_S)
     reader, writer = await asyncio.open_connection(address.hostname, address.port)
-    etag = ""
+    etag, pause_s = "", PERIOD_S
     while True:
         known = f"If-None-Match: {etag}\r\n" if etag else ""
-        request = f"GET /v1/jobs/{job_id} HTTP/1.1\r\nHost: {address.netloc}\r\n{known}\r\n"
+        request = f"GET /v1/jobs/{job_ids[at]} HTTP/1.1\r\nHost: {address.netloc}\r\n{known}\r\n"
         writer.write(request.encode())
         head = (await reader.readuntil(b"\r\n\r\n")).decode().lower()
         headers = dict(line.split(": ", 1) for line in head.split("\r\n")[1:] if line)
         await reader.readexactly(int(headers.get("content-length", 0)))
-        etag = headers["etag"]
         answers.value += 1
-        await asyncio.sleep(PERIOD_S)
+        if "retry-after" in headers:
+            etag, pause_s = headers["etag"], float(headers["retry-after"])
+        else:
+            etag, at = "", (at + 1) % len(job_ids)
+        await asyncio.sleep(pause_s)

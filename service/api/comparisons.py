@@ -10,6 +10,7 @@ from fastapi import APIRouter, Request, Response
 from pydantic import BaseModel, Field
 from sqlalchemy.orm import Session
 
+from service.api import ask_again
 from service.api import job_intake as intake
 from service.api.conditional import NOT_MODIFIED, created, unless_known
 from service.api.deps import AuditDep, CallerDep, DatabaseDep, SettingsDep
@@ -167,7 +168,7 @@ def get_comparison(
 
 def _describe(response: Response, shown: ComparisonOut) -> None:
     if shown.state == "running":
-        response.headers["Retry-After"] = str(intake.ASK_AGAIN_S)
+        response.headers["Retry-After"] = str(ask_again.SOON_S)
 
 
 def _shown(session: Session, rows: Sequence[ComparisonRow]) -> list[ComparisonOut]:

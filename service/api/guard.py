@@ -80,7 +80,7 @@ class Guard:
         await self.app(scope, receive, send)
 
     async def _admitted(self, request: Request) -> Caller:
-        path = request.url.path
+        path = request.scope["path"]
         if is_open(path):
             if is_limited(path):
                 self._count(request, NOBODY)

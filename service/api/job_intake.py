@@ -11,6 +11,7 @@ from sqlalchemy.orm import Session
 from planner_core.errors import Fault
 from planner_core.solvers import solver_class
 from service.access.audit import Audit
+from service.api import ask_again
 from service.api.errors import refuse
 from service.api.job_shapes import JobOut, LimitsIn, QuestionIn, etag_of_job, shown
 from service.api.problems import ServiceError
@@ -26,7 +27,6 @@ from service.stores import job_store as store
 from service.stores import scenario_store
 from service.stores.scenario_store import FrozenScenario
 
-ASK_AGAIN_S: Final = 1
 _QUEUE_FULL_S: Final = 30
 
 
@@ -110,7 +110,7 @@ def find_job(session: Session, job_id: str) -> JobRow:
 def not_ready(job: JobRow) -> ServiceError:
     """Return the error for a job without an answer, yet or for good."""
     if job.state in lease.ACTIVE:
-        headers = {"Retry-After": str(ASK_AGAIN_S)}
+        headers = {"Retry-After": str(ask_again.SOON_S)}
         return ServiceError("not_ready", f"The job is {job.state}.", headers=headers)
     why = job.error["code"] if job.error else "it was stopped before it had a plan"
     return ServiceError("not_ready", f"The job is {job.state} and left no answer: {why}.")
@@ -132,8 +132,9 @@ def shown_job(session: Session, job: JobRow) -> JobOut:
 def describe(response: Response, job: JobRow) -> None:
     """Set the headers that every answer about one job has."""
     response.headers["ETag"] = etag_of_job(job)
-    if job.state in lease.ACTIVE:
-        response.headers["Retry-After"] = str(ASK_AGAIN_S)
+    seconds = ask_again.seconds_until(job.state, job.created_at)
+    if seconds is not None:
+        response.headers["Retry-After"] = str(seconds)
 
 
 def accepted(session: Session, response: Response, job: JobRow) -> JobOut:

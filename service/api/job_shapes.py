@@ -172,6 +172,11 @@ def etag_of_job(job: JobRow) -> str:
     return etag_of_version(job.version)
 
 
+def etag_of_timeline(job_id: str) -> str:
+    """Return the ETag of a job's timeline document, which never changes."""
+    return f'"{job_id}"'
+
+
 def etag_of_version(version: int) -> str:
     """Return the ETag of a job of this version."""
     return f'"{version}"'

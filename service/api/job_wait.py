@@ -62,5 +62,5 @@ def _read(database: Database, job_id: str) -> tuple[JobRow, str]:
 
 
 def _version(database: Database, job_id: str) -> int | None:
-    with database.reading() as session:
-        return store.version_of(session, job_id)
+    with database.asking() as connection:
+        return store.version_of(connection, job_id)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Final
 
-from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 SECURITY_HEADERS: Final = {
@@ -15,8 +14,9 @@ SECURITY_HEADERS: Final = {
 }
 """On every answer, unless it brings its own, as a page with styles must."""
 
+_RAW: Final = [(n.lower().encode(), v.encode()) for n, v in SECURITY_HEADERS.items()]
 # Kept by nobody but who asked, who may use it again only when its ETag still holds.
-_PRIVATE: Final = "private, no-cache"
+_PRIVATE: Final = (b"cache-control", b"private, no-cache")
 _PERSONAL: Final = "/v1/"
 
 
@@ -34,11 +34,11 @@ class SecurityHeaders:
 
         async def send_with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":
-                headers = MutableHeaders(scope=message)
-                for name, value in SECURITY_HEADERS.items():
-                    headers.setdefault(name, value)
-                if scope["path"].startswith(_PERSONAL):
-                    headers.setdefault("Cache-Control", _PRIVATE)
+                headers = message.setdefault("headers", [])
+                given = {name.lower() for name, _ in headers}
+                headers.extend(pair for pair in _RAW if pair[0] not in given)
+                if scope["path"].startswith(_PERSONAL) and _PRIVATE[0] not in given:
+                    headers.append(_PRIVATE)
             await send(message)
 
         await self.app(scope, receive, send_with_headers)

@@ -15,7 +15,7 @@ from service.api.accept import preferred
 from service.api.conditional import NOT_MODIFIED
 from service.api.deps import DatabaseDep, own_job_only
 from service.api.errors import problem_responses
-from service.api.job_shapes import Outcome, TargetItem
+from service.api.job_shapes import Outcome, TargetItem, etag_of_timeline
 from service.api.paging import Listed, PagingDep
 from service.api.problems import ServiceError
 from service.api.shapes import matches
@@ -24,7 +24,6 @@ from service.db.rows import JobRow
 from service.db.session import Database
 from service.exports.answered import Answered
 from service.exports.forms import FORMS, Form
-from service.jobs import lease
 from service.stores import job_store as store
 
 router = APIRouter(prefix="/v1/jobs", tags=["timelines"], dependencies=[Depends(own_job_only)])
@@ -112,7 +111,7 @@ def get_proof(job_id: str, database: DatabaseDep, request: Request) -> Response:
     with database.reading() as session:
         job = intake.find_job(session, job_id)
         if store.timeline_of(session, job_id) is None:
-            raise _not_ready(job)
+            raise intake.not_ready(job)
         proof = store.proof_of(session, job_id)
     if matches(request.headers.get("if-none-match"), etag):
         return Response(status_code=304, headers={"ETag": etag})
@@ -132,7 +131,7 @@ def list_outcomes(
         job = intake.find_job(session, job_id)
         targets = store.targets_of(session, job_id)
     if targets is None:
-        raise _not_ready(job)
+        raise intake.not_ready(job)
     found = [
         (position, target)
         for position, target in enumerate(json.loads(targets))
@@ -154,7 +153,7 @@ def _answer(database: Database, request: Request, job: JobRow, form: Form | None
     }
     with database.reading() as session:
         if not store.has_timeline(session, job.id):
-            raise _not_ready(job)
+            raise intake.not_ready(job)
         if matches(request.headers.get("if-none-match"), headers["ETag"]):
             return Response(status_code=304, headers=headers)
         if form is None:
@@ -167,13 +166,7 @@ def _answer(database: Database, request: Request, job: JobRow, form: Form | None
 
 
 def _etag(job_id: str, form: Form | None) -> str:
-    # A timeline never changes; how it is written may, with the version of the service.
-    return f'"{job_id}"' if form is None else f'"{job_id}-{form.suffix}-{planner_core.__version__}"'
-
-
-def _not_ready(job: JobRow) -> ServiceError:
-    if job.state in lease.ACTIVE:
-        headers = {"Retry-After": str(intake.ASK_AGAIN_S)}
-        return ServiceError("not_ready", f"The job is {job.state}.", headers=headers)
-    why = job.error["code"] if job.error else "it was stopped before it had a plan"
-    return ServiceError("not_ready", f"The job is {job.state} and left no answer: {why}.")
+    if form is None:
+        return etag_of_timeline(job_id)
+    # How it is written may change with the version of the service.
+    return f'"{job_id}-{form.suffix}-{planner_core.__version__}"'

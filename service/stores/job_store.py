@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any
+from typing import Any, Final
 
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
@@ -16,6 +16,9 @@ from service.db.rows import JobResultRow, JobRow, ScenarioRow
 from service.ids import new_id
 from service.jobs.queue import JobQueue
 from service.logs import request_id
+
+# Made once: to make and compile it takes longer than to run it.
+_VERSION: Final = sa.select(JobRow.version).where(JobRow.id == sa.bindparam("job_id"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,9 +105,9 @@ def owner_of(session: Session, job_id: str) -> str | None:
     return session.scalar(sa.select(JobRow.tenant).where(JobRow.id == job_id))
 
 
-def version_of(session: Session, job_id: str) -> int | None:
+def version_of(connection: sa.Connection, job_id: str) -> int | None:
     """Return the number that grows with every visible change of a job, or None for no job."""
-    return session.scalar(sa.select(JobRow.version).where(JobRow.id == job_id))
+    return connection.scalar(_VERSION, {"job_id": job_id})
 
 
 def matching(**wanted: str | None) -> sa.Select[JobRow]:

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from service.commands.cli import FAILED, OK, main
+from service.commands.bodies import FAILED, OK
+from service.commands.cli import main
 from service.db.session import Database
 from service.settings import Settings
 

@@ -13,7 +13,8 @@ from typing import Any
 import pytest
 
 from service.commands import demo_mission
-from service.commands.cli import FAILED, OK, WRONG_INPUT, main
+from service.commands.bodies import FAILED, OK, WRONG_INPUT
+from service.commands.cli import main
 from service.scenarios.translate import canonical, sha256_of
 
 

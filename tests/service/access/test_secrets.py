@@ -9,7 +9,8 @@ import pytest
 
 from service.access.static_keys import StaticKeys
 from service.access.tokens import new_token
-from service.commands.cli import WRONG_INPUT, main
+from service.commands.bodies import WRONG_INPUT
+from service.commands.cli import main
 from service.jobs.supervisor import environment_of
 from service.logs import JsonFormatter
 from service.settings import Settings

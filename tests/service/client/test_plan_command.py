@@ -17,7 +17,8 @@ import pytest
 
 from service.client import Client
 from service.commands import demo_mission
-from service.commands.cli import FAILED, OK, WRONG_INPUT, main
+from service.commands.bodies import FAILED, OK, WRONG_INPUT
+from service.commands.cli import main
 from service.scenarios.translate import canonical, sha256_of
 from tests.service.client.trouble import Answer, proxy_before
 

@@ -17,7 +17,8 @@ from planner_core.domain import Scenario
 from planner_core.problem import Problem
 from planner_core.solvers.base import Budget
 from planner_core.timeline import plan_sha256, replay
-from service.commands.cli import FAILED, OK, WRONG_INPUT, main
+from service.commands.bodies import FAILED, OK, WRONG_INPUT
+from service.commands.cli import main
 from service.exports import table
 from service.exports.answered import Answered
 from service.exports.reading import READERS, Reading, UnreadableTimeline, plan_in

@@ -5,12 +5,15 @@ from __future__ import annotations
 import base64
 import json
 from concurrent.futures import ThreadPoolExecutor
+from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import httpx
 import pytest
+import sqlalchemy as sa
 
 from planner_core.solvers import SOLVERS
+from service.db.rows import JobRow
 from service.jobs import lease
 from service.jobs.lease import Lease, Outcome
 from service.jobs.queue import DbosQueue
@@ -290,6 +293,34 @@ def test_the_timeline_is_not_ready_before_the_job_has_ended(
     assert "retry-after" not in late.headers
     failed = client.get(f"/v1/jobs/{job_id}").json()
     assert failed["error"] == {"code": "time_limit", "detail": "No plan within the limit of 1 s."}
+
+
+def test_an_unchanged_timeline_is_not_sent_again(client: httpx.Client, jobs: Jobs) -> None:
+    job_id = posted(client, jobs)
+    path = f"/v1/jobs/{job_id}/timeline"
+    known = {"If-None-Match": f'"{job_id}"'}
+    assert client.get(path, headers=known).status_code == 409
+    finish(jobs, job_id)
+    sent = client.get(path)
+    again = client.get(path, headers=known)
+    assert (again.status_code, again.content) == (304, b"")
+    assert {name: again.headers[name] for name in ("etag", "vary")} == {
+        name: sent.headers[name] for name in ("etag", "vary")
+    }
+    assert client.get(path, headers=known | {"Accept": "text/csv"}).status_code != 304
+    assert client.get(path, headers={"If-None-Match": '"another"'}).status_code == 200
+
+
+def test_a_job_that_waits_says_when_to_ask_again(client: httpx.Client, jobs: Jobs) -> None:
+    job_id = posted(client, jobs)
+    with jobs.database.transaction() as session:
+        long_ago = datetime.now(UTC) - timedelta(minutes=10)
+        session.execute(sa.update(JobRow).values(created_at=long_ago))
+    path = f"/v1/jobs/{job_id}"
+    sent = client.get(path)
+    again = client.get(path, headers={"If-None-Match": sent.headers["etag"]})
+    assert (sent.status_code, sent.headers["retry-after"]) == (200, "5")
+    assert (again.status_code, again.headers["retry-after"]) == (304, "5")
 
 
 def test_the_proof_of_a_bound_is_kept_with_the_answer(client: httpx.Client, jobs: Jobs) -> None:
