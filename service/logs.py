@@ -62,3 +62,5 @@ def configure_logging(level: str = "INFO") -> None:
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(JsonFormatter())
     logging.basicConfig(level=level, handlers=[handler], force=True)
+    # Each call of its own that the service makes would be a line.
+    logging.getLogger("httpx").setLevel(logging.WARNING)

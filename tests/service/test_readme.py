@@ -11,10 +11,16 @@ from pathlib import Path
 
 import pytest
 
+from tests.service.factories import tle
 from tests.service.serving import serving
 
 ROOT = Path(__file__).resolve().parents[2]
 WITHIN_S = 120.0
+OWN_FILES = {
+    "satellites.tle": ["EYE", *tle(90100)],
+    "targets.csv": ["id,lat_deg,lon_deg", "bern,46.948,7.447", "quito,-0.22,-78.51"],
+    "stations.csv": ["name,lat_deg,lon_deg", "Svalbard,78.23,15.39"],
+}
 
 
 def _walk(page: str, url: str) -> str:
@@ -35,6 +41,8 @@ needs_tools = pytest.mark.skipif(
 def _output(page: str, tmp_path: Path) -> str:
     """Return what the commands of a page print on a fresh service; none of them may fail."""
     (tmp_path / "service").symlink_to(ROOT / "service")
+    for name, lines in OWN_FILES.items():
+        (tmp_path / name).write_text("\n".join(lines) + "\n", encoding="utf-8")
     with serving(tmp_path, "serve") as (_, line):
         ran = subprocess.run(
             ["bash", "-eu", "-c", _walk(page, line.split()[-1])],
@@ -57,6 +65,7 @@ def test_every_command_of_the_walk_works(tmp_path: Path) -> None:
         '"bound_proof"',
         '"mode": "collect"',
         '"code": "tle_line_length"',
+        ",EYE,collect,2026-03-01T",
     ]
     assert [part for part in answers if part not in printed] == []
     assert re.search(r"^rule .* valid$", printed, re.M)

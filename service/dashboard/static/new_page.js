@@ -15,7 +15,7 @@ import { allChoices } from "./uploads.js";
 
 const HOUR_MS = 3_600_000;
 const FRESH_MS = 5 * 24 * HOUR_MS;
-const FIRST_CHOICE = "forward_search";
+const FIRST_CHOICE = "certified";
 
 const choices = allChoices();
 /** @type {SolverOut[]} */
@@ -128,6 +128,8 @@ async function scenarioId() {
     ...chosen,
     use_resources: input("use-resources").checked,
     allow_old_elements: input("allow-old").checked,
+    collect_spacing_s: spacing(),
+    continuous_starts: input("continuous-starts").checked,
   });
   for (const warning of made.warnings) notice("warn", warning);
   return made.id;
@@ -140,6 +142,13 @@ async function scenarioId() {
 function instantOf(text) {
   const parts = /^(\d{4}-\d\d-\d\d)[T ](\d\d:\d\d(?::\d\d(?:\.\d+)?)?) ?(?:Z|UTC)?$/.exec(text.trim());
   return parts === null ? NaN : Date.parse(`${parts[1]}T${parts[2]}Z`);
+}
+
+function spacing() {
+  const text = input("collect-spacing").value.trim();
+  if (text === "") return null;
+  if (!(Number(text) > 0)) throw new Error("Collects of an access: give a number of seconds, or nothing.");
+  return Number(text);
 }
 
 function question() {

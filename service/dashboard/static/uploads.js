@@ -142,7 +142,7 @@ async function sendSatellites(file) {
   const answer = await upload("/v1/satellites/import", file, mediaType);
   const ids = answer.items.map((/** @type {{id: string}} */ item) => item.id);
   const parts = told(answer, "element sets");
-  parts.push(" Satellites get the agility, sensor and resources of the paper unless entered below.");
+  parts.push(" Satellites get the agility, sensor and resources of the paper unless entered one by one.");
   return { told: parts, ids };
 }
 

@@ -40,11 +40,14 @@ def test_from_files_to_a_timeline_in_the_browser_alone(
     # The orbit is old: its own day is suggested, in the page's form whatever the country.
     assert browser.find("#horizon-start").get_attribute("value") == "2026-03-01 00:00:00"
     browser.find("#label").send_keys("first plan")
+    browser.find("#collect-spacing").send_keys("60")
     browser.click("#send")
     path = browser.wait_for_answer()
     job, timeline = api.get(path).json(), api.get(f"{path}/timeline").json()
-    assert (job["label"], job["solver"]) == ("first plan", "forward_search")
+    assert (job["label"], job["solver"]) == ("first plan", "certified")
     assert timeline["horizon"]["start"] == "2026-03-01T00:00:00.000Z"
+    scenario = api.get(job["links"]["scenario"]).json()
+    assert (scenario["collect_spacing_s"], scenario["continuous_starts"]) == (60.0, False)
     totals = timeline["totals"]
     assert browser.text("[data-figure=reward] strong") == f"{totals['reward']:g}"
     assert browser.text("[data-figure=validity] strong") == timeline["validity"] == "valid"
