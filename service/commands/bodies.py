@@ -8,6 +8,9 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from planner_core.errors import Cancelled, PlannerError
@@ -25,6 +28,10 @@ _MOST_FAULTS: Final = 20
 
 class WrongInput(Exception):
     """Something on the command line, in the environment or in a file; the message names it."""
+
+
+class Stopped(Exception):
+    """Whoever waits for the command has ended it."""
 
 
 def complain(message: str, status: int) -> int:
@@ -160,10 +167,9 @@ def demo(options: argparse.Namespace) -> int:
 
 def solve(options: argparse.Namespace) -> int:
     """Plan a scenario file, without a service."""
-    from service.commands.scenario_files import place_of
     from service.commands.solve import solve_file
 
-    try:
+    with _faults_of(options.scenario):
         return solve_file(
             options.scenario,
             solver=options.solver,
@@ -172,11 +178,36 @@ def solve(options: argparse.Namespace) -> int:
             time_s=options.time_s,
             out=options.out,
         )
+
+
+def compare_spacing(options: argparse.Namespace) -> int:
+    """See what more starts in each access gain on a scenario file."""
+    from service.commands import compare_spacing
+
+    with _faults_of(options.scenario):
+        return compare_spacing.compare_spacing(
+            options.scenario,
+            spacings_s=options.spacing_s or compare_spacing.SPACINGS_S,
+            solver=options.solver,
+            params=dict(options.param),
+            seed=options.seed,
+            time_s=options.time_s,
+            out=options.out,
+        )
+
+
+@contextmanager
+def _faults_of(scenario: Path) -> Iterator[None]:
+    """Tell what is wrong with a scenario file, or with the search that it is given to."""
+    from service.commands.scenario_files import place_of
+
+    try:
+        yield
     except PlannerError as error:
-        place = place_of(error.fault.pointer or "", options.scenario)
+        place = place_of(error.fault.pointer or "", scenario)
         raise WrongInput(f"{place}: {error.detail}") from error
-    except Cancelled:
-        return complain("stopped before there was a plan", FAILED)
+    except Cancelled as error:
+        raise Stopped("stopped before there was a plan") from error
     except OSError as error:
         raise WrongInput(f"{error.filename}: {error.strerror}") from error
 
@@ -184,11 +215,11 @@ def solve(options: argparse.Namespace) -> int:
 def check(options: argparse.Namespace) -> int:
     """Have the referee judge a timeline."""
     from service.commands.check import check_file
-    from service.commands.scenario_files import place_of
     from service.exports.reading import UnreadableTimeline
 
     try:
-        return check_file(options.scenario, options.timeline)
+        with _faults_of(options.scenario):
+            return check_file(options.scenario, options.timeline)
     except UnreadableTimeline as error:
         lines = [
             f"{options.timeline} {f'line {f.row}' if f.row else f.pointer or ''}".strip()
@@ -197,11 +228,6 @@ def check(options: argparse.Namespace) -> int:
         ]
         left = len(error.faults) - len(lines)
         raise WrongInput("\n".join(lines + [f"{left} more"] * (left > 0))) from error
-    except PlannerError as error:
-        place = place_of(error.fault.pointer or "", options.scenario)
-        raise WrongInput(f"{place}: {error.detail}") from error
-    except OSError as error:
-        raise WrongInput(f"{error.filename}: {error.strerror}") from error
 
 
 def plan(options: argparse.Namespace) -> int:

@@ -12,7 +12,7 @@ from typing import Any
 import planner_core
 from service.access.callers import Scope, is_plain_name
 from service.commands import bodies
-from service.commands.bodies import FAILED, WRONG_INPUT, WrongInput, complain
+from service.commands.bodies import FAILED, WRONG_INPUT, Stopped, WrongInput, complain
 
 _LONGEST_DAYS = 3650
 
@@ -27,6 +27,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return command(options)
     except WrongInput as error:
         return complain(str(error), WRONG_INPUT)
+    except Stopped as error:
+        return complain(str(error), FAILED)
     except KeyboardInterrupt:
         return complain("interrupted", FAILED)
     except Exception as error:
@@ -77,6 +79,17 @@ def _parser() -> argparse.ArgumentParser:
     )
     check.add_argument("scenario", type=Path, metavar="SCENARIO.json")
     check.add_argument("timeline", type=_timeline_file, metavar="TIMELINE.{json,csv}")
+
+    spacing = _command(
+        commands, "compare-spacing", bodies.compare_spacing,
+        "see what more starts in each access gain on a scenario file",
+    )  # fmt: skip
+    spacing.add_argument(
+        "--spacing-s", action="append", type=_positive, metavar="SECONDS",
+        help="between the starts of an access; may be repeated (60, 30 and 15)",
+    )  # fmt: skip
+    spacing.add_argument("scenario", type=Path, metavar="SCENARIO.json")
+    _add_search(spacing, solver="certified", time_s=60.0, out="write the table here, as CSV")
 
     _add_keys(_command(commands, "keys", None, "make, list and revoke API keys"))
     _add_plan(
@@ -155,15 +168,27 @@ def _add_plan(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _add_search(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--solver", required=True, metavar="NAME")
+def _add_search(
+    parser: argparse.ArgumentParser,
+    solver: str | None = None,
+    time_s: float | None = None,
+    out: str = "write the timeline here",
+) -> None:
+    parser.add_argument(
+        "--solver", required=solver is None, default=solver, metavar="NAME",
+        help=f"({solver})" if solver else None,
+    )  # fmt: skip
     parser.add_argument(
         "--param", action="append", default=[], type=_parameter, metavar="KEY=VALUE",
         help="a parameter of the solver, as JSON or as a word; may be repeated",
     )  # fmt: skip
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--time-s", type=_positive, help="seconds after which the search stops")
-    parser.add_argument("--out", type=Path, metavar="FILE", help="write the timeline here")
+    usual = f" ({time_s:g})" if time_s else ""
+    parser.add_argument(
+        "--time-s", type=_positive, default=time_s,
+        help=f"seconds after which the search stops{usual}",
+    )  # fmt: skip
+    parser.add_argument("--out", type=Path, metavar="FILE", help=out)
 
 
 def _timeline_file(text: str) -> Path:

@@ -64,15 +64,16 @@ def solve_file(
         seed=seed,
         limits={"time_s": time_s},
     )
-    timeline = json.loads(_answer(request, Budget(time_s)).timeline)
+    timeline = json.loads(answer_of(request, Budget(time_s)).timeline)
     if out is not None:
         out.write_text(json.dumps(timeline, indent=1) + "\n", encoding="utf-8")
     print(summary(timeline))
     return 0 if timeline["validity"] == "valid" else 1
 
 
-def _answer(request: PlanRequest, budget: Budget) -> PlanAnswer:
-    """Run the job in a thread: inside a kernel the main one could not take a signal."""
+def answer_of(request: PlanRequest, budget: Budget) -> PlanAnswer:
+    """Return the answer to a request; Ctrl-C and the budget end the search with its best plan."""
+    # In a thread: inside a kernel the main one could not take a signal.
     signal.signal(signal.SIGINT, lambda *_: budget.cancel())
     with ThreadPoolExecutor(max_workers=1) as pool:
         job = pool.submit(run_plan_job, request, budget)

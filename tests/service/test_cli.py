@@ -17,7 +17,8 @@ from service.commands.bodies import FAILED, OK, WRONG_INPUT
 from service.commands.cli import main
 
 COMMANDS = (
-    "serve", "api", "worker", "migrate", "backup", "demo", "solve", "plan", "keys", "openapi",
+    "serve", "api", "worker", "migrate", "backup", "demo", "solve", "compare-spacing", "plan",
+    "keys", "openapi",
 )  # fmt: skip
 
 
@@ -41,7 +42,7 @@ def test_help_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
         main(["--help"])
     printed = capsys.readouterr().out
     assert ended.value.code == 0
-    assert [name for name in COMMANDS if f"\n    {name} " in printed] == list(COMMANDS)
+    assert [name for name in COMMANDS if f"\n    {name}" in printed] == list(COMMANDS)
 
 
 @pytest.mark.parametrize("arguments", [[], ["fly"], ["solve"], ["serve", "--port", "many"]])

@@ -1,0 +1,61 @@
+"""``slewline compare-spacing``: a line for each choice of starts."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+
+from service.commands.bodies import OK, WRONG_INPUT
+from service.commands.cli import main
+from tests.missions import drawn_targets, paper_mission
+
+A_QUARTER = {"start": "2019-01-01T00:00:00Z", "end": "2019-01-01T06:00:00Z"}
+
+
+@pytest.fixture
+def scenario(tmp_path: Path) -> Path:
+    mission = paper_mission(drawn_targets(150), use_resources=False, horizon=A_QUARTER)
+    path = tmp_path / "scenario.json"
+    # What it says of spacing itself does not matter.
+    path.write_text(json.dumps(mission | {"collect_spacing_s": 7.0}))
+    return path
+
+
+def test_more_starts_never_earn_less(
+    scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    table = tmp_path / "table.csv"
+    asked = ["compare-spacing", str(scenario), "--spacing-s", "40", "--spacing-s", "20"]
+    assert main([*asked, "--out", str(table)]) == OK
+    with table.open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["starts"] for row in rows] == [
+        "one, centred",
+        "every 40 s",
+        "every 20 s",
+        "anywhere",
+    ]
+    assert {row["validity"] for row in rows} == {"valid"}
+    rewards = [float(row["reward"]) for row in rows]
+    assert rewards[0] < rewards[2]
+    assert rewards[1] <= rewards[2]
+    assert rewards[0] <= rewards[3]
+    assert rows[2]["gain"] == f"{rewards[2] / rewards[0] - 1.0:+.1%}"
+    printed = capsys.readouterr().out.splitlines()
+    assert len(printed) == 5
+    assert printed[3].startswith("every 20 s")
+
+
+def test_what_is_wrong_is_told_by_its_place(
+    scenario: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["compare-spacing", str(scenario), "--solver", "magic"]) == WRONG_INPUT
+    assert capsys.readouterr().err.startswith("slewline: --solver: No solver is called 'magic'")
+    content = json.loads(scenario.read_text())
+    content["targets"][3]["lat_deg"] = 95.0
+    scenario.write_text(json.dumps(content))
+    assert main(["compare-spacing", str(scenario)]) == WRONG_INPUT
+    assert "scenario.json /targets/3/lat_deg" in capsys.readouterr().err
