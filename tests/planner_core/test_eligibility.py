@@ -110,7 +110,7 @@ def allowed_rows(scenario: Scenario, whole: ScenarioOpportunities) -> np.ndarray
     return np.array(rows, dtype=np.int32)
 
 
-@settings(max_examples=25)
+@settings(max_examples=25, deadline=None)
 @given(seed=st.integers(0, 10**6))
 def test_on_a_grid_exactly_the_collects_in_time_of_the_right_type_are_left(seed: int) -> None:
     scenario, whole = everything()
@@ -144,14 +144,14 @@ def test_plans_honour_times_and_types_and_exact_ones_are_the_best(solver: str, s
     release_s=st.integers(0, 900_000).map(lambda ms: ms / 1000.0),
     length_s=st.integers(1, 900_000).map(lambda ms: ms / 1000.0),
 )
-@settings(max_examples=30)
+@settings(max_examples=30, deadline=None)
 def test_centred_collects_lie_in_the_middle_of_what_times_leave(
     release_s: float, length_s: float
 ) -> None:
     scenario, _ = everything()
     alone = replace(scenario, collect_spacing_s=None, collect_alignment="access")
     free = compute_opportunities(alone, Budget()).opportunities
-    times = {"release": at(release_s), "due": at(release_s + length_s)}
+    times: dict[str, Any] = {"release": at(release_s), "due": at(release_s + length_s)}
     found = compute_opportunities(
         replace(alone, targets=tuple(replace(t, **times) for t in alone.targets)), Budget()
     ).opportunities
@@ -174,7 +174,7 @@ def test_the_referee_rejects_a_collect_outside_its_times() -> None:
     begin_s, end_s = float(table.access_start_s[row]), float(table.access_end_s[row])
     assert end_s - begin_s > 60.0
     name = scenario.targets[int(table.place[row])].id
-    times = {"release": at(begin_s + 10.0), "due": at(end_s - 10.0)}
+    times: dict[str, Any] = {"release": at(begin_s + 10.0), "due": at(end_s - 10.0)}
     asked = replace(
         free, targets=tuple(replace(t, **times) if t.id == name else t for t in free.targets)
     )
@@ -196,6 +196,12 @@ def test_the_referee_rejects_a_collect_outside_its_times() -> None:
     assert judged(begin_s + 9.999) == judged(end_s - 39.999) == ["window"]
 
 
+def target(**fields: Any) -> Target:
+    """Return a target near the equator, unless told otherwise."""
+    near: dict[str, Any] = {"id": "t", "lat_deg": 3.0, "lon_deg": 0.0}
+    return Target(**near | fields)
+
+
 def low_and_typed(**of_target: Any) -> Scenario:
     """Return one target under an equatorial orbit of a visible sensor."""
     return Scenario(
@@ -205,7 +211,7 @@ def low_and_typed(**of_target: Any) -> Scenario:
                 orbit(inclination_deg=0.01), name="low", sensor=Sensor(sensor_type="visible")
             ),
         ),
-        targets=(Target(**{"id": "t", "lat_deg": 3.0, "lon_deg": 0.0} | of_target),),
+        targets=(target(**of_target),),
         use_resources=False,
     )
 
@@ -281,7 +287,7 @@ def test_another_sensor_type_is_said_to_give_access() -> None:
 )
 def test_what_no_target_can_ask_for_is_refused(bad: dict[str, Any], pointer: str) -> None:
     with pytest.raises(InvalidScenario) as caught:
-        Target(**{"id": "t", "lat_deg": 0.0, "lon_deg": 0.0} | bad)
+        target(**bad)
     assert caught.value.fault.pointer == pointer
 
 
