@@ -45,7 +45,6 @@ from service.inputs import (
     ScenarioFile,
     TargetIn,
 )
-from service.instants import instant_text
 from service.pin_inputs import pins_from
 
 _SECONDS_PER_HOUR = 3600.0
@@ -300,8 +299,8 @@ def target_from(body: TargetIn, catalog_id: str | None = None) -> Target:
     if body.release is not None and body.due is not None and body.due <= body.release:
         raise InvalidScenario(
             "value_out_of_range",
-            f"due is {instant_text(body.due)}: it must be later than release, "
-            f"{instant_text(body.release)}.",
+            f"due is {body.due:%Y-%m-%dT%H:%M:%SZ}: it must be later than release, "
+            f"{body.release:%Y-%m-%dT%H:%M:%SZ}.",
             pointer="/due",
         )
     fields = {name: getattr(body, name) for name in TargetIn.model_fields}
