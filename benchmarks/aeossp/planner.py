@@ -45,8 +45,8 @@ class Planned:
     Attributes
     ----------
     weight, bound
-        Of the tasks observed, and what no solution can exceed: the battery left out, and with
-        it no image in the first seconds, before the satellite could have turned from nadir.
+        Of the tasks observed, and what no solution can exceed whatever its batteries, as long as
+        no image starts sooner than it could be a satellite's first, which begins at nadir.
     num_collects
         How many observations there were to choose from.
     num_dropped
