@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import json
 import zipfile
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Literal
 
 import numpy as np
@@ -13,7 +13,8 @@ import numpy.typing as npt
 
 from planner_core import opportunities as tasks
 from planner_core.access import Accesses, find_accesses
-from planner_core.domain import Horizon, Satellite, Scenario
+from planner_core.domain import Horizon, Satellite, Scenario, Sensor
+from planner_core.eligibility import Eligibility
 from planner_core.errors import Cancelled, InvalidScenario
 from planner_core.limits import Limits, TargetLimits
 from planner_core.orbits import ephemeris as orbits
@@ -25,10 +26,13 @@ from planner_core.pins.pinning import pinned_problem
 from planner_core.problem import (
     ACCESS_FOUND,
     ACCESS_TOO_SHORT,
+    BETWEEN_STARTS,
     COLLECT,
     CONTACT,
     NEVER_VISIBLE,
     OUTSIDE_LIMITS,
+    OUTSIDE_TIMES,
+    WRONG_SENSOR_TYPE,
     Opportunities,
     Problem,
     Sunlight,
@@ -45,8 +49,14 @@ OLD_ELEMENTS_DAYS = 3.0
 REFUSED_ELEMENTS_DAYS = 30.0
 
 _REASONS = np.array(
-    [NEVER_VISIBLE, OUTSIDE_LIMITS, ACCESS_TOO_SHORT, ACCESS_FOUND], dtype=np.int8
+    [
+        NEVER_VISIBLE, WRONG_SENSOR_TYPE, OUTSIDE_LIMITS, ACCESS_TOO_SHORT, OUTSIDE_TIMES,
+        BETWEEN_STARTS, ACCESS_FOUND,
+    ],
+    dtype=np.int8,
 )  # fmt: skip
+"""From what is farthest from a collect to what is nearest."""
+_RANK = {int(reason): rank for rank, reason in enumerate(_REASONS)}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -125,9 +135,8 @@ def compute_opportunities(scenario: Scenario, budget: Budget) -> ScenarioOpportu
     """
     places = _places(scenario)
     kinds = (COLLECT, CONTACT) if scenario.use_resources else (COLLECT,)
-    own = TargetLimits.of(scenario.targets)
+    collects = _Collects(scenario, places[COLLECT])
     contact = Limits.of_stations(scenario.ground_stations)
-    closeness = np.zeros(len(scenario.targets), dtype=np.int64)
     parts: list[tasks.Columns] = []
     lit: list[Sunlight] = []
     num_accesses = num_rows = 0
@@ -136,11 +145,11 @@ def compute_opportunities(scenario: Scenario, budget: Budget) -> ScenarioOpportu
         _go_on(budget, index / num_steps)
         path = propagate(satellite, scenario.horizon)
         for kind in kinds:
-            limits = contact if kind == CONTACT else Limits.of_targets(satellite.sensor, own)
-            found = find_accesses(path, places[kind], limits, budget.stop)
-            placed = _placed(scenario, kind, found)
             if kind == COLLECT:
-                _note(closeness, path, places[kind], found, placed[0])
+                found, placed = collects.placed(satellite.sensor, path, budget)
+            else:
+                found = find_accesses(path, places[kind], contact, budget.stop)
+                placed = tasks.place_contacts(found, scenario.ground_stations)
             parts.append(tasks.rows_of(index, kind, found, num_accesses, placed))
             num_accesses += len(found)
             num_rows += len(placed[0])
@@ -161,7 +170,7 @@ def compute_opportunities(scenario: Scenario, budget: Budget) -> ScenarioOpportu
     _go_on(budget, 1.0)
     return ScenarioOpportunities(
         opportunities=described.table(),
-        target_access=_REASONS[closeness],
+        target_access=_REASONS[collects.closeness],
         sunlight=tuple(lit),
         warnings=orbit_warnings(scenario),
     )
@@ -205,19 +214,52 @@ def _go_on(budget: Budget, fraction: float, phase: Literal["access", "compile"] 
     budget.report(Progress(phase=phase, fraction=fraction))
 
 
-def _placed(scenario: Scenario, kind: int, found: Accesses) -> tasks.Placed:
-    if kind == COLLECT:
-        return tasks.place_collects(found, scenario.targets, scenario.collect_spacing_s)
-    return tasks.place_contacts(found, scenario.ground_stations)
+class _Collects:
+    """Finds and places the collects of one satellite after another.
 
+    ``closeness`` tells, by target, how near any of them has come to one: an index of
+    ``_REASONS``.
+    """
 
-def _note(closeness: Longs, path: Ephemeris, targets: Places, found: Accesses, used: Longs) -> None:
-    """Raise each target's closeness (an index of ``_REASONS``) to what this satellite offers."""
-    np.maximum.at(closeness, found.place, 2)
-    np.maximum.at(closeness, found.place[used], 3)
-    unseen = np.flatnonzero(closeness == 0)
-    seen = find_accesses(path, targets.at(unseen), Limits.above_horizon(len(unseen)))
-    closeness[unseen[seen.place]] = 1
+    def __init__(self, scenario: Scenario, places: Places):
+        self.closeness = np.zeros(len(scenario.targets), dtype=np.int64)
+        self._scenario = scenario
+        self._places = places
+        self._limits = TargetLimits.of(scenario.targets)
+        self._eligibility = Eligibility.of(scenario.targets, scenario.horizon)
+
+    def placed(
+        self, sensor: Sensor, path: Ephemeris, budget: Budget
+    ) -> tuple[Accesses, tasks.Placed]:
+        """Return the accesses of a satellite that count, and the collects in them."""
+        scenario, targets = self._scenario, self._scenario.targets
+        served = self._eligibility.served_by(sensor)
+        limits = Limits.of_targets(sensor, self._limits.at(served))
+        found = find_accesses(path, self._places.at(served), limits, budget.stop)
+        found = replace(found, place=served[found.place].astype(np.int32))
+        in_time = self._eligibility.in_time(found)
+        placed = tasks.place_collects(
+            in_time, targets, scenario.collect_spacing_s, scenario.collect_alignment
+        )
+        self._raise_to(ACCESS_TOO_SHORT, found.place)
+        self._raise_to(OUTSIDE_TIMES, found.place[tasks.have_room(found, targets)])
+        self._raise_to(BETWEEN_STARTS, in_time.place[tasks.have_room(in_time, targets)])
+        self._raise_to(ACCESS_FOUND, in_time.place[placed[0]])
+        self._note_visible(served, path)
+        return in_time, placed
+
+    def _note_visible(self, served: Longs, path: Ephemeris) -> None:
+        """Look for bare visibility, where it would bring a target nearer."""
+        is_served = np.zeros(len(self.closeness), dtype=np.bool_)
+        is_served[served] = True
+        best = np.where(is_served, _RANK[OUTSIDE_LIMITS], _RANK[WRONG_SENSOR_TYPE])
+        unseen = np.flatnonzero(self.closeness < best)
+        seen = find_accesses(path, self._places.at(unseen), Limits.above_horizon(len(unseen)))
+        visible = unseen[seen.place]
+        np.maximum.at(self.closeness, visible, best[visible])
+
+    def _raise_to(self, reason: int, targets: npt.NDArray[np.integer]) -> None:
+        np.maximum.at(self.closeness, targets, _RANK[reason])
 
 
 def build_problem(scenario: Scenario, computed: ScenarioOpportunities, budget: Budget) -> Problem:

@@ -39,6 +39,9 @@ Dynamics = Literal["physical", "paper"]
 Nadir = Literal["geodetic", "geocentric"]
 LookSide = Literal["left", "right", "any"]
 OrbitDirection = Literal["ascending", "descending", "any"]
+CollectAlignment = Literal["access", "horizon"]
+
+_LONGEST_SENSOR_TYPE = 100
 
 
 def _require(condition: bool, where: str, message: str) -> None:
@@ -70,6 +73,15 @@ def _check_light(limits: Sensor | Target) -> None:
         (begin is None) == (end is None) and (begin is None or begin != end),
         "local_time_to_h",
         "needs a local_time_from_h that differs from it, and the other way round",
+    )
+
+
+def _check_sensor_type(sensor_type: str | None) -> None:
+    _require(
+        sensor_type is None
+        or (0 < len(sensor_type) <= _LONGEST_SENSOR_TYPE and sensor_type.isprintable()),
+        "sensor_type",
+        f"must be 1 to {_LONGEST_SENSOR_TYPE} printable characters, or null for none",
     )
 
 
@@ -183,6 +195,8 @@ class Sensor:
         runs over midnight. None for no limit.
     orbit_direction
         Ascending while the satellite moves north.
+    sensor_type
+        What targets may ask for by this name; None serves only targets that ask for none.
     """
 
     off_nadir_min_deg: float = 5.0
@@ -195,6 +209,7 @@ class Sensor:
     local_time_from_h: float | None = None
     local_time_to_h: float | None = None
     orbit_direction: OrbitDirection = "any"
+    sensor_type: str | None = None
 
     def __post_init__(self) -> None:
         _require_finite(self, "off_nadir_min_deg", "off_nadir_max_deg", "min_elevation_deg")
@@ -208,6 +223,7 @@ class Sensor:
             0 <= self.min_elevation_deg < 90, "min_elevation_deg", "must be from 0 to below 90"
         )
         _check_light(self)
+        _check_sensor_type(self.sensor_type)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -307,8 +323,15 @@ class Satellite:
 class Target:
     """A point on the ground to be imaged once, by any satellite.
 
-    The limits from ``off_nadir_min_deg`` on are named and meant as those of ``Sensor``, and
-    narrow them: a collect meets both.
+    The limits from ``off_nadir_min_deg`` to ``orbit_direction`` are named and meant as those of
+    ``Sensor``, and narrow them: a collect meets both.
+
+    Attributes
+    ----------
+    release, due
+        Aware instants between which a collect lies as a whole. None for no limit.
+    sensor_type
+        Only satellites whose sensor has this very type may collect it. None for any satellite.
     """
 
     id: str
@@ -326,6 +349,9 @@ class Target:
     local_time_to_h: float | None = None
     look_side: LookSide = "any"
     orbit_direction: OrbitDirection = "any"
+    release: datetime | None = None
+    due: datetime | None = None
+    sensor_type: str | None = None
     catalog_id: str | None = None
 
     def __post_init__(self) -> None:
@@ -339,6 +365,14 @@ class Target:
             value = getattr(self, name)
             _require(value is None or 0 <= value <= 90, name, "must be between 0 and 90")
         _check_light(self)
+        for name, instant in (("release", self.release), ("due", self.due)):
+            _require(instant is None or instant.tzinfo is not None, name, "needs a time zone")
+        _require(
+            self.release is None or self.due is None or self.release < self.due,
+            "due",
+            "must be later than release",
+        )
+        _check_sensor_type(self.sensor_type)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -374,7 +408,13 @@ class GroundStation:
 class Scenario:
     """The frozen question: who may image what, when, and under which rules.
 
-    ``allow_old_elements`` plans with element sets of any age (see ``build.check_element_age``).
+    Attributes
+    ----------
+    collect_alignment
+        Whether the starts of ``collect_spacing_s`` count from each access, or are multiples of it
+        from the horizon's start.
+    allow_old_elements
+        Plan with element sets of any age (see ``build.check_element_age``).
     """
 
     horizon: Horizon
@@ -384,6 +424,7 @@ class Scenario:
     use_resources: bool = True
     dynamics: Dynamics = "physical"
     collect_spacing_s: float | None = None
+    collect_alignment: CollectAlignment = "access"
     continuous_starts: bool = False
     allow_old_elements: bool = False
     pins: Pins = field(default_factory=Pins)
@@ -395,6 +436,12 @@ class Scenario:
             self.collect_spacing_s is None or self.collect_spacing_s > 0,
             "collect_spacing_s",
             "must be greater than 0",
+        )
+        _require(
+            self.collect_alignment == "access"
+            or (self.collect_spacing_s is not None and not self.continuous_starts),
+            "collect_alignment",
+            "horizon needs a collect_spacing_s, and no continuous_starts",
         )
         for what, ids in (
             ("satellite", [s.id for s in self.satellites]),

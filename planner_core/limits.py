@@ -65,6 +65,14 @@ class TargetLimits:
             },
         )
 
+    def at(self, rows: npt.NDArray[np.integer]) -> TargetLimits:
+        """Return the limits of these targets."""
+        return TargetLimits(
+            lon_deg=self.lon_deg[rows],
+            bounds={name: values[rows] for name, values in self.bounds.items()},
+            choices={name: values[rows] for name, values in self.choices.items()},
+        )
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Limits:

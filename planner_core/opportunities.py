@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from planner_core.access import Accesses
-from planner_core.domain import GroundStation, Nadir, Target
+from planner_core.domain import CollectAlignment, GroundStation, Nadir, Target
 from planner_core.errors import InvalidScenario
 from planner_core.orbits.ephemeris import Ephemeris
 from planner_core.orbits.places import Places, View, line_of_sight_teme, view
@@ -59,27 +59,42 @@ def check_number(num_opportunities: int) -> None:
 
 
 def place_collects(
-    accesses: Accesses, targets: Sequence[Target], spacing_s: float | None
+    accesses: Accesses,
+    targets: Sequence[Target],
+    spacing_s: float | None,
+    alignment: CollectAlignment = "access",
 ) -> Placed:
     """Return the collects that accesses offer.
 
-    Without a spacing, one in the middle of each access; with one, starts ``spacing_s`` apart
-    from the access's start on, and the last start that still fits.
+    Without a spacing, one in the middle of each access; with one, starts ``spacing_s`` apart:
+    from the access's start on, and the last start that still fits, or, aligned to the horizon,
+    at multiples of the spacing from the horizon's start.
 
     Returns
     -------
     Row of the access, start and end in milliseconds. Shape ``(n,)`` each.
     """
-    length_s = np.array([target.collect_s for target in targets], dtype=np.float64)
-    length_ms = np.ceil(length_s * _MS_PER_S - 1e-6).astype(np.int64)[accesses.place]
-    start_ms, end_ms = _ms(accesses.start_s), _ms(accesses.end_s)
-    room_ms = end_ms - start_ms - length_ms
+    length_ms, room_ms = _room_ms(accesses, targets)
+    start_ms = _ms(accesses.start_s)
     row = np.flatnonzero(room_ms >= 0)
     if spacing_s is None:
         begin = start_ms[row] + room_ms[row] // 2
     else:
-        row, begin = _spaced(row, start_ms[row], room_ms[row], max(spacing_s * _MS_PER_S, 1.0))
+        spaced = _spaced if alignment == "access" else _on_grid
+        row, begin = spaced(row, start_ms[row], room_ms[row], max(spacing_s * _MS_PER_S, 1.0))
     return row, begin, begin + length_ms[row]
+
+
+def have_room(accesses: Accesses, targets: Sequence[Target]) -> npt.NDArray[np.bool_]:
+    """Return which accesses last as long as their target's collect. Shape ``(n,)``."""
+    return np.asarray(_room_ms(accesses, targets)[1] >= 0)
+
+
+def _room_ms(accesses: Accesses, targets: Sequence[Target]) -> tuple[Longs, Longs]:
+    """Return how long each access's collect is, and how far it can be moved."""
+    length_s = np.array([target.collect_s for target in targets], dtype=np.float64)
+    length_ms = np.ceil(length_s * _MS_PER_S - 1e-6).astype(np.int64)[accesses.place]
+    return length_ms, _ms(accesses.end_s) - _ms(accesses.start_s) - length_ms
 
 
 def _spaced(row: Longs, start_ms: Longs, room_ms: Longs, step_ms: float) -> tuple[Longs, Longs]:
@@ -93,6 +108,19 @@ def _spaced(row: Longs, start_ms: Longs, room_ms: Longs, step_ms: float) -> tupl
     k = np.arange(len(of)) - np.repeat(np.cumsum(counts) - counts, counts)
     into_ms = np.minimum(np.rint(k * step_ms).astype(np.int64), room_ms[of])
     return row[of], start_ms[of] + into_ms
+
+
+def _on_grid(row: Longs, start_ms: Longs, room_ms: Longs, step_ms: float) -> tuple[Longs, Longs]:
+    # Multiples are rounded to the millisecond one by one, so half of one may fall outside.
+    first = np.ceil((start_ms - 0.5) / step_ms).astype(np.int64)
+    last = np.floor((start_ms + room_ms + 0.5) / step_ms).astype(np.int64)
+    counts = np.maximum(last - first + 1, 0)
+    check_number(int(counts.sum()))
+    of = np.repeat(np.arange(len(row)), counts)
+    k = first[of] + np.arange(len(of)) - np.repeat(np.cumsum(counts) - counts, counts)
+    begin = np.rint(k * step_ms).astype(np.int64)
+    fits = (begin >= start_ms[of]) & (begin <= start_ms[of] + room_ms[of])
+    return row[of[fits]], begin[fits]
 
 
 def place_contacts(accesses: Accesses, stations: Sequence[GroundStation]) -> Placed:

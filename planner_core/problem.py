@@ -35,6 +35,11 @@ OUTSIDE_LIMITS: Final = 2
 ACCESS_TOO_SHORT: Final = 3
 RULED_OUT: Final = 4
 """Geometry would allow it; what the scenario pins leaves no opportunity."""
+WRONG_SENSOR_TYPE: Final = 5
+OUTSIDE_TIMES: Final = 6
+"""An access is long enough, but not between the target's release and due times."""
+BETWEEN_STARTS: Final = 7
+"""There is room for a collect, but not at a start of the horizon's grid."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -59,7 +64,7 @@ class Opportunities:
     start_s, end_s
         Span of the task itself.
     access_start_s, access_end_s
-        Span of its access.
+        Span of its access, as far as it lies between its target's release and due times.
     los_start, los_end
         Line of sight at ``start_s`` and at ``end_s``.
     off_nadir_deg, elevation_deg, azimuth_deg, range_m

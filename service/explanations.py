@@ -7,7 +7,7 @@ from datetime import datetime
 import planner_core
 from planner_core.plan import Plan
 from planner_core.problem import Opportunities
-from planner_core.reasons.access_changes import AccessChange, access_changes
+from planner_core.reasons.access_changes import OF_TARGETS, AccessChange, access_changes
 from planner_core.reasons.at_length import Attempt, explain_target
 from planner_core.solvers.base import Budget
 from service.background import Background
@@ -99,10 +99,12 @@ class _Words(Wording):
         """Return a change in the words of a what-if's ``relax``."""
         satellite, own = self.scenario.satellites[change.satellite], self.scenario.targets[target]
         said: Document = {"satellite_id": satellite.id}
+        setting: Document = {change.setting: change.value}
         if isinstance(change.value, datetime):
-            return said | {change.setting: instant_text(change.value)}
-        setting = {change.setting: change.value}
-        if change.setting == "collect_s":
+            setting = {change.setting: instant_text(change.value)}
+        if change.setting == "horizon_end":
+            return said | setting
+        if change.setting in OF_TARGETS:
             return said | {"targets": {own.id: setting}}
         if _is_narrower(getattr(satellite.sensor, change.setting), change):
             said |= setting

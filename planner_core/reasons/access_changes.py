@@ -32,6 +32,9 @@ _LIMITS: Final = (
 )
 _SWITCHES: Final = (("look_side", "any"), ("orbit_direction", "any"))
 
+OF_TARGETS: Final = frozenset({"collect_s", "release", "due", "sensor_type"})
+"""Settings that are the target's alone to change."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AccessChange:
@@ -40,14 +43,14 @@ class AccessChange:
     Attributes
     ----------
     setting, value
-        A field of sensors and targets that both are set to where theirs is narrower,
-        ``collect_s`` of the target, or ``horizon_end``.
+        A field of sensors and targets that both are set to where theirs is narrower, one of
+        ``OF_TARGETS`` of the target, or ``horizon_end``.
     satellite
         Which satellite could then image it.
     """
 
     setting: str
-    value: float | str | datetime
+    value: float | str | datetime | None
     satellite: int
 
 
@@ -92,12 +95,45 @@ def _found(
         satellite = imaged_by(_with(alone, name, open_side, lambda _: True))
         if satellite is not None:
             yield AccessChange(setting=name, value=open_side, satellite=satellite)
+    yield from _sooner_or_later(alone, imaged_by, budget)
+    if alone.targets[0].sensor_type is not None:
+        satellite = imaged_by(_with_target(alone, "sensor_type", None))
+        if satellite is not None:
+            yield AccessChange(setting="sensor_type", value=None, satellite=satellite)
     shorter = _shorter(alone, imaged_by)
     if shorter is not None:
         yield shorter
     later = _later(alone, budget)
     if later is not None:
         yield later
+
+
+def _with_target(alone: Scenario, name: str, value: object) -> Scenario:
+    """Return the scenario with another value of its one target."""
+    change: dict[str, Any] = {name: value}
+    return replace(alone, targets=(replace(alone.targets[0], **change),))
+
+
+def _sooner_or_later(
+    alone: Scenario, imaged_by: Callable[[Scenario], int | None], budget: Budget
+) -> Iterator[AccessChange]:
+    """Return the latest release and the earliest due time with which an access has room."""
+    for name in ("release", "due"):
+        if getattr(alone.targets[0], name) is None:
+            continue
+        table = compute_opportunities(_with_target(alone, name, None), budget).opportunities
+        if len(table) == 0:
+            continue
+        starts_s, ends_s = table.start_s, table.end_s
+        if alone.collect_alignment == "access":
+            # A collect need not stay where it is centred: it moves with the time that cuts it.
+            length_s = ends_s - starts_s
+            starts_s, ends_s = table.access_end_s - length_s, table.access_start_s + length_s
+        whole_s = np.floor(starts_s.max()) if name == "release" else np.ceil(ends_s.min())
+        value = alone.horizon.instant(float(whole_s))
+        satellite = imaged_by(_with_target(alone, name, value))
+        if satellite is not None:
+            yield AccessChange(setting=name, value=value, satellite=satellite)
 
 
 def _with_limit(scenario: Scenario, name: str, value: float) -> Scenario:

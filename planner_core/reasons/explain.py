@@ -17,9 +17,12 @@ import numpy.typing as npt
 from planner_core.plan import Plan
 from planner_core.problem import (
     ACCESS_TOO_SHORT,
+    BETWEEN_STARTS,
     COLLECT,
     NEVER_VISIBLE,
     OUTSIDE_LIMITS,
+    OUTSIDE_TIMES,
+    WRONG_SENSOR_TYPE,
     Floats,
     Ints,
     Longs,
@@ -43,6 +46,10 @@ NO_ACCESS: Final = {
     NEVER_VISIBLE: "No satellite rises above its horizon during the planning horizon.",
     OUTSIDE_LIMITS: "It is visible, but never within the limits of the sensor and its own.",
     ACCESS_TOO_SHORT: "Every access is shorter than its collect.",
+    WRONG_SENSOR_TYPE: "Satellites rise above its horizon, but none that carries its sensor type.",
+    OUTSIDE_TIMES: "It has accesses, but none with room for its collect between its release and "
+    "due times.",
+    BETWEEN_STARTS: "Its accesses have no room for its collect at any start of the grid.",
 }
 _EXCLUDED: Final = "A pin forbids it."
 _BLOCKED: Final = "Pins rule all its opportunities out."

@@ -13,7 +13,7 @@ from pydantic import BaseModel, Field
 from sqlalchemy.orm import Session
 
 from planner_core.build import view_at
-from planner_core.domain import Dynamics, Nadir
+from planner_core.domain import CollectAlignment, Dynamics, Nadir
 from planner_core.orbits.places import View
 from planner_core.problem import COLLECT, CONTACT
 from service.api.conditional import NOT_MODIFIED, created, unless_known
@@ -63,6 +63,7 @@ class ScenarioOut(BaseModel):
     use_resources: bool
     dynamics: Dynamics
     collect_spacing_s: float | None
+    collect_alignment: CollectAlignment = "access"
     continuous_starts: bool
     allow_old_elements: bool
     pins: PinsIn = PinsIn()
@@ -93,7 +94,9 @@ class OpportunityOut(BaseModel):
     station_id: str | None = Field(description="Of a contact.")
     start: Instant
     end: Instant
-    access_start: Instant = Field(description="The opportunity lies within its access.")
+    access_start: Instant = Field(
+        description="The opportunity lies within its access, cut to the release and due times."
+    )
     access_end: Instant
     off_nadir_deg: float = Field(description="At the satellite, from the nadir named below.")
     elevation_deg: float = Field(description="At the target or station.")

@@ -125,6 +125,9 @@ class Target(Shape):
     alt_m: float
     reward: float
     collect_s: float
+    release: datetime | None = None
+    due: datetime | None = None
+    sensor_type: str | None = None
 
     @property
     def extra(self) -> Json:

@@ -45,7 +45,7 @@ class RelaxIn(Body):
         {}, description="By satellite: settings of its own, which come before the others."
     )
     targets: dict[Id, dict[str, JsonValue]] = Field(
-        {}, description="By target: its own limits, `reward` or `collect_s`."
+        {}, description="By target: its own limits, times, `reward` or `collect_s`."
     )
     horizon_end: Instant | None = Field(None, description="When planning ends instead.")
     drop_actions: list[Id] = Field(

@@ -9,10 +9,18 @@ from __future__ import annotations
 import json
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Discriminator, FailFast, Field, Tag, model_validator
+from pydantic import (
+    AfterValidator,
+    Discriminator,
+    FailFast,
+    Field,
+    StringConstraints,
+    Tag,
+    model_validator,
+)
 from pydantic_core import PydanticCustomError
 
-from planner_core.domain import Dynamics, LookSide, Nadir, OrbitDirection
+from planner_core.domain import CollectAlignment, Dynamics, LookSide, Nadir, OrbitDirection
 from service.api.shapes import Body, Instant, Name
 from service.scenarios.pin_inputs import Id, PinsIn
 
@@ -25,6 +33,9 @@ Longitude = Annotated[
 ]
 SunElevation = Annotated[float | None, Field(ge=-90, le=90)]
 LocalTime = Annotated[float | None, Field(ge=0, le=24)]
+SensorType = Annotated[
+    str, StringConstraints(min_length=1, max_length=100, pattern=r"^[^\x00-\x1f\x7f]*$")
+]
 Altitude = Annotated[float, Field(ge=-500, le=10000, description="Above the WGS84 ellipsoid.")]
 
 
@@ -64,6 +75,10 @@ class SensorIn(LightIn):
         "geodetic", description="Perpendicular to the ellipsoid, or towards the Earth's centre."
     )
     min_elevation_deg: float = Field(0.0, ge=0, lt=90, description="At the target.")
+    sensor_type: SensorType | None = Field(
+        None,
+        description="A name of your own, such as visible or infrared, that targets may ask for.",
+    )
 
 
 class ResourcesIn(Body):
@@ -203,6 +218,12 @@ class TargetIn(LightIn):
     min_elevation_deg: float | None = Field(
         None, ge=0, lt=90, description="Narrows the sensor's limit."
     )
+    release: Instant | None = Field(None, description="No collect of it starts earlier.")
+    due: Instant | None = Field(None, description="No collect of it ends later.")
+    sensor_type: SensorType | None = Field(
+        None,
+        description="Only satellites whose sensor has this very type collect it; null for any.",
+    )
 
 
 class HorizonIn(Body):
@@ -223,6 +244,11 @@ class Question(Body):
     dynamics: Dynamics = Field("physical", description="How battery and recorder are integrated.")
     collect_spacing_s: Positive | None = Field(
         None, description="Several collects per access, this far apart; null for one, centred."
+    )
+    collect_alignment: CollectAlignment = Field(
+        "access",
+        description="Whether those start from each access's own start on, or at multiples of "
+        "collect_spacing_s from the horizon's start.",
     )
     continuous_starts: bool = Field(
         False, description="A solver may place a collect anywhere inside its access."

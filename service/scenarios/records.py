@@ -20,7 +20,9 @@ B = TypeVar("B", bound=BaseModel)
 
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _WHOLE = re.compile(r"[+-]?\d{1,18}", re.ASCII)
-_TEXT_COLUMNS = frozenset({"id", "name", "satellite_id", "target_id", "station_id"})
+_TEXT_COLUMNS = frozenset(
+    {"id", "name", "satellite_id", "target_id", "station_id", "release", "due", "sensor_type"}
+)
 _ALIASES = {
     "lat": "lat_deg",
     "latitude": "lat_deg",

@@ -125,12 +125,21 @@ def canonical_of_file(file: ScenarioFile) -> str:
     document = file.model_dump(mode="json", exclude={"name"})
     for satellite in document["satellites"]:
         del satellite["omm" if satellite["omm"] is None else "tle"]
+        _without_unset(satellite["sensor"], "sensor_type")
     for target in document["targets"]:
-        if target["catalog_id"] is None:
-            del target["catalog_id"]
+        _without_unset(target, "catalog_id", "release", "due", "sensor_type")
+    if document["collect_alignment"] == "access":
+        del document["collect_alignment"]
     if not any(document["pins"].values()):
         del document["pins"]
     return json.dumps(document, sort_keys=True, separators=(",", ":"), allow_nan=False)
+
+
+def _without_unset(part: dict[str, Any], *names: str) -> None:
+    """Leave out fields that are null: questions older than the field keep their hash."""
+    for name in names:
+        if part[name] is None:
+            del part[name]
 
 
 def scenario_from_file(file: ScenarioFile) -> Scenario:
@@ -143,6 +152,7 @@ def scenario_from_file(file: ScenarioFile) -> Scenario:
         use_resources=file.use_resources,
         dynamics=file.dynamics,
         collect_spacing_s=file.collect_spacing_s,
+        collect_alignment=file.collect_alignment,
         continuous_starts=file.continuous_starts,
         allow_old_elements=file.allow_old_elements,
         pins=pins_from(file.pins),
@@ -285,6 +295,13 @@ def target_from(body: TargetIn, catalog_id: str | None = None) -> Target:
             "value_out_of_range",
             f"off_nadir_max_deg is {most}: it must be at least off_nadir_min_deg, {least}.",
             pointer="/off_nadir_max_deg",
+        )
+    if body.release is not None and body.due is not None and body.due <= body.release:
+        raise InvalidScenario(
+            "value_out_of_range",
+            f"due is {body.due:%Y-%m-%dT%H:%M:%SZ}: it must be later than release, "
+            f"{body.release:%Y-%m-%dT%H:%M:%SZ}.",
+            pointer="/due",
         )
     fields = {name: getattr(body, name) for name in TargetIn.model_fields}
     return Target(**fields, catalog_id=catalog_id)

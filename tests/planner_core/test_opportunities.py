@@ -55,6 +55,24 @@ def test_spaced_collects_cover_the_access_with_both_ends(
 
 
 @given(
+    start_ms=st.integers(0, 10**8),
+    length_ms=st.integers(1, 600_000),
+    spacing_s=st.one_of(st.integers(1, 400).map(float), st.floats(0.5, 400.0)),
+)
+def test_starts_aligned_to_the_horizon_are_all_its_multiples_that_fit(
+    start_ms: int, length_ms: int, spacing_s: float
+) -> None:
+    access = accesses((start_ms, start_ms + length_ms))
+    _, start, end = place_collects(access, target(), spacing_s, "horizon")
+    first = int(start_ms / 1000.0 / spacing_s) - 1
+    last = int((start_ms + length_ms) / 1000.0 / spacing_s) + 1
+    multiples = [round(k * spacing_s * 1000.0) for k in range(first, last + 1)]
+    fitting = [m for m in multiples if start_ms <= m <= start_ms + length_ms - 30_000]
+    assert start.tolist() == fitting
+    assert (end - start == 30_000).all()
+
+
+@given(
     st.integers(0, 10**8),
     st.integers(1, 2_000_000),
     st.floats(0.001, 500.0),

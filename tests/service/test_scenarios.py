@@ -86,6 +86,7 @@ def test_a_scenario_shows_its_defaults_counts_and_links(client: httpx.Client) ->
     assert body["counts"] == {"satellites": 1, "targets": 108, "ground_stations": 1}
     assert (body["use_resources"], body["dynamics"]) == (True, "physical")
     assert (body["collect_spacing_s"], body["continuous_starts"]) == (None, False)
+    assert body["collect_alignment"] == "access"
     again = client.get(response.headers["location"])
     assert again.json() == body
     assert again.headers["etag"] == response.headers["etag"]

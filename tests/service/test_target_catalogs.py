@@ -63,6 +63,9 @@ def test_a_json_catalogue_fills_in_defaults(client: httpx.Client) -> None:
         "local_time_from_h": None,
         "local_time_to_h": None,
         "orbit_direction": "any",
+        "release": None,
+        "due": None,
+        "sensor_type": None,
     }
 
 
@@ -80,6 +83,15 @@ def test_a_json_catalogue_fills_in_defaults(client: httpx.Client) -> None:
             "value_out_of_range",
             "/targets/1/off_nadir_max_deg",
         ),
+        (
+            target(id="t2", release="2026-03-01T10:00:00Z", due="2026-03-01T10:00:00Z"),
+            "value_out_of_range",
+            "/targets/1/due",
+        ),
+        (target(id="t2", due="2026-03-01T10:00:00"), "naive_time", "/targets/1/due"),
+        (target(id="t2", release=1772323200), "invalid_time", "/targets/1/release"),
+        (target(id="t2", sensor_type=""), "value_out_of_range", "/targets/1/sensor_type"),
+        (target(id="t2", sensor_type="a\nb"), "invalid_value", "/targets/1/sensor_type"),
     ],
 )
 def test_one_bad_target_refuses_the_catalogue(
@@ -222,6 +234,51 @@ def test_ten_thousand_rows_go_in_one_call(service: Service) -> None:
     body = send(service.client, PATH, HEADER + rows, "text/csv").json()
     assert body["num_targets"] == 10_000
     assert stored(service) == (1, 10_000)
+
+
+TIMED = "id,lat_deg,lon_deg,release,due,sensor_type\n"
+
+
+def test_times_and_sensor_types_come_from_csv_and_geojson_alike(client: httpx.Client) -> None:
+    text = f"{TIMED}a,1,2,2026-03-01T12:00:00+02:00,2026-03-01T11:30:00.5Z,4\nb,1,2,,,\n"
+    point = {"type": "Point", "coordinates": [2.0, 1.0]}
+    wanted = {"release": "2026-03-01T10:00:00Z", "due": "2026-03-01T11:30:00.500Z"}
+    features = [
+        {"type": "Feature", "id": "a", "geometry": point,
+         "properties": wanted | {"sensor_type": "4"}},
+        {"type": "Feature", "id": "b", "geometry": point, "properties": {"release": None}},
+    ]  # fmt: skip
+    collection = json.dumps({"type": "FeatureCollection", "features": features})
+    found = [
+        targets_of(client, send(client, PATH, content, media_type).json())
+        for content, media_type in ((text, "text/csv"), (collection, "application/geo+json"))
+    ]
+    assert found[0] == found[1]
+    first, second = found[0]
+    assert first["release"] == "2026-03-01T10:00:00.000Z"
+    assert (first["due"], first["sensor_type"]) == ("2026-03-01T11:30:00.500Z", "4")
+    assert (second["release"], second["due"], second["sensor_type"]) == (None, None, None)
+
+
+@pytest.mark.parametrize(
+    ("cells", "code", "words"),
+    [
+        ("2026-03-01T10:00:00Z,2026-03-01T09:00:00Z,", "value_out_of_range",
+         "due is 2026-03-01T09:00:00Z: it must be later than release"),
+        ("2026-03-01T10:00:00,,", "naive_time", "release"),
+        (",2026-02-30T10:00:00Z,", "invalid_time", "due"),
+        (",tomorrow,", "invalid_time", "due"),
+        (f",,{'x' * 101}", "value_out_of_range", "sensor_type"),
+    ],
+)  # fmt: skip
+def test_a_bad_time_is_named_by_row_and_field(
+    service: Service, cells: str, code: str, words: str
+) -> None:
+    text = f"{TIMED}a,1,2,,,\nb,1,2,{cells}\n"
+    problem = assert_problem(send(service.client, PATH, text, "text/csv"), 422, code)
+    assert [(e["row"], e["pointer"]) for e in problem["errors"]] == [(3, None)]
+    assert words in problem["errors"][0]["detail"]
+    assert stored(service) == (0, 0)
 
 
 def test_geojson_points_keep_their_ids_altitudes_and_properties(client: httpx.Client) -> None:

@@ -83,6 +83,9 @@ def test_the_canonical_form_is_its_own_canonical_form() -> None:
         {"satellites": [satellite(tle=[line + "  " for line in tle()])]},
         {"targets": [target(reward=1, collect_s=30)]},
         {"ground_stations": []},
+        {"targets": [target(release=None, due=None, sensor_type=None)]},
+        {"satellites": [satellite(sensor={"sensor_type": None})]},
+        {"collect_alignment": "access"},
     ],
 )
 def test_the_same_question_has_the_same_hash(same: dict[str, Any]) -> None:
@@ -98,6 +101,11 @@ def test_the_same_question_has_the_same_hash(same: dict[str, Any]) -> None:
         {"satellites": [satellite(tle=tle(raan_deg=11.0))]},
         {"targets": [target(), target(id="t2")]},
         {"targets": [target(catalog_id="c")]},
+        {"targets": [target(release="2026-03-01T10:00:00Z")]},
+        {"targets": [target(due="2026-03-01T10:00:00Z")]},
+        {"targets": [target(sensor_type="infrared")]},
+        {"satellites": [satellite(sensor={"sensor_type": "infrared"})]},
+        {"collect_spacing_s": 5.0, "collect_alignment": "horizon"},
         {"ground_stations": [ground_station()]},
     ],
 )
@@ -105,9 +113,46 @@ def test_another_question_has_another_hash(other: dict[str, Any]) -> None:
     assert sha256_of(canonical(file(**other))) != sha256_of(canonical(file()))
 
 
+def test_questions_frozen_by_earlier_versions_keep_their_hash() -> None:
+    """Made before targets had times and sensors a type."""
+    stations = {"ground_stations": [ground_station()], "collect_spacing_s": 15.0}
+    assert [sha256_of(canonical(file(**fields))) for fields in ({}, stations)] == [
+        "ec8499406a946db350eb7b5ce64364c2a4fe4aa70ce8da18c9db220a82c98b7b",
+        "de5abf2e2c8e4fa0d0fe1596b38f289a0e2a6ada3a6cfcccb4502d0b22b0dfdf",
+    ]
+
+
+def test_times_types_and_alignment_survive_their_file() -> None:
+    asked = file(
+        satellites=[satellite(sensor={"sensor_type": "infrared"})],
+        targets=[
+            target(release="2026-03-01T12:00:00+02:00", due="2026-03-01T11:00:00.25Z"),
+            target(id="t2", sensor_type="infrared"),
+        ],
+        collect_spacing_s=5.0,
+        collect_alignment="horizon",
+    )
+    text = canonical(asked)
+    assert canonical(json.loads(text)) == text
+    made = scenario_from_content(json.loads(text))
+    first, second = made.targets
+    assert first.release == datetime(2026, 3, 1, 10, tzinfo=UTC)
+    assert first.due == datetime(2026, 3, 1, 11, 0, 0, 250_000, tzinfo=UTC)
+    assert (first.sensor_type, second.sensor_type) == (None, "infrared")
+    assert made.satellites[0].sensor.sensor_type == "infrared"
+    assert made.collect_alignment == "horizon"
+
+
 @pytest.mark.parametrize(
     ("change", "code", "pointer"),
     [
+        (
+            {"targets": [target(release="2026-03-01T10:00:00Z", due="2026-03-01T09:00:00Z")]},
+            "value_out_of_range",
+            "/targets/0/due",
+        ),
+        ({"collect_alignment": "horizon"}, "value_out_of_range", "/collect_alignment"),
+        ({"collect_alignment": "grid"}, "unknown_value", "/collect_alignment"),
         ({"satellite_ids": []}, "unknown_field", "/satellite_ids"),
         ({"satellites": []}, "value_out_of_range", "/satellites"),
         ({"satellites": [satellite(tle=[*tle()[:1], "2"])]}, None, "/satellites/0/tle/1"),

@@ -50,6 +50,39 @@ def test_a_target_without_access_is_told_what_would_give_it_one(
     assert set(wider) == {"satellite_id", "targets"}
 
 
+def test_times_and_sensor_types_of_targets_go_all_the_way(mission: Mission) -> None:
+    """A target is planned within its times; what hides two others is named and can be relaxed."""
+    scenario = small_mission(use_resources=False)
+    first = mission.plan(scenario)
+    actions = mission.timeline(first)["satellites"][0]["actions"]
+    names = [action["target_id"] for action in actions]
+    own, late, typed = names[10], names[-1], names[20]
+    targets = {target["id"]: target for target in scenario["targets"]}
+    end = actions[10]["end"]
+    targets[own] |= {"release": actions[10]["start"], "due": end}
+    targets[late] |= {"due": "2019-01-01T00:00:01Z"}
+    targets[typed] |= {"sensor_type": "infrared"}
+    job = mission.plan(scenario)
+    again = mission.targets(job)
+    (taken,) = [
+        action for action in mission.timeline(job)["satellites"][0]["actions"]
+        if action["target_id"] == own
+    ]  # fmt: skip
+    assert (taken["start"], taken["end"]) == (actions[10]["start"], end)
+    for name, setting, words in (
+        (late, "due", "between its release and due times"),
+        (typed, "sensor_type", "none that carries its sensor type"),
+    ):
+        assert (again[name]["reason"]["code"], again[name]["reason"]["certainty"]) == (
+            "no_access", "proven",
+        )  # fmt: skip
+        assert words in again[name]["reason"]["detail"]
+        found = mission.explain(job, name).json()["access_changes"]
+        (change,) = [c for c in found if setting in c.get("targets", {}).get(name, {})]
+        varied = mission.ended(mission.what_if(job, relax=change, force=[name]))
+        assert mission.targets(varied)[name]["outcome"] == "collected"
+
+
 def test_a_collected_target_with_an_odd_id_has_its_action_and_no_attempts(
     mission: Mission,
 ) -> None:

@@ -1,0 +1,1 @@
+"""Standard agile scheduling cases (AEOSSP, GitHub Mtrya/astro-reason), planned and verified."""
