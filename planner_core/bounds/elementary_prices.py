@@ -24,9 +24,9 @@ from planner_core.draws import Uint64s, draws_of, next_draw
 from planner_core.jit import borrowing
 from planner_core.problem import Bools, Bytes, Floats, Ints, Longs, Problem
 
-_FIRST_STEP: Final = 0.5  # of a target's reward, for each path too many, in an epoch
-_SHORTER: Final = 0.98  # from epoch to epoch
-_SHORTEST: Final = 0.002
+_FIRST_STEP: Final = 0.2  # of a target's reward, for each path too many, in an epoch
+_SHORTER: Final = 0.99  # from epoch to epoch
+_SHORTEST: Final = 0.001
 _MEMORY: Final = 0.85  # of the mean, from epoch to epoch
 _ASKED_EVERY: Final = 5  # epochs
 

@@ -1,4 +1,4 @@
-"""The access-elementary bound: never below a plan, never above the plain bound, and checkable."""
+"""The bound that pays a target once in each pass: never below a plan, never above the plain bound, and checkable."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def test_crowded_problems_never_hold_a_better_plan(seed: int) -> None:
 
 @settings(max_examples=100, deadline=None)
 @given(seed=st.integers(0, 10**6))
-def test_it_holds_for_weights_that_differ_within_an_access(seed: int) -> None:
+def test_it_holds_for_weights_that_differ_from_collect_to_collect(seed: int) -> None:
     """Against the heaviest path without repetition, found by trying all."""
     problem = spaced_problem(seed, num_accesses=2, num_offers=4)
     network = network_of(problem)
@@ -104,7 +104,7 @@ def test_it_holds_for_weights_that_differ_within_an_access(seed: int) -> None:
 
 
 def heaviest_without_repetition(problem: Problem, worth: Floats) -> float:
-    """Return what the satellites' best chains are worth that take each access once at most."""
+    """Return what the satellites' best chains are worth that take each target once at most."""
     table, total = problem.opportunities, 0.0
     for satellite in problem.satellites:
         chains: list[tuple[float, int, frozenset[int]]] = [(0.0, -1, frozenset())]
@@ -113,25 +113,25 @@ def heaviest_without_repetition(problem: Problem, worth: Floats) -> float:
             value, last, seen = chains.pop()
             best = max(best, value)
             for row in range(last + 1, len(satellite)):
-                access = int(table.access[satellite.rows[row]])
+                target = int(table.place[satellite.rows[row]])
                 if last >= 0 and not satellite.transitions.allows(last, row):
                     continue
-                gained = 0.0 if access in seen else float(worth[satellite.rows[row]])
-                chains.append((value + gained, row, seen | {access}))
+                gained = 0.0 if target in seen else float(worth[satellite.rows[row]])
+                chains.append((value + gained, row, seen | {target}))
         total += best
     return total
 
 
 def test_a_target_in_view_for_long_is_paid_once() -> None:
-    """Six collects of one access, 30 s apart: the plain bound pays them all."""
+    """Ten collects of one access, 30 s apart: the plain bound pays them all."""
     tasks = [
         Task(kind=COLLECT, place=0, start_s=30.0 * k, end_s=30.0 * k + 30.0, access=0)
-        for k in range(6)
+        for k in range(10)
     ]
     problem = make_problem(tasks, num_targets=1, use_resources=False)
     nothing = np.zeros(1)
     assert elementary_value(problem, nothing)[0] == pytest.approx(1.0)
-    assert lagrangian_value(problem, nothing)[0] == pytest.approx(6.0)
+    assert lagrangian_value(problem, nothing)[0] == pytest.approx(10.0)
 
 
 def test_prices_get_better_and_their_proof_survives_being_written_down() -> None:

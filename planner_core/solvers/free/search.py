@@ -50,7 +50,7 @@ _POLISH: Final = 50.0
 _POLISHED: Final = (1, 4)  # rounds
 _ROUNDED_OFF: Final = 8  # this round, and when cutting planes lead no further
 _REPORT_EVERY_S: Final = 0.25
-_SHARE: Final = 0.04  # of a window search, between prices of accesses that offer several collects
+_SHARE: Final = 0.04  # of a window search, between prices
 _ROUNDS: Final = 2  # of such prices
 _MOST_TASKS: Final = 12_000  # that cutting planes and HiGHS are tried on, in such accesses
 
@@ -177,8 +177,8 @@ class FreeSearch:
         )
         self.step(Multipliers(prices=prices))
 
-    def price_accesses(self, num_rounds: int) -> None:
-        """Search for prices by which no target is paid twice in one access."""
+    def price_passes(self, num_rounds: int) -> None:
+        """Search for prices by which no target is paid twice in one pass over it."""
         if self._prices is None:
             best = self.steps[-1].prices
             self._prices = ElementaryPrices(self.problem, self._network, best, self.seed)
@@ -423,7 +423,7 @@ def _approach(search: FreeSearch, effort: Effort) -> None:
     left, num_idle = effort.moves_per_task, 0.0
     while left > 0 and num_idle < 2 and not search.is_done:
         if is_spaced and not search.is_priced_out:
-            search.price_accesses(_ROUNDS)
+            search.price_passes(_ROUNDS)
             search.report("prices")
             if search.is_done:
                 return
