@@ -1,4 +1,4 @@
-"""The bound that pays a target once in each pass: never below a plan, never above the plain bound, and checkable."""
+"""The bound that pays a target once in each pass: between plans and the plain bound, checkable."""
 
 from __future__ import annotations
 

@@ -50,8 +50,8 @@ _POLISH: Final = 50.0
 _POLISHED: Final = (1, 4)  # rounds
 _ROUNDED_OFF: Final = 8  # this round, and when cutting planes lead no further
 _REPORT_EVERY_S: Final = 0.25
-_SHARE: Final = 0.04  # of a window search, between prices
-_ROUNDS: Final = 2  # of such prices
+_SHARE: Final = 0.02  # of a window search, where prices of passes take turns with it
+_ROUNDS: Final = 4  # of such prices
 _MOST_TASKS: Final = 12_000  # that cutting planes and HiGHS are tried on, in such accesses
 
 
@@ -180,8 +180,8 @@ class FreeSearch:
     def price_passes(self, num_rounds: int) -> None:
         """Search for prices by which no target is paid twice in one pass over it."""
         if self._prices is None:
-            best = self.steps[-1].prices
-            self._prices = ElementaryPrices(self.problem, self._network, best, self.seed)
+            first = 0.5 * self.problem.target_reward
+            self._prices = ElementaryPrices(self.problem, self._network, first, self.seed)
         self._prices.improve(num_rounds, self.budget.stop)
         self.lower(self._prices.bound)
 
@@ -406,7 +406,7 @@ def solve_free(problem: Problem, budget: Budget, seed: int, gap: float, effort: 
     search = FreeSearch(problem, budget, seed, gap)
     for solver in (Rule(), Graph()):
         search.offer(solver.solve(problem, Budget(), seed).plan)
-    if not search.is_done:
+    if not search.is_done and not search.offers_choice:
         search.price()
         search.report("prices")
     if not search.is_done:
