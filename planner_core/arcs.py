@@ -52,7 +52,7 @@ def covering_arcs(order: Order, later: Ints | None = None) -> Arcs:
 def _bits_at(words: Words, bit: int) -> np.uint64:
     """Return the 64 bits that begin with a given one."""
     at, into = bit >> 6, np.uint64(bit & 63)
-    found = words[at] >> into
+    found: np.uint64 = words[at] >> into
     if into > 0:
         found |= words[at + 1] << (np.uint64(_WORD) - into)
     return found

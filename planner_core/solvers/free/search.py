@@ -50,7 +50,8 @@ _POLISH: Final = 50.0
 _POLISHED: Final = (1, 4)  # rounds
 _ROUNDED_OFF: Final = 8  # this round, and when cutting planes lead no further
 _REPORT_EVERY_S: Final = 0.25
-_SHARE: Final = 0.02  # of a window search, where prices of passes take turns with it
+_SHARE: Final = 0.1  # moves for each task, where prices of passes take turns with them
+_PATIENT: Final = 20.0  # moves for each task without a better plan, in such problems
 _ROUNDS: Final = 4  # of such prices
 _MOST_TASKS: Final = 12_000  # that cutting planes and HiGHS are tried on, in such accesses
 
@@ -419,18 +420,17 @@ def solve_free(problem: Problem, budget: Budget, seed: int, gap: float, effort: 
 def _approach(search: FreeSearch, effort: Effort) -> None:
     """Better the plan by windows, and the bound by prices, until both lead no further."""
     is_spaced = search.offers_choice
-    share = _SHARE if is_spaced else 1.0
+    share, patience = (_SHARE, _PATIENT) if is_spaced else (5.0, 10.0)
     left, num_idle = effort.moves_per_task, 0.0
-    while left > 0 and num_idle < 2 and not search.is_done:
+    while left > 0 and num_idle < patience and not search.is_done:
         if is_spaced and not search.is_priced_out:
             search.price_passes(_ROUNDS)
             search.report("prices")
-            if search.is_done:
-                return
-        left -= 5.0 * share
-        is_better = search.search(5.0 * share, search.open_rows(search.reward))
-        num_idle = 0.0 if is_better else num_idle + share
-        search.report("window search")
+        if not search.is_close:
+            left -= share
+            is_better = search.search(share, search.open_rows(search.reward))
+            num_idle = 0.0 if is_better else num_idle + share
+            search.report("window search")
 
 
 def _close_in(search: FreeSearch, effort: Effort) -> None:
