@@ -7,6 +7,7 @@ with a sparse table of which of them may follow each other.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -17,7 +18,7 @@ import numpy.typing as npt
 
 from planner_core.domain import Agility, Dynamics, Resources
 from planner_core.jit import inlined, kernel
-from planner_core.slew import INSTANT, TIME_TOLERANCE_S, angle_between_deg, slew_s
+from planner_core.slew import INSTANT, TIME_TOLERANCE_S, angle_between_deg, reach_deg, slew_s
 
 Floats = npt.NDArray[np.float64]
 Singles = npt.NDArray[np.float32]
@@ -25,6 +26,8 @@ Ints = npt.NDArray[np.int32]
 Longs = npt.NDArray[np.int64]
 Bytes = npt.NDArray[np.uint8]
 Bools = npt.NDArray[np.bool_]
+
+_CLEARLY: Final = 1e-7  # in the cosine of an angle; rounding is far smaller
 
 COLLECT: Final = 0
 CONTACT: Final = 1
@@ -371,7 +374,8 @@ def _transitions(
     far_from = np.searchsorted(start_s, end_s + longest_s).astype(np.int32)
     far_from = np.maximum(far_from, near_from)
     offset = np.concatenate([[0], np.cumsum((far_from - near_from).astype(np.int64))])
-    bits = np.zeros((int(offset[-1]) + 7) // 8, dtype=np.uint8)
+    # Whole words and two to spare, so that kernels may read any 64 bits at once.
+    bits = np.zeros(8 * (int(offset[-1]) // 64 + 3), dtype=np.uint8)
     _fill_near_bits(
         start_s, end_s, np.ascontiguousarray(los_start), np.ascontiguousarray(los_end),
         agility.slew_rate_deg_s, acceleration, agility.settle_s,
@@ -396,11 +400,25 @@ def _fill_near_bits(
 ) -> None:
     for a in range(len(start_s)):
         for b in range(near_from[a], far_from[a]):
-            angle_deg = angle_between_deg(los_end[a], los_start[b])
-            needed_s = slew_s(angle_deg, rate_deg_s, acceleration_deg_s2) + settle_s
-            if start_s[b] - end_s[a] >= needed_s - TIME_TOLERANCE_S:
-                bit = offset[a] + b - near_from[a]
-                bits[bit >> 3] |= np.uint8(1 << (bit & 7))
+            room_s = start_s[b] - end_s[a] - settle_s + TIME_TOLERANCE_S
+            if room_s < 0.0:
+                continue
+            # Most pairs are far from the limit, and cosines are cheaper than angles.
+            least = math.cos(math.radians(reach_deg(room_s, rate_deg_s, acceleration_deg_s2)))
+            dot = (
+                los_end[a, 0] * los_start[b, 0]
+                + los_end[a, 1] * los_start[b, 1]
+                + los_end[a, 2] * los_start[b, 2]
+            )
+            if dot < least - _CLEARLY:
+                continue
+            if dot < least + _CLEARLY:
+                angle_deg = angle_between_deg(los_end[a], los_start[b])
+                needed_s = slew_s(angle_deg, rate_deg_s, acceleration_deg_s2) + settle_s
+                if start_s[b] - end_s[a] < needed_s - TIME_TOLERANCE_S:
+                    continue
+            bit = offset[a] + b - near_from[a]
+            bits[bit >> 3] |= np.uint8(1 << (bit & 7))
 
 
 @inlined

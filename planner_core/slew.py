@@ -57,3 +57,19 @@ def slew_s(angle_deg: float, rate_deg_s: float, acceleration_deg_s2: float) -> f
     if angle_deg <= rate_deg_s * rate_deg_s / acceleration_deg_s2:
         return 2.0 * math.sqrt(angle_deg / acceleration_deg_s2)
     return angle_deg / rate_deg_s + rate_deg_s / acceleration_deg_s2
+
+
+@kernel
+def reach_deg(room_s: float, rate_deg_s: float, acceleration_deg_s2: float) -> float:
+    """Return the largest angle, up to 180 degrees, that can be turned through in some time.
+
+    >>> reach_deg(32.0, 1.0, 0.5), round(reach_deg(2.828427, 1.0, 0.5), 6)
+    (30.0, 1.0)
+    """
+    if acceleration_deg_s2 <= 0.0:
+        angle_deg = rate_deg_s * room_s
+    elif room_s <= 2.0 * rate_deg_s / acceleration_deg_s2:
+        angle_deg = acceleration_deg_s2 * room_s * room_s / 4.0
+    else:
+        angle_deg = rate_deg_s * (room_s - rate_deg_s / acceleration_deg_s2)
+    return min(angle_deg, 180.0)

@@ -25,6 +25,8 @@ class Bound:
         What proves a Lagrangian bound (``lagrangian_value`` checks them) or one by dynamic
         programmes (``resource_bound.resource_value``), one per target; None for other proofs.
         Shape ``(num_targets,)``.
+    is_elementary
+        Whether it is ``elementary_value`` that checks the prices.
     unit
         In what the dynamic programmes count worth.
     certificate
@@ -36,6 +38,7 @@ class Bound:
     value: float
     proof: Proof
     prices: Floats | None = None
+    is_elementary: bool = False
     unit: float | None = None
     certificate: Certificate | None = None
     log: str | None = None

@@ -31,7 +31,7 @@ def lagrangian_value(problem: Problem, prices: Floats) -> tuple[float, Ints]:
     price[np.setdiff1d(np.arange(num_targets), network.place)] = 0.0
     n = len(network.row)
     previous = np.empty(n, dtype=np.int32)
-    ends = np.empty(len(problem.satellites), dtype=np.int32)
+    ends = np.empty(len(network.first) - 1, dtype=np.int32)
     weight = (reward - price)[network.place]
     total = price.sum() + heaviest_paths(network, weight, np.empty(n), previous, ends)
     counts = np.zeros(num_targets + 1, dtype=np.int32)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner_core.arcs import covering_arcs, near_arcs, reversed_arcs
+from planner_core.arcs import Arcs, covering_arcs, near_arcs, reversed_arcs, waiting
 from planner_core.comparable import order_of, transitive_closure
 from planner_core.jit import kernel
 from planner_core.problem import COLLECT, Floats, Ints, Longs, Problem
@@ -17,7 +17,9 @@ class Network(NamedTuple):
 
     A path is a sequence of tasks of one satellite that may follow each other directly. Where
     that relation is transitive only covering arcs are kept (those that no third task can
-    split), for a path may pass through a task without being paid.
+    split), for a path may pass through a task without being paid. Where an access offers
+    several collects, what may follow a later one may follow an earlier one too: the path then
+    waits, and arcs from the earlier one to what follows the later one are left out.
 
     Attributes
     ----------
@@ -26,11 +28,17 @@ class Network(NamedTuple):
     place
         Target of each node; of a contact, one past the last target. Shape ``(n,)``.
     first
-        Where each satellite's nodes begin. Shape ``(num_satellites + 1,)``.
+        Where each part's nodes begin. A satellite's tasks fall into parts where a pause is
+        longer than any slew: paths before and after it do not mind each other.
+        Shape ``(num_parts + 1,)``.
     arc_from, before
         Predecessors of node ``b``: ``before[arc_from[b]:arc_from[b + 1]]``.
     far_from
-        From here on every node of the satellite may follow the node. Shape ``(n,)``.
+        From here on every node of the satellite may follow the node; where its part ends, at
+        most. Shape ``(n,)``.
+    earlier
+        The collect before in the same access, from which a path may wait for what follows the
+        node; -1 for none. Shape ``(n,)``.
     """
 
     row: Ints
@@ -39,41 +47,67 @@ class Network(NamedTuple):
     arc_from: Longs
     before: Ints
     far_from: Ints
+    earlier: Ints
 
 
 def network_of(problem: Problem) -> Network:
     """Return the network of a problem."""
     table = problem.opportunities
-    first = [0]
-    num_arcs = 0
-    arc_from, before, far_from = [np.zeros(1, dtype=np.int64)], [], []
+    nothing = np.empty(0, dtype=np.int32)
+    row, before, far_from, earlier = [nothing], [nothing], [nothing], [nothing]
+    first, arc_from = [np.zeros(1, dtype=np.int64)], [np.zeros(1, dtype=np.int64)]
+    base = num_arcs = 0
     for satellite in problem.satellites:
-        base = first[-1]
         order = order_of(satellite.transitions)
         is_transitive = transitive_closure(problem, satellite) is satellite.transitions
-        offsets, rows = reversed_arcs(covering_arcs(order) if is_transitive else near_arcs(order))
-        arc_from.append(offsets[1:] + num_arcs)
-        num_arcs += len(rows)
+        later = waiting(order, table.access[satellite.rows])
+        arcs = covering_arcs(order, later) if is_transitive else near_arcs(order)
+        ends = _part_ends(order.far_from)
+        part = np.searchsorted(ends, np.arange(len(satellite)), side="right")
+        offsets, rows = reversed_arcs(_within(arcs, part))
+        own = np.full(len(satellite), -1, dtype=np.int32)
+        waits = np.flatnonzero(later >= 0)
+        waits = waits[part[waits] == part[later[waits]]]
+        own[later[waits]] = waits + base
+        row.append(satellite.rows)
+        first.append(base + ends)
+        arc_from.append(num_arcs + offsets[1:])
         before.append(rows + np.int32(base))
-        far_from.append(satellite.transitions.far_from + np.int32(base))
-        first.append(base + len(satellite))
-    row = np.concatenate([np.empty(0, dtype=np.int32), *(s.rows for s in problem.satellites)])
-    is_collect = table.kind[row] == COLLECT
+        far_from.append(order.far_from + np.int32(base))
+        earlier.append(own)
+        base += len(satellite)
+        num_arcs += len(rows)
+    rows = np.concatenate(row)
+    is_collect = table.kind[rows] == COLLECT
     return Network(
-        row=row,
-        place=np.where(is_collect, table.place[row], len(problem.target_ids)).astype(np.int32),
-        first=np.array(first, dtype=np.int64),
+        row=rows,
+        place=np.where(is_collect, table.place[rows], len(problem.target_ids)).astype(np.int32),
+        first=np.concatenate(first),
         arc_from=np.concatenate(arc_from),
-        before=np.concatenate([np.empty(0, dtype=np.int32), *before]),
-        far_from=np.concatenate([np.empty(0, dtype=np.int32), *far_from]),
+        before=np.concatenate(before),
+        far_from=np.concatenate(far_from),
+        earlier=np.concatenate(earlier),
     )
+
+
+def _part_ends(far_from: Ints) -> Longs:
+    """Return where parts of a satellite's tasks end, each of them followed by all that is after."""
+    ends = np.arange(1, len(far_from) + 1, dtype=np.int64)
+    return ends[np.maximum.accumulate(far_from) <= ends]
+
+
+def _within(arcs: Arcs, part: Longs) -> Arcs:
+    """Return the arcs that do not lead from part to part."""
+    is_within = np.repeat(part, np.diff(arcs.first)) == part[arcs.to]
+    count = np.concatenate([[0], np.cumsum(is_within)])
+    return Arcs(count[arcs.first].astype(np.int64), arcs.to[is_within])
 
 
 @kernel
 def heaviest_paths(
     network: Network, weight: Floats, value: Floats, previous: Ints, ends: Ints
 ) -> float:
-    """Find each satellite's heaviest path; return the sum of their weights.
+    """Find each part's heaviest path; return the sum of their weights.
 
     Parameters
     ----------
@@ -83,11 +117,13 @@ def heaviest_paths(
         Filled with the weight of the heaviest path that ends with each node, and with the
         node ahead of it there, or -1. Shape ``(n,)``.
     ends
-        Filled with the last node of each satellite's path, or -1. Shape ``(num_satellites,)``.
+        Filled with the last node of each part's path, or -1. Shape ``(num_parts,)``.
     """
     n = len(weight)
     far_value = np.zeros(n + 1)
     far_node = np.full(n + 1, -1, dtype=np.int32)
+    onward = np.empty(n)  # of the heaviest path that ends with each node or waits until then
+    waits_at = np.empty(n, dtype=np.int32)
     total = 0.0
     for s in range(len(network.first) - 1):
         begin, end = network.first[s], network.first[s + 1]
@@ -100,15 +136,19 @@ def heaviest_paths(
             reached, at = far, far_at
             for i in range(network.arc_from[b], network.arc_from[b + 1]):
                 a = network.before[i]
-                if value[a] > reached:
-                    reached, at = value[a], a
+                if onward[a] > reached:
+                    reached, at = onward[a], a
             value[b] = reached + weight[b]
-            previous[b] = at
+            previous[b] = waits_at[at] if at >= 0 else -1
             if value[b] > best:
                 best, best_at = value[b], b
+            onward[b], waits_at[b] = value[b], b
+            a = network.earlier[b]
+            if a >= 0 and onward[a] >= value[b]:
+                onward[b], waits_at[b] = onward[a], waits_at[a]
             to = network.far_from[b]
-            if value[b] > far_value[to]:
-                far_value[to] = value[b]
+            if onward[b] > far_value[to]:
+                far_value[to] = onward[b]
                 far_node[to] = b
         ends[s] = best_at
         total += best
@@ -118,13 +158,17 @@ def heaviest_paths(
 @kernel
 def _heaviest_onward(network: Network, weight: Floats, value: Floats) -> None:
     """Fill in the weight of the heaviest path that begins with each node."""
-    value[:] = 0.0
+    value[:] = 0.0  # of what follows, until the node's turn has come
     suffix = np.zeros(len(weight) + 1)
     for s in range(len(network.first) - 1):
         begin, end = network.first[s], network.first[s + 1]
         suffix[end] = 0.0
         for b in range(end - 1, begin - 1, -1):
-            value[b] = max(value[b], suffix[network.far_from[b]]) + weight[b]
+            follows = max(value[b], suffix[network.far_from[b]])
+            a = network.earlier[b]
+            if a >= 0:
+                value[a] = max(value[a], follows)
+            value[b] = follows + weight[b]
             suffix[b] = max(suffix[b + 1], value[b])
             for i in range(network.arc_from[b], network.arc_from[b + 1]):
                 a = network.before[i]

@@ -9,6 +9,7 @@ import numpy as np
 
 from planner_core.bounds.bound import Bound, Proof, reward_unit, rounded_bound
 from planner_core.bounds.certificate import Certificate, Cut, Multipliers, Refutation, is_refuted
+from planner_core.bounds.elementary import elementary_value
 from planner_core.bounds.lagrangian import lagrangian_value
 from planner_core.bounds.resource_bound import resource_value
 from planner_core.problem import Problem
@@ -22,6 +23,8 @@ def to_json(bound: Bound) -> str:
     document: dict[str, Any] = {"version": VERSION, "proof": bound.proof, "value": bound.value}
     if bound.prices is not None:
         document["prices"] = bound.prices.tolist()
+    if bound.is_elementary:
+        document["elementary"] = True
     if bound.unit is not None:
         document["unit"] = bound.unit
     if bound.certificate is not None:
@@ -40,6 +43,7 @@ def from_json(text: str) -> Bound:
         value=float(document["value"]),
         proof=cast(Proof, document["proof"]),
         prices=None if prices is None else np.array(prices, dtype=np.float64),
+        is_elementary=bool(document.get("elementary", False)),
         unit=document.get("unit"),
         certificate=Certificate(
             amount=float(document["amount"]),
@@ -65,6 +69,8 @@ def is_proven(problem: Problem, bound: Bound) -> bool | None:
         return None
     if bound.unit is not None:
         value = resource_value(problem, bound.prices, bound.unit)
+    elif bound.is_elementary:
+        value, _ = elementary_value(problem, bound.prices)
     else:
         value, _ = lagrangian_value(problem, bound.prices)
     return rounded_bound(problem, value, 0.0) <= bound.value + room

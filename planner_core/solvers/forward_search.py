@@ -264,7 +264,7 @@ class ForwardSearch:
         metadata={
             "minimum": 0,
             "maximum": 1000,
-            "description": "Moves of a window search on the finished plan, for each opportunity; "
+            "description": "Moves of a window search on the finished plan, for each access; "
             "without resources only. The paper has none.",
         },
     )

@@ -36,6 +36,7 @@ _REPORT_EVERY_S: Final = 0.25
 _STALLED: Final = 1e-4  # of the bound, in _PATIENCE rounds of cuts
 _PATIENCE: Final = 5
 _HEURISTIC_EFFORT: Final = 0.05  # what HiGHS does by default
+_MOST_PAIRS: Final = 8_000_000  # of tasks near each other; HiGHS takes about 100 bytes for each
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,6 +97,16 @@ class Milp:
             best.offer(improved(problem, best.plan, self.moves_per_task, budget, seed))
         if len(problem.opportunities) == 0 or budget.is_spent():
             return best.solution(problem, budget, self.gap)
+        if _num_pairs(problem) > _MOST_PAIRS:
+            budget.report(
+                Progress(
+                    phase="solve",
+                    fraction=1.0,
+                    reward=best.reward,
+                    message="The program is too large for HiGHS: the plan it would start from.",
+                )
+            )
+            return best.solution(problem, budget, self.gap)
         outcome = self._search(problem, budget, seed, best, _TOUCHING)
         best.bound, best.log = outcome.bound, outcome.log
         if outcome.is_infeasible:
@@ -128,6 +139,15 @@ def is_free(problem: Problem) -> bool:
     Pins fit in by themselves only where turning is transitive.
     """
     return not problem.use_resources and (not problem.pinned.kept or is_transitive(problem))
+
+
+def _num_pairs(problem: Problem) -> int:
+    """Return how many pairs of tasks are near enough to exclude each other."""
+    pairs = 0
+    for satellite in problem.satellites:
+        after = np.arange(1, len(satellite) + 1)
+        pairs += int((satellite.transitions.far_from - after).sum())
+    return pairs
 
 
 def _starts(problem: Problem, budget: Budget) -> list[Plan]:

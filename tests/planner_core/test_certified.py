@@ -61,7 +61,9 @@ def assert_proven(problem: Problem, solution: Solution, best: float) -> None:
     assert solution.bound >= best - slack
     if solution.termination is Termination.OPTIMAL:
         assert timeline.reward >= best * (1.0 - TOLERANCE) - slack
-    if solution.proven.proof == "lagrangian":
+    if solution.proven.is_elementary:
+        assert is_proven(problem, solution.proven)
+    elif solution.proven.proof == "lagrangian":
         assert solution.proven.certificate is not None
         assert is_refuted(problem, solution.proven.certificate)
         assert solution.proven.certificate.amount > best
@@ -90,6 +92,47 @@ def test_it_equals_brute_force(
     solution = Certified().solve(problem, Budget(), 0)
     assert solution.termination is Termination.OPTIMAL
     assert_proven(problem, solution, best_reward(problem))
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    seed=SEEDS, spread=SPREADS, num_satellites=st.integers(1, 2), agility=AGILITY,
+    max_turn_deg=st.sampled_from([0.0, 25.0]), num_offers=st.integers(2, 4),
+)  # fmt: skip
+def test_with_a_choice_of_starts_it_equals_brute_force(
+    seed: int,
+    spread: str,
+    num_satellites: int,
+    agility: Agility,
+    max_turn_deg: float,
+    num_offers: int,
+) -> None:
+    problem = random_problem(
+        seed, use_resources=False, num_satellites=num_satellites, num_collects=12 // num_offers,
+        num_offers=num_offers, num_targets=4, span_s=250.0, agility=agility,
+        max_turn_deg=max_turn_deg,
+    )  # fmt: skip
+    problem = with_rewards(problem, seed, spread)
+    solution = Certified().solve(problem, Budget(), 0)
+    assert solution.termination is Termination.OPTIMAL
+    assert_proven(problem, solution, best_reward(problem))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_crowded_starts_are_planned_within_a_true_bound(seed: int) -> None:
+    """Too large to be closed: what the prices of passes prove checks out, whatever the plan."""
+    problem = random_problem(
+        seed, use_resources=False, num_collects=300, num_offers=8, num_targets=150, span_s=5000.0,
+        has_rewards=seed == 2,
+    )  # fmt: skip
+    problem = replace(problem, horizon_s=5200.0)
+    solution = Certified(moves_per_task=1.0, gap=0.03).solve(problem, Budget(), seed)
+    reward = replay(problem, solution.plan).reward
+    assert_proven(problem, solution, reward)
+    assert solution.bound is not None
+    assert solution.bound - reward <= 0.1 * solution.bound
+    again = Certified(moves_per_task=1.0, gap=0.03).solve(problem, Budget(), seed)
+    assert (again.plan, again.bound) == (solution.plan, solution.bound)
 
 
 @settings(max_examples=60, deadline=None)

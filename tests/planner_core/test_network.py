@@ -34,14 +34,27 @@ def readable(problem: Problem, worth: Floats) -> tuple[float, Floats]:
 
 @pytest.mark.parametrize("slew_rate_deg_s", [1.0, 0.3])
 @settings(max_examples=60, deadline=None)
-@given(seed=st.integers(0, 10**6), num_satellites=st.integers(1, 4), size=st.integers(0, 40))
+@given(
+    seed=st.integers(0, 10**6), num_satellites=st.integers(1, 4), size=st.integers(0, 40),
+    num_offers=st.sampled_from([1, 1, 6]), span_s=st.sampled_from([900.0, 4000.0]),
+    settle_s=st.sampled_from([0.0, 7.0]),
+)  # fmt: skip
 def test_paths_and_detours_are_the_heaviest(
-    slew_rate_deg_s: float, seed: int, num_satellites: int, size: int
+    slew_rate_deg_s: float,
+    seed: int,
+    num_satellites: int,
+    size: int,
+    num_offers: int,
+    span_s: float,
+    settle_s: float,
 ) -> None:
+    """In parts of the horizon as well as over it, with one collect in an access or several."""
     problem = random_problem(
         seed, use_resources=False, num_collects=size, num_satellites=num_satellites,
-        max_turn_deg=25.0, agility=Agility(slew_rate_deg_s=slew_rate_deg_s),
+        num_offers=num_offers, span_s=span_s, max_turn_deg=25.0,
+        agility=Agility(slew_rate_deg_s=slew_rate_deg_s, settle_s=settle_s),
     )  # fmt: skip
+    size *= num_offers
     rng = np.random.default_rng(seed)
     # Nothing at all is worth half of the tasks: slow satellites pass through those too.
     worth = rng.uniform(0.0, 5.0, size) * rng.integers(0, 2, size)

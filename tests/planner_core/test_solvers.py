@@ -258,7 +258,7 @@ def test_mcts_follows_its_seed_and_nothing_else() -> None:
 
 def test_an_action_without_its_own_reward_loses_images() -> None:
     """Line 14 of Alg. 2 taken literally leaves the reward of the first action out."""
-    literal = replace(PAPER_MCTS, returns="literal", num_simulations=200)
+    literal = replace(PAPER_MCTS, returns="literal", num_simulations=200, window_moves_per_task=0.0)
     whole = replace(literal, returns="with_reward")
     totals = {literal: 0.0, whole: 0.0}
     for seed in range(12):

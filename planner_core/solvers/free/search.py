@@ -21,6 +21,7 @@ from planner_core.bounds.certificate import (
     is_below,
     values_through,
 )
+from planner_core.bounds.elementary_prices import ElementaryPrices
 from planner_core.bounds.lagrangian import default_steps, priced_bound
 from planner_core.bounds.network import network_of
 from planner_core.comparable import is_transitive
@@ -31,7 +32,7 @@ from planner_core.solvers.base import Budget, Progress, Solution, Termination
 from planner_core.solvers.free.master import Master
 from planner_core.solvers.free.prover import Prover
 from planner_core.solvers.graph import Graph
-from planner_core.solvers.lns import improved
+from planner_core.solvers.lns import WindowSearch
 from planner_core.solvers.programs.model import plan_program
 from planner_core.solvers.programs.program import Program
 from planner_core.solvers.rule import Rule
@@ -49,6 +50,10 @@ _POLISH: Final = 50.0
 _POLISHED: Final = (1, 4)  # rounds
 _ROUNDED_OFF: Final = 8  # this round, and when cutting planes lead no further
 _REPORT_EVERY_S: Final = 0.25
+_SHARE: Final = 0.1  # moves for each task, where prices of passes take turns with them
+_PATIENT: Final = 20.0  # moves for each task without a better plan, in such problems
+_ROUNDS: Final = 4  # of such prices
+_MOST_TASKS: Final = 12_000  # that cutting planes and HiGHS are tried on, in such accesses
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,7 +95,10 @@ class FreeSearch:
         self._rest = problem
         self._reported_s = 0.0
         self._num_searches = 0
+        self._windows: WindowSearch | None = None
+        self._window_rows: Ints = self._rows[:0]
         self._network = network_of(problem)
+        self._prices: ElementaryPrices | None = None
         self.through: Floats = np.full(len(self._rows), self.bound)
 
     @property
@@ -170,15 +178,50 @@ class FreeSearch:
         )
         self.step(Multipliers(prices=prices))
 
+    def price_passes(self, num_rounds: int) -> None:
+        """Search for prices by which no target is paid twice in one pass over it."""
+        if self._prices is None:
+            first = 0.5 * self.problem.target_reward
+            self._prices = ElementaryPrices(self.problem, self._network, first, self.seed)
+        self._prices.improve(num_rounds, self.budget.stop)
+        self.lower(self._prices.bound)
+
+    @property
+    def offers_choice(self) -> bool:
+        """Whether some access offers several collects."""
+        return bool((self._network.earlier >= 0).any())
+
+    @property
+    def is_small(self) -> bool:
+        """Whether what is open is little enough for cutting planes."""
+        return not self.offers_choice or int((~self.is_struck).sum()) <= _MOST_TASKS
+
+    @property
+    def is_priced_out(self) -> bool:
+        """Whether prices of targets alone will not bring the bound down any more."""
+        return self._prices is not None and self._prices.is_worn_out
+
     def search(self, moves_per_task: float, rows: Ints) -> bool:
         """Search windows among some of the problem's tasks; return whether that helped."""
         own = np.array([a.opportunity for a in self.plan.actions], dtype=np.int32)
-        self._num_searches += 1
         rows = np.union1d(rows, own).astype(np.int32)
-        focus = restricted(self.problem, rows)
-        start = Plan.of(focus, np.searchsorted(rows, own))
-        plan = improved(focus, start, moves_per_task, self.budget, self.seed + self._num_searches)
-        return self.offer(Plan.of(self.problem, rows[[a.opportunity for a in plan.actions]]))
+        if self._windows is None or not np.array_equal(rows, self._window_rows):
+            self._num_searches += 1
+            is_whole = len(rows) == len(self.problem.opportunities)
+            focus = self.problem if is_whole else restricted(self.problem, rows)
+            is_first = is_whole and self._rest is self.problem
+            self._windows = WindowSearch(
+                focus, self.seed + self._num_searches, self._network if is_first else None
+            )
+            self._window_rows = rows
+        windows = self._windows
+        # A search that has wandered over equal plans goes on from where it is.
+        if windows.reward < self.reward:
+            windows.adopt(Plan.of(windows.problem, np.searchsorted(rows, own)))
+        windows.make_moves(int(moves_per_task * len(rows)), self.budget)
+        return self.offer(
+            Plan.of(self.problem, rows[[a.opportunity for a in windows.plan.actions]])
+        )
 
     def report(self, message: str) -> None:
         """Tell how far plan and bound are apart."""
@@ -345,7 +388,12 @@ class FreeSearch:
             termination = self.budget.termination()
         else:
             termination = Termination.HORIZON_COMPLETE
-        if self.log:
+        prices = self._prices
+        if prices and rounded_bound(self.problem, prices.bound, self.reward) <= self.bound:
+            proven = Bound(
+                value=self.bound, proof="lagrangian", prices=prices.prices, is_elementary=True
+            )
+        elif self.log:
             proven = Bound(value=self.bound, proof="milp", log=self.log)
         else:
             above = self.bound + (self.unit or 4e-9 * max(1.0, self.bound))
@@ -359,18 +407,30 @@ def solve_free(problem: Problem, budget: Budget, seed: int, gap: float, effort: 
     search = FreeSearch(problem, budget, seed, gap)
     for solver in (Rule(), Graph()):
         search.offer(solver.solve(problem, Budget(), seed).plan)
-    if not search.is_done:
+    if not search.is_done and not search.offers_choice:
         search.price()
         search.report("prices")
-    left, num_idle = effort.moves_per_task, 0
-    while left > 0 and num_idle < 2 and not search.is_done:
-        left -= 5.0
-        is_better = search.search(5.0, search.open_rows(search.reward))
-        num_idle = 0 if is_better else num_idle + 1
-        search.report("window search")
     if not search.is_done:
+        _approach(search, effort)
+    if not search.is_done and search.is_small:
         _close_in(search, effort)
     return search.solution()
+
+
+def _approach(search: FreeSearch, effort: Effort) -> None:
+    """Better the plan by windows, and the bound by prices, until both lead no further."""
+    is_spaced = search.offers_choice
+    share, patience = (_SHARE, _PATIENT) if is_spaced else (5.0, 10.0)
+    left, num_idle = effort.moves_per_task, 0.0
+    while left > 0 and num_idle < patience and not search.is_done:
+        if is_spaced and not search.is_priced_out:
+            search.price_passes(_ROUNDS)
+            search.report("prices")
+        if not search.is_close:
+            left -= share
+            is_better = search.search(share, search.open_rows(search.reward))
+            num_idle = 0.0 if is_better else num_idle + share
+            search.report("window search")
 
 
 def _close_in(search: FreeSearch, effort: Effort) -> None:

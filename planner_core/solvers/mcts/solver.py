@@ -146,7 +146,7 @@ class Mcts:
     window_moves_per_task: float = field(
         default=0.5,
         metadata=_described(
-            "Moves of a window search on the finished plan, for each opportunity; without "
+            "Moves of a window search on the finished plan, for each access; without "
             "resources only. The paper has none.",
             minimum=0,
             maximum=1000,

@@ -1,0 +1,153 @@
+"""The bound that pays a target once in each pass: between plans and the plain bound, checkable."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from planner_core.bounds.bound import Bound
+from planner_core.bounds.elementary import (
+    elementary_paths,
+    elementary_value,
+    labels_for,
+    memory_of,
+)
+from planner_core.bounds.elementary_prices import ElementaryPrices
+from planner_core.bounds.lagrangian import lagrangian_value
+from planner_core.bounds.network import network_of
+from planner_core.bounds.proofs import from_json, is_proven, to_json
+from planner_core.domain import Agility
+from planner_core.plan import Plan
+from planner_core.problem import COLLECT, Floats, Problem
+from planner_core.solvers.base import Budget
+from planner_core.solvers.lns import improved
+from planner_core.timeline import replay
+from tests.planner_core.brute_force import best_reward
+from tests.planner_core.problems import Task, make_problem, random_problem
+
+NEVER = np.zeros(1, dtype=np.uint8)
+
+
+def spaced_problem(
+    seed: int, *, num_accesses: int = 3, num_offers: int = 5, span_s: float = 200.0
+) -> Problem:
+    """Return a problem whose accesses offer collects 9 s apart, in many variations."""
+    rng = np.random.default_rng(seed)
+    problem = random_problem(
+        seed,
+        use_resources=False,
+        num_collects=num_accesses,
+        num_offers=num_offers,
+        num_targets=max(2, num_accesses - 1),
+        num_satellites=int(rng.integers(1, 3)),
+        max_turn_deg=float(rng.choice([0.0, 25.0])),
+        has_rewards=bool(rng.integers(2)),
+        agility=Agility(
+            slew_rate_deg_s=float(rng.choice([1.0, 0.3])), settle_s=float(rng.choice([0.0, 8.0]))
+        ),
+        span_s=span_s,
+    )
+    return replace(problem, horizon_s=span_s + 200.0)
+
+
+def random_prices(problem: Problem, rng: np.random.Generator) -> Floats:
+    prices: Floats = rng.uniform(-0.3, 1.2, len(problem.target_ids)) * problem.target_reward
+    return prices
+
+
+@settings(max_examples=150, deadline=None)
+@given(seed=st.integers(0, 10**6))
+def test_whatever_the_prices_it_lies_between_the_optimum_and_the_plain_bound(seed: int) -> None:
+    problem = spaced_problem(seed)
+    rng = np.random.default_rng(seed)
+    best = best_reward(problem)
+    for _ in range(4):
+        prices = random_prices(problem, rng)
+        value, counts = elementary_value(problem, prices)
+        plain, _ = lagrangian_value(problem, prices)
+        assert best - 1e-9 <= value <= plain + 1e-9
+        assert counts.min() >= 0
+
+
+@settings(max_examples=40, deadline=None)
+@given(seed=st.integers(0, 10**6))
+def test_crowded_problems_never_hold_a_better_plan(seed: int) -> None:
+    """Too large for brute force: many accesses are open at once, and bits are used again."""
+    problem = spaced_problem(seed, num_accesses=40, num_offers=8, span_s=1500.0)
+    reward = replay(problem, improved(problem, Plan(), 30.0, Budget(), seed)).reward
+    rng = np.random.default_rng(seed)
+    for _ in range(4):
+        prices = random_prices(problem, rng)
+        value, _ = elementary_value(problem, prices)
+        plain, _ = lagrangian_value(problem, prices)
+        assert reward - 1e-9 <= value <= plain + 1e-9
+
+
+@settings(max_examples=100, deadline=None)
+@given(seed=st.integers(0, 10**6))
+def test_it_holds_for_weights_that_differ_from_collect_to_collect(seed: int) -> None:
+    """Against the heaviest path without repetition, found by trying all."""
+    problem = spaced_problem(seed, num_accesses=2, num_offers=4)
+    network = network_of(problem)
+    memory = memory_of(problem, network)
+    rng = np.random.default_rng(seed)
+    weight = rng.uniform(0.0, 3.0, len(network.row)) * rng.integers(0, 2, len(network.row))
+    by_row = np.empty(len(weight))
+    by_row[network.row] = weight
+    counts = np.zeros(len(problem.target_ids) + 1, dtype=np.int32)
+    value = elementary_paths(network, memory, weight, labels_for(network, memory), counts)
+    assert value >= heaviest_without_repetition(problem, by_row) - 1e-9
+
+
+def heaviest_without_repetition(problem: Problem, worth: Floats) -> float:
+    """Return what the satellites' best chains are worth that take each target once at most."""
+    table, total = problem.opportunities, 0.0
+    for satellite in problem.satellites:
+        chains: list[tuple[float, int, frozenset[int]]] = [(0.0, -1, frozenset())]
+        best = 0.0
+        while chains:
+            value, last, seen = chains.pop()
+            best = max(best, value)
+            for row in range(last + 1, len(satellite)):
+                target = int(table.place[satellite.rows[row]])
+                if last >= 0 and not satellite.transitions.allows(last, row):
+                    continue
+                gained = 0.0 if target in seen else float(worth[satellite.rows[row]])
+                chains.append((value + gained, row, seen | {target}))
+        total += best
+    return total
+
+
+def test_a_target_in_view_for_long_is_paid_once() -> None:
+    """Ten collects of one access, 30 s apart: the plain bound pays them all."""
+    tasks = [
+        Task(kind=COLLECT, place=0, start_s=30.0 * k, end_s=30.0 * k + 30.0, access=0)
+        for k in range(10)
+    ]
+    problem = make_problem(tasks, num_targets=1, use_resources=False)
+    nothing = np.zeros(1)
+    assert elementary_value(problem, nothing)[0] == pytest.approx(1.0)
+    assert lagrangian_value(problem, nothing)[0] == pytest.approx(10.0)
+
+
+def test_prices_get_better_and_their_proof_survives_being_written_down() -> None:
+    problem = spaced_problem(5, num_accesses=60, num_offers=8, span_s=3000.0)
+    network = network_of(problem)
+    first, again = (
+        ElementaryPrices(problem, network, 0.5 * problem.target_reward, 0) for _ in range(2)
+    )
+    first.improve(1, NEVER)
+    before = first.bound
+    first.improve(20, NEVER)
+    again.improve(21, NEVER)
+    assert first.bound < before
+    assert first.bound == again.bound
+    bound = Bound(value=first.bound, proof="lagrangian", prices=first.prices, is_elementary=True)
+    read = from_json(to_json(bound))
+    assert is_proven(problem, read)
+    assert not is_proven(problem, replace(read, value=first.bound - 1.5))
+    assert not is_proven(problem, replace(read, is_elementary=False))
