@@ -23,6 +23,7 @@ from planner_core.orbits.eclipse import always_sunlit, sunlight
 from planner_core.orbits.ephemeris import Ephemeris, propagate
 from planner_core.orbits.places import Places, View, view
 from planner_core.pins.pinning import pinned_problem
+from planner_core.pointing import Path, Pointing
 from planner_core.problem import (
     ACCESS_FOUND,
     ACCESS_TOO_SHORT,
@@ -294,7 +295,8 @@ def build_problem(scenario: Scenario, computed: ScenarioOpportunities, budget: B
         horizon_s=scenario.horizon.duration_s,
         use_resources=scenario.use_resources,
         dynamics=scenario.dynamics,
-        continuous_starts=scenario.continuous_starts,
+        continuous_starts=has_continuous_starts(scenario),
+        pointing=_pointing(scenario) if has_continuous_starts(scenario) else None,
         target_ids=tuple(target.id for target in scenario.targets),
         target_reward=np.array([t.reward for t in scenario.targets], dtype=np.float64),
         target_access=computed.target_access,
@@ -304,6 +306,30 @@ def build_problem(scenario: Scenario, computed: ScenarioOpportunities, budget: B
         satellites=tuple(satellites),
     )
     return pinned_problem(scenario, problem)
+
+
+def has_continuous_starts(scenario: Scenario) -> bool:
+    """Return whether collects may start anywhere in their accesses.
+
+    The events of ``dynamics: paper`` are the starts of opportunities: it knows no others.
+    """
+    knows_starts_alone = scenario.use_resources and scenario.dynamics == "paper"
+    return scenario.continuous_starts and not knows_starts_alone
+
+
+def _pointing(scenario: Scenario) -> Pointing:
+    places = _places(scenario)
+    paths = []
+    for satellite in scenario.satellites:
+        found = propagate(satellite, scenario.horizon)
+        turn = np.column_stack([found.gmst_rad, found.xp_rad, found.yp_rad])
+        nodes = np.hstack([found.position_itrf_m, found.velocity_itrf_m_s, turn])
+        paths.append(Path(found.step_s, np.ascontiguousarray(nodes)))
+    return Pointing(
+        paths=tuple(paths),
+        targets_m=places[COLLECT].position_m,
+        stations_m=places[CONTACT].position_m,
+    )
 
 
 def check_propagation(scenario: Scenario) -> None:
@@ -335,13 +361,18 @@ def check_element_age(scenario: Scenario) -> None:
 
 
 def orbit_warnings(scenario: Scenario) -> tuple[str, ...]:
-    """Return what a reader should know about element sets and the Earth's orientation."""
+    """Return what a reader should know about element sets, the Earth's orientation and starts."""
     ages = (_age_warning(satellite, scenario.horizon) for satellite in scenario.satellites)
     warnings = [warning for warning in ages if warning is not None]
     if not shipped().covers(scenario.horizon):
         warnings.append(
             "The horizon reaches outside the table of the Earth's orientation: its end values "
             "are held, and access times may be off by up to a second."
+        )
+    if scenario.continuous_starts and not has_continuous_starts(scenario):
+        warnings.append(
+            "continuous_starts has no effect: in dynamics 'paper' tasks begin at the starts of "
+            "opportunities alone."
         )
     return tuple(warnings)
 

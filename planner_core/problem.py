@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from planner_core.domain import Agility, Dynamics, Resources
 from planner_core.jit import inlined, kernel
+from planner_core.pointing import Pointing, Vector, sight
 from planner_core.slew import INSTANT, TIME_TOLERANCE_S, angle_between_deg, reach_deg, slew_s
 
 Floats = npt.NDArray[np.float64]
@@ -232,6 +233,7 @@ class Struck:
     row: int
     satellite: int
     start_s: float
+    end_s: float
     kept: tuple[int, ...] = ()
 
 
@@ -268,6 +270,10 @@ class Problem:
         Why a target has no opportunity, or ``ACCESS_FOUND``. Shape ``(num_targets,)``.
     station_antennas
         How many satellites each station serves at a time. Shape ``(num_stations,)``.
+    continuous_starts
+        Whether a collect may start anywhere in its access, at a whole millisecond.
+    pointing
+        Lines of sight at any instant, where continuous starts need them.
     pinned
         Opportunities that pins rule out are not in the table; those to be kept are named here.
     origin
@@ -285,6 +291,7 @@ class Problem:
     station_antennas: Ints
     opportunities: Opportunities
     satellites: tuple[SatelliteProblem, ...]
+    pointing: Pointing | None = None
     pinned: Pinned = Pinned()
     origin: Ints | None = None
 
@@ -322,6 +329,22 @@ class Problem:
         """Return the rows of a target's collects, in order."""
         rows, offsets = self.target_opportunities
         return rows[offsets[target] : offsets[target + 1]]
+
+
+def line_of_sight(problem: Problem, row: int, t_s: float) -> Vector:
+    """Return where the satellite looks when it does an opportunity's task at an instant.
+
+    Without ``pointing`` the problem knows that at the opportunity's own start and end only.
+    """
+    table, pointing = problem.opportunities, problem.pointing
+    if pointing is None:
+        own = table.los_start if t_s <= table.start_s[row] else table.los_end
+        x, y, z = own[row].tolist()
+        return x, y, z
+    is_collect = table.kind[row] == COLLECT
+    places = pointing.targets_m if is_collect else pointing.stations_m
+    path = pointing.paths[int(table.satellite[row])]
+    return sight(path, places, int(table.place[row]), float(t_s))
 
 
 def build_satellite_problem(

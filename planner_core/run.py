@@ -8,6 +8,7 @@ import time
 from dataclasses import dataclass, replace
 from typing import Final
 
+from planner_core.bounds import continuous
 from planner_core.bounds.bound import Bound
 from planner_core.bounds.lagrangian import lagrangian_bound
 from planner_core.bounds.resource_bound import quick_bound
@@ -17,6 +18,7 @@ from planner_core.problem import Problem
 from planner_core.reasons.explain import explain
 from planner_core.reasons.reason import Search, TargetOutcome
 from planner_core.solvers.base import Budget, Progress, Solution, Solver, Termination
+from planner_core.solvers.continuous.solve import with_own_starts
 from planner_core.timeline import Timeline, replay
 
 log = logging.getLogger(__name__)
@@ -41,8 +43,7 @@ class Judged:
     Attributes
     ----------
     bound
-        None where no bound covers the freedom that the plan had (continuous starts), or where
-        this plan has refuted all there were.
+        None where this plan has refuted all there were.
     outcomes
         Every target once, in the scenario's order.
     """
@@ -87,12 +88,12 @@ def plan_scenario(
     clock.append(time.perf_counter())
     budget.report(Progress(phase="solve", fraction=0.0))
     solution = solver.solve(problem, budget, seed)
+    if problem.continuous_starts:
+        solution = with_own_starts(problem, solution, budget)
     clock.append(time.perf_counter())
     budget.report(Progress(phase="verify", fraction=0.0))
     timeline = replay(problem, solution.plan)
-    bound = None
-    if not problem.continuous_starts:
-        bound = _best_bound(problem, solution, timeline, budget, known_bound)
+    bound = _best_bound(problem, solution, timeline, budget, known_bound)
     budget.report(
         Progress(
             phase="verify",
@@ -132,14 +133,23 @@ def _best_bound(
     claimed = (bound for bound in (known, solution.proven) if bound is not None)
     sound = [bound for bound in claimed if not _is_beaten(bound, timeline)]
     if known not in sound and all(bound.value > reward for bound in sound):
-        # Someone who cancels wants the answer now: prices stay rough then.
-        quick = lagrangian_bound(problem, reward, 0) if budget.is_cancelled else None
-        sound = [b for b in (*sound, quick or quick_bound(problem, reward))
-                 if not _is_beaten(b, timeline)]  # fmt: skip
+        quick = _quick_bound(problem, reward, budget)
+        sound = [b for b in (*sound, quick) if not _is_beaten(b, timeline)]
     if not sound:
         return None
     best = min(sound, key=lambda bound: bound.value)
     return replace(best, value=max(best.value, reward))
+
+
+def _quick_bound(problem: Problem, reward: float, budget: Budget) -> Bound:
+    if problem.continuous_starts:
+        return continuous.quick_bound(problem)
+    # Someone who cancels wants the answer now: prices stay rough then.
+    return (
+        lagrangian_bound(problem, reward, 0)
+        if budget.is_cancelled
+        else quick_bound(problem, reward)
+    )
 
 
 def _is_beaten(bound: Bound, timeline: Timeline) -> bool:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from planner_core.jit import kernel
 
 Floats = npt.NDArray[np.float64]
+Vector = Floats | tuple[float, float, float]
 
 TIME_TOLERANCE_S = 1e-6
 """Instants are whole milliseconds held in floats: differences below this are rounding."""
@@ -19,7 +20,7 @@ INSTANT = 0.0
 
 
 @kernel
-def angle_between_deg(u: Floats, v: Floats) -> float:
+def angle_between_deg(u: Vector, v: Vector) -> float:
     """Return the angle between two unit vectors; exact for small and for straight angles."""
     cx = u[1] * v[2] - u[2] * v[1]
     cy = u[2] * v[0] - u[0] * v[2]

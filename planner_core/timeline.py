@@ -12,11 +12,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 from planner_core.pins.pinned_plan import breaches
 from planner_core.plan import Action, Plan
-from planner_core.problem import COLLECT, CONTACT, Floats, Problem
+from planner_core.problem import COLLECT, CONTACT, Floats, Problem, line_of_sight
 from planner_core.resource_profile import Point, Profile, integrate, thin
-from planner_core.slew import INSTANT, TIME_TOLERANCE_S, angle_between_deg, slew_s
+from planner_core.slew import INSTANT, TIME_TOLERANCE_S, Vector, angle_between_deg, slew_s
 
 Mode = Literal["collect", "contact", "sunpoint"]
 ViolationCode = Literal[
@@ -231,7 +233,6 @@ def _turns(
     problem: Problem, plan: Plan, index: int, positions: Sequence[int]
 ) -> tuple[list[Violation], dict[int, Slew | None]]:
     """Tasks of one satellite neither overlap nor follow faster than it turns: C(a, b)."""
-    table = problem.opportunities
     agility = problem.satellites[index].agility
     acceleration = agility.acceleration_deg_s2 or INSTANT
     found: list[Violation] = []
@@ -242,9 +243,7 @@ def _turns(
         action = plan.actions[position]
         slews[position] = None
         if previous is not None and busy_until is not None:
-            angle_deg = angle_between_deg(
-                table.los_end[previous.opportunity], table.los_start[action.opportunity]
-            )
+            angle_deg = angle_between_deg(_looked(problem, previous), _looks(problem, action))
             needed_s = slew_s(angle_deg, agility.slew_rate_deg_s, acceleration) + agility.settle_s
             available_s = action.start_s - previous.end_s
             slews[position] = Slew(angle_deg=angle_deg, needed_s=needed_s, available_s=available_s)
@@ -265,6 +264,22 @@ def _turns(
         if busy_until is None or action.end_s > busy_until.end_s:
             busy_until = action
     return found, slews
+
+
+def _looks(problem: Problem, action: Action) -> Vector:
+    """Return the line of sight at an action's start."""
+    table, i = problem.opportunities, action.opportunity
+    if abs(action.start_s - table.start_s[i]) <= TIME_TOLERANCE_S:
+        return np.asarray(table.los_start[i])
+    return line_of_sight(problem, i, action.start_s)
+
+
+def _looked(problem: Problem, action: Action) -> Vector:
+    """Return the line of sight at an action's end."""
+    table, i = problem.opportunities, action.opportunity
+    if abs(action.end_s - table.end_s[i]) <= TIME_TOLERANCE_S:
+        return np.asarray(table.los_end[i])
+    return line_of_sight(problem, i, action.end_s)
 
 
 def _stations(problem: Problem, plan: Plan) -> list[Violation]:

@@ -14,6 +14,7 @@ from planner_core.errors import InvalidScenario
 from planner_core.pins.pins import PinnedAction, Pins
 from planner_core.plan import Plan
 from planner_core.problem import Problem
+from planner_core.reasons.as_flown import as_flown
 from planner_core.reasons.displacing import displace_each
 from planner_core.reasons.explain import earned_by
 from planner_core.reasons.forcing import PlannedSatellite, force_each
@@ -173,6 +174,10 @@ def _with_time(
         return action
     if action.target_id not in problem.target_ids:
         raise _unknown("target", str(action.target_id), pointer)
+    target = problem.target_ids.index(action.target_id)
+    if problem.pointing is not None:
+        made, plan = as_flown(problem, plan, np.array([target]))
+        problem = made.problem
     row = _cheapest(problem, plan, action)
     if row is None:
         raise InvalidScenario(

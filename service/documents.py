@@ -6,9 +6,13 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from planner_core import __version__
+from planner_core.build import view_at
 from planner_core.orbits.sgp4_record import GRAVITY
 from planner_core.run import Judged
+from planner_core.slew import TIME_TOLERANCE_S
 from planner_core.timeline import JudgedAction, Resourceline, plan_sha256
 from service.instants import instant_text
 from service.wording import Document, Wording
@@ -40,6 +44,7 @@ class Documents(Wording):
         self.judged = judged
         self.job_id = job_id
         self.scenario_sha256 = scenario_sha256
+        self._seen = _seen_at_own_starts(judged)
 
     def timeline(
         self, *, solver: str, params: Mapping[str, Any], seed: int, termination: str
@@ -154,8 +159,11 @@ class Documents(Wording):
         row = action.opportunity
         target_id = station_id = off_nadir_deg = azimuth_deg = None
         if row is not None:
-            off_nadir_deg = round(float(table.off_nadir_deg[row]), 4)
-            azimuth_deg = round(float(table.azimuth_deg[row]), 4)
+            off_nadir, azimuth = self._seen.get(
+                action.position, (table.off_nadir_deg[row], table.azimuth_deg[row])
+            )
+            off_nadir_deg = round(float(off_nadir), 4)
+            azimuth_deg = round(float(azimuth), 4)
             place = int(table.place[row])
             if action.mode == "collect":
                 target_id = scenario.targets[place].id
@@ -189,6 +197,30 @@ class Documents(Wording):
             "battery_fraction": [round(float(v), 9) for v in line.battery],
             "recorder_fraction": [round(float(v), 9) for v in line.recorder],
         }
+
+
+def _seen_at_own_starts(judged: Judged) -> dict[int | None, tuple[float, float]]:
+    """Return off-nadir angle and azimuth at the middle of each collect with a start of its own.
+
+    By position in the plan; all else is in the table of opportunities.
+    """
+    table, problem = judged.opportunities.opportunities, judged.problem
+    moved = [
+        (position, problem.scenario_row(action.opportunity), action)
+        for position, action in enumerate(judged.solution.plan.actions)
+    ]
+    moved = [
+        (position, row, action)
+        for position, row, action in moved
+        if abs(action.start_s - table.start_s[row]) > TIME_TOLERANCE_S
+    ]
+    if not moved or not problem.continuous_starts:
+        return {}
+    positions, rows, actions = zip(*moved, strict=True)
+    middle_s = np.array([0.5 * (a.start_s + a.end_s) for a in actions])
+    seen = view_at(judged.scenario, table, np.array(rows, dtype=np.int64), middle_s)
+    angles = zip(seen.off_nadir_deg.tolist(), seen.azimuth_deg.tolist(), strict=True)
+    return dict(zip(positions, angles, strict=True))
 
 
 def _rounded(value: float | None) -> float | None:

@@ -5,8 +5,6 @@ from __future__ import annotations
 from datetime import datetime
 
 import planner_core
-from planner_core.plan import Plan
-from planner_core.problem import Opportunities
 from planner_core.reasons.access_changes import OF_TARGETS, AccessChange, access_changes
 from planner_core.reasons.at_length import Attempt, explain_target
 from planner_core.solvers.base import Budget
@@ -55,7 +53,6 @@ class _Words(Wording):
     def __init__(self, job: Rebuilt):
         super().__init__(job.scenario, job.problem, job.timeline)
         self.job = job
-        self._own = {action.opportunity: p for p, action in enumerate(job.plan.actions)}
 
     def document(self, target: int, budget: Budget) -> Document:
         job = self.job
@@ -70,30 +67,17 @@ class _Words(Wording):
         }
 
     def _attempt(self, attempt: Attempt) -> Document:
-        table: Opportunities = self.job.computed.opportunities
         return {
             "opportunity_id": f"o{attempt.scenario_row}",
             "satellite_id": self.problem.satellites[attempt.satellite].id,
             "start": self._instant(attempt.start_s),
-            "end": self._instant(float(table.end_s[attempt.scenario_row])),
-            "violations": self._violations(attempt),
+            "end": self._instant(attempt.end_s),
+            "violations": [self._violation(violation) for violation in attempt.violations],
             "displaces": [self._action_ids[p] for p in attempt.displaces],
             "fits_instead": attempt.is_settled,
             "reward_delta": attempt.reward_delta,
             "ruled_out": attempt.ruled_out,
         }
-
-    def _violations(self, attempt: Attempt) -> list[Document]:
-        if attempt.opportunity is None:
-            return []
-        # They blame actions by their place in the plan with this one in it.
-        forced = Plan.of(self.problem, [*self._own, attempt.opportunity]).actions
-        ids = {
-            place: self._action_ids[self._own[action.opportunity]]
-            for place, action in enumerate(forced)
-            if action.opportunity in self._own
-        }
-        return [self._violation(violation, ids) for violation in attempt.violations]
 
     def _access_change(self, target: int, change: AccessChange) -> Document:
         """Return a change in the words of a what-if's ``relax``."""

@@ -10,7 +10,7 @@ import numpy as np
 from planner_core.bounds.certificate import Certificate
 from planner_core.problem import Floats, Problem
 
-Proof = Literal["lagrangian", "milp", "dp"]
+Proof = Literal["lagrangian", "milp", "dp", "totals"]
 
 _ROUNDING: Final = 1e-6  # relative; far above the rounding of the sums, far below one reward
 

@@ -9,9 +9,11 @@ import numpy as np
 
 from planner_core.bounds.bound import Bound, Proof, reward_unit, rounded_bound
 from planner_core.bounds.certificate import Certificate, Cut, Multipliers, Refutation, is_refuted
+from planner_core.bounds.continuous import continuous_value
 from planner_core.bounds.elementary import elementary_value
 from planner_core.bounds.lagrangian import lagrangian_value
 from planner_core.bounds.resource_bound import resource_value
+from planner_core.bounds.totals import totals_bound
 from planner_core.problem import Problem
 
 VERSION: Final = 1
@@ -65,9 +67,14 @@ def is_proven(problem: Problem, bound: Bound) -> bool | None:
     if bound.certificate is not None:
         is_enough = bound.certificate.amount <= bound.value + (reward_unit(problem) or room)
         return is_enough and is_refuted(problem, bound.certificate)
+    if bound.proof == "totals":
+        totals = totals_bound(problem)
+        return totals is not None and totals.value <= bound.value + room
     if bound.prices is None:
         return None
-    if bound.unit is not None:
+    if problem.continuous_starts:
+        value = continuous_value(problem, bound.prices)
+    elif bound.unit is not None:
         value = resource_value(problem, bound.prices, bound.unit)
     elif bound.is_elementary:
         value, _ = elementary_value(problem, bound.prices)

@@ -23,7 +23,7 @@ class Breach(NamedTuple):
 def breaches(problem: Problem, plan: Plan) -> list[Breach]:
     """Return every kept action that is missing and every action that is ruled out."""
     pinned, table = problem.pinned, problem.opportunities
-    taken = {action.opportunity for action in plan.actions}
+    starts = {action.opportunity: action.start_s for action in plan.actions}
     found = [
         Breach(
             satellite=int(table.satellite[kept.row]),
@@ -34,7 +34,11 @@ def breaches(problem: Problem, plan: Plan) -> list[Breach]:
             blamed=(),
         )
         for kept in pinned.kept
-        if kept.row not in taken
+        if kept.row not in starts
+        or (
+            problem.continuous_starts
+            and abs(starts[kept.row] - table.start_s[kept.row]) > TIME_TOLERANCE_S
+        )
     ]
     for position, action in enumerate(plan.actions):
         row = action.opportunity

@@ -9,7 +9,7 @@ What is left fits around all kept actions, and solvers need only take those (see
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from datetime import datetime
 
@@ -23,6 +23,7 @@ from planner_core.comparable import Order, are_comparable, order_of, transitive_
 from planner_core.domain import Scenario
 from planner_core.errors import InvalidScenario
 from planner_core.jit import kernel
+from planner_core.pins.pinned_starts import whole_accesses, with_pinned_starts
 from planner_core.pins.pins import PinnedAction
 from planner_core.plan import Plan
 from planner_core.problem import (
@@ -60,23 +61,28 @@ def pinned_problem(scenario: Scenario, problem: Problem) -> Problem:
     """
     if not scenario.pins:
         return problem
-    return apply_pins(problem, resolve(scenario, problem.opportunities))
+    pins, table = scenario.pins, problem.opportunities
+    whole = table if problem.pointing is None else whole_accesses(problem)
+    kept, skipped = (
+        [row_of(scenario, whole, pin, f"/pins/{name}/{i}") for i, pin in enumerate(actions)]
+        for name, actions in (("keep", pins.keep), ("skip", pins.skip))
+    )
+    if problem.pointing is not None:
+        accesses = table.access[skipped]
+        problem, kept = with_pinned_starts(scenario, problem, kept)
+        skipped = np.flatnonzero(np.isin(problem.opportunities.access, accesses)).tolist()
+    return apply_pins(problem, resolve(scenario, kept, skipped))
 
 
-def resolve(scenario: Scenario, table: Opportunities) -> Pinned:
-    """Return the scenario's pins in terms of its table of opportunities."""
+def resolve(scenario: Scenario, kept: Sequence[int], skipped: Iterable[int]) -> Pinned:
+    """Return the scenario's pins in terms of its problem, where these rows are meant."""
     pins = scenario.pins
     satellites = {satellite.id: i for i, satellite in enumerate(scenario.satellites)}
     targets = {target.id: i for i, target in enumerate(scenario.targets)}
     offset_s = scenario.horizon.offset_s
     return Pinned(
-        kept=tuple(
-            Kept(row=row_of(scenario, table, pin, f"/pins/keep/{i}"), pointer=f"/pins/keep/{i}")
-            for i, pin in enumerate(pins.keep)
-        ),
-        skipped=frozenset(
-            row_of(scenario, table, pin, f"/pins/skip/{i}") for i, pin in enumerate(pins.skip)
-        ),
+        kept=tuple(Kept(row=row, pointer=f"/pins/keep/{i}") for i, row in enumerate(kept)),
+        skipped=frozenset(skipped),
         blocked=tuple(
             Blocked(
                 satellite=satellites[pin.satellite_id],
@@ -304,6 +310,7 @@ def _struck(
             row=problem.scenario_row(int(row)),
             satellite=int(table.satellite[row]),
             start_s=float(table.start_s[row]),
+            end_s=float(table.end_s[row]),
             kept=tuple(kept for kept, excluded in keepers if excluded[row]),
         )
         target = int(table.place[row])

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from planner_core.plan import Plan
 from planner_core.problem import Problem
+from planner_core.reasons.as_flown import as_flown
 from planner_core.reasons.displacing import displace_each
 from planner_core.reasons.explain import earned_by, explain
 from planner_core.reasons.forcing import PlannedSatellite, force_each
@@ -26,7 +27,8 @@ class Attempt:
     scenario_row
         Row of the scenario's table.
     violations
-        What the plan then breaks and did not break before. None needed where it fits.
+        What the plan then breaks and did not break before, with the positions in
+        ``plan.actions`` of the actions that break it. None needed where it fits.
     displaces
         Positions in ``plan.actions`` of the actions that have to go for it.
     is_settled
@@ -41,6 +43,7 @@ class Attempt:
     scenario_row: int
     satellite: int
     start_s: float
+    end_s: float
     violations: tuple[Violation, ...] = ()
     displaces: tuple[int, ...] = ()
     is_settled: bool = False
@@ -75,6 +78,10 @@ def explain_target(
 
 
 def _forced(problem: Problem, plan: Plan, timeline: Timeline, target: int) -> list[Attempt]:
+    source = np.arange(len(problem.opportunities), dtype=np.int32)
+    if problem.pointing is not None:
+        made, plan = as_flown(problem, plan, np.array([target]))
+        problem, source = made
     table = problem.opportunities
     earned = earned_by(problem, plan, timeline)
     own = [action.opportunity for action in plan.actions]
@@ -90,16 +97,26 @@ def _forced(problem: Problem, plan: Plan, timeline: Timeline, target: int) -> li
         for c, row in enumerate(rows.tolist()):
             dropped = np.flatnonzero(displaced.dropped[c])
             positions = tuple(sorted(planned.positions[dropped].tolist()))
-            forced = replay(problem, Plan.of(problem, [*own, row]))
-            left = [r for position, r in enumerate(own) if position not in positions]
-            after = replay(problem, Plan.of(problem, [*left, row]))
+            (added,) = Plan.of(problem, [row]).actions
+            order = sorted([*plan.actions, added])
+            forced = replay(problem, Plan(tuple(order)))
+            place = {action: position for position, action in enumerate(plan.actions)}
+            left = [a for position, a in enumerate(plan.actions) if position not in positions]
+            after = replay(problem, Plan(tuple(sorted([*left, added]))))
             attempts.append(
                 Attempt(
-                    opportunity=row,
+                    opportunity=int(source[row]),
                     scenario_row=problem.scenario_row(row),
                     satellite=int(index),
                     start_s=float(table.start_s[row]),
-                    violations=tuple(v for v in forced.violations if _name(v) not in before),
+                    end_s=float(table.end_s[row]),
+                    violations=tuple(
+                        replace(
+                            v, blamed=tuple(place[order[p]] for p in v.blamed if order[p] != added)
+                        )
+                        for v in forced.violations
+                        if _name(v) not in before
+                    ),
                     displaces=positions,
                     is_settled=after.is_valid,
                     reward_delta=after.reward - timeline.reward if after.is_valid else None,
@@ -120,6 +137,7 @@ def _ruled_out(problem: Problem, plan: Plan, target: int) -> list[Attempt]:
             scenario_row=struck.row,
             satellite=struck.satellite,
             start_s=struck.start_s,
+            end_s=struck.end_s,
             displaces=tuple(sorted(positions[row] for row in struck.kept if row in positions)),
             ruled_out=True,
         )

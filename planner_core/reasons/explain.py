@@ -28,6 +28,7 @@ from planner_core.problem import (
     Longs,
     Problem,
 )
+from planner_core.reasons.as_flown import as_flown, in_rows_of
 from planner_core.reasons.displacing import displace_each
 from planner_core.reasons.forcing import FITS, Forced, PlannedSatellite, force_each
 from planner_core.reasons.reason import (
@@ -67,7 +68,13 @@ def explain(
         for target in range(len(problem.target_ids))
         if target not in timeline.collected and target not in reasons
     ]
-    reasons |= _forced_reasons(problem, plan, timeline, search, np.array(left, dtype=np.int64))
+    targets = np.array(left, dtype=np.int64)
+    if problem.pointing is None:
+        reasons |= _forced_reasons(problem, plan, timeline, search, targets)
+    elif left:
+        made, flown = as_flown(problem, plan, targets)
+        found = _forced_reasons(made.problem, flown, timeline, search, targets)
+        reasons |= {target: in_rows_of(made.source, reason) for target, reason in found.items()}
     outcomes = []
     for target in range(len(problem.target_ids)):
         collected, reason = timeline.collected.get(target), reasons.get(target)

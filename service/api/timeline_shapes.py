@@ -72,7 +72,9 @@ class TotalsOut(_Answer):
     reward: float
     bound: float | None = Field(description="Proven: no plan of the scenario can earn more.")
     gap: float | None = Field(description="`(bound - reward) / bound`.")
-    bound_proof: str | None = Field(description="`milp`, `lagrangian` or `dp`; more may be added.")
+    bound_proof: str | None = Field(
+        description="`milp`, `lagrangian`, `dp` or `totals`; more may be added."
+    )
     collects: int
     contacts: int
     targets: OutcomeCounts
@@ -154,7 +156,7 @@ class ProofOut(_Answer):
     """What proves a bound: planner_core checks it without any search."""
 
     version: Any
-    proof: str = Field(description="The argument: `milp`, `lagrangian` or `dp`.")
+    proof: str = Field(description="The argument: `milp`, `lagrangian`, `dp` or `totals`.")
     value: float = Field(description="The bound.")
     prices: list[float] | None = Field(
         None, description="A multiplier for each target, in the order of the scenario."

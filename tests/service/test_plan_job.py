@@ -41,9 +41,12 @@ def run(
 @pytest.mark.parametrize("solver", sorted(SOLVERS))
 @pytest.mark.parametrize(
     "flags",
-    [{}, {"dynamics": "paper"}, {"use_resources": False}, {"collect_spacing_s": 30.0}],
+    [
+        {}, {"dynamics": "paper"}, {"use_resources": False}, {"collect_spacing_s": 30.0},
+        {"continuous_starts": True}, {"continuous_starts": True, "use_resources": False},
+    ],
     ids=str,
-)
+)  # fmt: skip
 def test_timelines_pass_an_independent_check(solver: str, flags: dict[str, Any]) -> None:
     scenario = paper_mission(drawn_targets(150), **flags)
     answer = run(scenario, solver)
@@ -52,6 +55,19 @@ def test_timelines_pass_an_independent_check(solver: str, flags: dict[str, Any])
     independent.check(file, timeline, json.loads(answer.targets))
     assert timeline["totals"]["reward"] > 50
     assert timeline["totals"]["reward"] == answer.reward
+
+
+def test_angles_are_those_of_an_action_with_its_own_start() -> None:
+    scenario = paper_mission(drawn_targets(150), use_resources=False, continuous_starts=True)
+    answer = run(scenario, "rule")
+    (line,) = json.loads(answer.timeline)["satellites"]
+    record = independent.record_of(scenario["satellites"][0])
+    places = {target["id"]: target for target in scenario["targets"]}
+    for action in line["actions"]:
+        start, end = independent.instant(action["start"]), independent.instant(action["end"])
+        middle = start + (end - start) / 2
+        off_nadir_deg, _ = independent.view(record, places[action["target_id"]], middle)
+        assert action["off_nadir_deg"] == pytest.approx(off_nadir_deg, abs=0.02)
 
 
 def test_stored_opportunities_give_the_same_plan_as_computed_ones() -> None:
@@ -64,11 +80,16 @@ def test_stored_opportunities_give_the_same_plan_as_computed_ones() -> None:
     assert first.targets == again.targets
 
 
+@pytest.mark.parametrize("continuous_starts", [False, True])
 @pytest.mark.parametrize("use_resources", [True, False])
 @pytest.mark.parametrize("solver", ["rule", "certified"])
-def test_the_stored_proof_proves_the_bound(solver: str, use_resources: bool) -> None:
+def test_the_stored_proof_proves_the_bound(
+    solver: str, use_resources: bool, continuous_starts: bool
+) -> None:
     """From the file alone: nothing is left of the search that found it."""
-    scenario = paper_mission(drawn_targets(120), use_resources=use_resources)
+    scenario = paper_mission(
+        drawn_targets(120), use_resources=use_resources, continuous_starts=continuous_starts
+    )
     answer = run(scenario, solver)
     assert answer.proof is not None
     bound = proofs.from_json(answer.proof)

@@ -8,6 +8,7 @@ from typing import ClassVar
 from planner_core.problem import Problem
 from planner_core.solvers.base import Budget, Constraint, Solution
 from planner_core.solvers.certified.resources import solve_with_resources
+from planner_core.solvers.continuous.solve import bounded, solve_continuous
 from planner_core.solvers.free.search import Effort, solve_free
 from planner_core.solvers.milp import Milp, is_free
 
@@ -41,8 +42,13 @@ class Certified:
 
     def solve(self, problem: Problem, budget: Budget, seed: int) -> Solution:
         """Return the best plan and its bound; the same for the same seed if time suffices."""
+        if problem.pointing is not None and not problem.use_resources:
+            return solve_continuous(problem, budget, seed, self.gap, self.moves_per_task)
         if problem.use_resources:
-            return solve_with_resources(problem, budget, seed, self.gap)
+            solution = solve_with_resources(problem, budget, seed, self.gap)
+            if problem.pointing is not None:
+                return bounded(problem, solution, budget, self.gap)
+            return solution
         if not is_free(problem):
             return Milp(gap=self.gap).solve(problem, budget, seed)
         return solve_free(

@@ -1,0 +1,175 @@
+"""Plans with continuous starts and their bound, until they meet or the effort is spent."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from planner_core.bounds.bound import Bound, reward_unit, rounded_bound
+from planner_core.bounds.continuous import (
+    CELL_S,
+    LABELS,
+    ContinuousDual,
+    ContinuousPrices,
+    quick_bound,
+)
+from planner_core.plan import Plan
+from planner_core.problem import Problem
+from planner_core.solvers.base import Budget, Progress, Solution, Termination
+from planner_core.solvers.continuous.search import ContinuousSearch
+from planner_core.solvers.continuous.with_resources import filled_with_resources
+from planner_core.solvers.rule import Rule
+from planner_core.timeline import replay
+
+_TOLERANCE: Final = 1e-6  # of the reward
+_ROUNDS: Final = 40  # of moves
+_FIRST_ROUNDS: Final = 20  # before the bound
+_COARSE_S: Final = 25.0
+_COARSE: Final = (120, 1)  # steps, labels
+_FINE: Final = 40
+
+
+@dataclass(kw_only=True, eq=False)
+class _Meeting:
+    """A plan and a bound that close in on each other."""
+
+    problem: Problem
+    budget: Budget
+    gap: float
+    plan: Plan
+    reward: float
+    bound: Bound
+
+    @property
+    def is_optimal(self) -> bool:
+        unit = reward_unit(self.problem)
+        return self.bound.value < self.reward + max(unit, _TOLERANCE * self.reward, 4e-9)
+
+    @property
+    def is_close(self) -> bool:
+        missing = self.bound.value - self.reward
+        return self.is_optimal or missing <= self.gap * self.bound.value
+
+    @property
+    def is_done(self) -> bool:
+        return self.is_close or self.budget.is_spent()
+
+    def offer(self, plan: Plan, message: str) -> None:
+        """Take a plan if it is better."""
+        timeline = replay(self.problem, plan)
+        if timeline.is_valid and timeline.reward > self.reward:
+            self.plan, self.reward = plan, timeline.reward
+        self.report(message)
+
+    def move(self, search: ContinuousSearch, num_rounds: int, num_moves: int) -> None:
+        """Search for plans."""
+        for _ in range(num_rounds):
+            if self.is_done:
+                return
+            search.move(num_moves)
+            self.offer(search.plan, "window search")
+
+    def price(self) -> None:
+        """Search for prices: roughly at first, then with more labels to a cell."""
+        prices = self.problem.target_reward * 0.5
+        for width_s, (num_steps, most) in ((_COARSE_S, _COARSE), (CELL_S, (_FINE, LABELS))):
+            if self.is_done:
+                return
+            dual = ContinuousDual.of(self.problem, width_s, most)
+            if dual is None:
+                return
+            search = ContinuousPrices(dual=dual, prices=prices)
+            for _ in range(num_steps):
+                if self.is_done or search.is_done:
+                    break
+                search.step(self.reward)
+                if most == LABELS:
+                    self._lower(search)
+                    self.report("prices")
+            prices = search.prices
+
+    def _lower(self, search: ContinuousPrices) -> None:
+        value = rounded_bound(self.problem, search.value, self.reward)
+        if value < self.bound.value:
+            self.bound = Bound(value=value, proof="lagrangian", prices=search.prices)
+
+    def report(self, message: str) -> None:
+        reward, bound = self.reward, self.bound.value
+        share = reward / bound if bound > 0.0 else 1.0
+        self.budget.report(
+            Progress(phase="solve", fraction=min(1.0, share), reward=reward, bound=bound,
+                     message=message)
+        )  # fmt: skip
+
+    def solution(self) -> Solution:
+        if self.is_optimal:
+            termination = Termination.OPTIMAL
+        elif self.is_close:
+            termination = Termination.GAP_REACHED
+        elif self.budget.is_spent():
+            termination = self.budget.termination()
+        else:
+            termination = Termination.HORIZON_COMPLETE
+        return Solution(plan=self.plan, termination=termination, proven=self.bound)
+
+
+def solve_continuous(
+    problem: Problem, budget: Budget, seed: int, gap: float, moves_per_task: float
+) -> Solution:
+    """Return the best plan found of a problem without resources, and what bounds it.
+
+    Parameters
+    ----------
+    moves_per_task
+        Moves of the window search for each access.
+    """
+    meeting = _meeting(problem, Rule().solve(problem, Budget(), seed).plan, budget, gap)
+    search = ContinuousSearch(problem, meeting.plan, budget, seed)
+    search.fill()
+    meeting.offer(search.plan, "insertion")
+    num_tasks = max((len(s.spans.row) for s in search.satellites), default=0)
+    num_moves = int(np.ceil(moves_per_task * num_tasks / _ROUNDS))
+    meeting.move(search, _FIRST_ROUNDS, num_moves)
+    meeting.price()
+    meeting.move(search, _ROUNDS - _FIRST_ROUNDS, num_moves)
+    return meeting.solution()
+
+
+def bounded(problem: Problem, solution: Solution, budget: Budget, gap: float) -> Solution:
+    """Return a plan with resources after insertion, and what bounds it."""
+    meeting = _meeting(problem, solution.plan, budget, gap)
+    meeting.offer(filled_with_resources(problem, solution.plan, budget), "insertion")
+    meeting.price()
+    return meeting.solution()
+
+
+def _meeting(problem: Problem, plan: Plan, budget: Budget, gap: float) -> _Meeting:
+    timeline = replay(problem, plan)
+    return _Meeting(
+        problem=problem,
+        budget=budget,
+        gap=gap,
+        plan=plan,
+        reward=timeline.reward,
+        bound=quick_bound(problem),
+    )
+
+
+def with_own_starts(problem: Problem, solution: Solution, budget: Budget) -> Solution:
+    """Return another solver's answer with what fits between its tasks once those may move.
+
+    "Optimal" meant the starts that opportunities have.
+    """
+    if solution.termination is Termination.OPTIMAL and solution.proven is None:
+        solution = replace(solution, termination=Termination.HORIZON_COMPLETE)
+    if problem.pointing is None or solution.proven is not None or budget.is_cancelled:
+        # What has a bound here was searched with free starts already.
+        return solution
+    if problem.use_resources:
+        plan = filled_with_resources(problem, solution.plan, Budget())
+        return replace(solution, plan=plan)
+    search = ContinuousSearch(problem, solution.plan, Budget(), 0)
+    search.fill()
+    return replace(solution, plan=search.plan)

@@ -1,0 +1,210 @@
+"""Continuous starts: plans the referee agrees with, and bounds that none exceeds."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from planner_core.arrivals import follows_at_s
+from planner_core.bounds import proofs
+from planner_core.bounds.continuous import ContinuousDual, accessible, continuous_value
+from planner_core.domain import Agility
+from planner_core.plan import Plan
+from planner_core.problem import COLLECT, Blocked, Kept, Pinned, Problem
+from planner_core.solvers import SOLVERS, Certified, Rule
+from planner_core.solvers.base import Budget, Termination
+from planner_core.solvers.continuous.search import ContinuousSearch
+from planner_core.solvers.continuous.solve import solve_continuous, with_own_starts
+from planner_core.spans import spans_of, view_of
+from planner_core.timeline import replay
+from tests.planner_core.flat_earth import flat_problem
+
+SEEDS = st.integers(0, 10**6)
+AGILITIES = st.sampled_from(
+    [Agility(), Agility(slew_rate_deg_s=3.0), Agility(slew_rate_deg_s=1.0, settle_s=5.0),
+     Agility(slew_rate_deg_s=1.5, acceleration_deg_s2=0.3), Agility(slew_rate_deg_s=0.3)]
+)  # fmt: skip
+
+
+def best_reward(problem: Problem) -> float:
+    """Return the best reward of one satellite with free starts, by trying every sequence.
+
+    It turns faster than its lines of sight, so each task is best begun as early as it can be.
+    """
+    spans, view = spans_of(problem, 0), view_of(problem, 0)
+    reward = problem.target_reward
+    best = 0.0
+
+    def go_on(last: int, start_s: float, taken: frozenset[int]) -> None:
+        nonlocal best
+        best = max(best, float(sum(reward[target] for target in taken)))
+        for task in range(len(spans.row)):
+            target = int(spans.place[task])
+            if target in taken:
+                continue
+            then_s = spans.open_s[task]
+            if last >= 0:
+                then_s = follows_at_s(spans, view, last, start_s, task)
+            if np.isfinite(then_s):
+                go_on(task, float(then_s), taken | {target})
+
+    go_on(-1, 0.0, frozenset())
+    return best
+
+
+@settings(max_examples=60, deadline=None)
+@given(seed=SEEDS, agility=AGILITIES, num_satellites=st.integers(1, 3), has_rewards=st.booleans(),
+       spacing_s=st.sampled_from([None, 40.0]))  # fmt: skip
+def test_plans_are_valid_no_worse_than_they_began_and_below_the_bound(
+    seed: int, agility: Agility, num_satellites: int, has_rewards: bool, spacing_s: float | None
+) -> None:
+    problem = flat_problem(
+        seed, num_targets=12, horizon_s=900.0, agility=agility, has_rewards=has_rewards,
+        num_satellites=num_satellites, spacing_s=spacing_s,
+    )  # fmt: skip
+    rule = Rule().solve(problem, Budget(), 0)
+    solution = solve_continuous(problem, Budget(), seed, 0.0, 20.0)
+    timeline = replay(problem, solution.plan)
+    assert not timeline.violations
+    assert timeline.reward >= replay(problem, rule.plan).reward
+    assert solution.bound is not None
+    assert timeline.reward <= solution.bound + 1e-6
+    assert solution.plan == solve_continuous(problem, Budget(), seed, 0.0, 20.0).plan
+    filled = with_own_starts(problem, rule, Budget())
+    assert replay(problem, filled.plan).is_valid
+    assert replay(problem, filled.plan).reward >= replay(problem, rule.plan).reward
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    seed=SEEDS, rate=st.sampled_from([1.0, 2.0]), settle_s=st.sampled_from([0.0, 6.0]),
+    has_rewards=st.booleans(), most=st.integers(1, 3), width_s=st.sampled_from([7.0, 25.0]),
+)  # fmt: skip
+def test_whatever_the_prices_the_bound_is_not_below_the_best_plan(
+    seed: int, rate: float, settle_s: float, has_rewards: bool, most: int, width_s: float
+) -> None:
+    agility = Agility(slew_rate_deg_s=rate, settle_s=settle_s)
+    problem = flat_problem(
+        seed, num_targets=6, horizon_s=450.0, has_rewards=has_rewards, agility=agility
+    )
+    best = best_reward(problem)
+    dual = ContinuousDual.of(problem, width_s, most)
+    assert dual is not None
+    rng = np.random.default_rng(seed)
+    for share in (0.0, 0.3, 1.0):
+        prices = problem.target_reward * np.clip(rng.normal(share, 0.3, 6), 0.0, 1.0)
+        assert dual.at(prices)[0] >= best - 1e-9
+    solution = solve_continuous(problem, Budget(), 0, 0.0, 20.0)
+    reward = replay(problem, solution.plan).reward
+    assert reward <= best + 1e-9
+    assert solution.bound is not None
+    assert best <= solution.bound + 1e-9
+    if solution.termination is Termination.OPTIMAL:
+        assert reward == pytest.approx(best, abs=1e-5)
+
+
+def test_small_problems_end_at_the_optimum_and_most_are_proven() -> None:
+    reached = proven = 0
+    for seed in range(25):
+        problem = flat_problem(seed, num_targets=6, horizon_s=450.0)
+        solution = solve_continuous(problem, Budget(), 0, 0.0, 30.0)
+        reached += replay(problem, solution.plan).reward == best_reward(problem)
+        proven += solution.termination is Termination.OPTIMAL
+    assert reached >= 23
+    assert proven >= 15
+
+
+@settings(max_examples=15, deadline=None)
+@given(seed=SEEDS, num_satellites=st.integers(1, 2))
+def test_the_best_plan_on_a_grid_stays_below_the_bound(seed: int, num_satellites: int) -> None:
+    problem = flat_problem(
+        seed, num_targets=10, horizon_s=700.0, spacing_s=20.0, num_satellites=num_satellites
+    )
+    grid = replace(problem, continuous_starts=False, pointing=None)
+    best = Certified().solve(grid, Budget(), 0)
+    bound = solve_continuous(problem, Budget(), 0, 0.0, 5.0).proven
+    assert bound is not None
+    assert replay(grid, best.plan).reward <= bound.value
+    search = ContinuousSearch(problem, best.plan, Budget(), 0)
+    assert search.reward == replay(grid, best.plan).reward
+    search.fill()
+    search.move(100)
+    assert best.bound is not None
+    assert search.reward >= replay(grid, best.plan).reward
+
+
+def test_bounds_can_be_checked_and_false_ones_are_refused() -> None:
+    problem = flat_problem(3, num_targets=14, horizon_s=700.0)
+    bound = solve_continuous(problem, Budget(), 0, 0.0, 10.0).proven
+    assert bound is not None
+    again = proofs.from_json(proofs.to_json(bound))
+    assert proofs.is_proven(problem, again)
+    assert not proofs.is_proven(problem, replace(again, value=bound.value - 1.0))
+    every = accessible(problem)
+    assert every.value == len(np.unique(problem.opportunities.place))
+    assert proofs.is_proven(problem, every)
+
+
+def test_a_satellite_slower_than_its_lines_of_sight_has_the_bound_of_all_targets() -> None:
+    slow = flat_problem(1, num_targets=10, agility=Agility(slew_rate_deg_s=0.2))
+    assert ContinuousDual.of(slow, 10.0, 2) is None
+    solution = solve_continuous(slow, Budget(), 0, 0.0, 5.0)
+    assert replay(slow, solution.plan).is_valid
+    assert solution.bound == accessible(slow).value
+    assert solution.proven is not None
+    assert proofs.is_proven(slow, solution.proven)
+    assert continuous_value(slow, np.zeros(10)) == accessible(slow).value
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=SEEDS)
+def test_pins_hold_and_blocked_intervals_stay_empty(seed: int) -> None:
+    """Accesses around a blocked interval may be used on either side of it."""
+    problem = flat_problem(seed, num_targets=12, horizon_s=900.0)
+    rng = np.random.default_rng(seed)
+    from_s = round(float(rng.uniform(100.0, 600.0)), 3)
+    table = problem.opportunities
+    clear = (table.end_s < from_s - 1.0) | (table.start_s > from_s + 61.0)
+    rows = np.flatnonzero(clear & (table.kind == COLLECT))
+    kept = int(rng.choice(rows))
+    blocked = Blocked(satellite=0, start_s=from_s, end_s=from_s + 60.0,
+                      kinds=frozenset({COLLECT}), pointer="/pins/block/0")  # fmt: skip
+    pinned = replace(
+        problem, pinned=Pinned(kept=(Kept(row=kept, pointer="/pins/keep/0"),), blocked=(blocked,))
+    )
+    start = Plan.of(pinned, [kept])
+    search = ContinuousSearch(pinned, start, Budget(), seed)
+    search.fill()
+    search.move(200)
+    timeline = replay(pinned, search.plan)
+    assert not timeline.violations
+    assert any(a.opportunity == kept for a in search.plan.actions)
+    spans = spans_of(pinned, 0)
+    is_before = spans.close_s + spans.length_s <= from_s + 1e-6
+    assert (is_before | (spans.open_s >= from_s + 60.0 - 1e-6)).all()
+
+
+@pytest.mark.parametrize("name", ["rule", "graph", "forward_search", "milp"])
+def test_other_solvers_get_what_fits_between_their_tasks(name: str) -> None:
+    gained = 0.0
+    for seed in range(6):
+        problem = flat_problem(seed, num_targets=14, horizon_s=900.0)
+        solution = SOLVERS[name]().solve(problem, Budget(), 0)
+        filled = with_own_starts(problem, solution, Budget())
+        assert not replay(problem, filled.plan).violations
+        gained += replay(problem, filled.plan).reward - replay(problem, solution.plan).reward
+        assert filled.termination is not Termination.OPTIMAL
+    assert gained > 0.0
+
+
+def test_a_spent_budget_still_answers() -> None:
+    problem = flat_problem(0, num_targets=12)
+    budget = Budget()
+    budget.cancel()
+    solution = solve_continuous(problem, budget, 0, 0.0, 30.0)
+    assert replay(problem, solution.plan).is_valid
+    assert solution.termination in (Termination.CANCELLED, Termination.OPTIMAL)
