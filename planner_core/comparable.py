@@ -55,6 +55,15 @@ def is_transitive(problem: Problem) -> bool:
     return all(transitive_closure(problem, s) is s.transitions for s in problem.satellites)
 
 
+def num_near_pairs(problem: Problem) -> int:
+    """Return how many pairs of tasks are near enough in time to exclude each other."""
+    pairs = 0
+    for satellite in problem.satellites:
+        after = np.arange(1, len(satellite) + 1)
+        pairs += int((satellite.transitions.far_from - after).sum())
+    return pairs
+
+
 @kernel
 def _turns_slower_than_it_tracks(
     start_s: np.ndarray,

@@ -317,6 +317,11 @@ class Problem:
         return local
 
     @cached_property
+    def offers_choice(self) -> bool:
+        """Return whether some access offers several collects."""
+        return len(np.unique(self.opportunities.access)) < len(self.opportunities)
+
+    @cached_property
     def target_opportunities(self) -> tuple[Ints, Longs]:
         """Return collects grouped by target: rows, and offsets of shape ``(num_targets + 1,)``."""
         collects = np.flatnonzero(self.opportunities.kind == COLLECT).astype(np.int32)

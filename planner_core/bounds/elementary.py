@@ -60,11 +60,6 @@ class Memory(NamedTuple):
     start_bit: Ints
     num_started: Ints
 
-    @property
-    def is_needed(self) -> bool:
-        """Whether any target can be imaged twice in a part at all."""
-        return len(self.start_bit) > 0
-
 
 def memory_of(problem: Problem, network: Network) -> Memory:
     """Return what paths through a network are to remember."""

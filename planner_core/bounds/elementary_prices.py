@@ -17,22 +17,29 @@ from planner_core.bounds.elementary import (
     elementary_paths,
     label_part,
     labels_for,
-    memory_of,
 )
 from planner_core.bounds.network import Network
 from planner_core.draws import Uint64s, draws_of, next_draw
 from planner_core.jit import borrowing
 from planner_core.problem import Bools, Bytes, Floats, Ints, Longs, Problem
 
+ROUND: Final = 6
+"""Steps over all parts in a round: five that move the prices, and one that asks for a bound."""
+
 _FIRST_STEP: Final = 0.2  # of a target's reward, for each path too many, in an epoch
 _SHORTER: Final = 0.99  # from epoch to epoch
+_LAST_STEP: Final = 0.01  # of few rounds
 _SHORTEST: Final = 0.001
 _MEMORY: Final = 0.85  # of the mean, from epoch to epoch
-_ASKED_EVERY: Final = 5  # epochs
 
 
 class ElementaryPrices:
     """Prices that come ever closer to the best, and the bound that they prove.
+
+    Parameters
+    ----------
+    num_rounds
+        How many rounds there will be, where they are few: steps get shorter the sooner.
 
     Attributes
     ----------
@@ -42,16 +49,24 @@ class ElementaryPrices:
         Those. Shape ``(num_targets,)``.
     """
 
-    def __init__(self, problem: Problem, network: Network, prices: Floats, seed: int) -> None:
-        self._network = network
-        self._memory = memory_of(problem, network)
-        self._labels = labels_for(network, self._memory)
+    def __init__(
+        self,
+        problem: Problem,
+        network: Network,
+        memory: Memory,
+        seed: int,
+        num_rounds: int | None = None,
+    ) -> None:
+        self._network, self._memory = network, memory
+        self._shorter = _SHORTER
+        if num_rounds is not None:
+            self._shorter = (_LAST_STEP / _FIRST_STEP) ** (1.0 / (num_rounds * (ROUND - 1)))
+        self._labels = labels_for(network, memory)
         self._reward = np.append(problem.target_reward, 0.0)
         self._is_offered = np.zeros(len(self._reward), dtype=np.bool_)
         self._is_offered[network.place] = True
         self._is_offered[-1] = False
-        clipped = np.clip(np.append(prices, 0.0), 0.0, self._reward)
-        self._now = np.where(self._is_offered, clipped, 0.0)
+        self._now = np.where(self._is_offered, 0.5 * self._reward, 0.0)
         self._mean = self._now.copy()
         self._draws = draws_of(seed)
         self._weight = np.zeros(len(network.row))
@@ -70,7 +85,7 @@ class ElementaryPrices:
     def improve(self, num_rounds: int, stop: Bytes) -> None:
         """Go on for some rounds of epochs; each ends with a bound."""
         for _ in range(num_rounds):
-            for _ in range(_ASKED_EVERY):
+            for _ in range(ROUND - 1):
                 _epoch(
                     self._network, self._memory, self._labels, self._reward, self._is_offered,
                     self._now, self._weight, self._is_on_path, self._wanted, self._order,
@@ -79,7 +94,7 @@ class ElementaryPrices:
                 if stop[0]:
                     return
                 self._mean = _MEMORY * self._mean + (1.0 - _MEMORY) * self._now
-                self.step = max(self.step * _SHORTER, _SHORTEST)
+                self.step = max(self.step * self._shorter, _SHORTEST)
             self.ask(self._mean)
 
     def ask(self, prices: Floats) -> None:

@@ -12,6 +12,8 @@ from __future__ import annotations
 import numpy as np
 
 from planner_core.bounds.bound import Bound, rounded_bound
+from planner_core.bounds.elementary import memory_of
+from planner_core.bounds.elementary_prices import ROUND, ElementaryPrices
 from planner_core.bounds.network import Network, heaviest_paths, network_of
 from planner_core.bounds.prices import improve_prices
 from planner_core.problem import Bytes, Floats, Ints, Problem
@@ -55,6 +57,12 @@ def lagrangian_bound(problem: Problem, reward: float, iterations: int | None = N
     network = network_of(problem)
     if iterations is None:
         iterations = default_steps(network)
+    if problem.offers_choice and iterations > 0:
+        memory = memory_of(problem, network)
+        passes = ElementaryPrices(problem, network, memory, 0, num_rounds=iterations // ROUND + 1)
+        passes.improve(iterations // ROUND + 1, np.zeros(1, dtype=np.uint8))
+        value = rounded_bound(problem, passes.bound, reward)
+        return Bound(value=value, proof="lagrangian", prices=passes.prices, is_elementary=True)
     value, prices = priced_bound(problem, network, reward, iterations, np.zeros(1, dtype=np.uint8))
     return Bound(value=rounded_bound(problem, value, reward), proof="lagrangian", prices=prices)
 

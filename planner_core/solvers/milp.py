@@ -13,12 +13,12 @@ from typing import ClassVar, Final
 import numpy as np
 
 from planner_core.bounds.bound import Bound, rounded_bound
-from planner_core.comparable import is_transitive
+from planner_core.comparable import is_transitive, num_near_pairs
 from planner_core.plan import Plan
 from planner_core.problem import COLLECT, Floats, Problem
 from planner_core.solvers.base import Budget, Constraint, Progress, Solution, Termination
 from planner_core.solvers.forward_search import ForwardSearch
-from planner_core.solvers.free.search import Effort, solve_free
+from planner_core.solvers.free.search import MOST_PAIRS, Effort, solve_free
 from planner_core.solvers.graph import Graph
 from planner_core.solvers.lns import improved
 from planner_core.solvers.programs.antichains import violated_antichains
@@ -36,7 +36,6 @@ _REPORT_EVERY_S: Final = 0.25
 _STALLED: Final = 1e-4  # of the bound, in _PATIENCE rounds of cuts
 _PATIENCE: Final = 5
 _HEURISTIC_EFFORT: Final = 0.05  # what HiGHS does by default
-_MOST_PAIRS: Final = 8_000_000  # of tasks near each other; HiGHS takes about 100 bytes for each
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,7 +96,7 @@ class Milp:
             best.offer(improved(problem, best.plan, self.moves_per_task, budget, seed))
         if len(problem.opportunities) == 0 or budget.is_spent():
             return best.solution(problem, budget, self.gap)
-        if _num_pairs(problem) > _MOST_PAIRS:
+        if num_near_pairs(problem) > MOST_PAIRS:
             budget.report(
                 Progress(
                     phase="solve",
@@ -139,15 +138,6 @@ def is_free(problem: Problem) -> bool:
     Pins fit in by themselves only where turning is transitive.
     """
     return not problem.use_resources and (not problem.pinned.kept or is_transitive(problem))
-
-
-def _num_pairs(problem: Problem) -> int:
-    """Return how many pairs of tasks are near enough to exclude each other."""
-    pairs = 0
-    for satellite in problem.satellites:
-        after = np.arange(1, len(satellite) + 1)
-        pairs += int((satellite.transitions.far_from - after).sum())
-    return pairs
 
 
 def _starts(problem: Problem, budget: Budget) -> list[Plan]:

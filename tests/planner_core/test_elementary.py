@@ -17,7 +17,7 @@ from planner_core.bounds.elementary import (
     memory_of,
 )
 from planner_core.bounds.elementary_prices import ElementaryPrices
-from planner_core.bounds.lagrangian import lagrangian_value
+from planner_core.bounds.lagrangian import lagrangian_bound, lagrangian_value
 from planner_core.bounds.network import network_of
 from planner_core.bounds.proofs import from_json, is_proven, to_json
 from planner_core.domain import Agility
@@ -137,9 +137,8 @@ def test_a_target_in_view_for_long_is_paid_once() -> None:
 def test_prices_get_better_and_their_proof_survives_being_written_down() -> None:
     problem = spaced_problem(5, num_accesses=60, num_offers=8, span_s=3000.0)
     network = network_of(problem)
-    first, again = (
-        ElementaryPrices(problem, network, 0.5 * problem.target_reward, 0) for _ in range(2)
-    )
+    memory = memory_of(problem, network)
+    first, again = (ElementaryPrices(problem, network, memory, 0) for _ in range(2))
     first.improve(1, NEVER)
     before = first.bound
     first.improve(20, NEVER)
@@ -151,3 +150,12 @@ def test_prices_get_better_and_their_proof_survives_being_written_down() -> None
     assert is_proven(problem, read)
     assert not is_proven(problem, replace(read, value=first.bound - 1.5))
     assert not is_proven(problem, replace(read, is_elementary=False))
+
+
+def test_the_quick_bound_pays_a_target_once_in_each_pass() -> None:
+    problem = spaced_problem(6, num_accesses=60, num_offers=8, span_s=3000.0)
+    reward = replay(problem, improved(problem, Plan(), 10.0, Budget(), 0)).reward
+    bound = lagrangian_bound(problem, reward)
+    assert bound.value >= reward
+    assert bound.is_elementary
+    assert is_proven(problem, bound)

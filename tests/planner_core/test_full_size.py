@@ -9,9 +9,10 @@ import pytest
 
 from benchmarks.missions import paper_scenario, problem_of
 from benchmarks.paper.settings import MCTS_TUNED, PAPER_FORWARD, PAPER_MCTS, make_solver
+from planner_core.bounds import proofs
 from planner_core.domain import Dynamics
-from planner_core.problem import Problem
-from planner_core.solvers import ForwardSearch, Graph, Mcts, Milp, Rule
+from planner_core.problem import ACCESS_FOUND, Problem
+from planner_core.solvers import Certified, ForwardSearch, Graph, Mcts, Milp, Rule
 from planner_core.solvers.base import Budget, Solver, Termination
 from planner_core.timeline import Timeline, replay
 
@@ -75,3 +76,29 @@ def test_many_collects_of_each_access_are_planned_as_well() -> None:
     assert len(spaced.opportunities) > 5 * len(plain.opportunities)
     for solver in (Rule(), ForwardSearch(), Graph()):
         assert judged(spaced, solver).reward > judged(plain, solver).reward
+
+
+def test_a_choice_of_starts_is_planned_near_its_bound() -> None:
+    scenario = replace(paper_scenario(TARGETS, 2, use_resources=False), collect_spacing_s=15.0)
+    problem = problem_of(scenario)
+    solution = Certified(moves_per_task=0.3).solve(problem, Budget(), 0)
+    timeline = replay(problem, solution.plan)
+    assert timeline.is_valid
+    assert solution.bound is not None
+    assert timeline.reward <= solution.bound <= timeline.reward / 0.95
+    assert solution.proven is not None
+    assert proofs.is_proven(problem, solution.proven)
+    assert judged(problem, ForwardSearch()).reward <= solution.bound
+    # Its program would take gigabytes: the answer is what it would have started from.
+    milp = Milp(formulation="pairwise", moves_per_task=0.1).solve(problem, Budget(), 0)
+    assert milp.bound is None
+    assert replay(problem, milp.plan).is_valid
+
+
+def test_where_all_targets_fit_in_that_is_proven() -> None:
+    scenario = replace(paper_scenario(500, 2, use_resources=False), collect_spacing_s=15.0)
+    problem = problem_of(scenario)
+    solution = Certified().solve(problem, Budget(), 0)
+    assert solution.termination is Termination.OPTIMAL
+    reward = replay(problem, solution.plan).reward
+    assert solution.bound == reward == (problem.target_access == ACCESS_FOUND).sum()

@@ -21,10 +21,11 @@ from planner_core.bounds.certificate import (
     is_below,
     values_through,
 )
+from planner_core.bounds.elementary import memory_of
 from planner_core.bounds.elementary_prices import ElementaryPrices
 from planner_core.bounds.lagrangian import default_steps, priced_bound
 from planner_core.bounds.network import network_of
-from planner_core.comparable import is_transitive
+from planner_core.comparable import is_transitive, num_near_pairs
 from planner_core.plan import Plan
 from planner_core.problem import Bools, Floats, Ints, Problem
 from planner_core.restrict import restricted
@@ -40,6 +41,9 @@ from planner_core.timeline import replay
 
 TOLERANCE: Final = 1e-6
 """Share of the reward to which a plan is optimal where rewards are not whole."""
+
+MOST_PAIRS: Final = 8_000_000
+"""Of tasks near each other, in a program; HiGHS takes about 100 bytes for each."""
 
 _STALLED: Final = 0.02  # of the gap, in _PATIENCE rounds of cuts
 _PATIENCE: Final = 12
@@ -181,20 +185,18 @@ class FreeSearch:
     def price_passes(self, num_rounds: int) -> None:
         """Search for prices by which no target is paid twice in one pass over it."""
         if self._prices is None:
-            first = 0.5 * self.problem.target_reward
-            self._prices = ElementaryPrices(self.problem, self._network, first, self.seed)
-        self._prices.improve(num_rounds, self.budget.stop)
-        self.lower(self._prices.bound)
-
-    @property
-    def offers_choice(self) -> bool:
-        """Whether some access offers several collects."""
-        return bool((self._network.earlier >= 0).any())
+            memory = memory_of(self.problem, self._network)
+            self._prices = ElementaryPrices(self.problem, self._network, memory, self.seed)
+        for _ in range(num_rounds):
+            if not self.is_done:
+                self._prices.improve(1, self.budget.stop)
+                self.lower(self._prices.bound)
 
     @property
     def is_small(self) -> bool:
         """Whether what is open is little enough for cutting planes."""
-        return not self.offers_choice or int((~self.is_struck).sum()) <= _MOST_TASKS
+        is_dense = num_near_pairs(self._rest) > MOST_PAIRS
+        return not is_dense and (not self.problem.offers_choice or len(self._rows) <= _MOST_TASKS)
 
     @property
     def is_priced_out(self) -> bool:
@@ -407,19 +409,23 @@ def solve_free(problem: Problem, budget: Budget, seed: int, gap: float, effort: 
     search = FreeSearch(problem, budget, seed, gap)
     for solver in (Rule(), Graph()):
         search.offer(solver.solve(problem, Budget(), seed).plan)
-    if not search.is_done and not search.offers_choice:
+    if not search.is_done and not search.problem.offers_choice:
         search.price()
         search.report("prices")
     if not search.is_done:
         _approach(search, effort)
-    if not search.is_done and search.is_small:
-        _close_in(search, effort)
+    if not search.is_done:
+        search.shrink()
+        if search.is_small:
+            _close_in(search, effort)
+        else:
+            search.report("too many starts for cutting planes")
     return search.solution()
 
 
 def _approach(search: FreeSearch, effort: Effort) -> None:
     """Better the plan by windows, and the bound by prices, until both lead no further."""
-    is_spaced = search.offers_choice
+    is_spaced = search.problem.offers_choice
     share, patience = (_SHARE, _PATIENT) if is_spaced else (5.0, 10.0)
     left, num_idle = effort.moves_per_task, 0.0
     while left > 0 and num_idle < patience and not search.is_done:
