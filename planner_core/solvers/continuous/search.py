@@ -59,19 +59,19 @@ class Satellite:
                 )
                 tasks.setdefault(int(table.place[i]), int(np.flatnonzero(is_its)[0]))
         route = empty_route(len(spans.row) + 128)
-        route.count[0] = len(tasks)
+        route.size[0] = len(tasks)
         route.task[: len(tasks)] = list(tasks.values())
         is_timed = update_early(spans, view, route, 0, len(tasks)) and update_late(
             spans, view, route, len(tasks) - 1, -1
         )
         if not is_timed:
-            route.count[0] = 0
+            route.size[0] = 0
         return cls(spans=spans, view=view, worth=worth, route=route)
 
     @property
     def tasks(self) -> Ints:
         """Return the tasks of its part of the plan, in order."""
-        return self.route.task[: self.route.count[0]]
+        return self.route.task[: self.route.size[0]]
 
 
 class ContinuousSearch:
@@ -163,7 +163,7 @@ class ContinuousSearch:
         """Keep the plan of the routes if it is better."""
         actions = []
         for satellite in self.satellites:
-            starts = satellite.route.early_s[: satellite.route.count[0]].tolist()
+            starts = satellite.route.early_s[: satellite.route.size[0]].tolist()
             rows = satellite.spans.row[satellite.tasks].tolist()
             actions += [action_of(self.problem, *pair) for pair in zip(rows, starts, strict=True)]
         plan = Plan(tuple(sorted(actions)))

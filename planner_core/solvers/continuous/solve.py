@@ -8,13 +8,7 @@ from typing import Final
 import numpy as np
 
 from planner_core.bounds.bound import Bound, reward_unit, rounded_bound
-from planner_core.bounds.continuous import (
-    CELL_S,
-    LABELS,
-    ContinuousDual,
-    ContinuousPrices,
-    quick_bound,
-)
+from planner_core.bounds.continuous import quick_bound, search_prices
 from planner_core.plan import Plan
 from planner_core.problem import Problem
 from planner_core.solvers.base import Budget, Progress, Solution, Termination
@@ -25,10 +19,7 @@ from planner_core.timeline import replay
 
 _TOLERANCE: Final = 1e-6  # of the reward
 _ROUNDS: Final = 40  # of moves
-_FIRST_ROUNDS: Final = 20  # before the bound
-_COARSE_S: Final = 25.0
-_COARSE: Final = (120, 1)  # steps, labels
-_FINE: Final = 40
+_FIRST_ROUNDS: Final = 10  # before the bound
 
 
 @dataclass(kw_only=True, eq=False)
@@ -72,28 +63,16 @@ class _Meeting:
             self.offer(search.plan, "window search")
 
     def price(self) -> None:
-        """Search for prices: roughly at first, then with more labels to a cell."""
-        prices = self.problem.target_reward * 0.5
-        for width_s, (num_steps, most) in ((_COARSE_S, _COARSE), (CELL_S, (_FINE, LABELS))):
+        """Search for prices that prove a bound."""
+        if self.is_close or self.budget.is_spent():
+            return
+        for value, prices in search_prices(self.problem, self.budget.stop):
+            rounded = rounded_bound(self.problem, value, self.reward)
+            if rounded < self.bound.value:
+                self.bound = Bound(value=rounded, proof="lagrangian", prices=prices)
+            self.report("prices")
             if self.is_done:
                 return
-            dual = ContinuousDual.of(self.problem, width_s, most)
-            if dual is None:
-                return
-            search = ContinuousPrices(dual=dual, prices=prices)
-            for _ in range(num_steps):
-                if self.is_done or search.is_done:
-                    break
-                search.step(self.reward)
-                if most == LABELS:
-                    self._lower(search)
-                    self.report("prices")
-            prices = search.prices
-
-    def _lower(self, search: ContinuousPrices) -> None:
-        value = rounded_bound(self.problem, search.value, self.reward)
-        if value < self.bound.value:
-            self.bound = Bound(value=value, proof="lagrangian", prices=search.prices)
 
     def report(self, message: str) -> None:
         reward, bound = self.reward, self.bound.value
