@@ -30,6 +30,7 @@ _ROUGH_S: Final = 10.0
 _ROUGH: Final = 50  # rounds of the price search over wide cells
 _FINE: Final = 70  # and over narrow ones
 _FOLLOWERS: Final = 8_000_000  # in the tables of all satellites, more or less
+_MOST_FOLLOWERS: Final = 30_000_000  # of 12 bytes each; with more there is no search for prices
 _STEPS: Final = (0.15, 0.08)  # of prices, at first, in rough and fine rounds
 _SHORTER: Final = 0.96
 _KEPT: Final = 0.85  # of the mean of prices, from round to round
@@ -55,26 +56,33 @@ def quick_bound(problem: Problem) -> Bound:
 
 def continuous_value(problem: Problem, prices: Floats) -> float:
     """Return the bound that ``prices`` prove. This is the whole proof: it needs no search."""
-    dual = ContinuousDual.of(problem, width_for(problem))
-    if dual is None:
-        # Prices of the whole reward leave nothing to earn on any chain.
-        table = problem.opportunities
-        prices = np.maximum(prices, problem.target_reward)
-        return float(prices[np.unique(table.place[table.kind == COLLECT])].sum())
-    value, _ = dual.at(prices)
-    return value
+    if np.any(prices < problem.target_reward):
+        dual = ContinuousDual.of(problem, width_for(problem))
+        if dual is not None:
+            value, _ = dual.at(prices)
+            return value
+    # Prices of the whole reward leave nothing to earn on any chain.
+    table = problem.opportunities
+    prices = np.maximum(prices, problem.target_reward)
+    return float(prices[np.unique(table.place[table.kind == COLLECT])].sum())
 
 
 def width_for(problem: Problem) -> float:
     """Return how wide cells are, so that tables have a size that a machine can hold."""
-    num_followers = 0.0
+    width_s = _WIDTHS_S[0] * num_followers(problem, _WIDTHS_S[0]) / _FOLLOWERS
+    return float(np.clip(width_s, *_WIDTHS_S))
+
+
+def num_followers(problem: Problem, width_s: float) -> float:
+    """Return about how many followers the tables of all satellites have."""
+    count = 0.0
     for index in range(len(problem.satellites)):
         spans = spans_of(problem, index)
         free_s = spans.close_s - spans.open_s
         # Of what is open at a time, about four times as much comes next.
         mean_open = float((free_s + spans.length_s).sum()) / problem.horizon_s
-        num_followers += 4.0 * mean_open * float((free_s / _WIDTHS_S[0] + 1.0).sum())
-    return float(np.clip(_WIDTHS_S[0] * num_followers / _FOLLOWERS, *_WIDTHS_S))
+        count += 4.0 * mean_open * float((free_s / width_s + 1.0).sum())
+    return count
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -205,6 +213,8 @@ class ContinuousPrices:
 def search_prices(problem: Problem, stop: Bytes) -> Iterator[tuple[float, Floats]]:
     """Yield after each round of a search for prices the best bound so far and its prices."""
     width_s = width_for(problem)
+    if num_followers(problem, width_s) > _MOST_FOLLOWERS:
+        return
     rough_s = max(_ROUGH_S, width_s)
     best, prices = np.inf, 0.9 * problem.target_reward
     proving = prices

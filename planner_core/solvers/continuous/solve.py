@@ -18,8 +18,8 @@ from planner_core.solvers.rule import Rule
 from planner_core.timeline import replay
 
 _TOLERANCE: Final = 1e-6  # of the reward
-_ROUNDS: Final = 40  # of moves
-_FIRST_ROUNDS: Final = 10  # before the bound
+_MOVES_A_ROUND: Final = 1000  # on each satellite
+_BEFORE: Final = 0.25  # of the moves come before the bound
 
 
 @dataclass(kw_only=True, eq=False)
@@ -54,12 +54,12 @@ class _Meeting:
             self.plan, self.reward = plan, timeline.reward
         self.report(message)
 
-    def move(self, search: ContinuousSearch, num_rounds: int, num_moves: int) -> None:
+    def move(self, search: ContinuousSearch, num_rounds: int) -> None:
         """Search for plans."""
         for _ in range(num_rounds):
             if self.is_done:
                 return
-            search.move(num_moves)
+            search.move(_MOVES_A_ROUND)
             self.offer(search.plan, "window search")
 
     def price(self) -> None:
@@ -109,10 +109,11 @@ def solve_continuous(
     search.fill()
     meeting.offer(search.plan, "insertion")
     num_tasks = max((len(s.spans.row) for s in search.satellites), default=0)
-    num_moves = int(np.ceil(moves_per_task * num_tasks / _ROUNDS))
-    meeting.move(search, _FIRST_ROUNDS, num_moves)
+    num_rounds = int(np.ceil(moves_per_task * num_tasks / _MOVES_A_ROUND))
+    first = int(np.ceil(_BEFORE * num_rounds))
+    meeting.move(search, first)
     meeting.price()
-    meeting.move(search, _ROUNDS - _FIRST_ROUNDS, num_moves)
+    meeting.move(search, num_rounds - first)
     return meeting.solution()
 
 
