@@ -71,13 +71,13 @@ def cell_of(arrivals: Arrivals, spans: Spans, task: int, start_s: float) -> int:
     """Return the cell that a start of a task falls into."""
     k = int((start_s - spans.open_s[task]) / arrivals.width_s)
     first, end = arrivals.first_cell[task], arrivals.first_cell[task + 1]
-    return min(max(first + k, first), end - 1)
+    return int(min(max(first + k, first), end - 1))
 
 
 @borrowing
 def edge_s(arrivals: Arrivals, spans: Spans, task: int, cell: int) -> float:
     """Return the left edge of a task's cell."""
-    return spans.open_s[task] + (cell - arrivals.first_cell[task]) * arrivals.width_s
+    return float(spans.open_s[task] + (cell - arrivals.first_cell[task]) * arrivals.width_s)
 
 
 @borrowing
@@ -106,7 +106,7 @@ def _tabulate(
     for i in range(n):
         opens[i] = sight(view.path, view.places_m, spans.place[i], spans.open_s[i])
     first_arc = np.zeros(first_cell[n] + 1, dtype=np.int64)
-    room = 64 * max(1, first_cell[n])
+    room = 32 * max(1, first_cell[n])
     to = np.empty(room, dtype=np.int32)
     after_s, slope = np.empty(room, dtype=np.float32), np.empty(room, dtype=np.float32)
     count = 0

@@ -8,10 +8,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from planner_core.plan import Action
 from planner_core.pointing import Agile, Path, agile_of
-from planner_core.problem import COLLECT, Floats, Ints, Problem
+from planner_core.problem import COLLECT, Bools, Floats, Ints, Problem
 
 _LEAST_S = 5e-4  # half a millisecond
 
@@ -36,7 +37,7 @@ class Spans(NamedTuple):
     open_s: Floats
     close_s: Floats
     length_s: Floats
-    is_kept: np.ndarray
+    is_kept: Bools
 
 
 class View(NamedTuple):
@@ -102,6 +103,18 @@ def spans_of(problem: Problem, index: int) -> Spans:
     )
 
 
+def part_of(spans: Spans, rows: npt.NDArray[np.integer] | slice) -> Spans:
+    """Return some of the tasks."""
+    return Spans(
+        row=spans.row[rows],
+        place=spans.place[rows],
+        open_s=spans.open_s[rows],
+        close_s=spans.close_s[rows],
+        length_s=spans.length_s[rows],
+        is_kept=spans.is_kept[rows],
+    )
+
+
 def with_contacts(problem: Problem, spans: Spans, rows: Ints) -> Spans:
     """Return tasks with contacts among them, which have their own start alone."""
     table = problem.opportunities
@@ -116,7 +129,7 @@ def with_contacts(problem: Problem, spans: Spans, rows: Ints) -> Spans:
         is_kept=np.concatenate([spans.is_kept, np.ones(len(rows), dtype=np.bool_)]),
     )
     order = np.lexsort((joined.row, joined.close_s, joined.open_s))
-    return Spans(*(column[order] for column in joined))
+    return part_of(joined, order)
 
 
 def action_of(problem: Problem, row: int, start_s: float) -> Action:

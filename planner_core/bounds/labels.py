@@ -81,9 +81,9 @@ class Cells(NamedTuple):
 
 
 class Labels(NamedTuple):
-    """Labels of all cells, ``most`` to a cell; of each cell the first ``count``."""
+    """Labels of all cells, ``most`` to a cell; of each cell the first ``used``."""
 
-    count: Ints
+    used: Ints
     value: Floats
     start_s: Floats
     mask: Masks
@@ -96,7 +96,7 @@ def labels_of(cells: Cells, most: int) -> Labels:
     """Return room for labels."""
     n = len(cells.order)
     return Labels(
-        count=np.zeros(n, dtype=np.int32),
+        used=np.zeros(n, dtype=np.int32),
         value=np.empty(n * most),
         start_s=np.empty(n * most),
         mask=np.empty(n * most, dtype=np.uint64),
@@ -256,7 +256,7 @@ def heaviest(
         heaviest_task = max(heaviest_task, weight[i])
     per_second = weight.mean() / _PER_TASK_S
     for cell in range(len(cells.order)):
-        labels.count[cell] = 0
+        labels.used[cell] = 0
     for task in range(len(weight)):
         if cells.is_first[task]:
             _insert(
@@ -273,7 +273,7 @@ def heaviest(
             if cells.bit[next_open] != _NONE:
                 labels.bit_weight[_place_of(cells.bit[next_open])] = weight[next_open]
             next_open += 1
-        for slot in range(cell * most, cell * most + labels.count[cell]):
+        for slot in range(cell * most, cell * most + labels.used[cell]):
             value, start_s = labels.value[slot], labels.start_s[slot]
             if value > top:
                 top, best = value, slot
@@ -319,11 +319,11 @@ def _not_after_s(cells: Cells, end_s: float, looked: Vector, task: int, guess_s:
     first_s = max(end_s + eye.agile.settle_s, spans.open_s[task])
     guess_s -= _SOONER_S
     if guess_s <= first_s:
-        return first_s
+        return float(first_s)
     looks = sight(eye.path, eye.places_m, spans.place[task], guess_s)
     if guess_s < end_s + needed_s(eye.agile, looked, looks):
         return guess_s
-    exact_s = earliest_start_s(
+    exact_s: float = earliest_start_s(
         eye.agile, end_s, looked, eye.path, eye.places_m,
         spans.place[task], spans.open_s[task], spans.close_s[task] + EARLY_S,
     )  # fmt: skip
@@ -349,12 +349,13 @@ def _left_open(cells: Cells, mask: np.uint64, from_s: float, into: int, other: i
     if level >= _LEVELS:
         return _NONE
     new = cells.opened[level, first] | cells.opened[level, last - span + 1]
-    return mask & (new ^ _ALL)
+    left: np.uint64 = mask & (new ^ _ALL)
+    return left
 
 
 @borrowing
 def _place_of(bit: np.uint64) -> int:
-    return _PLACE_OF_BIT[(bit * _DE_BRUIJN) >> _SHIFT]
+    return int(_PLACE_OF_BIT[(bit * _DE_BRUIJN) >> _SHIFT])
 
 
 @borrowing
@@ -395,7 +396,7 @@ def _is_covered(
     start_s: float,
     mask: np.uint64,
 ) -> bool:
-    for i in range(cell * most, cell * most + labels.count[cell]):
+    for i in range(cell * most, cell * most + labels.used[cell]):
         if labels.value[i] >= value and _is_as_good(
             cells, labels, heaviest_task, labels.value[i] - value,
             labels.start_s[i] - start_s, labels.mask[i] & (mask ^ _ALL),
@@ -422,7 +423,7 @@ def _insert(
         return
     base = cell * most
     kept = base
-    for i in range(base, base + labels.count[cell]):
+    for i in range(base, base + labels.used[cell]):
         if value >= labels.value[i] and _is_as_good(
             cells, labels, heaviest_task, value - labels.value[i],
             start_s - labels.start_s[i], mask & (labels.mask[i] ^ _ALL),
@@ -437,9 +438,9 @@ def _insert(
         labels.value[kept], labels.start_s[kept] = value, start_s
         labels.mask[kept], labels.parent[kept] = mask, parent
         labels.is_paid[kept] = is_paid
-        labels.count[cell] = kept + 1 - base
+        labels.used[cell] = kept + 1 - base
         return
-    labels.count[cell] = most
+    labels.used[cell] = most
     least, into = np.inf, base
     for i in range(base, kept):
         gain = abs(labels.value[i] - value)

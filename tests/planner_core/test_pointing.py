@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -35,7 +36,7 @@ from tests.planner_core.test_build import scenario as built_scenario
 SEEDS = st.integers(0, 10**6)
 
 
-def scenario(**flags: object) -> Scenario:
+def scenario(**flags: Any) -> Scenario:
     return replace(
         built_scenario(satellites=two_satellites(), span_h=6.0), continuous_starts=True, **flags
     )

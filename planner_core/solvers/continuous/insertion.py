@@ -20,7 +20,7 @@ from planner_core.spans import Spans, View
 @borrowing
 def first_near(route: Route, instant_s: float) -> int:
     """Return the first task that may still start at an instant or later."""
-    low, high = 0, route.count[0]
+    low, high = 0, route.size[0]
     while low < high:
         middle = (low + high) // 2
         if route.late_s[middle] < instant_s:
@@ -42,7 +42,7 @@ def fits_at(spans: Spans, view: View, route: Route, task: int, p: int) -> float:
     then_s = early_after(spans, view, before, start_s, task)
     if then_s == np.inf:
         return -np.inf
-    if p < route.count[0]:
+    if p < route.size[0]:
         if then_s + spans.length_s[task] > route.late_s[p]:
             return np.inf
         if then_s > late_before(spans, view, task, route.task[p], route.late_s[p]):
@@ -60,7 +60,7 @@ def insert_each(
             return
         if holder[spans.place[task]] != FREE:
             continue
-        for p in range(first_near(route, spans.open_s[task]), route.count[0] + 1):
+        for p in range(first_near(route, spans.open_s[task]), route.size[0] + 1):
             then_s = fits_at(spans, view, route, task, p)
             if then_s == -np.inf:
                 break
@@ -72,11 +72,11 @@ def insert_each(
 
 @borrowing
 def _put_in(spans: Spans, view: View, route: Route, task: int, p: int, start_s: float) -> None:
-    for q in range(route.count[0], p, -1):
+    for q in range(route.size[0], p, -1):
         route.task[q] = route.task[q - 1]
         route.early_s[q] = route.early_s[q - 1]
         route.late_s[q] = route.late_s[q - 1]
-    route.count[0] += 1
+    route.size[0] += 1
     route.task[p], route.early_s[p] = task, start_s
     update_early(spans, view, route, p + 1, p + 1)
     update_late(spans, view, route, p, p - 1)
@@ -89,7 +89,7 @@ def fitting(spans: Spans, view: View, route: Route, is_free: Bools) -> tuple[Int
     for task in range(len(spans.row)):
         if not is_free[spans.place[task]]:
             continue
-        for p in range(first_near(route, spans.open_s[task]), route.count[0] + 1):
+        for p in range(first_near(route, spans.open_s[task]), route.size[0] + 1):
             then_s = fits_at(spans, view, route, task, p)
             if then_s == -np.inf:
                 break

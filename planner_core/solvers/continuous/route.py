@@ -25,7 +25,7 @@ FIXED = -3
 
 
 class Route(NamedTuple):
-    """A sequence in arrays with room for more; the first ``count[0]`` entries count.
+    """A sequence in arrays with room for more; the first ``size[0]`` entries count.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ class Route(NamedTuple):
         Earliest and latest start of each.
     """
 
-    count: Ints
+    size: Ints
     task: Ints
     early_s: Floats
     late_s: Floats
@@ -44,7 +44,7 @@ class Route(NamedTuple):
 def empty_route(room: int) -> Route:
     """Return a route of nothing."""
     return Route(
-        count=np.zeros(1, dtype=np.int32),
+        size=np.zeros(1, dtype=np.int32),
         task=np.zeros(room, dtype=np.int32),
         early_s=np.zeros(room),
         late_s=np.zeros(room),
@@ -55,7 +55,7 @@ def empty_route(room: int) -> Route:
 def early_after(spans: Spans, view: View, before: int, start_s: float, task: int) -> float:
     """Return the earliest start of a task after another one, or of all (``before`` of -1)."""
     if before < 0:
-        return spans.open_s[task]
+        return float(spans.open_s[task])
     end_s = start_s + spans.length_s[before]
     looked = sight(view.path, view.places_m, spans.place[before], end_s)
     return earliest_start_s(
@@ -68,7 +68,7 @@ def early_after(spans: Spans, view: View, before: int, start_s: float, task: int
 def late_before(spans: Spans, view: View, task: int, after: int, start_s: float) -> float:
     """Return the latest start of a task before another one, or of all (``after`` of -1)."""
     if after < 0:
-        return spans.close_s[task]
+        return float(spans.close_s[task])
     looks = sight(view.path, view.places_m, spans.place[after], start_s)
     return latest_start_s(
         view.agile, start_s, looks, view.path, view.places_m,
@@ -82,7 +82,7 @@ def update_early(spans: Spans, view: View, route: Route, first: int, until: int)
 
     Returns whether every task can still start in time.
     """
-    for p in range(first, route.count[0]):
+    for p in range(first, route.size[0]):
         before, start_s = -1, 0.0
         if p > 0:
             before, start_s = route.task[p - 1], route.early_s[p - 1]
@@ -100,7 +100,7 @@ def update_late(spans: Spans, view: View, route: Route, last: int, until: int) -
     """Work out latest starts from ``last`` back; before ``until`` as long as they change."""
     for p in range(last, -1, -1):
         after, start_s = -1, 0.0
-        if p + 1 < route.count[0]:
+        if p + 1 < route.size[0]:
             after, start_s = route.task[p + 1], route.late_s[p + 1]
         now_s = late_before(spans, view, route.task[p], after, start_s)
         if now_s == -np.inf:
@@ -114,12 +114,12 @@ def update_late(spans: Spans, view: View, route: Route, last: int, until: int) -
 @borrowing
 def remove(spans: Spans, view: View, route: Route, p: int) -> None:
     """Take the task at a position out; what is around it gains."""
-    n = route.count[0]
+    n = route.size[0]
     for q in range(p, n - 1):
         route.task[q] = route.task[q + 1]
         route.early_s[q] = route.early_s[q + 1]
         route.late_s[q] = route.late_s[q + 1]
-    route.count[0] = n - 1
+    route.size[0] = n - 1
     update_early(spans, view, route, p, p)
     update_late(spans, view, route, p - 1, p - 1)
 
@@ -127,7 +127,7 @@ def remove(spans: Spans, view: View, route: Route, p: int) -> None:
 @borrowing
 def position_of(route: Route, task: int, begin: int, end: int) -> int:
     """Return where a task stands outside the positions ``begin`` up to ``end``; -1 for nowhere."""
-    for p in range(route.count[0]):
+    for p in range(route.size[0]):
         if route.task[p] == task and not begin <= p < end:
             return p
     return -1

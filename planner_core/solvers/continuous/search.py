@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from planner_core.arrivals import Arrivals, arrivals_of
+from planner_core.bounds.continuous import width_for
 from planner_core.draws import draws_of
 from planner_core.plan import Plan
 from planner_core.problem import COLLECT, Floats, Ints, Problem
@@ -27,9 +28,10 @@ from planner_core.solvers.continuous.windows import make_moves, scratch_of
 from planner_core.spans import Spans, View, action_of, spans_of, view_of
 from planner_core.timeline import replay
 
-CELL_S: Final = 10.0
+_CELL_S: Final = 10.0
 _LONGEST: Final = 12  # tasks that a window takes up
 _MOVES_AT_A_TIME: Final = 500
+_AT_ONCE: Final = 20
 _MOST_KEPT: Final = 30_000_000  # followers, of 12 bytes each, kept from turn to turn
 
 
@@ -59,19 +61,19 @@ class Satellite:
                 )
                 tasks.setdefault(int(table.place[i]), int(np.flatnonzero(is_its)[0]))
         route = empty_route(len(spans.row) + 128)
-        route.count[0] = len(tasks)
+        route.size[0] = len(tasks)
         route.task[: len(tasks)] = list(tasks.values())
         is_timed = update_early(spans, view, route, 0, len(tasks)) and update_late(
             spans, view, route, len(tasks) - 1, -1
         )
         if not is_timed:
-            route.count[0] = 0
+            route.size[0] = 0
         return cls(spans=spans, view=view, worth=worth, route=route)
 
     @property
     def tasks(self) -> Ints:
         """Return the tasks of its part of the plan, in order."""
-        return self.route.task[: self.route.count[0]]
+        return self.route.task[: self.route.size[0]]
 
 
 class ContinuousSearch:
@@ -89,14 +91,15 @@ class ContinuousSearch:
             Satellite.of(problem, index, plan) for index in range(len(problem.satellites))
         ]
         self._tables: dict[int, Arrivals] = {}
-        self._num_kept = 0
+        self._num_kept = self._num_calls = 0
+        self._width_s = max(_CELL_S, width_for(problem))
 
     def arrivals(self, index: int) -> Arrivals:
         """Return a satellite's table; kept from turn to turn where all of them are small."""
         table = self._tables.get(index)
         if table is None:
             satellite = self.satellites[index]
-            table = arrivals_of(satellite.spans, satellite.view, CELL_S)
+            table = arrivals_of(satellite.spans, satellite.view, self._width_s)
             if self._num_kept + len(table.to) <= _MOST_KEPT:
                 self._tables[index] = table
                 self._num_kept += len(table.to)
@@ -113,23 +116,31 @@ class ContinuousSearch:
         self._note()
 
     def move(self, num_moves: int) -> bool:
-        """Make moves on each satellite in turn; return whether the plan earns more."""
+        """Make moves on each satellite in turn; return whether the plan earns more.
+
+        A satellite whose table is not kept has its moves all at once, in one call of many.
+        """
         before = self.reward
+        self._num_calls += 1
         for index in range(len(self.satellites)):
             left = num_moves
+            if self._num_calls > 1 and index not in self._tables:
+                if self._num_calls % _AT_ONCE:
+                    continue
+                left = num_moves * _AT_ONCE
+            if self.budget.is_spent() or len(self.satellites[index].spans.row) == 0:
+                continue
+            arrivals = self.arrivals(index)
             while left > 0 and not self.budget.is_spent():
-                self._turn(index, min(left, _MOVES_AT_A_TIME))
+                self._turn(index, arrivals, min(left, _MOVES_AT_A_TIME))
                 left -= _MOVES_AT_A_TIME
         self._note()
         return self.reward > before
 
-    def _turn(self, index: int, num_moves: int) -> None:
+    def _turn(self, index: int, arrivals: Arrivals, num_moves: int) -> None:
         """Make moves on one satellite."""
         satellite = self.satellites[index]
         spans, view = satellite.spans, satellite.view
-        if len(spans.row) == 0:
-            return
-        arrivals = self.arrivals(index)
         num_cells = int(arrivals.first_cell[-1])
         scratch = scratch_of(len(spans.row), num_cells, len(self.problem.target_ids))
         holder = self._holder(index)
@@ -163,7 +174,7 @@ class ContinuousSearch:
         """Keep the plan of the routes if it is better."""
         actions = []
         for satellite in self.satellites:
-            starts = satellite.route.early_s[: satellite.route.count[0]].tolist()
+            starts = satellite.route.early_s[: satellite.route.size[0]].tolist()
             rows = satellite.spans.row[satellite.tasks].tolist()
             actions += [action_of(self.problem, *pair) for pair in zip(rows, starts, strict=True)]
         plan = Plan(tuple(sorted(actions)))

@@ -8,13 +8,7 @@ from typing import Final
 import numpy as np
 
 from planner_core.bounds.bound import Bound, reward_unit, rounded_bound
-from planner_core.bounds.continuous import (
-    CELL_S,
-    LABELS,
-    ContinuousDual,
-    ContinuousPrices,
-    quick_bound,
-)
+from planner_core.bounds.continuous import quick_bound, search_prices
 from planner_core.plan import Plan
 from planner_core.problem import Problem
 from planner_core.solvers.base import Budget, Progress, Solution, Termination
@@ -24,11 +18,8 @@ from planner_core.solvers.rule import Rule
 from planner_core.timeline import replay
 
 _TOLERANCE: Final = 1e-6  # of the reward
-_ROUNDS: Final = 40  # of moves
-_FIRST_ROUNDS: Final = 20  # before the bound
-_COARSE_S: Final = 25.0
-_COARSE: Final = (120, 1)  # steps, labels
-_FINE: Final = 40
+_MOVES_A_ROUND: Final = 1000  # on each satellite
+_BEFORE: Final = 0.25  # of the moves come before the bound
 
 
 @dataclass(kw_only=True, eq=False)
@@ -63,37 +54,25 @@ class _Meeting:
             self.plan, self.reward = plan, timeline.reward
         self.report(message)
 
-    def move(self, search: ContinuousSearch, num_rounds: int, num_moves: int) -> None:
+    def move(self, search: ContinuousSearch, num_rounds: int) -> None:
         """Search for plans."""
         for _ in range(num_rounds):
             if self.is_done:
                 return
-            search.move(num_moves)
+            search.move(_MOVES_A_ROUND)
             self.offer(search.plan, "window search")
 
     def price(self) -> None:
-        """Search for prices: roughly at first, then with more labels to a cell."""
-        prices = self.problem.target_reward * 0.5
-        for width_s, (num_steps, most) in ((_COARSE_S, _COARSE), (CELL_S, (_FINE, LABELS))):
+        """Search for prices that prove a bound."""
+        if self.is_close or self.budget.is_spent():
+            return
+        for value, prices in search_prices(self.problem, self.budget.stop):
+            rounded = rounded_bound(self.problem, value, self.reward)
+            if rounded < self.bound.value:
+                self.bound = Bound(value=rounded, proof="lagrangian", prices=prices)
+            self.report("prices")
             if self.is_done:
                 return
-            dual = ContinuousDual.of(self.problem, width_s, most)
-            if dual is None:
-                return
-            search = ContinuousPrices(dual=dual, prices=prices)
-            for _ in range(num_steps):
-                if self.is_done or search.is_done:
-                    break
-                search.step(self.reward)
-                if most == LABELS:
-                    self._lower(search)
-                    self.report("prices")
-            prices = search.prices
-
-    def _lower(self, search: ContinuousPrices) -> None:
-        value = rounded_bound(self.problem, search.value, self.reward)
-        if value < self.bound.value:
-            self.bound = Bound(value=value, proof="lagrangian", prices=search.prices)
 
     def report(self, message: str) -> None:
         reward, bound = self.reward, self.bound.value
@@ -130,10 +109,11 @@ def solve_continuous(
     search.fill()
     meeting.offer(search.plan, "insertion")
     num_tasks = max((len(s.spans.row) for s in search.satellites), default=0)
-    num_moves = int(np.ceil(moves_per_task * num_tasks / _ROUNDS))
-    meeting.move(search, _FIRST_ROUNDS, num_moves)
+    num_rounds = int(np.ceil(moves_per_task * num_tasks / _MOVES_A_ROUND))
+    first = int(np.ceil(_BEFORE * num_rounds))
+    meeting.move(search, first)
     meeting.price()
-    meeting.move(search, _ROUNDS - _FIRST_ROUNDS, num_moves)
+    meeting.move(search, num_rounds - first)
     return meeting.solution()
 
 

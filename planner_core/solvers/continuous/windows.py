@@ -83,7 +83,7 @@ def scratch_of(num_tasks: int, num_cells: int, num_targets: int) -> Scratch:
         chosen=np.empty(_MOST_TASKS, dtype=np.int32),
         chosen_s=np.empty(_MOST_TASKS),
         old=Route(
-            count=np.zeros(1, dtype=np.int32),
+            size=np.zeros(1, dtype=np.int32),
             task=np.empty(num_tasks + _MOST_TASKS, dtype=np.int32),
             early_s=np.empty(num_tasks + _MOST_TASKS),
             late_s=np.empty(num_tasks + _MOST_TASKS),
@@ -128,7 +128,7 @@ def make_moves(
                     break
                 task = int(next_draw(draws) * n)
         at_s = spans.open_s[task] + next_draw(draws) * (spans.close_s[task] - spans.open_s[task])
-        low, high = 0, route.count[0]
+        low, high = 0, route.size[0]
         while low < high:
             middle = (low + high) // 2
             if route.early_s[middle] < at_s:
@@ -139,7 +139,7 @@ def make_moves(
         first = max(0, low - int(next_draw(draws) * (size + 1)))
         replan(
             spans, view, arrivals, worth, holder, route, scratch, draws,
-            first, min(first + size, route.count[0]),
+            first, min(first + size, route.size[0]),
         )  # fmt: skip
 
 
@@ -208,9 +208,9 @@ def _time_chain(
             return False
         scratch.chosen_s[i] = start_s
         before = scratch.chosen[i]
-    if end < route.count[0]:
+    if end < route.size[0]:
         start_s = early_after(spans, view, before, start_s, route.task[end])
-        return start_s <= route.late_s[end] + 1e-9
+        return bool(start_s <= route.late_s[end] + 1e-9)
     return True
 
 
@@ -219,7 +219,7 @@ def _put_in(
     spans: Spans, view: View, route: Route, scratch: Scratch, first: int, end: int, size: int
 ) -> None:
     """Put the chain in place of the tasks ``first`` up to ``end``."""
-    n, shift = route.count[0], size - (end - first)
+    n, shift = route.size[0], size - (end - first)
     if shift > 0:
         for p in range(n - 1, end - 1, -1):
             route.task[p + shift] = route.task[p]
@@ -230,7 +230,7 @@ def _put_in(
             route.task[p + shift] = route.task[p]
             route.early_s[p + shift] = route.early_s[p]
             route.late_s[p + shift] = route.late_s[p]
-    route.count[0] = n + shift
+    route.size[0] = n + shift
     for i in range(size):
         route.task[first + size - 1 - i] = scratch.chosen[i]
         route.early_s[first + size - 1 - i] = scratch.chosen_s[i]
@@ -255,7 +255,7 @@ def _best_chain(
     """Return the last label of the best chain, -1 for the empty one, ``_DONE`` for none as good."""
     after, late_s = -1, np.inf
     looks = (1.0, 0.0, 0.0)
-    if end < route.count[0]:
+    if end < route.size[0]:
         after, late_s = route.task[end], route.late_s[end]
         looks = sight(view.path, view.places_m, spans.place[after], late_s)
     count = 0

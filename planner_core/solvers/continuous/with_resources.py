@@ -93,7 +93,7 @@ def _task_of(problem: Problem, spans: Spans, action: Action) -> int:
 
 def _route_of(spans: Spans, view: View, tasks: list[int]) -> Route | None:
     route = empty_route(len(tasks))
-    route.count[0] = len(tasks)
+    route.size[0] = len(tasks)
     route.task[:] = tasks
     is_timed = update_early(spans, view, route, 0, len(tasks)) and update_late(
         spans, view, route, len(tasks) - 1, -1
