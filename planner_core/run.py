@@ -131,7 +131,11 @@ def _best_bound(
     reward = timeline.reward
     claimed = (bound for bound in (known, solution.proven) if bound is not None)
     sound = [bound for bound in claimed if not _is_beaten(bound, timeline)]
-    if known not in sound and all(bound.value > reward for bound in sound):
+    # Prices that a search has settled on are better than those of a moment.
+    is_settled = not problem.use_resources and any(
+        bound is solution.proven and bound.proof == "lagrangian" for bound in sound
+    )
+    if known not in sound and not is_settled and all(bound.value > reward for bound in sound):
         # Someone who cancels wants the answer now: prices stay rough then.
         quick = lagrangian_bound(problem, reward, 0) if budget.is_cancelled else None
         sound = [b for b in (*sound, quick or quick_bound(problem, reward))

@@ -412,7 +412,7 @@ def solve_free(problem: Problem, budget: Budget, seed: int, gap: float, effort: 
     if not search.is_done:
         _approach(search, effort)
     if not search.is_done and search.is_small:
-        _close_in(search, effort)
+        close_in(search, effort)
     return search.solution()
 
 
@@ -433,7 +433,7 @@ def _approach(search: FreeSearch, effort: Effort) -> None:
         search.report("window search")
 
 
-def _close_in(search: FreeSearch, effort: Effort) -> None:
+def close_in(search: FreeSearch, effort: Effort) -> None:
     """Cut, search and branch until plan and bound meet or the budget is spent."""
     search.price()
     master = search.cut(effort.max_rounds)
