@@ -132,7 +132,11 @@ def _best_bound(
     reward = timeline.reward
     claimed = (bound for bound in (known, solution.proven) if bound is not None)
     sound = [bound for bound in claimed if not _is_beaten(bound, timeline)]
-    if known not in sound and all(bound.value > reward for bound in sound):
+    # Prices that a search has settled on are better than those of a moment.
+    is_settled = not problem.use_resources and any(
+        bound is solution.proven and bound.proof == "lagrangian" for bound in sound
+    )
+    if known not in sound and not is_settled and all(bound.value > reward for bound in sound):
         quick = _quick_bound(problem, reward, budget)
         sound = [b for b in (*sound, quick) if not _is_beaten(b, timeline)]
     if not sound:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ipaddress
+import os
 import re
 from pathlib import Path
 from typing import Final
@@ -49,6 +50,7 @@ class Settings(BaseSettings):
     max_time_s: float = Field(3600.0, gt=0)
     default_memory_mb: int = Field(2048, ge=64)
     max_memory_mb: int = Field(16_384, ge=64)
+    solver_threads: int | None = Field(None, ge=1, le=64)
     queue_poll_s: float = Field(0.1, gt=0)
     max_queued: int = Field(10_000, ge=1)
     max_running_per_tenant: int = Field(64, ge=1)
@@ -69,6 +71,11 @@ class Settings(BaseSettings):
             num_targets=self.max_targets,
             satellite_target_days=self.max_satellite_target_days,
         )
+
+    @property
+    def threads_per_job(self) -> int:
+        """Return how many threads a solver may use."""
+        return self.solver_threads or max(1, (os.cpu_count() or 1) // max(1, self.workers))
 
     @property
     def is_local(self) -> bool:

@@ -14,6 +14,7 @@ import numpy as np
 from planner_core.bounds.bound import Bound, rounded_bound
 from planner_core.bounds.elementary import memory_of
 from planner_core.bounds.elementary_prices import ROUND, ElementaryPrices
+from planner_core.bounds.incremental import incremental_prices
 from planner_core.bounds.network import Network, heaviest_paths, network_of
 from planner_core.bounds.prices import improve_prices
 from planner_core.problem import Bytes, Floats, Ints, Problem
@@ -81,6 +82,8 @@ def priced_bound(
     stop: Bytes,
 ) -> tuple[float, Floats]:
     """Return the value that prices prove after so many steps towards ``level``, and the prices."""
+    if sum(len(satellite) > 0 for satellite in problem.satellites) > 1:
+        return incremental_prices(problem, network, level, num_steps, stop)
     reward = np.append(problem.target_reward, 0.0)
     offered = np.zeros(len(reward), dtype=np.bool_)
     offered[network.place] = True

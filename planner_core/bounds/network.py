@@ -119,40 +119,50 @@ def heaviest_paths(
     ends
         Filled with the last node of each part's path, or -1. Shape ``(num_parts,)``.
     """
-    n = len(weight)
-    far_value = np.zeros(n + 1)
-    far_node = np.full(n + 1, -1, dtype=np.int32)
-    onward = np.empty(n)  # of the heaviest path that ends with each node or waits until then
-    waits_at = np.empty(n, dtype=np.int32)
     total = 0.0
-    for s in range(len(network.first) - 1):
-        begin, end = network.first[s], network.first[s + 1]
-        far, far_at = 0.0, -1
-        far_value[begin] = 0.0
-        best, best_at = 0.0, -1
-        for b in range(begin, end):
-            if far_value[b] > far:
-                far, far_at = far_value[b], far_node[b]
-            reached, at = far, far_at
-            for i in range(network.arc_from[b], network.arc_from[b + 1]):
-                a = network.before[i]
-                if onward[a] > reached:
-                    reached, at = onward[a], a
-            value[b] = reached + weight[b]
-            previous[b] = waits_at[at] if at >= 0 else -1
-            if value[b] > best:
-                best, best_at = value[b], b
-            onward[b], waits_at[b] = value[b], b
-            a = network.earlier[b]
-            if a >= 0 and onward[a] >= value[b]:
-                onward[b], waits_at[b] = onward[a], waits_at[a]
-            to = network.far_from[b]
-            if onward[b] > far_value[to]:
-                far_value[to] = onward[b]
-                far_node[to] = b
-        ends[s] = best_at
-        total += best
+    for part in range(len(network.first) - 1):
+        worth, ends[part] = heaviest_path(network, part, weight, value, previous)
+        total += worth
     return total
+
+
+@kernel
+def heaviest_path(
+    network: Network, part: int, weight: Floats, value: Floats, previous: Ints
+) -> tuple[float, int]:
+    """Return the weight of one part's heaviest path, and its last node or -1.
+
+    The arrays are those of ``heaviest_paths``, of which only the part's own nodes count.
+    """
+    begin, end = network.first[part], network.first[part + 1]
+    m = end - begin
+    far_value = np.zeros(m + 1)
+    far_node = np.full(m + 1, -1, dtype=np.int32)
+    onward = np.empty(m)  # of the heaviest path that ends with each node or waits until then
+    waits_at = np.empty(m, dtype=np.int32)
+    far, far_at = 0.0, -1
+    best, best_at = 0.0, -1
+    for b in range(begin, end):
+        if far_value[b - begin] > far:
+            far, far_at = far_value[b - begin], far_node[b - begin]
+        reached, at = far, far_at
+        for i in range(network.arc_from[b], network.arc_from[b + 1]):
+            a = network.before[i]
+            if onward[a - begin] > reached:
+                reached, at = onward[a - begin], a
+        value[b] = reached + weight[b]
+        previous[b] = waits_at[at - begin] if at >= 0 else -1
+        if value[b] > best:
+            best, best_at = value[b], b
+        onward[b - begin], waits_at[b - begin] = value[b], b
+        a = network.earlier[b]
+        if a >= 0 and onward[a - begin] >= value[b]:
+            onward[b - begin], waits_at[b - begin] = onward[a - begin], waits_at[a - begin]
+        to = network.far_from[b] - begin
+        if onward[b - begin] > far_value[to]:
+            far_value[to] = onward[b - begin]
+            far_node[to] = b
+    return best, best_at
 
 
 @kernel

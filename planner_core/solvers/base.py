@@ -65,6 +65,9 @@ class Budget:
         Seconds from now, or None for no limit.
     report
         Called with each progress report.
+    num_threads
+        How many threads may work at a time. What comes out does not depend on it, but for how
+        far a search gets before its time is over.
 
     Attributes
     ----------
@@ -73,9 +76,15 @@ class Budget:
         cancels sets it through ``cancel``, from any thread. Shape ``(1,)``.
     """
 
-    def __init__(self, time_s: float | None = None, report: Callable[[Progress], None] = _ignore):
+    def __init__(
+        self,
+        time_s: float | None = None,
+        report: Callable[[Progress], None] = _ignore,
+        num_threads: int = 1,
+    ):
         self.stop: Bytes = np.zeros(1, dtype=np.uint8)
         self.report = report
+        self.num_threads = num_threads
         self._deadline = None if time_s is None else time.monotonic() + time_s
         self._cancelled = False
 

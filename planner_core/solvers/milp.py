@@ -17,8 +17,9 @@ from planner_core.comparable import is_transitive, num_near_pairs
 from planner_core.plan import Plan
 from planner_core.problem import COLLECT, Floats, Problem
 from planner_core.solvers.base import Budget, Constraint, Progress, Solution, Termination
+from planner_core.solvers.fleet.search import solve_without_resources
 from planner_core.solvers.forward_search import ForwardSearch
-from planner_core.solvers.free.search import MOST_PAIRS, Effort, solve_free
+from planner_core.solvers.free.search import MOST_PAIRS, Effort
 from planner_core.solvers.graph import Graph
 from planner_core.solvers.lns import improved
 from planner_core.solvers.programs.antichains import violated_antichains
@@ -89,7 +90,7 @@ class Milp:
             effort = Effort(
                 moves_per_task=self.moves_per_task, max_rounds=self.cut_rounds, max_parts=0
             )
-            return solve_free(problem, budget, seed, self.gap, effort)
+            return solve_without_resources(problem, budget, seed, self.gap, effort)
         best = _Best(problem)
         best.offer(*_starts(problem, budget))
         if not problem.use_resources:

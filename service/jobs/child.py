@@ -65,20 +65,26 @@ class Stopped:
 Ending = Answered | Refused | Stopped
 
 
-def main(connection: Connection[Any, Any], work: str, request: PlanRequest, time_s: float) -> None:
+def main(
+    connection: Connection[Any, Any],
+    work: str,
+    request: PlanRequest,
+    time_s: float,
+    num_threads: int,
+) -> None:
     """Do one piece of work and send how it ended.
 
     Parameters
     ----------
     work
         The work function as ``"module:function"``.
-    time_s
+    time_s, num_threads
         Its budget.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     die_with_parent(signal.SIGKILL)
     outbox = _Outbox(connection)
-    budget = Budget(time_s, outbox.report)
+    budget = Budget(time_s, outbox.report, num_threads)
     outbox.send(Started())
     threading.Thread(target=_obey, args=(connection, budget), daemon=True).start()
     outbox.send(_do(load(work), request, budget))

@@ -61,6 +61,7 @@ class Limits:
 
     time_s: float
     memory_mb: int
+    num_threads: int = 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,7 +84,7 @@ class Runner:
     """Runs one piece of work at a time, each in a fresh fork of a warm process."""
 
     def __init__(self, work: Work):
-        # One solver is one thread: the workers share the machine between them.
+        # Libraries start no threads of their own: the workers share the machine between them.
         os.environ |= dict.fromkeys(_SINGLE_THREADED, "1")
         self._work = work
         self._context = get_context("forkserver")
@@ -121,7 +122,7 @@ class Runner:
         ours, theirs = self._context.Pipe()
         process = self._context.Process(
             target=child.main,
-            args=(theirs, self._work.function, request, limits.time_s),
+            args=(theirs, self._work.function, request, limits.time_s, limits.num_threads),
             daemon=True,
         )
         try:

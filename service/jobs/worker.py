@@ -141,7 +141,9 @@ class Worker:
 
     def _run(self, held: Lease, request: PlanRequest, span: JobSpan) -> None:
         limits = Limits(
-            time_s=float(request.limits["time_s"]), memory_mb=int(request.limits["memory_mb"])
+            time_s=float(request.limits["time_s"]),
+            memory_mb=int(request.limits["memory_mb"]),
+            num_threads=self._settings.threads_per_job,
         )
         renewal = Renewal(lambda progress: self._renew(held, progress))
         try:

@@ -24,7 +24,8 @@ from planner_core.solvers.base import Budget, Progress, Solution, Termination
 from planner_core.solvers.certified.choices import ChoiceSearch
 from planner_core.solvers.certified.contact_sets import FixedContacts, Relaxation
 from planner_core.solvers.certified.resource_prices import PriceSearch
-from planner_core.solvers.free.search import TOLERANCE, Effort, solve_free
+from planner_core.solvers.fleet.search import solve_without_resources
+from planner_core.solvers.free.search import TOLERANCE, Effort
 from planner_core.solvers.milp import Milp
 from planner_core.solvers.rule import Rule
 from planner_core.timeline import replay
@@ -122,7 +123,7 @@ class ResourceSearch:
         # Its plans are not for this problem: they are not reported.
         quiet = Budget(self.budget.remaining_s())
         quiet.stop = self.budget.stop
-        solution = solve_free(free, quiet, self.seed, self.gap, Effort())
+        solution = solve_without_resources(free, quiet, self.seed, self.gap, Effort())
         if solution.proven is not None:
             self.lower(solution.proven)
         self.report("without resources")

@@ -9,7 +9,8 @@ from planner_core.problem import Problem
 from planner_core.solvers.base import Budget, Constraint, Solution
 from planner_core.solvers.certified.resources import solve_with_resources
 from planner_core.solvers.continuous.solve import bounded, solve_continuous
-from planner_core.solvers.free.search import Effort, solve_free
+from planner_core.solvers.fleet.search import solve_without_resources
+from planner_core.solvers.free.search import Effort
 from planner_core.solvers.milp import Milp, is_free
 
 
@@ -51,6 +52,6 @@ class Certified:
             return solution
         if not is_free(problem):
             return Milp(gap=self.gap).solve(problem, budget, seed)
-        return solve_free(
+        return solve_without_resources(
             problem, budget, seed, self.gap, Effort(moves_per_task=self.moves_per_task)
         )

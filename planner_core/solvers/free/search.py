@@ -417,7 +417,7 @@ def solve_free(problem: Problem, budget: Budget, seed: int, gap: float, effort: 
     if not search.is_done:
         search.shrink()
         if search.is_small:
-            _close_in(search, effort)
+            close_in(search, effort)
         else:
             search.report("too many starts for cutting planes")
     return search.solution()
@@ -439,7 +439,7 @@ def _approach(search: FreeSearch, effort: Effort) -> None:
             search.report("window search")
 
 
-def _close_in(search: FreeSearch, effort: Effort) -> None:
+def close_in(search: FreeSearch, effort: Effort) -> None:
     """Cut, search and branch until plan and bound meet or the budget is spent."""
     search.price()
     master = search.cut(effort.max_rounds)

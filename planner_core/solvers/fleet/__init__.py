@@ -1,0 +1,1 @@
+"""Planning many satellites together: prices that they share, and a search that heeds them."""

@@ -1,0 +1,126 @@
+"""Fleets without resources: brute force, true bounds, and the same plan whatever the threads."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from planner_core.bounds.incremental import IncrementalPrices
+from planner_core.bounds.network import network_of
+from planner_core.bounds.proofs import from_json, is_proven, to_json
+from planner_core.domain import Agility
+from planner_core.plan import Plan
+from planner_core.problem import Problem
+from planner_core.solvers import Certified, Milp
+from planner_core.solvers.base import Budget, Termination
+from planner_core.solvers.fleet.search import FleetSearch
+from planner_core.solvers.fleet.start import priced_start
+from planner_core.timeline import replay
+from tests.planner_core.brute_force import best_reward
+from tests.planner_core.problems import random_problem
+
+SEEDS = st.integers(0, 10**6)
+
+
+def fleet(seed: int, slew_rate_deg_s: float = 1.0) -> Problem:
+    """Return a crowded fleet that wants more of the same targets than it can take."""
+    return random_problem(
+        seed, use_resources=False, num_collects=240, num_targets=90, num_satellites=8,
+        has_rewards=seed % 2 == 0, max_turn_deg=25.0,
+        agility=Agility(settle_s=15.0, slew_rate_deg_s=slew_rate_deg_s),
+    )  # fmt: skip
+
+
+def searched(problem: Problem, budget: Budget, seed: int) -> FleetSearch:
+    """Return a search that has gone through all its steps."""
+    search = FleetSearch(problem, budget, seed, 0.0)
+    search.price()
+    search.start()
+    search.search(20.0)
+    return search
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    seed=SEEDS, num_satellites=st.integers(2, 4), has_rewards=st.booleans(),
+    num_offers=st.integers(1, 2), slew_rate_deg_s=st.sampled_from([1.0, 0.3]),
+)  # fmt: skip
+def test_small_fleets_are_planned_as_brute_force_does(
+    seed: int, num_satellites: int, has_rewards: bool, num_offers: int, slew_rate_deg_s: float
+) -> None:
+    problem = random_problem(
+        seed, use_resources=False, num_satellites=num_satellites, has_rewards=has_rewards,
+        num_collects=10 // num_offers, num_offers=num_offers, span_s=400.0, max_turn_deg=25.0,
+        agility=Agility(slew_rate_deg_s=slew_rate_deg_s),
+    )  # fmt: skip
+    best = best_reward(problem)
+    search = searched(problem, Budget(), seed)
+    assert search.reward == replay(problem, search.plan).reward
+    assert search.reward <= best + 1e-9
+    proven = search.solution().proven
+    assert proven is not None
+    assert proven.value >= best - 1e-9
+    assert is_proven(problem, from_json(to_json(proven)))
+    for solver in (Certified(), Milp()):
+        solution = solver.solve(problem, Budget(), seed)
+        assert solution.termination is Termination.OPTIMAL
+        assert replay(problem, solution.plan).reward == pytest.approx(best)
+
+
+@settings(max_examples=15, deadline=None)
+@given(seed=SEEDS, slew_rate_deg_s=st.sampled_from([1.0, 0.3]))
+def test_the_plan_is_the_same_however_many_threads_work(seed: int, slew_rate_deg_s: float) -> None:
+    problem = fleet(seed, slew_rate_deg_s)
+    alone, together = (
+        searched(problem, Budget(num_threads=num_threads), seed) for num_threads in (1, 3)
+    )
+    timeline = replay(problem, alone.plan)
+    assert not timeline.violations
+    assert timeline.reward == alone.reward > 0.0
+    assert together.plan == alone.plan
+    assert together.bound == alone.bound
+
+
+def test_a_large_fleet_is_planned_in_one_stream(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = fleet(4)
+    monkeypatch.setattr("planner_core.solvers.fleet.search._SMALL", 10)
+    solution = Certified().solve(problem, Budget(), 0)
+    timeline = replay(problem, solution.plan)
+    assert timeline.is_valid
+    assert solution.proven is not None
+    assert solution.proven.prices is not None
+    assert is_proven(problem, from_json(to_json(solution.proven)))
+    assert timeline.reward <= solution.proven.value <= 1.1 * timeline.reward
+
+
+def test_prices_make_a_better_start() -> None:
+    gained = 0.0
+    for seed in range(10):
+        problem = fleet(seed)
+        network, reward = network_of(problem), np.append(problem.target_reward, 0.0)
+        dual = IncrementalPrices(network, reward, 100, 0)
+        dual.improve(100, Budget().stop)
+        nothing = np.zeros(len(reward), dtype=np.bool_)
+        plans = [
+            Plan.of(problem, priced_start(network, reward, prices, nothing, 0))
+            for prices in (dual.prices, np.zeros(len(reward)))
+        ]
+        priced, plain = (replay(problem, plan) for plan in plans)
+        assert priced.is_valid and plain.is_valid
+        gained += priced.reward / plain.reward - 1.0
+    assert gained > 0.0
+
+
+def test_who_cancels_gets_the_plan_so_far_and_its_bound() -> None:
+    problem = fleet(5)
+    budget = Budget()
+    budget.report = lambda _: budget.cancel()
+    solution = Certified().solve(problem, budget, 0)
+    assert solution.termination is Termination.CANCELLED
+    timeline = replay(problem, solution.plan)
+    assert timeline.is_valid
+    assert timeline.reward > 0.0
+    assert solution.bound is not None
+    assert timeline.reward <= solution.bound <= problem.target_reward.sum()

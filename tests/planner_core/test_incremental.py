@@ -1,0 +1,90 @@
+"""Incremental prices: whatever they are they bound all plans, and they settle near the best."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from planner_core.bounds.bound import Bound, rounded_bound
+from planner_core.bounds.incremental import incremental_prices
+from planner_core.bounds.lagrangian import lagrangian_bound, lagrangian_value
+from planner_core.bounds.network import network_of
+from planner_core.bounds.prices import improve_prices
+from planner_core.bounds.proofs import from_json, is_proven, to_json
+from planner_core.domain import Agility
+from planner_core.problem import Floats, Problem
+from tests.planner_core.brute_force import best_reward
+from tests.planner_core.problems import random_problem
+
+SEEDS = st.integers(0, 10**6)
+GO_ON = np.zeros(1, dtype=np.uint8)
+
+
+def crowded(seed: int, num_satellites: int) -> Problem:
+    """Return a fleet that wants more of the same targets than it can take."""
+    problem = random_problem(
+        seed, use_resources=False, num_collects=60 * num_satellites, num_targets=30,
+        num_satellites=num_satellites, has_rewards=seed % 2 == 0, max_turn_deg=25.0,
+    )  # fmt: skip
+    return problem
+
+
+def settled(problem: Problem, num_epochs: int) -> tuple[float, Floats]:
+    """Return what so many epochs prove, and the prices."""
+    return incremental_prices(problem, network_of(problem), 0.0, num_epochs, GO_ON)
+
+
+def best_known(problem: Problem) -> float:
+    """Return what many subgradient steps prove."""
+    reward = np.append(problem.target_reward, 0.0)
+    return improve_prices(network_of(problem), reward, 0.5 * reward, 0.0, 3000, GO_ON)
+
+
+@settings(max_examples=80, deadline=None)
+@given(
+    seed=SEEDS, num_satellites=st.integers(2, 3), has_rewards=st.booleans(),
+    slew_rate_deg_s=st.sampled_from([1.0, 0.3]), num_epochs=st.sampled_from([0, 1, 7, 60]),
+)  # fmt: skip
+def test_no_plan_of_a_fleet_beats_them(
+    seed: int, num_satellites: int, has_rewards: bool, slew_rate_deg_s: float, num_epochs: int
+) -> None:
+    problem = random_problem(
+        seed, use_resources=False, num_satellites=num_satellites, has_rewards=has_rewards,
+        num_collects=10, agility=Agility(slew_rate_deg_s=slew_rate_deg_s), max_turn_deg=25.0,
+    )  # fmt: skip
+    best = best_reward(problem)
+    value, prices = settled(problem, num_epochs)
+    assert value >= best - 1e-9
+    proven, _ = lagrangian_value(problem, prices)
+    assert proven == pytest.approx(value)
+    bound = Bound(value=rounded_bound(problem, value, 0.0), proof="lagrangian", prices=prices)
+    assert is_proven(problem, from_json(to_json(bound)))
+    assert lagrangian_bound(problem, 0.0).value >= best - 1e-9
+
+
+@pytest.mark.parametrize("num_satellites", [2, 4, 8])
+def test_they_settle_near_the_best(num_satellites: int) -> None:
+    for seed in range(6):
+        problem = crowded(seed, num_satellites)
+        value, _ = settled(problem, 300)
+        assert value <= 1.003 * best_known(problem)
+
+
+def test_the_same_prices_come_out_again() -> None:
+    problem = crowded(1, 4)
+    first, again = (settled(problem, 40) for _ in range(2))
+    assert first[0] == again[0]
+    np.testing.assert_array_equal(first[1], again[1])
+
+
+def test_targets_without_access_cost_nothing() -> None:
+    problem = crowded(2, 3)
+    rewards: Floats = np.append(problem.target_reward, 50.0)
+    wider = replace(problem, target_ids=(*problem.target_ids, "far"), target_reward=rewards)
+    value, prices = settled(wider, 40)
+    assert value == settled(problem, 40)[0]
+    assert prices[-1] == 0.0
