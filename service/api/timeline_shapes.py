@@ -161,6 +161,9 @@ class ProofOut(_Answer):
     prices: list[float] | None = Field(
         None, description="A multiplier for each target, in the order of the scenario."
     )
+    elementary: bool | None = Field(
+        None, description="Whether the prices are for paths that take a target once in each pass."
+    )
 
 
 JSON_TIMELINE: Final = {"application/json": {"schema": {"$ref": "#/components/schemas/Timeline"}}}

@@ -47,6 +47,8 @@ def warm_up() -> None:
     crowd = zip(random.uniform(60, 85, 120), random.uniform(-180, 180, 120), strict=True)
     crowded = _mission(crowd, use_resources=False)
     _plan(crowded, [Certified(), Graph(path="longest")])
+    # A choice of starts has a bound of its own.
+    _plan(replace(crowded, collect_spacing_s=30.0), [Rule()])
 
 
 def _plan(scenario: Scenario, solvers: Iterable[Solver]) -> None:

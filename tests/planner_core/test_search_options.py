@@ -142,7 +142,10 @@ def test_a_tree_that_is_full_goes_on_by_rollouts(
 
 
 def test_the_code_sunpoints_rather_than_image_a_target_again() -> None:
-    paper = Mcts(num_simulations=20, depth=3, rollout="random", unimaged_only=False)
+    paper = Mcts(
+        num_simulations=20, depth=3, rollout="random", unimaged_only=False,
+        window_moves_per_task=0.0,
+    )  # fmt: skip
     again = {"take": 0, "sunpoint": 0}
     for seed in range(20):
         problem = random_problem(seed, num_collects=30, num_targets=8, use_resources=seed % 2 == 0)
