@@ -157,7 +157,7 @@ def test_skipping_an_image_skips_its_access_and_blocking_leaves_what_is_around(
         satellite_id=problem.satellites[table.satellite[action.opportunity]].id,
         start=horizon.instant(action.start_s),
     )
-    middle_s = float(np.median([a.start_s for a in judged.solution.plan.actions]))
+    middle_s = round(float(np.median([a.start_s for a in judged.solution.plan.actions])))
     block = BlockedInterval(
         satellite_id=problem.satellites[0].id,
         start=horizon.instant(middle_s),
