@@ -17,8 +17,8 @@ from planner_core.comparable import is_transitive
 from planner_core.plan import Plan
 from planner_core.problem import COLLECT, Floats, Problem
 from planner_core.solvers.base import Budget, Constraint, Progress, Solution, Termination
-from planner_core.solvers.forward_search import ForwardSearch
 from planner_core.solvers.fleet.search import solve_without_resources
+from planner_core.solvers.forward_search import ForwardSearch
 from planner_core.solvers.free.search import Effort
 from planner_core.solvers.graph import Graph
 from planner_core.solvers.lns import improved
