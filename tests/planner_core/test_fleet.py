@@ -108,7 +108,8 @@ def test_prices_make_a_better_start() -> None:
             for prices in (dual.prices, np.zeros(len(reward)))
         ]
         priced, plain = (replay(problem, plan) for plan in plans)
-        assert priced.is_valid and plain.is_valid
+        assert priced.is_valid
+        assert plain.is_valid
         gained += priced.reward / plain.reward - 1.0
     assert gained > 0.0
 

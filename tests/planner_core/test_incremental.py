@@ -26,11 +26,10 @@ GO_ON = np.zeros(1, dtype=np.uint8)
 
 def crowded(seed: int, num_satellites: int) -> Problem:
     """Return a fleet that wants more of the same targets than it can take."""
-    problem = random_problem(
+    return random_problem(
         seed, use_resources=False, num_collects=60 * num_satellites, num_targets=30,
         num_satellites=num_satellites, has_rewards=seed % 2 == 0, max_turn_deg=25.0,
     )  # fmt: skip
-    return problem
 
 
 def settled(problem: Problem, num_epochs: int) -> tuple[float, Floats]:

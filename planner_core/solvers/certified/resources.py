@@ -38,6 +38,7 @@ _FURTHER_MOVES: Final = 20  # after each round of that
 _FIRST_STEPS: Final = 2  # of the search for prices, where sets of contacts gave new ones
 _STEPS: Final = 8
 _PATIENCE: Final = 3  # rounds without a new set of contacts or a better plan
+_FLEET_PATIENCE: Final = 12  # the same of a fleet, which HiGHS is of no help for
 _SETS_AT_A_TIME: Final = 2
 _AS_GOOD: Final = 0.75  # of a target: sets whose prices count
 _OFFERED: Final = (700, 1000)  # tasks in a search with fixed contacts
@@ -79,6 +80,11 @@ class ResourceSearch:
     def is_done(self) -> bool:
         """Whether plan and bound are close enough, or the budget is spent."""
         return self.is_close or self.budget.is_spent()
+
+    @property
+    def is_fleet(self) -> bool:
+        """Whether several satellites share so much that the whole program is too large."""
+        return len(self.problem.satellites) > 1 and len(self.problem.opportunities) > _LARGE
 
     def offer(self, plan: Plan) -> bool:
         """Take a plan if it is better; a valid one is better than any other."""
@@ -123,7 +129,9 @@ class ResourceSearch:
         # Its plans are not for this problem: they are not reported.
         quiet = Budget(self.budget.remaining_s())
         quiet.stop = self.budget.stop
-        solution = solve_without_resources(free, quiet, self.seed, self.gap, Effort())
+        # What a fleet gains by cutting planes is little beside what battery and recorder take.
+        effort = Effort(moves_per_task=5.0, max_rounds=0) if self.is_fleet else Effort()
+        solution = solve_without_resources(free, quiet, self.seed, self.gap, effort)
         if solution.proven is not None:
             self.lower(solution.proven)
         self.report("without resources")
@@ -283,7 +291,7 @@ def solve_with_resources(problem: Problem, budget: Budget, seed: int, gap: float
         search.offer(choices.plan)
     search.search(choices, int(np.clip(len(problem.opportunities) // _TASKS_A_MOVE, *_FIRST_MOVES)))
     _close_in(search, choices)
-    if not search.is_done:
+    if not search.is_done and not search.is_fleet:
         search.exhaust()
     return search.solution()
 
@@ -306,7 +314,8 @@ def _close_in(search: ResourceSearch, choices: ChoiceSearch) -> None:
     prices.learn(search.plan)
     is_large = len(search.problem.opportunities) > _LARGE
     idle_rounds = 0
-    while idle_rounds < _PATIENCE and not search.is_done:
+    patience = _FLEET_PATIENCE if search.is_fleet else _PATIENCE
+    while idle_rounds < patience and not search.is_done:
         is_new = search.relax_sets(prices, choices)
         # Where steps take long, a search for the last image is tried before them.
         is_better = is_large and not is_new and search.fix_contacts(is_last=True)

@@ -1,12 +1,14 @@
 """Many satellites without resources: incremental prices, and a search that heeds them.
 
 A high price says that a target is easily had: several satellites would take it. A first plan at
-these prices gives each satellite about its share. Then the window search tries for what has a price
-and is not imaged, and prefers what is harder to have. What is small enough goes on to cutting planes and HiGHS, as a single satellite does.
+these prices gives each satellite about its share. Then the window search tries for what has a
+price and is not imaged. What is small enough goes on to cutting planes and HiGHS, as a single
+satellite does.
 """
 
 from __future__ import annotations
 
+import math
 from concurrent.futures import ThreadPoolExecutor
 from typing import Final
 
@@ -29,6 +31,7 @@ from planner_core.timeline import replay
 
 _PREFERENCE: Final = 0.1  # of a large fleet, for targets that are hard to have
 _EPOCHS_AT_A_TIME: Final = 10
+_EPOCHS_TO_START: Final = 80  # until a first plan is worth making
 _SMALL: Final = 60_000  # opportunities for which cutting planes are tried
 _EPOCHS: Final = (250, 500)  # at least and at most
 _STREAMS: Final = 2  # of a small fleet, that a plan does not hang on one start
@@ -104,14 +107,19 @@ class FleetSearch:
             )
         )  # fmt: skip
 
-    def price(self) -> None:
-        """Search for prices until more steps are of little use."""
-        while not (self._dual.is_settled or self.is_close or self.budget.is_spent()):
+    def price(self, num_epochs: float = math.inf) -> None:
+        """Search for prices, so long or until more steps are of little use."""
+        while num_epochs > 0 and not (self._dual.is_settled or self.is_close):
+            if self.budget.is_spent():
+                return
             self._dual.improve(_EPOCHS_AT_A_TIME, self.budget.stop)
             self.report("prices")
+            num_epochs -= _EPOCHS_AT_A_TIME
 
     def start(self) -> None:
         """Plan one stretch after another at the prices."""
+        if self.budget.is_spent() or self.is_close:
+            return
         self.offer(self._priced_plan(self._seed))
         self.report("start")
 
@@ -135,7 +143,9 @@ class FleetSearch:
         with ThreadPoolExecutor(self.budget.num_threads) as pool:
             while left > 0 and not self.budget.is_spent():
                 num_moves = min(left, _MOVES_AT_A_TIME)
-                list(pool.map(lambda stream: stream.go_on(num_moves, self.budget), streams))
+                going = [pool.submit(s.go_on, num_moves, self.budget) for s in streams]
+                for one in going:
+                    one.result()
                 left -= num_moves
                 best = max(stream.reward for stream in streams)
                 self.report("window search", best)
@@ -179,10 +189,15 @@ def solve_without_resources(
         return solve_free(problem, budget, seed, gap, effort)
     fleet = FleetSearch(problem, budget, seed, gap)
     fleet.offer(Rule().solve(problem, Budget(), seed).plan)
+    fleet.report("first plan")
+    fleet.price(_EPOCHS_TO_START)
+    fleet.start()
     fleet.price()
     fleet.start()
-    fleet.search(effort.moves_per_task)
-    if len(problem.opportunities) > _SMALL or budget.is_spent():
+    if not budget.is_spent():
+        fleet.search(effort.moves_per_task)
+    is_small = effort.max_rounds > 0 and len(problem.opportunities) <= _SMALL
+    if not is_small or budget.is_spent():
         return fleet.solution()
     search = FreeSearch(problem, budget, seed, gap)
     search.offer(fleet.plan)
