@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from planner_core.jit import borrowing, kernel
 from planner_core.pointing import earliest_start_s, needed_s, sight
-from planner_core.problem import Floats, Ints, Longs
+from planner_core.problem import Bytes, Floats, Ints, Longs
 from planner_core.slew import slew_s
 from planner_core.spans import Spans, View
 
@@ -59,10 +59,14 @@ def num_cells(spans: Spans, width_s: float) -> Ints:
     return np.maximum(count, 1.0).astype(np.int32)
 
 
-def arrivals_of(spans: Spans, view: View, width_s: float) -> Arrivals:
-    """Return the table of one satellite's tasks."""
+def arrivals_of(spans: Spans, view: View, width_s: float, stop: Bytes | None = None) -> Arrivals:
+    """Return the table of one satellite's tasks.
+
+    When ``stop[0]`` becomes non-zero it ends early, and lacks what would come.
+    """
+    stop = np.zeros(1, dtype=np.uint8) if stop is None else stop
     first_cell = np.concatenate([[0], np.cumsum(num_cells(spans, width_s))]).astype(np.int32)
-    first_arc, to, after_s, slope = _tabulate(spans, view, width_s, first_cell)
+    first_arc, to, after_s, slope = _tabulate(spans, view, width_s, first_cell, stop)
     return Arrivals(width_s, first_cell, first_arc, to, after_s, slope)
 
 
@@ -93,7 +97,7 @@ def follows_at_s(spans: Spans, view: View, a: int, start_s: float, b: int) -> fl
 
 @kernel
 def _tabulate(
-    spans: Spans, view: View, width_s: float, first_cell: Ints
+    spans: Spans, view: View, width_s: float, first_cell: Ints, stop: Bytes
 ) -> tuple[Longs, Ints, Singles, Singles]:
     n = len(spans.open_s)
     agile = view.agile
@@ -116,6 +120,9 @@ def _tabulate(
     own_end_s = np.empty(n)
     own_looked = np.empty((n, 3))
     for a in range(n):
+        if stop[0]:
+            first_arc[first_cell[a] :] = count
+            break
         from_s = spans.open_s[a] + spans.length_s[a] + agile.settle_s
         low = np.searchsorted(spans.open_s, from_s - longest_s)
         high = low

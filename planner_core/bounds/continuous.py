@@ -101,14 +101,21 @@ class ContinuousDual:
     is_offered: Bools
 
     @classmethod
-    def of(cls, problem: Problem, width_s: float) -> ContinuousDual | None:
-        """Return it; None where a satellite turns more slowly than its lines of sight."""
+    def of(
+        cls, problem: Problem, width_s: float, stop: Bytes | None = None
+    ) -> ContinuousDual | None:
+        """Return it; None where a satellite turns more slowly than its lines of sight.
+
+        None as well once ``stop[0]`` is not zero.
+        """
         parts = []
         is_offered = np.zeros(len(problem.target_ids), dtype=np.bool_)
         for index in range(len(problem.satellites)):
             spans = spans_of(problem, index)
             is_offered[spans.place] = True
             for piece in pieces_of(spans):
+                if stop is not None and stop[0]:
+                    return None
                 if len(piece.row) == 0:
                     continue
                 cells = cells_of(piece, view_of(problem, index), width_s)
@@ -219,7 +226,7 @@ def search_prices(problem: Problem, stop: Bytes) -> Iterator[tuple[float, Floats
     best, prices = np.inf, 0.9 * problem.target_reward
     proving = prices
     for cell_s, num_rounds, step in ((rough_s, _ROUGH, _STEPS[0]), (width_s, _FINE, _STEPS[1])):
-        dual = None if stop[0] else ContinuousDual.of(problem, cell_s)
+        dual = None if stop[0] else ContinuousDual.of(problem, cell_s, stop)
         if dual is None:
             return
         search = ContinuousPrices(dual, prices, step)

@@ -64,6 +64,9 @@ def is_proven(problem: Problem, bound: Bound) -> bool | None:
     ``problem``, whose value is a bound whatever they are. What HiGHS has proven has its log.
     """
     room = _ROUNDING * max(1.0, abs(bound.value))
+    if problem.continuous_starts and bound.certificate is not None:
+        # It strikes out tasks at the starts of opportunities, and others remain.
+        return False
     if bound.certificate is not None:
         is_enough = bound.certificate.amount <= bound.value + (reward_unit(problem) or room)
         return is_enough and is_refuted(problem, bound.certificate)

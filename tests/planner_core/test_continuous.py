@@ -56,7 +56,7 @@ def best_reward(problem: Problem) -> float:
     return best
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(seed=SEEDS, agility=AGILITIES, num_satellites=st.integers(1, 3), has_rewards=st.booleans(),
        spacing_s=st.sampled_from([None, 40.0]))  # fmt: skip
 def test_plans_are_valid_no_worse_than_they_began_and_below_the_bound(
@@ -147,6 +147,32 @@ def test_bounds_can_be_checked_and_false_ones_are_refused() -> None:
     every = accessible(problem)
     assert every.value == len(np.unique(problem.opportunities.place))
     assert proofs.is_proven(problem, every)
+
+
+def test_what_bounds_fixed_starts_is_not_taken_for_free_ones() -> None:
+    """Found among the opportunities alone, such a bound may be below a plan with free starts."""
+    problem = flat_problem(3, num_targets=14, horizon_s=700.0)
+    grid = replace(problem, continuous_starts=False, pointing=None)
+    bound = Certified().solve(grid, Budget(), 0).proven
+    assert bound is not None
+    assert proofs.is_proven(grid, bound)
+    assert not proofs.is_proven(problem, bound)
+    best = solve_continuous(problem, Budget(), 0, 0.0, 10.0)
+    assert replay(problem, best.plan).reward > bound.value
+    for name in ("rule", "milp", "forward_search"):
+        assert SOLVERS[name]().solve(problem, Budget(), 0).proven is None
+
+
+def test_progress_with_resources_tells_no_bound_of_fixed_starts() -> None:
+    problem = flat_problem(
+        2, num_targets=14, num_contacts=2, horizon_s=900.0, use_resources=True, spacing_s=60.0
+    )
+    told: list[float] = []
+    budget = Budget(report=lambda p: told.append(p.bound) if p.bound is not None else None)
+    solution = Certified().solve(problem, budget, 0)
+    assert solution.bound is not None
+    assert min(told) >= solution.bound
+    assert solution.bound >= replay(problem, solution.plan).reward
 
 
 def test_a_satellite_slower_than_its_lines_of_sight_has_the_bound_of_all_targets() -> None:

@@ -8,7 +8,7 @@ from typing import ClassVar
 from planner_core.problem import Problem
 from planner_core.solvers.base import Budget, Constraint, Solution
 from planner_core.solvers.certified.resources import solve_with_resources
-from planner_core.solvers.continuous.solve import bounded, solve_continuous
+from planner_core.solvers.continuous.solve import bounded, part_of, solve_continuous
 from planner_core.solvers.fleet.search import solve_without_resources
 from planner_core.solvers.free.search import Effort
 from planner_core.solvers.milp import Milp, is_free
@@ -46,10 +46,10 @@ class Certified:
         if problem.pointing is not None and not problem.use_resources:
             return solve_continuous(problem, budget, seed, self.gap, self.moves_per_task)
         if problem.use_resources:
-            solution = solve_with_resources(problem, budget, seed, self.gap)
             if problem.pointing is not None:
+                solution = solve_with_resources(problem, part_of(budget), seed, self.gap)
                 return bounded(problem, solution, budget, self.gap)
-            return solution
+            return solve_with_resources(problem, budget, seed, self.gap)
         if not is_free(problem):
             return Milp(gap=self.gap).solve(problem, budget, seed)
         return solve_without_resources(

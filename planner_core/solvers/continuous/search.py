@@ -99,7 +99,7 @@ class ContinuousSearch:
         table = self._tables.get(index)
         if table is None:
             satellite = self.satellites[index]
-            table = arrivals_of(satellite.spans, satellite.view, self._width_s)
+            table = arrivals_of(satellite.spans, satellite.view, self._width_s, self.budget.stop)
             if self._num_kept + len(table.to) <= _MOST_KEPT:
                 self._tables[index] = table
                 self._num_kept += len(table.to)

@@ -19,6 +19,7 @@ from planner_core.timeline import replay
 
 _TOLERANCE: Final = 1e-6  # of the reward
 _MOVES_A_ROUND: Final = 1000  # on each satellite
+_SHARE: Final = 0.6  # of the time for fixed starts first, where resources count
 _BEFORE: Final = 0.25  # of the moves come before the bound
 
 
@@ -115,6 +116,20 @@ def solve_continuous(
     meeting.price()
     meeting.move(search, num_rounds - first)
     return meeting.solution()
+
+
+def part_of(budget: Budget) -> Budget:
+    """Return a budget for the search among the starts that opportunities have.
+
+    What bounds that search bounds no plan with free starts: it is not reported.
+    """
+    remaining_s = budget.remaining_s()
+    part = Budget(
+        None if remaining_s is None else _SHARE * remaining_s,
+        lambda progress: budget.report(replace(progress, bound=None)),
+    )
+    part.stop = budget.stop
+    return part
 
 
 def bounded(problem: Problem, solution: Solution, budget: Budget, gap: float) -> Solution:
