@@ -1,9 +1,9 @@
 """Plans and bounds of whole fleets (``python -m benchmarks.fleet SPACECRAFT CITIES STATIONS``).
 
-Runs each case in a process of its own, after a warm-up, for so many CPU seconds, and prints opportunities, CPU seconds of
-the access search, of compiling the problem and of ``certified``, what plan and bound came to,
-when the gap was first within some shares of the bound, and the most memory that was held.
-The files are those of the public benchmark (see ``benchmarks.fleet_missions``).
+Runs each case in a process of its own, after a warm-up, for so many CPU seconds. Prints
+opportunities, CPU seconds of the access search, of compiling the problem and of ``certified``, what
+plan and bound came to, the most memory that was held, and when the gap was first within some
+shares of the bound. The files are those of the public benchmark (``benchmarks.fleet_missions``).
 """
 
 from __future__ import annotations
