@@ -27,6 +27,7 @@ from planner_core.solvers import SOLVERS, Certified, Graph, Rule
 from planner_core.solvers.base import Budget, Solver
 
 _START: Final = datetime(2026, 1, 1, tzinfo=UTC)
+_FEW: Final = 40  # targets
 
 
 def main() -> None:
@@ -47,14 +48,25 @@ def warm_up() -> None:
     crowd = zip(random.uniform(60, 85, 120), random.uniform(-180, 180, 120), strict=True)
     crowded = _mission(crowd, use_resources=False)
     _plan(crowded, [Certified(), Graph(path="longest")])
-    # A choice of starts has a bound of its own.
-    _plan(replace(crowded, collect_spacing_s=30.0), [Rule()])
+    # A choice of starts, free starts and fleets have bounds and searches of their own.
+    few = replace(crowded, targets=crowded.targets[:_FEW])
+    _plan(replace(few, collect_spacing_s=30.0), [Rule(), Certified()])
+    _plan(replace(few, continuous_starts=True), [Rule(), Certified()])
+    _plan(replace(few, satellites=_two(few.satellites[0])), [Rule(), Certified()])
+    fed = _mission(over_the_globe, use_resources=True)
+    _plan(replace(fed, continuous_starts=True), [Rule(), Certified(gap=0.5)])
 
 
 def _plan(scenario: Scenario, solvers: Iterable[Solver]) -> None:
     opportunities = None
     for solver in solvers:
         opportunities = plan_scenario(scenario, solver, 0, Budget(), opportunities).opportunities
+
+
+def _two(satellite: Satellite) -> tuple[Satellite, Satellite]:
+    """Return a satellite and another that follows it."""
+    later = replace(satellite.orbit, mean_anomaly_deg=20.0, norad_cat_id=2)
+    return satellite, replace(satellite, id="later", orbit=later)
 
 
 def _mission(
