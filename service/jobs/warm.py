@@ -51,7 +51,7 @@ def warm_up() -> None:
     # A choice of starts, free starts and fleets have bounds and searches of their own.
     few = replace(crowded, targets=crowded.targets[:_FEW])
     _plan(replace(few, collect_spacing_s=30.0), [Rule(), Certified()])
-    _plan(replace(few, continuous_starts=True), [Rule(), Certified()])
+    _plan(replace(crowded, continuous_starts=True), [Rule(), Certified(moves_per_task=1.0)])
     _plan(replace(few, satellites=_two(few.satellites[0])), [Rule(), Certified()])
     fed = _mission(over_the_globe, use_resources=True)
     _plan(replace(fed, continuous_starts=True), [Rule(), Certified(gap=0.5)])
