@@ -26,7 +26,7 @@ def main(table: str, picture: str) -> None:
             top = float(row["bound"])
             axes.hlines(
                 top, place - 0.31, place + 0.31, color="#b3261e", linewidth=2,
-                label="proven bound" if place == 0 else None,
+                label="proven bound" if place == 0 else "_",
             )  # fmt: skip
         axes.annotate(
             f"{rewards[place]:g}" + (f"  {row['gain']}" if place else ""),
