@@ -118,6 +118,14 @@ class Budget:
         """Return why a spent budget ended the search."""
         return Termination.CANCELLED if self._cancelled else Termination.TIME_LIMIT
 
+    def ending(self, *, is_optimal: bool, is_close: bool) -> Termination:
+        """Return why a search for plan and bound has ended: by what it found, or by the budget."""
+        if is_optimal:
+            return Termination.OPTIMAL
+        if is_close:
+            return Termination.GAP_REACHED
+        return self.termination() if self.is_spent() else Termination.HORIZON_COMPLETE
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Solution:

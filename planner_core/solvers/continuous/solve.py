@@ -84,14 +84,7 @@ class _Meeting:
         )  # fmt: skip
 
     def solution(self) -> Solution:
-        if self.is_optimal:
-            termination = Termination.OPTIMAL
-        elif self.is_close:
-            termination = Termination.GAP_REACHED
-        elif self.budget.is_spent():
-            termination = self.budget.termination()
-        else:
-            termination = Termination.HORIZON_COMPLETE
+        termination = self.budget.ending(is_optimal=self.is_optimal, is_close=self.is_close)
         return Solution(plan=self.plan, termination=termination, proven=self.bound)
 
 

@@ -21,7 +21,7 @@ from planner_core.bounds.lagrangian import default_steps
 from planner_core.bounds.network import network_of
 from planner_core.plan import Plan
 from planner_core.problem import COLLECT, Floats, Problem
-from planner_core.solvers.base import Budget, Progress, Solution, Termination
+from planner_core.solvers.base import Budget, Progress, Solution
 from planner_core.solvers.fleet.start import priced_start
 from planner_core.solvers.fleet.stream import WindowStream
 from planner_core.solvers.free.search import TOLERANCE, Effort, FreeSearch, close_in, solve_free
@@ -166,14 +166,7 @@ class FleetSearch:
 
     def solution(self) -> Solution:
         """Return the plan with what is known of it."""
-        if self.is_optimal:
-            termination = Termination.OPTIMAL
-        elif self.is_close:
-            termination = Termination.GAP_REACHED
-        elif self.budget.is_spent():
-            termination = self.budget.termination()
-        else:
-            termination = Termination.HORIZON_COMPLETE
+        termination = self.budget.ending(is_optimal=self.is_optimal, is_close=self.is_close)
         if self.problem.continuous_starts:
             # The bound does not cover the freedom to shift tasks.
             return Solution(plan=self.plan, termination=termination)

@@ -29,7 +29,7 @@ from planner_core.comparable import is_transitive, num_near_pairs
 from planner_core.plan import Plan
 from planner_core.problem import Bools, Floats, Ints, Problem
 from planner_core.restrict import restricted
-from planner_core.solvers.base import Budget, Progress, Solution, Termination
+from planner_core.solvers.base import Budget, Progress, Solution
 from planner_core.solvers.free.master import Master
 from planner_core.solvers.free.prover import Prover
 from planner_core.solvers.graph import Graph
@@ -379,17 +379,9 @@ class FreeSearch:
         """Return the plan with what is known of it."""
         if self.problem.continuous_starts:
             # The bound does not cover the freedom to shift tasks.
-            is_cut_short = self.budget.is_spent()
-            ended = self.budget.termination() if is_cut_short else Termination.HORIZON_COMPLETE
+            ended = self.budget.ending(is_optimal=False, is_close=False)
             return Solution(plan=self.plan, termination=ended)
-        if self.is_optimal:
-            termination = Termination.OPTIMAL
-        elif self.is_close:
-            termination = Termination.GAP_REACHED
-        elif self.budget.is_spent():
-            termination = self.budget.termination()
-        else:
-            termination = Termination.HORIZON_COMPLETE
+        termination = self.budget.ending(is_optimal=self.is_optimal, is_close=self.is_close)
         prices = self._prices
         if prices and rounded_bound(self.problem, prices.bound, self.reward) <= self.bound:
             proven = Bound(
