@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import fields, replace
 
 import numpy as np
 import numpy.typing as npt
 
-from planner_core.problem import Opportunities, Problem, build_satellite_problem
+from planner_core.problem import (
+    Floats,
+    Ints,
+    Opportunities,
+    Pinned,
+    Problem,
+    build_satellite_problem,
+)
 
 
 def restricted(problem: Problem, rows: npt.NDArray[np.integer]) -> Problem:
@@ -26,22 +34,48 @@ def restricted(problem: Problem, rows: npt.NDArray[np.integer]) -> Problem:
             replace(k, row=int(place[k.row])) for k in problem.pinned.kept if is_left[k.row]
         ),
     )
+    return with_table(
+        problem,
+        part,
+        pinned=pinned,
+        origin=rows,
+        events=[(s.event_s, s.event[is_left[s.rows]]) for s in problem.satellites],
+    )
+
+
+def with_table(
+    problem: Problem,
+    table: Opportunities,
+    *,
+    pinned: Pinned,
+    origin: npt.NDArray[np.integer],
+    events: Sequence[tuple[Floats, Ints] | None],
+) -> Problem:
+    """Return the problem with another table of opportunities.
+
+    Parameters
+    ----------
+    origin
+        The row of the problem's table that each stands for.
+    events
+        By satellite, ``event_s`` and ``event`` where there are more of them than opportunities.
+    """
     return replace(
         problem,
-        opportunities=part,
+        opportunities=table,
         pinned=pinned,
-        origin=(rows if problem.origin is None else problem.origin[rows]).astype(np.int32),
+        origin=(origin if problem.origin is None else problem.origin[origin]).astype(np.int32),
         satellites=tuple(
             build_satellite_problem(
                 index,
-                part,
+                table,
                 id=satellite.id,
                 name=satellite.name,
                 agility=satellite.agility,
                 resources=satellite.resources,
                 sunlight=satellite.sunlight,
-                events=(satellite.event_s, satellite.event[is_left[satellite.rows]]),
+                events=own,
             )
-            for index, satellite in enumerate(problem.satellites)
+            for index, (satellite, own) in enumerate(zip(problem.satellites, events, strict=True))
         ),
     )

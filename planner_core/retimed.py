@@ -15,8 +15,8 @@ from planner_core.problem import (
     Ints,
     Opportunities,
     Problem,
-    build_satellite_problem,
 )
+from planner_core.restrict import with_table
 from planner_core.slew import TIME_TOLERANCE_S
 
 
@@ -68,23 +68,8 @@ def retimed(problem: Problem, rows: Ints, start_s: Floats) -> Retimed:
             for target, struck in problem.pinned.struck.items()
         },
     )
-    made = replace(
-        problem,
-        opportunities=part,
-        pinned=pinned,
-        origin=rows if problem.origin is None else problem.origin[rows],
-        satellites=tuple(
-            build_satellite_problem(
-                index,
-                part,
-                id=satellite.id,
-                name=satellite.name,
-                agility=satellite.agility,
-                resources=satellite.resources,
-                sunlight=satellite.sunlight,
-            )
-            for index, satellite in enumerate(problem.satellites)
-        ),
+    made = with_table(
+        problem, part, pinned=pinned, origin=rows, events=[None] * len(problem.satellites)
     )
     return Retimed(made, rows)
 

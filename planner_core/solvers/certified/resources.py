@@ -20,7 +20,7 @@ from planner_core.bounds.lagrangian import lagrangian_bound
 from planner_core.bounds.resource_bound import quick_bound
 from planner_core.plan import Plan
 from planner_core.problem import CONTACT, Bools, Problem
-from planner_core.solvers.base import Budget, Progress, Solution, Termination
+from planner_core.solvers.base import Budget, Progress, Solution
 from planner_core.solvers.certified.choices import ChoiceSearch
 from planner_core.solvers.certified.contact_sets import FixedContacts, Relaxation
 from planner_core.solvers.certified.resource_prices import PriceSearch
@@ -257,14 +257,10 @@ class ResourceSearch:
 
     def solution(self) -> Solution:
         """Return the plan with what is known of it."""
-        if self.is_optimal and self.is_valid:
-            termination = Termination.OPTIMAL
-        elif self.is_close and self.is_valid:
-            termination = Termination.GAP_REACHED
-        elif self.budget.is_spent():
-            termination = self.budget.termination()
-        else:
-            termination = Termination.HORIZON_COMPLETE
+        termination = self.budget.ending(
+            is_optimal=self.is_valid and self.is_optimal,
+            is_close=self.is_valid and self.is_close,
+        )
         if self.problem.continuous_starts:
             # Another start may suit the next task better: nothing here bounds that.
             return Solution(plan=self.plan, termination=termination)
