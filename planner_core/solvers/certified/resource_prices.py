@@ -64,7 +64,7 @@ class PriceSearch:
     def _unit(self, value: float) -> float:
         largest = max(len(s.satellite) for s in self._satellites)
         unit = 2.0 ** np.floor(np.log2(self._typical)) / _UNITS_PER_REWARD
-        while value / unit > _MAX_CELLS / largest:
+        while value / len(self._satellites) / unit > _MAX_CELLS / largest:
             unit *= 2.0
         return float(unit)
 

@@ -16,14 +16,16 @@ from typing import Final
 import numpy as np
 
 from planner_core.bounds.bound import Bound, reward_unit, rounded_bound
+from planner_core.bounds.energy_prices import EnergyPrices
 from planner_core.bounds.lagrangian import lagrangian_bound
 from planner_core.bounds.resource_bound import quick_bound
 from planner_core.plan import Plan
-from planner_core.problem import CONTACT, Bools, Problem
+from planner_core.problem import CONTACT, Bools, Floats, Problem
 from planner_core.solvers.base import Budget, Progress, Solution
 from planner_core.solvers.certified.choices import ChoiceSearch
 from planner_core.solvers.certified.contact_sets import FixedContacts, Relaxation
 from planner_core.solvers.certified.resource_prices import PriceSearch
+from planner_core.solvers.certified.turns import TurnSearch
 from planner_core.solvers.fleet.search import solve_without_resources
 from planner_core.solvers.free.search import TOLERANCE, Effort
 from planner_core.solvers.milp import Milp
@@ -38,7 +40,11 @@ _FURTHER_MOVES: Final = 20  # after each round of that
 _FIRST_STEPS: Final = 2  # of the search for prices, where sets of contacts gave new ones
 _STEPS: Final = 8
 _PATIENCE: Final = 3  # rounds without a new set of contacts or a better plan
-_FLEET_PATIENCE: Final = 12  # the same of a fleet, which HiGHS is of no help for
+_FLEET_PATIENCE: Final = 300  # turns of a fleet without a better plan
+_FLEET_FIRST_TURNS: Final = 8  # of the window search alone
+_FLEET_ROUNDS: Final = 400  # of the search for a fleet's prices
+_ROUNDS_AT_A_TIME: Final = 20
+_FLEET_STEPS: Final = 3  # of prices with recorders, from there
 _SETS_AT_A_TIME: Final = 2
 _AS_GOOD: Final = 0.75  # of a target: sets whose prices count
 _OFFERED: Final = (700, 1000)  # tasks in a search with fixed contacts
@@ -129,9 +135,7 @@ class ResourceSearch:
         # Its plans are not for this problem: they are not reported.
         quiet = Budget(self.budget.remaining_s())
         quiet.stop = self.budget.stop
-        # What a fleet gains by cutting planes is little beside what battery and recorder take.
-        effort = Effort(moves_per_task=5.0, max_rounds=0) if self.is_fleet else Effort()
-        solution = solve_without_resources(free, quiet, self.seed, self.gap, effort)
+        solution = solve_without_resources(free, quiet, self.seed, self.gap, Effort())
         if solution.proven is not None:
             self.lower(solution.proven)
         self.report("without resources")
@@ -164,6 +168,13 @@ class ResourceSearch:
                 Bound(value=prices.value, proof="dp", prices=prices.prices, unit=prices.unit)
             )
         self.report("prices")
+
+    def prices(self) -> Floats:
+        """Return prices to begin with."""
+        known = self.bound.prices
+        if known is None:
+            known = lagrangian_bound(self.problem, self.reward).prices
+        return np.zeros(len(self.problem.target_ids)) if known is None else known
 
     def relax_sets(self, prices: PriceSearch, choices: ChoiceSearch) -> bool:
         """Learn prices from the relaxations of sets of contacts; return whether any is new."""
@@ -278,6 +289,9 @@ def solve_with_resources(problem: Problem, budget: Budget, seed: int, gap: float
     if unit == 0.0 or search.bound.value / unit > _MAX_UNITS:
         unit = max(search.bound.value / _MAX_UNITS, 1e-12)
     choices = ChoiceSearch(problem, unit, seed, budget.stop)
+    if search.is_fleet:
+        _close_in_fleet(search, choices)
+        return search.solution()
     choices.start(search.mask([]), _FIRST_GOAL)
     search.offer(choices.plan)
     search.report("plans")
@@ -287,31 +301,57 @@ def solve_with_resources(problem: Problem, budget: Budget, seed: int, gap: float
         search.offer(choices.plan)
     search.search(choices, int(np.clip(len(problem.opportunities) // _TASKS_A_MOVE, *_FIRST_MOVES)))
     _close_in(search, choices)
-    if not search.is_done and not search.is_fleet:
+    if not search.is_done:
         search.exhaust()
     return search.solution()
+
+
+def _close_in_fleet(search: ResourceSearch, choices: ChoiceSearch) -> None:
+    """Search for plans, for prices, and for plans again until that gets nowhere.
+
+    HiGHS is of no help for a fleet.
+    """
+    turns = TurnSearch(search.problem, choices, search.plan, search.budget, search.seed)
+    turns.windows(_FLEET_FIRST_TURNS)
+    search.offer(turns.plan)
+    search.report("plans")
+    _price_fleet(search)
+    idle_turns = 0
+    while idle_turns < _FLEET_PATIENCE and not search.is_done:
+        turns.turn()
+        is_better = turns.reward > search.reward + 1e-12 and search.offer(turns.plan)
+        idle_turns = 0 if is_better else idle_turns + 1
+        search.report("plans")
+
+
+def _price_fleet(search: ResourceSearch) -> None:
+    """Search for prices by energy alone, and see what they prove with recorders.
+
+    Of what recorders take from the bound the exact programmes find nearly all at these prices;
+    to search with them takes fifty times as long, and brings next to nothing.
+    """
+    energy = EnergyPrices(search.problem, search.prices(), _FLEET_ROUNDS, search.seed)
+    while not (energy.is_settled or search.is_done):
+        energy.improve(_ROUNDS_AT_A_TIME, search.budget.stop)
+        search.report("prices")
+    if search.is_done:
+        return
+    prices = PriceSearch(
+        search.problem, min(search.bound.value, energy.value), energy.prices, search.budget.stop
+    )
+    prices.learn(search.plan)
+    search.price(prices, _FLEET_STEPS)
 
 
 def _close_in(search: ResourceSearch, choices: ChoiceSearch) -> None:
     """Search for prices and plans in turn, until neither gets anywhere."""
     if search.is_done:
         return
-    start = search.bound.prices
-    if start is None:
-        start = lagrangian_bound(search.problem, search.reward).prices
-    if start is None:
-        start = np.zeros(len(search.problem.target_ids))
-    prices = PriceSearch(
-        search.problem,
-        search.bound.value,
-        start,
-        search.budget.stop,
-    )
+    prices = PriceSearch(search.problem, search.bound.value, search.prices(), search.budget.stop)
     prices.learn(search.plan)
     is_large = len(search.problem.opportunities) > _LARGE
     idle_rounds = 0
-    patience = _FLEET_PATIENCE if search.is_fleet else _PATIENCE
-    while idle_rounds < patience and not search.is_done:
+    while idle_rounds < _PATIENCE and not search.is_done:
         is_new = search.relax_sets(prices, choices)
         # Where steps take long, a search for the last image is tried before them.
         is_better = is_large and not is_new and search.fix_contacts(is_last=True)
