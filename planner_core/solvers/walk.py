@@ -9,9 +9,10 @@ from typing import Final
 
 import numpy as np
 
-from planner_core.jit import borrowing, kernel
+from planner_core.actions import next_action
+from planner_core.jit import inlined, kernel
 from planner_core.problem import Bytes, Ints
-from planner_core.track import NO_TASK, Track, is_safe, next_action, take
+from planner_core.track import NO_TASK, Track, take
 
 CONTACT_ABOVE: Final = 0.45
 """How full the recorder is before a contact is worth its power; between 0.35 and 0.45 the
@@ -23,7 +24,7 @@ CODE_COLLECTS_BELOW: Final = 0.5
 NOTHING_TAKEN: Final[Ints] = np.empty(0, dtype=np.int32)
 
 
-@borrowing
+@inlined
 def naive_select_action(
     track: Track,
     collected: Bytes,
@@ -47,8 +48,9 @@ def naive_select_action(
     row = cursor
     while row < m:
         row = next_action(
-            track, last, row + 1, battery, recorder, is_hard, collected, unimaged_only
-        )
+            track, last, row + 1, battery, recorder, is_hard, collected, unimaged_only,
+            contact_above,
+        )  # fmt: skip
         if row == m or not track.use_resources or row == track.next_kept[last + 1]:
             break
         battery_after, recorder_after, _ = take(track, last, row, battery, recorder)
@@ -58,10 +60,6 @@ def naive_select_action(
             if not track.is_contact[row] and recorder >= CODE_COLLECTS_BELOW:
                 continue
         elif battery_after <= track.battery_min or recorder_after > track.recorder_max:
-            continue
-        # A contact that is not worth it yet may pass, unless the recorder cannot do without.
-        may_pass = track.is_contact[row] and recorder < contact_above
-        if may_pass and (not track.is_guarded or is_safe(track, last, row, battery, recorder)):
             continue
         break
     return row

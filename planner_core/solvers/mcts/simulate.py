@@ -4,13 +4,23 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from planner_core.actions import is_repeated, may_wait, next_action
 from planner_core.draws import Uint64s, next_draw
-from planner_core.jit import borrowing
+from planner_core.jit import borrowing, inlined
 from planner_core.model import WAIT, Guidance, counts_as_made, task_reward
 from planner_core.problem import Bytes, Floats, Ints
-from planner_core.solvers.mcts.tree import UNSEEN, Tree, choose, has_room, new_edge, new_node
-from planner_core.solvers.walk import CONTACT_ABOVE, naive_select_action
-from planner_core.track import Track, is_repeated, may_wait, next_action, take
+from planner_core.solvers.mcts.successors import MOST, Successors, successors_of
+from planner_core.solvers.mcts.tree import (
+    ROLLED_OUT,
+    UNSEEN,
+    Tree,
+    choose,
+    has_room,
+    new_edge,
+    new_node,
+)
+from planner_core.solvers.walk import naive_select_action
+from planner_core.track import Track, take
 
 
 class Path(NamedTuple):
@@ -36,36 +46,87 @@ class Rules(NamedTuple):
     is_literal: bool
     is_greedy: bool
     is_max_backup: bool
+    contact_above: float
 
 
-@borrowing
-def expand(tree: Tree, track: Track, rules: Rules, collected: Bytes, node: int) -> None:
-    """Lines 5-8: enter A(s) with N = Q = 0. Its first task stands first, ``WAIT`` last."""
+@inlined
+def _enter_tasks(
+    track: Track,
+    rules: Rules,
+    guidance: Guidance,
+    successors: Successors,
+    collected: Bytes,
+    actions: Ints,
+    begin: int,
+    cursor: int,
+    last: int,
+    battery: float,
+    recorder: float,
+) -> int:
+    """Put the tasks of A(s) into ``actions`` from ``begin`` on and return where they end."""
     m = len(track.start_s)
-    tree.first_edge[node] = tree.used[1]
-    row = tree.cursor[node]
-    while tree.num_edges[node] < rules.breadth:
+    end = begin
+    row = cursor
+    if not track.use_resources and cursor == last:
+        at, known = successors_of(successors, track, guidance.gamma, rules.unimaged_only, last)
+        is_all = known - at < MOST
+        while at < known and end < begin + rules.breadth:
+            row = successors.row[at]
+            at += 1
+            if (
+                track.is_contact[row]
+                or not rules.unimaged_only
+                or not collected[track.place[row]]
+            ):
+                actions[end] = row
+                end += 1
+        if is_all:
+            return end
+    while end < begin + rules.breadth:
         row = next_action(
-            track, tree.last[node], row + 1, tree.battery[node], tree.recorder[node],
-            rules.is_hard, collected, rules.unimaged_only,
+            track, last, row + 1, battery, recorder, rules.is_hard, collected,
+            rules.unimaged_only, rules.contact_above,
         )  # fmt: skip
         if row == m:
             break
-        if not is_repeated(track, tree.action, tree.first_edge[node], tree.used[1], row):
-            new_edge(tree, node, row)
-    if tree.num_edges[node] == 0 or not track.use_resources:
-        return
-    first = tree.action[tree.first_edge[node]]
-    if may_wait(
-        track, tree.last[node], first, tree.battery[node], tree.recorder[node], rules.is_hard
-    ):
-        new_edge(tree, node, WAIT)
+        if not is_repeated(track, actions, begin, end, row):
+            actions[end] = row
+            end += 1
+    return end
 
 
 @borrowing
-def _rollout_action(
+def expand(
+    tree: Tree,
     track: Track,
     rules: Rules,
+    guidance: Guidance,
+    successors: Successors,
+    collected: Bytes,
+    node: int,
+) -> None:
+    """Lines 5-8: enter A(s) with N = Q = 0. Its first task stands first, ``WAIT`` last."""
+    begin = tree.used[1]
+    last, battery, recorder = tree.last[node], tree.battery[node], tree.recorder[node]
+    end = _enter_tasks(
+        track, rules, guidance, successors, collected, tree.action, begin,
+        tree.cursor[node], last, battery, recorder,
+    )  # fmt: skip
+    tree.first_edge[node] = begin
+    for edge in range(begin, end):
+        new_edge(tree, node, tree.action[edge])
+    if end == begin or not track.use_resources:
+        return
+    if may_wait(track, last, tree.action[begin], battery, recorder, rules.is_hard):
+        new_edge(tree, node, WAIT)
+
+
+@inlined
+def _random_action(
+    track: Track,
+    rules: Rules,
+    guidance: Guidance,
+    successors: Successors,
     collected: Bytes,
     random: Uint64s,
     actions: Ints,
@@ -74,25 +135,11 @@ def _rollout_action(
     battery: float,
     recorder: float,
 ) -> tuple[int, int]:
-    """Return an action of the rollout policy and the first task of A(s), or (m, m) at the end."""
+    """Return any action of A(s) and the first task of A(s), or (m, m) at the end."""
     m = len(track.start_s)
-    if rules.is_greedy:
-        row = naive_select_action(
-            track, collected, rules.is_hard, True, CONTACT_ABOVE,
-            cursor, last, battery, recorder,
-        )  # fmt: skip
-        return row, row
-    count = 0
-    row = cursor
-    while count < rules.breadth:
-        row = next_action(
-            track, last, row + 1, battery, recorder, rules.is_hard, collected, rules.unimaged_only
-        )
-        if row == m:
-            break
-        if not is_repeated(track, actions, 0, count, row):
-            actions[count] = row
-            count += 1
+    count = _enter_tasks(
+        track, rules, guidance, successors, collected, actions, 0, cursor, last, battery, recorder
+    )
     if count == 0:
         return m, m
     if track.use_resources and may_wait(track, last, actions[0], battery, recorder, rules.is_hard):
@@ -101,12 +148,44 @@ def _rollout_action(
     return actions[int(next_draw(random) * count)], actions[0]
 
 
+@inlined
+def _greedy_action(
+    track: Track,
+    rules: Rules,
+    guidance: Guidance,
+    successors: Successors,
+    collected: Bytes,
+    cursor: int,
+    last: int,
+    battery: float,
+    recorder: float,
+) -> tuple[int, float]:
+    """Return what the rule takes next, or m, and its discount, 0 where that is to be worked out."""
+    row = cursor
+    if not track.use_resources and cursor == last:
+        at, end = successors_of(successors, track, guidance.gamma, rules.unimaged_only, last)
+        is_all = end - at < MOST
+        while at < end:
+            row = successors.row[at]
+            if track.is_contact[row] or not collected[track.place[row]]:
+                return row, successors.discount[at]
+            at += 1
+        if is_all:
+            return len(track.start_s), 0.0
+    row = naive_select_action(
+        track, collected, rules.is_hard, True, rules.contact_above,
+        row, last, battery, recorder,
+    )  # fmt: skip
+    return row, 0.0
+
+
 @borrowing
 def _simulate(
     tree: Tree,
     track: Track,
     rules: Rules,
     guidance: Guidance,
+    successors: Successors,
     target_reward: Floats,
     collected: Bytes,
     random: Uint64s,
@@ -125,15 +204,30 @@ def _simulate(
     d = 0
     is_rollout = False
     while d < depth:
-        if not is_rollout and tree.first_edge[node] == UNSEEN:
-            if node == root or has_room(tree, rules.breadth):
-                expand(tree, track, rules, collected, node)
-            # The listing rolls out from a new state; the root itself is searched at once.
-            is_rollout = node != root
+        if not is_rollout and tree.first_edge[node] < 0:
+            # The listing rolls out from a new state; the root itself is searched at once. What
+            # may be done in a state is looked for when it is met again, which most never are.
+            is_met = node == root or tree.first_edge[node] == ROLLED_OUT
+            if node != root and not has_room(tree, rules.breadth):
+                is_rollout = True
+            elif is_met:
+                expand(tree, track, rules, guidance, successors, collected, node)
+            else:
+                tree.first_edge[node] = ROLLED_OUT
+                is_rollout = True
+        discount = 0.0
         if is_rollout:
-            action, first = _rollout_action(
-                track, rules, collected, random, path.options, cursor, last, battery, recorder
-            )
+            if rules.is_greedy:
+                action, discount = _greedy_action(
+                    track, rules, guidance, successors, collected,
+                    cursor, last, battery, recorder,
+                )  # fmt: skip
+                first = action
+            else:
+                action, first = _random_action(
+                    track, rules, guidance, successors, collected, random, path.options,
+                    cursor, last, battery, recorder,
+                )  # fmt: skip
             if action == m:
                 break
         else:
@@ -147,7 +241,8 @@ def _simulate(
         path.image[d] = -1
         row = first if action == WAIT else action
         sojourn_s = track.start_s[row] - now_s
-        discount = guidance.gamma**sojourn_s
+        if discount == 0.0:
+            discount = guidance.gamma**sojourn_s
         if action == WAIT:
             path.reward[d] = guidance.sunpoint_reward_per_s * sojourn_s
         else:
@@ -206,6 +301,7 @@ def search(
     track: Track,
     rules: Rules,
     guidance: Guidance,
+    successors: Successors,
     target_reward: Floats,
     collected: Bytes,
     random: Uint64s,
@@ -224,6 +320,7 @@ def search(
             track,
             rules,
             guidance,
+            successors,
             target_reward,
             collected,
             random,
@@ -233,7 +330,7 @@ def search(
             best_actions,
         )
     chosen = UNSEEN
-    if tree.first_edge[0] == UNSEEN:
+    if tree.first_edge[0] < 0:
         return chosen
     for edge in range(tree.first_edge[0], tree.first_edge[0] + tree.num_edges[0]):
         if tree.visits[edge] == 0:
