@@ -25,8 +25,8 @@ def next_action(
     """Return the first row from ``from_row`` on that may be taken after ``last``, or ``m``.
 
     With ``is_hard`` an action must also keep the limits, now and (see ``is_safe``) to the end of
-    the horizon. A contact must be worth it (see ``is_worth_no_contact``). A(s) ends with the next
-    task that must be taken, and what that one could not follow is not in it.
+    the horizon. Contacts that may as well pass (see ``contact_may_pass``) are left out. A(s) ends
+    with the next task that must be taken, and what that one could not follow is not in it.
     """
     # Rows that start before the last task ends need no look.
     first = from_row if last < 0 else max(from_row, track.near_from[last])
@@ -54,7 +54,7 @@ def next_action(
                 continue
         if not may_follow(last, row, track.near_from, track.far_from, track.offset, track.bits):
             continue
-        if row != kept and is_worth_no_contact(track, last, row, battery, recorder, contact_above):
+        if row != kept and contact_may_pass(track, last, row, battery, recorder, contact_above):
             continue
         # Without a way to keep the limits, what must be taken comes before them.
         if track.use_resources and is_hard and (row != kept or track.is_guarded):
@@ -67,14 +67,17 @@ def next_action(
 
 
 @inlined
-def is_worth_no_contact(
+def contact_may_pass(
     track: Track, last: int, row: int, battery: float, recorder: float, contact_above: float
 ) -> bool:
-    """Return whether ``row`` is a contact that may as well pass.
+    """Return whether ``row`` is a contact that is not worth its power and time yet.
 
-    That is while the recorder is less full than ``contact_above``, unless it cannot do without.
+    That is while the recorder is less full than ``contact_above`` and has room for what is
+    written until the next contact, and the limits can be kept without this one.
     """
     if not (track.use_resources and track.is_contact[row] and recorder < contact_above):
+        return False
+    if recorder + track.fill_ahead[row] >= track.recorder_max:
         return False
     return not track.is_guarded or is_safe(track, last, row, battery, recorder)
 
@@ -129,9 +132,7 @@ def _first_charged(
         before, beyond, stride = beyond, min(end, beyond + stride), 2 * stride
     while beyond - before > 1:
         middle = (before + beyond) // 2
-        if _is_charged(
-            charge_to_s[middle] - charge_from_s, charge_per_s, battery, cost, least
-        ):
+        if _is_charged(charge_to_s[middle] - charge_from_s, charge_per_s, battery, cost, least):
             beyond = middle
         else:
             before = middle

@@ -56,8 +56,9 @@ class Track(NamedTuple):
     ``first_offer`` is the first row of the same access: itself, unless the access offers several
     collects to choose from. ``next_kept[i]`` and ``next_contact[i]`` are the first row from ``i``
     on that must be taken and the first contact, m where there is none (shape ``(m + 1,)``).
-    ``least_cost`` and ``least_fill`` are what the cheapest collect takes of the battery and of
-    the recorder's room. ``fallbacks`` lists the usable contact rows and
+    ``fill_ahead[i]`` is about what may be written between the start of row ``i`` and that of the
+    next contact; ``least_cost`` and ``least_fill`` are what the cheapest collect takes of the
+    battery and writes. ``fallbacks`` lists the usable contact rows and
     those that must be taken; ``fallback_after[i]`` is the place in it of the first one after
     row ``i - 1`` (shape ``(m + 1,)``).
     ``fallback_*`` hold, for each of them, up to eight pairs (battery needed, recorder
@@ -92,6 +93,7 @@ class Track(NamedTuple):
     recorder_start: float
     next_kept: Ints
     next_contact: Ints
+    fill_ahead: Floats
     least_cost: float
     least_fill: float
     fallbacks: Ints
@@ -126,7 +128,8 @@ def compile_track(problem: Problem, satellite: SatelliteProblem, blocked: Bytes)
     is_kept[problem.kept_local(satellite)] = True
     fallbacks = np.flatnonzero((is_contact == 1) & (blocked == 0) | is_kept).astype(np.int32)
     access = problem.opportunities.access[satellite.rows]
-    _, first_offer, offer_of = np.unique(access, return_index=True, return_inverse=True)
+    _, first_of_access, access_of = np.unique(access, return_index=True, return_inverse=True)
+    first_offer = first_of_access[access_of].astype(np.int32)
     columns = _resource_columns(problem, satellite, is_contact)
     is_collect = is_contact == 0
     track = Track(
@@ -134,7 +137,7 @@ def compile_track(problem: Problem, satellite: SatelliteProblem, blocked: Bytes)
         end_s=satellite.end_s,
         is_contact=is_contact,
         place=satellite.place,
-        first_offer=first_offer[offer_of].astype(np.int32),
+        first_offer=first_offer,
         blocked=blocked,
         near_from=satellite.transitions.near_from,
         far_from=satellite.transitions.far_from,
@@ -144,6 +147,7 @@ def compile_track(problem: Problem, satellite: SatelliteProblem, blocked: Bytes)
         **columns,
         next_kept=_next_of(is_kept),
         next_contact=_next_of(~is_collect),
+        fill_ahead=_fill_ahead(problem, satellite, first_offer, blocked),
         least_cost=float(columns["battery_cost"][is_collect].min(initial=np.inf)),
         least_fill=float(columns["recorder_gain"][is_collect].min(initial=np.inf)),
         fallbacks=fallbacks,
@@ -166,6 +170,25 @@ def _next_of(is_such: Bools) -> Ints:
     m = len(is_such)
     found = np.where(np.append(is_such, True), np.arange(m + 1), m)
     return np.minimum.accumulate(found[::-1])[::-1].astype(np.int32)
+
+
+def _fill_ahead(
+    problem: Problem, satellite: SatelliteProblem, first_offer: Ints, blocked: Bytes
+) -> Floats:
+    r = satellite.resources
+    m = len(satellite)
+    rows = np.arange(m)
+    usable = np.flatnonzero((satellite.kind == CONTACT) & (blocked == 0))
+    after = np.searchsorted(usable, rows, side="right")
+    wait_s = np.append(satellite.start_s[usable], problem.horizon_s)[after] - satellite.start_s
+    # In the long run the battery pays for a part of the time, and each access is collected once.
+    busy = r.sunpoint_charge_per_s + r.collect_drain_per_s
+    duty = r.sunpoint_charge_per_s / busy if busy > 0.0 else 1.0
+    is_collect = (satellite.kind != CONTACT) & (first_offer == rows)
+    collects_s = np.where(is_collect, satellite.end_s - satellite.start_s, 0.0)
+    until_s = np.concatenate([[0.0], np.cumsum(collects_s)])
+    offered_s = until_s[np.append(usable, m)[after]] - until_s[rows]
+    return r.collect_fill_per_s * np.minimum(offered_s, duty * wait_s) + r.telemetry_per_s * wait_s
 
 
 def _resource_columns(

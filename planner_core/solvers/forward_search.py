@@ -34,7 +34,7 @@ from planner_core.solvers.base import (
 )
 from planner_core.solvers.lns import polished
 from planner_core.solvers.sequential import Turn, plan_in_turn
-from planner_core.solvers.walk import CONTACT_ABOVE
+from planner_core.solvers.walk import CONTACT_ABOVE, contact_above_metadata
 from planner_core.track import NO_TASK, Track, take
 
 Discount = Literal["action", "next_action"]
@@ -260,12 +260,7 @@ class ForwardSearch:
     )
     contact_above_fraction: float = field(
         default=CONTACT_ABOVE,
-        metadata={
-            "minimum": 0,
-            "maximum": 1,
-            "description": "Leave contacts out of A(s) until the recorder is at least this full. "
-            "The paper's search has 0, every contact.",
-        },
+        metadata=contact_above_metadata("The paper's search has 0, every contact in A(s)."),
     )
     penalty: float = field(
         default=1e4,

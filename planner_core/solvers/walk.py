@@ -18,6 +18,17 @@ CONTACT_ABOVE: Final = 0.45
 """How full the recorder is before a contact is worth its power; between 0.35 and 0.45 the
 paper's mission keeps most images."""
 
+
+def contact_above_metadata(note: str) -> dict[str, object]:
+    """Return what the API says of a solver's ``contact_above_fraction``, and a note of its own."""
+    return {
+        "minimum": 0,
+        "maximum": 1,
+        "description": "Take a contact only when the recorder is at least this full, or would "
+        f"be full before the next contact. {note}",
+    }
+
+
 CODE_COLLECTS_BELOW: Final = 0.5
 """How full the recorder may be for a collect in the rule of the authors' code."""
 

@@ -20,11 +20,12 @@ from planner_core.solvers.base import (
     Solution,
 )
 from planner_core.solvers.lns import polished
-from planner_core.solvers.mcts.simulate import Path, Rules, search, sunpoint_instead
+from planner_core.solvers.mcts.choices import Rules
+from planner_core.solvers.mcts.simulate import Path, search, sunpoint_instead
 from planner_core.solvers.mcts.successors import no_successors
 from planner_core.solvers.mcts.tree import UNSEEN, Tree, copy_branch, empty_tree, new_node
 from planner_core.solvers.sequential import Turn, plan_in_turn
-from planner_core.solvers.walk import CONTACT_ABOVE
+from planner_core.solvers.walk import CONTACT_ABOVE, contact_above_metadata
 from planner_core.track import NO_TASK
 
 MAX_ACTIONS: Final = 10_000_000
@@ -146,11 +147,8 @@ class Mcts:
     )
     contact_above_fraction: float = field(
         default=CONTACT_ABOVE,
-        metadata=_described(
-            "Leave contacts out of A(s) and of rollouts until the recorder is at least this "
-            "full. The paper's search has 0, every contact.",
-            minimum=0,
-            maximum=1,
+        metadata=contact_above_metadata(
+            "In A(s) and in rollouts alike; the paper has 0, every contact."
         ),
     )
 
