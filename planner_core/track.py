@@ -57,10 +57,10 @@ class Track(NamedTuple):
     collects to choose from. ``next_kept[i]`` and ``next_contact[i]`` are the first row from ``i``
     on that must be taken and the first contact, m where there is none (shape ``(m + 1,)``).
     ``fill_ahead[i]`` is about what may be written between the start of row ``i`` and that of the
-    next contact; ``least_cost`` and ``least_fill`` are what the cheapest collect takes of the
-    battery and writes. ``fallbacks`` lists the usable contact rows and
-    those that must be taken; ``fallback_after[i]`` is the place in it of the first one after
-    row ``i - 1`` (shape ``(m + 1,)``).
+    next contact, an image at least; ``least_cost`` and ``least_fill`` are what the cheapest
+    collect takes of the battery and writes. ``fallbacks`` lists the usable contact rows and those
+    that must be taken; ``fallback_after[i]`` is the place in it of the first one after row
+    ``i - 1`` (shape ``(m + 1,)``).
     ``fallback_*`` hold, for each of them, up to eight pairs (battery needed, recorder
     allowed) after it, from which the satellite can keep its limits to the end by these rows
     alone; shape ``(num_fallbacks, 8)``.
@@ -188,7 +188,10 @@ def _fill_ahead(
     collects_s = np.where(is_collect, satellite.end_s - satellite.start_s, 0.0)
     until_s = np.concatenate([[0.0], np.cumsum(collects_s)])
     offered_s = until_s[np.append(usable, m)[after]] - until_s[rows]
-    return r.collect_fill_per_s * np.minimum(offered_s, duty * wait_s) + r.telemetry_per_s * wait_s
+    # Where contacts follow each other closely, none may pass once not even one image fits in.
+    image_s = collects_s[is_collect].min() if is_collect.any() else 0.0
+    written_s = np.maximum(image_s, np.minimum(offered_s, duty * wait_s))
+    return r.collect_fill_per_s * written_s + r.telemetry_per_s * wait_s
 
 
 def _resource_columns(
