@@ -190,7 +190,7 @@ def _fill_ahead(
     offered_s = until_s[np.append(usable, m)[after]] - until_s[rows]
     # Where contacts follow each other closely, none may pass once not even one image fits in.
     image_s = collects_s[is_collect].min() if is_collect.any() else 0.0
-    written_s = np.maximum(image_s, np.minimum(offered_s, duty * wait_s))
+    written_s: Floats = np.maximum(image_s, np.minimum(offered_s, duty * wait_s))
     return r.collect_fill_per_s * written_s + r.telemetry_per_s * wait_s
 
 

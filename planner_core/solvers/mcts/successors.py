@@ -26,11 +26,12 @@ class Successors(NamedTuple):
     """The first tasks that may follow each one directly, of different accesses, in time order.
 
     Those of task ``i`` begin at ``MOST * (i + 1)``, those of the start at 0. Shape
-    ``(MOST * (m + 1),)``; ``count`` is of shape ``(m + 1,)``, and ``UNKNOWN`` before they are
-    looked for.
+    ``(MOST * (m + 1),)`` unless said otherwise.
 
     Attributes
     ----------
+    known
+        How many a task has, or ``UNKNOWN`` before they are looked for. Shape ``(m + 1,)``.
     discount
         Of each, from the start of the task before it.
     imaged
@@ -39,7 +40,7 @@ class Successors(NamedTuple):
 
     row: Ints
     discount: Floats
-    count: Ints
+    known: Ints
     imaged: Bytes
 
 
@@ -48,7 +49,7 @@ def no_successors(num_rows: int, imaged: Bytes) -> Successors:
     return Successors(
         row=np.empty(MOST * (num_rows + 1), dtype=np.int32),
         discount=np.empty(MOST * (num_rows + 1)),
-        count=np.full(num_rows + 1, UNKNOWN, dtype=np.int32),
+        known=np.full(num_rows + 1, UNKNOWN, dtype=np.int32),
         imaged=imaged,
     )
 
@@ -71,7 +72,7 @@ def _find(
             successors.row[end] = row
             successors.discount[end] = gamma ** (track.start_s[row] - now_s)
             end += 1
-    successors.count[last + 1] = end - begin
+    successors.known[last + 1] = end - begin
 
 
 @inlined
@@ -79,7 +80,7 @@ def successors_of(
     successors: Successors, track: Track, gamma: float, unimaged_only: bool, last: int
 ) -> tuple[int, int]:
     """Return where the successors of a task begin and end."""
-    if successors.count[last + 1] == UNKNOWN:
+    if successors.known[last + 1] == UNKNOWN:
         _find(successors, track, gamma, unimaged_only, last)
     begin = MOST * (last + 1)
-    return begin, begin + successors.count[last + 1]
+    return begin, begin + successors.known[last + 1]
