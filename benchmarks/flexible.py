@@ -3,7 +3,8 @@
 Prints, for each size of the paper's mission without resources and each ``collect_spacing_s``, what
 solver ``certified`` comes to on one core in ``LIMIT_S`` CPU seconds: plan, bound, gap, CPU seconds
 and peak memory. One run each, in a process of its own, after a warm-up on a small mission; access
-and opportunities are not counted. Beside it the plan of forward search (3, 3) and its CPU seconds.
+and opportunities are not counted. Beside it the plans of forward search (3, 3) and of MCTS with its
+defaults, and their CPU seconds.
 
 ``python -m benchmarks.flexible 1000 --spacings 15 5 --draw 1`` picks sizes, spacings and a draw.
 """
@@ -37,7 +38,7 @@ def mission(num_targets: int, draw: int, spacing_s: float | None) -> Problem:
 
 def one(num_targets: int, draw: int, spacing_s: float | None) -> dict[str, Any]:
     """Return what one solve came to, after a warm-up."""
-    from planner_core.solvers import Certified, ForwardSearch
+    from planner_core.solvers import Certified, ForwardSearch, Mcts
     from planner_core.solvers.base import Budget
     from planner_core.timeline import replay
 
@@ -45,11 +46,14 @@ def one(num_targets: int, draw: int, spacing_s: float | None) -> dict[str, Any]:
         small = mission(WARM_UP, 99, warm_s)
         Certified().solve(small, Budget(), 0)
         ForwardSearch().solve(small, Budget(), 0)
+        Mcts().solve(small, Budget(), 0)
     began = time.process_time()
     problem = mission(num_targets, draw, spacing_s)
     build_s, began = time.process_time() - began, time.process_time()
     forward = replay(problem, ForwardSearch().solve(problem, Budget(), 0).plan).reward
     forward_s, began = time.process_time() - began, time.process_time()
+    mcts = replay(problem, Mcts().solve(problem, Budget(), 0).plan).reward
+    mcts_s, began = time.process_time() - began, time.process_time()
     solution = Certified().solve(problem, CpuBudget(LIMIT_S, time.time() + 10.0 * LIMIT_S), 0)
     cpu_s = time.process_time() - began
     timeline = replay(problem, solution.plan)
@@ -63,6 +67,8 @@ def one(num_targets: int, draw: int, spacing_s: float | None) -> dict[str, Any]:
         "build_s": build_s,
         "forward": forward,
         "forward_s": forward_s,
+        "mcts": mcts,
+        "mcts_s": mcts_s,
         "peak_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0,
     }
 
@@ -93,7 +99,8 @@ def main() -> None:
         print(json.dumps(one(options.sizes[0], options.draw, options.spacings[0])))
         return
     print(f"{'targets':>7} {'spacing_s':>9} {'starts':>7} {'plan':>5} {'bound':>6} {'gap':>7} "
-          f"{'cpu_s':>6} {'peak_mb':>7} {'build_s':>7} {'forward':>7} {'cpu_s':>6}")  # fmt: skip
+          f"{'cpu_s':>6} {'peak_mb':>7} {'build_s':>7} {'forward':>7} {'cpu_s':>6} "
+          f"{'mcts':>5} {'cpu_s':>6}")  # fmt: skip
     for size in options.sizes:
         for spacing_s in options.spacings:
             r = apart(size, options.draw, spacing_s)
@@ -101,7 +108,8 @@ def main() -> None:
             name = "none" if spacing_s is None else f"{spacing_s:g}"
             print(f"{size:7} {name:>9} {r['opportunities']:7} {r['reward']:5.0f} "
                   f"{r['bound']:6.0f} {100 * gap:6.2f}% {r['cpu_s']:6.1f} {r['peak_mb']:7.0f} "
-                  f"{r['build_s']:7.1f} {r['forward']:7.0f} {r['forward_s']:6.1f}",
+                  f"{r['build_s']:7.1f} {r['forward']:7.0f} {r['forward_s']:6.1f} "
+                  f"{r['mcts']:5.0f} {r['mcts_s']:6.1f}",
                   flush=True)  # fmt: skip
 
 

@@ -8,9 +8,10 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from planner_core.actions import may_wait, next_action
 from planner_core.jit import inlined
 from planner_core.problem import Bytes, Floats
-from planner_core.track import NO_TASK, Track, may_wait, next_action, take
+from planner_core.track import NO_TASK, Track, take
 
 WAIT: Final = -1
 """The sun-point action: wait for the first opportunity one could take, and let it pass."""
@@ -113,6 +114,7 @@ class Model:
     guidance: Guidance
     is_hard: bool = True
     unimaged_only: bool = True
+    contact_above: float = 0.0
 
     def initial_state(self) -> State:
         """Return the state at the start of the horizon."""
@@ -139,7 +141,7 @@ class Model:
         while len(rows) < breadth:
             row = next_action(
                 self.track, state.last, row + 1, state.battery, state.recorder,
-                self.is_hard, collected, self.unimaged_only,
+                self.is_hard, collected, self.unimaged_only, self.contact_above,
             )  # fmt: skip
             if row == len(self.track.start_s):
                 break

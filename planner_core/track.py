@@ -31,6 +31,7 @@ import numpy as np
 from planner_core.jit import borrowing, inlined
 from planner_core.problem import (
     CONTACT,
+    Bools,
     Bytes,
     Floats,
     Ints,
@@ -53,10 +54,13 @@ class Track(NamedTuple):
     """One satellite's problem as plain arrays; shape ``(m,)`` unless said otherwise.
 
     ``first_offer`` is the first row of the same access: itself, unless the access offers several
-    collects to choose from. ``next_kept[i]`` is the first row from ``i`` on that must be taken, m
-    where there is none (shape ``(m + 1,)``). ``fallbacks`` lists the usable contact rows and
-    those that must be taken; ``fallback_after[i]`` is the place in it of the first one after
-    row ``i - 1`` (shape ``(m + 1,)``).
+    collects to choose from. ``next_kept[i]`` and ``next_contact[i]`` are the first row from ``i``
+    on that must be taken and the first contact, m where there is none (shape ``(m + 1,)``).
+    ``fill_ahead[i]`` is about what may be written between the start of row ``i`` and that of the
+    next contact, an image at least; ``least_cost`` and ``least_fill`` are what the cheapest
+    collect takes of the battery and writes. ``fallbacks`` lists the usable contact rows and those
+    that must be taken; ``fallback_after[i]`` is the place in it of the first one after row
+    ``i - 1`` (shape ``(m + 1,)``).
     ``fallback_*`` hold, for each of them, up to eight pairs (battery needed, recorder
     allowed) after it, from which the satellite can keep its limits to the end by these rows
     alone; shape ``(num_fallbacks, 8)``.
@@ -88,6 +92,10 @@ class Track(NamedTuple):
     battery_start: float
     recorder_start: float
     next_kept: Ints
+    next_contact: Ints
+    fill_ahead: Floats
+    least_cost: float
+    least_fill: float
     fallbacks: Ints
     fallback_after: Ints
     fallback_battery: Floats
@@ -118,24 +126,30 @@ def compile_track(problem: Problem, satellite: SatelliteProblem, blocked: Bytes)
     is_contact = (satellite.kind == CONTACT).astype(np.uint8)
     is_kept = np.zeros(m, dtype=np.bool_)
     is_kept[problem.kept_local(satellite)] = True
-    next_kept = np.where(np.append(is_kept, True), np.arange(m + 1), m)
     fallbacks = np.flatnonzero((is_contact == 1) & (blocked == 0) | is_kept).astype(np.int32)
     access = problem.opportunities.access[satellite.rows]
-    _, first_offer, offer_of = np.unique(access, return_index=True, return_inverse=True)
+    _, first_of_access, access_of = np.unique(access, return_index=True, return_inverse=True)
+    first_offer = first_of_access[access_of].astype(np.int32)
+    columns = _resource_columns(problem, satellite, is_contact)
+    is_collect = is_contact == 0
     track = Track(
         start_s=satellite.start_s,
         end_s=satellite.end_s,
         is_contact=is_contact,
         place=satellite.place,
-        first_offer=first_offer[offer_of].astype(np.int32),
+        first_offer=first_offer,
         blocked=blocked,
         near_from=satellite.transitions.near_from,
         far_from=satellite.transitions.far_from,
         offset=satellite.transitions.offset,
         bits=satellite.transitions.bits,
         use_resources=problem.use_resources,
-        **_resource_columns(problem, satellite, is_contact),
-        next_kept=np.minimum.accumulate(next_kept[::-1])[::-1].astype(np.int32),
+        **columns,
+        next_kept=_next_of(is_kept),
+        next_contact=_next_of(~is_collect),
+        fill_ahead=_fill_ahead(problem, satellite, first_offer, blocked),
+        least_cost=float(columns["battery_cost"][is_collect].min(initial=np.inf)),
+        least_fill=float(columns["recorder_gain"][is_collect].min(initial=np.inf)),
         fallbacks=fallbacks,
         fallback_after=np.searchsorted(fallbacks, np.arange(m + 1)).astype(np.int32),
         fallback_battery=np.full((len(fallbacks), _MAX_LABELS), np.inf),
@@ -149,6 +163,35 @@ def compile_track(problem: Problem, satellite: SatelliteProblem, blocked: Bytes)
     # say what breaks: there is no plan to protect.
     safe = is_safe(track, NO_TASK, NO_TASK, track.battery_start, track.recorder_start)
     return track._replace(is_guarded=bool(safe))
+
+
+def _next_of(is_such: Bools) -> Ints:
+    """Return, for each row and for the end, the first such row from there on, or ``m``."""
+    m = len(is_such)
+    found = np.where(np.append(is_such, True), np.arange(m + 1), m)
+    return np.minimum.accumulate(found[::-1])[::-1].astype(np.int32)
+
+
+def _fill_ahead(
+    problem: Problem, satellite: SatelliteProblem, first_offer: Ints, blocked: Bytes
+) -> Floats:
+    r = satellite.resources
+    m = len(satellite)
+    rows = np.arange(m)
+    usable = np.flatnonzero((satellite.kind == CONTACT) & (blocked == 0))
+    after = np.searchsorted(usable, rows, side="right")
+    wait_s = np.append(satellite.start_s[usable], problem.horizon_s)[after] - satellite.start_s
+    # In the long run the battery pays for a part of the time, and each access is collected once.
+    busy = r.sunpoint_charge_per_s + r.collect_drain_per_s
+    duty = r.sunpoint_charge_per_s / busy if busy > 0.0 else 1.0
+    is_collect = (satellite.kind != CONTACT) & (first_offer == rows)
+    collects_s = np.where(is_collect, satellite.end_s - satellite.start_s, 0.0)
+    until_s = np.concatenate([[0.0], np.cumsum(collects_s)])
+    offered_s = until_s[np.append(usable, m)[after]] - until_s[rows]
+    # Where contacts follow each other closely, none may pass once not even one image fits in.
+    image_s = collects_s[is_collect].min() if is_collect.any() else 0.0
+    written_s: Floats = np.maximum(image_s, np.minimum(offered_s, duty * wait_s))
+    return r.collect_fill_per_s * written_s + r.telemetry_per_s * wait_s
 
 
 def _resource_columns(
@@ -324,75 +367,3 @@ def _fill_fallbacks(track: Track) -> None:
                     track.fallback_battery[at, num_labels] = needed
                     track.fallback_recorder[at, num_labels] = allowed
                     num_labels += 1
-
-
-@inlined
-def next_action(
-    track: Track,
-    last: int,
-    from_row: int,
-    battery: float,
-    recorder: float,
-    is_hard: bool,
-    collected: Bytes,
-    unimaged_only: bool,
-) -> int:
-    """Return the first row from ``from_row`` on that may be taken after ``last``, or ``m``.
-
-    This is A(s) of eq. 4, in time order. With ``is_hard`` an action must also keep the limits,
-    now and (see ``is_safe``) to the end of the horizon. It ends with the next task that must be
-    taken, and what that one could not follow is not in it.
-    """
-    # Rows that start before the last task ends need no look.
-    first = from_row if last < 0 else max(from_row, track.near_from[last])
-    m = len(track.start_s)
-    kept = track.next_kept[last + 1]
-    for row in range(first, min(m, kept + 1)):
-        if row != kept:
-            if track.blocked[row]:
-                continue
-            if unimaged_only and not track.is_contact[row] and collected[track.place[row]]:
-                continue
-            if kept < m and not may_follow(
-                row, kept, track.near_from, track.far_from, track.offset, track.bits
-            ):
-                continue
-        if not may_follow(last, row, track.near_from, track.far_from, track.offset, track.bits):
-            continue
-        # Without a way to keep the limits, what must be taken comes before them.
-        if track.use_resources and is_hard and (row != kept or track.is_guarded):
-            battery_after, recorder_after, is_within = take(track, last, row, battery, recorder)
-            if not is_within or (
-                track.is_guarded and not is_safe(track, row, row, battery_after, recorder_after)
-            ):
-                continue
-        return row
-    return m
-
-
-@inlined
-def is_repeated(track: Track, chosen: Ints, begin: int, end: int, row: int) -> bool:
-    """Return whether ``chosen[begin:end]``, in time order, has an earlier collect of its access.
-
-    A(s) holds the first feasible collect of each access: the later ones would push other
-    targets out of its ``breadth``, and are on offer again after the next action.
-    """
-    first = track.first_offer[row]
-    at = end - 1
-    while at >= begin and chosen[at] >= first:
-        if track.first_offer[chosen[at]] == first:
-            return True
-        at -= 1
-    return False
-
-
-@inlined
-def may_wait(
-    track: Track, last: int, cursor: int, battery: float, recorder: float, is_hard: bool
-) -> bool:
-    """Return whether sun-pointing past row ``cursor`` leaves a way to keep pins and limits."""
-    if track.next_kept[last + 1] == cursor:
-        return False
-    if not (track.use_resources and is_hard and track.is_guarded):
-        return True
-    return is_safe(track, last, cursor, battery, recorder)

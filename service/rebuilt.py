@@ -57,4 +57,5 @@ def _search(document: dict[str, Any], judged: Timeline) -> Search:
     return Search(
         is_optimal=judged.is_valid and document["termination"] == Termination.OPTIMAL.value,
         breadth=document["solver"]["params"].get("breadth"),
+        contact_above=document["solver"]["params"].get("contact_above_fraction", 0.0),
     )

@@ -26,6 +26,7 @@ PAPER_SEARCH: Final[Params] = {
     "sunpoint_reward_per_s": 1e-4,
     "penalty": 1e4,
     "feasibility": "penalty",
+    "contact_above_fraction": 0.0,
 }
 """What forward search and MCTS share in the paper (Table 2)."""
 

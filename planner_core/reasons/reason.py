@@ -85,10 +85,13 @@ class Search:
         Whether no plan earns more.
     breadth
         How many tasks it looked at in each state at most; None for all.
+    contact_above
+        How full the recorder was before contacts were among them.
     """
 
     is_optimal: bool = False
     breadth: int | None = None
+    contact_above: float = 0.0
 
 
 UNKNOWN_SEARCH: Final = Search()

@@ -78,6 +78,7 @@ class Teller:
             track=self.planned.track,
             target_reward=self.problem.target_reward,
             guidance=Guidance(1.0, 0.0, 0.0, 0.0),
+            contact_above=self.search.contact_above,
         )
         last = int(plan.rows[k - 1]) if k else NO_TASK
         images = plan.rows[:k][self.planned.track.is_contact[plan.rows[:k]] == 0]

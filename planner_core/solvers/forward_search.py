@@ -11,6 +11,7 @@ from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 
+from planner_core.actions import is_repeated, may_wait, next_action
 from planner_core.jit import borrowing
 from planner_core.model import (
     IMAGE_NEEDS,
@@ -33,7 +34,8 @@ from planner_core.solvers.base import (
 )
 from planner_core.solvers.lns import polished
 from planner_core.solvers.sequential import Turn, plan_in_turn
-from planner_core.track import NO_TASK, Track, is_repeated, may_wait, next_action, take
+from planner_core.solvers.walk import CONTACT_ABOVE, contact_above_metadata
+from planner_core.track import NO_TASK, Track, take
 
 Discount = Literal["action", "next_action"]
 
@@ -75,6 +77,7 @@ class Rules(NamedTuple):
     is_hard: bool
     unimaged_only: bool
     is_discounted_by_next: bool
+    contact_above: float
 
 
 @borrowing
@@ -105,8 +108,9 @@ def _select_action(
     begin = end = (depth - 1) * rules.breadth
     while end < begin + rules.breadth:
         row = next_action(
-            track, last, row + 1, battery, recorder, rules.is_hard, collected, rules.unimaged_only
-        )
+            track, last, row + 1, battery, recorder, rules.is_hard, collected,
+            rules.unimaged_only, rules.contact_above,
+        )  # fmt: skip
         if row == m or stop[0]:
             break
         if is_repeated(track, chosen, begin, end, row):
@@ -254,6 +258,10 @@ class ForwardSearch:
         default=1e-4,
         metadata={"minimum": 0, "description": "Guidance per second of sun-pointing (Table 2)."},
     )
+    contact_above_fraction: float = field(
+        default=CONTACT_ABOVE,
+        metadata=contact_above_metadata("The paper's search has 0, every contact in A(s)."),
+    )
     penalty: float = field(
         default=1e4,
         metadata={"minimum": 0, "description": "Guidance lost for each broken limit (Table 2)."},
@@ -303,6 +311,7 @@ class ForwardSearch:
             is_hard=self.feasibility == "hard",
             unimaged_only=self.unimaged_only,
             is_discounted_by_next=self.discount == "next_action",
+            contact_above=self.contact_above_fraction,
         )
         chosen = np.empty(self.depth * breadth, dtype=np.int32)
         taken: list[int] = []

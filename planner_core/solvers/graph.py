@@ -16,7 +16,12 @@ from planner_core.chains import Links
 from planner_core.problem import Problem
 from planner_core.solvers.base import Budget, Constraint, Feasibility, Solution
 from planner_core.solvers.sequential import Turn, plan_in_turn
-from planner_core.solvers.walk import CONTACT_ABOVE, NOTHING_TAKEN, rule_plan
+from planner_core.solvers.walk import (
+    CONTACT_ABOVE,
+    NOTHING_TAKEN,
+    contact_above_metadata,
+    rule_plan,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,11 +51,7 @@ class Graph:
     )
     contact_above_fraction: float = field(
         default=CONTACT_ABOVE,
-        metadata={
-            "minimum": 0,
-            "maximum": 1,
-            "description": "On the walk, take a contact only when the recorder is this full.",
-        },
+        metadata=contact_above_metadata("Matters where feasibility is hard."),
     )
 
     def solve(self, problem: Problem, budget: Budget, seed: int) -> Solution:

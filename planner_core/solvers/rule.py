@@ -8,7 +8,12 @@ from typing import ClassVar, Literal
 from planner_core.problem import Problem
 from planner_core.solvers.base import Budget, Constraint, Feasibility, Solution
 from planner_core.solvers.sequential import Turn, plan_in_turn
-from planner_core.solvers.walk import CONTACT_ABOVE, NOTHING_TAKEN, rule_plan
+from planner_core.solvers.walk import (
+    CONTACT_ABOVE,
+    NOTHING_TAKEN,
+    contact_above_metadata,
+    rule_plan,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,12 +34,9 @@ class Rule:
     )
     contact_above_fraction: float = field(
         default=CONTACT_ABOVE,
-        metadata={
-            "minimum": 0,
-            "maximum": 1,
-            "description": "Take a contact only when the recorder is at least this full. "
-            "The paper's rule is 0, every contact, which costs images.",
-        },
+        metadata=contact_above_metadata(
+            "The paper's rule is 0, every contact, which costs images."
+        ),
     )
     feasibility: Feasibility = field(
         default="hard",

@@ -83,7 +83,7 @@ def test_bound_and_reward_close_in_and_a_gap_ends_the_search() -> None:
 
 
 def test_cancelling_keeps_plan_and_bound() -> None:
-    problem = random_problem(12, num_collects=80, num_targets=40, num_contacts=4)
+    problem = random_problem(11, num_collects=80, num_targets=40, num_contacts=4)
     budget = Budget()
     budget.cancel()
     solution = Certified().solve(problem, budget, 0)

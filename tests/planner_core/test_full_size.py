@@ -10,7 +10,7 @@ import pytest
 from benchmarks.missions import paper_scenario, problem_of
 from benchmarks.paper.settings import MCTS_TUNED, PAPER_FORWARD, PAPER_MCTS, make_solver
 from planner_core.bounds import proofs
-from planner_core.domain import Dynamics
+from planner_core.domain import Dynamics, GroundStation
 from planner_core.problem import ACCESS_FOUND, Problem
 from planner_core.solvers import Certified, ForwardSearch, Graph, Mcts, Milp, Rule
 from planner_core.solvers.base import Budget, Solver, Termination
@@ -55,6 +55,21 @@ def test_with_resources_the_improved_search_leads_the_papers_methods(dynamics: D
     assert judged(problem, ForwardSearch()).reward <= mcts
 
 
+def test_many_stations_cost_no_images() -> None:
+    """A contact is on offer all the time, and each of them costs the power of many images."""
+    scenario = paper_scenario(300, 2, use_resources=True)
+    stations = tuple(
+        GroundStation(id=f"g{lat}/{lon}", name="", lat_deg=lat, lon_deg=lon)
+        for lat in (75, -70)
+        for lon in range(0, 360, 30)
+    )
+    problem = problem_of(replace(scenario, ground_stations=stations))
+    rule = judged(problem, Rule()).reward
+    assert judged(problem, ForwardSearch()).reward >= rule
+    assert judged(problem, Mcts()).reward >= rule
+    assert judged(problem, ForwardSearch(contact_above_fraction=0.0)).reward < 0.9 * rule
+
+
 @pytest.mark.parametrize("dynamics", ["physical", "paper"])
 def test_with_resources_the_bound_of_the_program_is_true(dynamics: Dynamics) -> None:
     """Cut short it has proven something all the same, and no plan of anyone contradicts it."""
@@ -74,7 +89,7 @@ def test_many_collects_of_each_access_are_planned_as_well() -> None:
     spaced = problem_of(replace(scenario, collect_spacing_s=15.0))
     plain = day(use_resources=False)
     assert len(spaced.opportunities) > 5 * len(plain.opportunities)
-    for solver in (Rule(), ForwardSearch(), Graph()):
+    for solver in (Rule(), ForwardSearch(), Graph(), Mcts()):
         assert judged(spaced, solver).reward > judged(plain, solver).reward
 
 

@@ -18,6 +18,7 @@ from planner_core.plan import Plan
 from planner_core.problem import (
     ACCESS_TOO_SHORT,
     COLLECT,
+    CONTACT,
     NEVER_VISIBLE,
     OUTSIDE_LIMITS,
     Blocked,
@@ -251,6 +252,21 @@ def test_a_task_beyond_the_breadth_was_not_considered() -> None:
         for outcome in explain(problem, plan, replay(problem, plan), Search(breadth=2))
     ]
     assert reasons == [None, "solver_limit", "solver_limit", "not_considered", "not_considered"]
+
+
+def test_a_contact_that_the_search_left_out_takes_no_breadth() -> None:
+    tasks = [
+        Task(kind=CONTACT, place=0, start_s=100.0, end_s=130.0),
+        Task(kind=COLLECT, place=0, start_s=200.0, end_s=230.0),
+    ]
+    problem = make_problem(tasks, num_targets=1)
+    plan = Plan.of(problem, [])
+    codes = []
+    for contact_above in (0.0, 0.45):
+        search = Search(breadth=1, contact_above=contact_above)
+        reason = explain(problem, plan, replay(problem, plan), search)[0].reason
+        codes.append(reason and reason.code)
+    assert codes == ["not_considered", "solver_limit"]
 
 
 @pytest.mark.parametrize(

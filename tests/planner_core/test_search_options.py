@@ -15,7 +15,8 @@ from planner_core.model import WAIT, Model
 from planner_core.problem import COLLECT, CONTACT, Problem
 from planner_core.solvers import ForwardSearch, Mcts, Rule
 from planner_core.solvers.base import Budget, Solver
-from planner_core.solvers.mcts.simulate import Rules, expand
+from planner_core.solvers.mcts.choices import Rules, expand
+from planner_core.solvers.mcts.successors import no_successors
 from planner_core.solvers.mcts.tree import empty_tree, new_node
 from planner_core.timeline import replay
 from planner_core.track import Track, compile_track
@@ -39,6 +40,7 @@ def track_of(problem: Problem) -> Track:
     is_hard=st.booleans(),
     unimaged_only=st.booleans(),
     breadth=st.integers(1, 5),
+    contact_above=st.sampled_from([0.0, 0.3]),
 )
 def test_the_actions_of_a_state_are_of_different_accesses_in_model_and_tree(
     seed: int,
@@ -47,18 +49,22 @@ def test_the_actions_of_a_state_are_of_different_accesses_in_model_and_tree(
     is_hard: bool,
     unimaged_only: bool,
     breadth: int,
+    contact_above: float,
 ) -> None:
     problem = random_problem(seed, dynamics=dynamics, use_resources=use_resources, num_offers=4)
     track = track_of(problem)
     model = Model(
         track=track, target_reward=problem.target_reward, guidance=ForwardSearch().guidance,
-        is_hard=is_hard, unimaged_only=unimaged_only,
+        is_hard=is_hard, unimaged_only=unimaged_only, contact_above=contact_above,
     )  # fmt: skip
     state = model.initial_state()
     rules = Rules(
         depth=1, breadth=breadth, exploration=1.0, is_hard=is_hard, unimaged_only=unimaged_only,
         is_per_decision=False, is_literal=False, is_greedy=False, is_max_backup=False,
+        contact_above=contact_above,
     )  # fmt: skip
+    imaged = np.zeros(len(problem.target_ids), dtype=np.uint8)
+    successors = no_successors(len(problem.opportunities), imaged)
     while actions := model.actions(state, breadth):
         tasks = [row for row in actions if row != WAIT]
         accesses = problem.opportunities.access[problem.satellites[0].rows[tasks]]
@@ -67,7 +73,7 @@ def test_the_actions_of_a_state_are_of_different_accesses_in_model_and_tree(
         collected[list(state.collected)] = 1
         tree = empty_tree(1, breadth + 1)
         new_node(tree, state.cursor, state.last, state.battery, state.recorder)
-        expand(tree, track, rules, collected, 0)
+        expand(tree, track, rules, model.guidance, successors, collected, 0)
         assert tree.action[: tree.num_edges[0]].tolist() == actions
         state = model.step(state, tasks[-1], tasks[0]).state
 
@@ -164,7 +170,10 @@ def test_a_contact_may_count_by_the_wait_for_it(make: Any) -> None:
     soon = Task(kind=CONTACT, place=0, start_s=10.0, end_s=310.0)
     late = Task(kind=CONTACT, place=0, start_s=300.0, end_s=360.0)
     problem = make_problem([soon, late], num_targets=0)
-    weights = {"contact_reward_per_s": 1.0, "sunpoint_reward_per_s": 0.0, "gamma": 1.0, "depth": 2}
+    weights = {
+        "contact_reward_per_s": 1.0, "sunpoint_reward_per_s": 0.0, "gamma": 1.0, "depth": 2,
+        "contact_above_fraction": 0.0,
+    }  # fmt: skip
     assert rows_of(problem, make(**weights)) == [0]
     assert rows_of(problem, make(contact_counts="wait", **weights)) == [1]
 

@@ -40,6 +40,8 @@ VARIANTS: list[Solver] = [
     Mcts(num_simulations=30, depth=8),
     ForwardSearch(unimaged_only=False),
     ForwardSearch(depth=5, breadth=2, gamma=0.999),
+    ForwardSearch(contact_above_fraction=0.0),
+    Mcts(num_simulations=30, depth=8, contact_above_fraction=0.0),
     Rule(contact_above_fraction=0.0),
     Graph(path="longest"),
     Mcts(num_simulations=30, depth=4, backup="mean", discount="per_decision"),
@@ -112,8 +114,9 @@ def test_forward_search_at_full_depth_and_breadth_equals_brute_force(
     problem = problems(seed, dynamics, use_resources, has_rewards=has_rewards, num_collects=6)
     n = len(problem.opportunities)
     solver = ForwardSearch(
-        depth=n, breadth=n, gamma=1.0, contact_reward_per_s=0.0, sunpoint_reward_per_s=0.0
-    )
+        depth=n, breadth=n, gamma=1.0, contact_reward_per_s=0.0, sunpoint_reward_per_s=0.0,
+        contact_above_fraction=0.0,
+    )  # fmt: skip
     timeline = replay(problem, solver.solve(problem, Budget(), 0).plan)
     assert timeline.reward == pytest.approx(best_reward(problem))
 
@@ -131,6 +134,7 @@ def test_forward_search_at_full_depth_and_breadth_equals_brute_force(
     contact_counts=st.sampled_from(["duration", "wait"]),
     image_needs=st.sampled_from(["nothing", "limits", "room"]),
     num_offers=st.integers(1, 3),
+    contact_above=st.sampled_from([0.0, 0.25, 0.45]),
 )
 def test_the_compiled_forward_search_plans_what_the_listing_plans(
     seed: int,
@@ -144,6 +148,7 @@ def test_the_compiled_forward_search_plans_what_the_listing_plans(
     contact_counts: Any,
     image_needs: Any,
     num_offers: int,
+    contact_above: float,
 ) -> None:
     problem = problems(
         seed, dynamics, use_resources, num_collects=14, num_contacts=4, num_offers=num_offers
@@ -152,6 +157,7 @@ def test_the_compiled_forward_search_plans_what_the_listing_plans(
         depth=depth, breadth=breadth, feasibility=feasibility, unimaged_only=unimaged_only,
         window_moves_per_task=0.0,
         gamma=0.99, discount=discount, contact_counts=contact_counts, image_needs=image_needs,
+        contact_above_fraction=contact_above,
     )  # fmt: skip
     satellite = problem.satellites[0]
     model = Model(
@@ -160,6 +166,7 @@ def test_the_compiled_forward_search_plans_what_the_listing_plans(
         guidance=solver.guidance,
         is_hard=feasibility == "hard",
         unimaged_only=unimaged_only,
+        contact_above=contact_above,
     )
     state = model.initial_state()
     rows = []

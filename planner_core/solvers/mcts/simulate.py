@@ -4,13 +4,23 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from planner_core.draws import Uint64s, next_draw
+from planner_core.actions import may_wait
+from planner_core.draws import Uint64s
 from planner_core.jit import borrowing
 from planner_core.model import WAIT, Guidance, counts_as_made, task_reward
 from planner_core.problem import Bytes, Floats, Ints
-from planner_core.solvers.mcts.tree import UNSEEN, Tree, choose, has_room, new_edge, new_node
-from planner_core.solvers.walk import CONTACT_ABOVE, naive_select_action
-from planner_core.track import Track, is_repeated, may_wait, next_action, take
+from planner_core.solvers.mcts.choices import Rules, expand, greedy_action, random_action
+from planner_core.solvers.mcts.successors import Successors
+from planner_core.solvers.mcts.tree import (
+    ROLLED_OUT,
+    UNSEEN,
+    Tree,
+    choose,
+    has_room,
+    new_edge,
+    new_node,
+)
+from planner_core.track import Track, take
 
 
 class Path(NamedTuple):
@@ -24,89 +34,13 @@ class Path(NamedTuple):
     options: Ints
 
 
-class Rules(NamedTuple):
-    """The parameters of the search, as kernels take them."""
-
-    depth: int
-    breadth: int
-    exploration: float
-    is_hard: bool
-    unimaged_only: bool
-    is_per_decision: bool
-    is_literal: bool
-    is_greedy: bool
-    is_max_backup: bool
-
-
-@borrowing
-def expand(tree: Tree, track: Track, rules: Rules, collected: Bytes, node: int) -> None:
-    """Lines 5-8: enter A(s) with N = Q = 0. Its first task stands first, ``WAIT`` last."""
-    m = len(track.start_s)
-    tree.first_edge[node] = tree.used[1]
-    row = tree.cursor[node]
-    while tree.num_edges[node] < rules.breadth:
-        row = next_action(
-            track, tree.last[node], row + 1, tree.battery[node], tree.recorder[node],
-            rules.is_hard, collected, rules.unimaged_only,
-        )  # fmt: skip
-        if row == m:
-            break
-        if not is_repeated(track, tree.action, tree.first_edge[node], tree.used[1], row):
-            new_edge(tree, node, row)
-    if tree.num_edges[node] == 0 or not track.use_resources:
-        return
-    first = tree.action[tree.first_edge[node]]
-    if may_wait(
-        track, tree.last[node], first, tree.battery[node], tree.recorder[node], rules.is_hard
-    ):
-        new_edge(tree, node, WAIT)
-
-
-@borrowing
-def _rollout_action(
-    track: Track,
-    rules: Rules,
-    collected: Bytes,
-    random: Uint64s,
-    actions: Ints,
-    cursor: int,
-    last: int,
-    battery: float,
-    recorder: float,
-) -> tuple[int, int]:
-    """Return an action of the rollout policy and the first task of A(s), or (m, m) at the end."""
-    m = len(track.start_s)
-    if rules.is_greedy:
-        row = naive_select_action(
-            track, collected, rules.is_hard, True, CONTACT_ABOVE,
-            cursor, last, battery, recorder,
-        )  # fmt: skip
-        return row, row
-    count = 0
-    row = cursor
-    while count < rules.breadth:
-        row = next_action(
-            track, last, row + 1, battery, recorder, rules.is_hard, collected, rules.unimaged_only
-        )
-        if row == m:
-            break
-        if not is_repeated(track, actions, 0, count, row):
-            actions[count] = row
-            count += 1
-    if count == 0:
-        return m, m
-    if track.use_resources and may_wait(track, last, actions[0], battery, recorder, rules.is_hard):
-        actions[count] = WAIT
-        count += 1
-    return actions[int(next_draw(random) * count)], actions[0]
-
-
 @borrowing
 def _simulate(
     tree: Tree,
     track: Track,
     rules: Rules,
     guidance: Guidance,
+    successors: Successors,
     target_reward: Floats,
     collected: Bytes,
     random: Uint64s,
@@ -125,15 +59,30 @@ def _simulate(
     d = 0
     is_rollout = False
     while d < depth:
-        if not is_rollout and tree.first_edge[node] == UNSEEN:
-            if node == root or has_room(tree, rules.breadth):
-                expand(tree, track, rules, collected, node)
-            # The listing rolls out from a new state; the root itself is searched at once.
-            is_rollout = node != root
+        if not is_rollout and tree.first_edge[node] < 0:
+            # The listing rolls out from a new state; the root itself is searched at once. What
+            # may be done in a state is looked for when it is met again, which most never are.
+            is_met = node == root or tree.first_edge[node] == ROLLED_OUT
+            if node != root and not has_room(tree, rules.breadth):
+                is_rollout = True
+            elif is_met:
+                expand(tree, track, rules, guidance, successors, collected, node)
+            else:
+                tree.first_edge[node] = ROLLED_OUT
+                is_rollout = True
+        discount = 0.0
         if is_rollout:
-            action, first = _rollout_action(
-                track, rules, collected, random, path.options, cursor, last, battery, recorder
-            )
+            if rules.is_greedy:
+                action, discount = greedy_action(
+                    track, rules, guidance, successors, collected,
+                    cursor, last, battery, recorder,
+                )  # fmt: skip
+                first = action
+            else:
+                action, first = random_action(
+                    track, rules, guidance, successors, collected, random, path.options,
+                    cursor, last, battery, recorder,
+                )  # fmt: skip
             if action == m:
                 break
         else:
@@ -147,7 +96,8 @@ def _simulate(
         path.image[d] = -1
         row = first if action == WAIT else action
         sojourn_s = track.start_s[row] - now_s
-        discount = guidance.gamma**sojourn_s
+        if discount == 0.0:
+            discount = guidance.gamma**sojourn_s
         if action == WAIT:
             path.reward[d] = guidance.sunpoint_reward_per_s * sojourn_s
         else:
@@ -206,6 +156,7 @@ def search(
     track: Track,
     rules: Rules,
     guidance: Guidance,
+    successors: Successors,
     target_reward: Floats,
     collected: Bytes,
     random: Uint64s,
@@ -224,6 +175,7 @@ def search(
             track,
             rules,
             guidance,
+            successors,
             target_reward,
             collected,
             random,
@@ -233,7 +185,7 @@ def search(
             best_actions,
         )
     chosen = UNSEEN
-    if tree.first_edge[0] == UNSEEN:
+    if tree.first_edge[0] < 0:
         return chosen
     for edge in range(tree.first_edge[0], tree.first_edge[0] + tree.num_edges[0]):
         if tree.visits[edge] == 0:

@@ -20,9 +20,12 @@ from planner_core.solvers.base import (
     Solution,
 )
 from planner_core.solvers.lns import polished
-from planner_core.solvers.mcts.simulate import Path, Rules, search, sunpoint_instead
+from planner_core.solvers.mcts.choices import Rules
+from planner_core.solvers.mcts.simulate import Path, search, sunpoint_instead
+from planner_core.solvers.mcts.successors import no_successors
 from planner_core.solvers.mcts.tree import UNSEEN, Tree, copy_branch, empty_tree, new_node
 from planner_core.solvers.sequential import Turn, plan_in_turn
+from planner_core.solvers.walk import CONTACT_ABOVE, contact_above_metadata
 from planner_core.track import NO_TASK
 
 MAX_ACTIONS: Final = 10_000_000
@@ -142,6 +145,12 @@ class Mcts:
         default=1e4,
         metadata=_described("Guidance lost for each broken limit (Table 2).", minimum=0),
     )
+    contact_above_fraction: float = field(
+        default=CONTACT_ABOVE,
+        metadata=contact_above_metadata(
+            "In A(s) and in rollouts alike; the paper has 0, every contact."
+        ),
+    )
 
     window_moves_per_task: float = field(
         default=0.5,
@@ -182,6 +191,7 @@ class Mcts:
             is_literal=self.returns == "literal",
             is_greedy=self.rollout == "greedy",
             is_max_backup=self.backup == "max",
+            contact_above=self.contact_above_fraction,
         )
         # A state stays in the tree for at most ``depth`` steps, so no more ever hang together.
         # Where that is more than memory should hold, the rest is sampled by rollouts alone.
@@ -193,6 +203,10 @@ class Mcts:
         trees = [empty_tree(num_nodes, num_edges) for _ in range(2)]
         tree, spare = trees
         new_node(tree, NO_TASK, NO_TASK, track.battery_start, track.recorder_start)
+        # Without resources alone A(s) hangs on the last task only.
+        successors = no_successors(
+            0 if track.use_resources else len(track.start_s), collected.copy()
+        )
         random = draws_of(seed)
         path = Path(
             edge=np.empty(self.depth, dtype=np.int32),
@@ -207,7 +221,7 @@ class Mcts:
         reward = 0.0
         while not budget.is_spent():
             edge = search(
-                tree, track, rules, guidance, target_reward, collected, random,
+                tree, track, rules, guidance, successors, target_reward, collected, random,
                 path, self.num_simulations, budget.stop, best, best_actions,
             )  # fmt: skip
             if edge == UNSEEN or budget.is_spent():
@@ -229,7 +243,7 @@ class Mcts:
                     and not collected[place]
                     and (self.image_needs == "nothing" or counts_as_made(track, guidance, *levels))
                 ):
-                    collected[place] = 1
+                    collected[place] = successors.imaged[place] = 1
                     reward += float(target_reward[place])
             best[0] = -np.inf
             copy_branch(tree, spare, child)

@@ -15,13 +15,16 @@ from planner_core.jit import borrowing, kernel
 from planner_core.problem import Floats, Ints
 
 UNSEEN: Final = -1
+ROLLED_OUT: Final = -2
+"""In place of a first edge: the state has been met once, and A(s) is not entered yet."""
 
 
 class Tree(NamedTuple):
     """States and actions of the search, both numbered in order of appearance.
 
-    A node's actions stand side by side from ``first_edge[node]``; ``child`` of an edge is the
-    node it leads to, or -1. Shape ``(num_nodes,)`` and ``(num_edges,)``; ``used`` counts both.
+    A node's actions stand side by side from ``first_edge[node]``, which is ``UNSEEN`` or
+    ``ROLLED_OUT`` before; ``child`` of an edge is the node it leads to, or ``UNSEEN``.
+    Shape ``(num_nodes,)`` and ``(num_edges,)``; ``used`` counts both.
     """
 
     cursor: Ints
@@ -103,8 +106,8 @@ def copy_branch(old: Tree, new: Tree, root: int) -> None:
     done = 0
     while done < new.used[0]:
         source = waiting[done]
-        new.first_edge[done] = UNSEEN if old.first_edge[source] == UNSEEN else new.used[1]
         first = old.first_edge[source]
+        new.first_edge[done] = first if first < 0 else new.used[1]
         for edge in range(first, first + old.num_edges[source]):
             to = new.used[1]
             new_edge(new, done, old.action[edge])
