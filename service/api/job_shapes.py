@@ -169,14 +169,14 @@ def shown(job: JobRow, scenario_sha256: str) -> JobOut:
     )
 
 
-def etag_of_job(job: JobRow) -> str:
+def etag_of_job(job: JobRow | sa.Row[Any]) -> str:
     """Return the ETag of a job's present form."""
-    return etag_of_version(job.version)
+    return f'"{job.version}"'
 
 
 def headers_of(job: JobRow | sa.Row[Any]) -> dict[str, str]:
     """Return the headers that every answer about one job has."""
-    headers = {"ETag": etag_of_version(job.version)}
+    headers = {"ETag": etag_of_job(job)}
     seconds = ask_again.seconds_until(job.state, job.created_at)
     return headers if seconds is None else headers | {"Retry-After": str(seconds)}
 
@@ -184,8 +184,3 @@ def headers_of(job: JobRow | sa.Row[Any]) -> dict[str, str]:
 def etag_of_timeline(job_id: str) -> str:
     """Return the ETag of a job's timeline document, which never changes."""
     return f'"{job_id}"'
-
-
-def etag_of_version(version: int) -> str:
-    """Return the ETag of a job of this version."""
-    return f'"{version}"'

@@ -3,61 +3,65 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Final, Generic, TypeVar
 
+K = TypeVar("K", bound=Hashable)
 T = TypeVar("T")
 
-GATHER_S: Final = 0.03
+_LONGEST_PAUSE_S: Final = 0.1
+_PAUSE_EACH_S: Final = 0.02
 _MOST_KEYS: Final = 500
 
 
-class Together(Generic[T]):
+class Together(Generic[K, T]):
     """Gathers what is asked for while a query runs, and asks for it all with the next one.
 
     No answer is older than its question: the query that answers it begins after it was asked.
-    Whoever asks alone does not wait. Where the last query served several, the next one begins
-    ``GATHER_S`` after it, so that many clients cost a bounded number of queries.
+    Whoever asks alone does not wait. The more have shared a query, the longer is the pause before
+    the next one: many clients cost no more than ten queries a second.
 
-    For one event loop; the queries run in a thread, one at a time.
+    For one event loop; the queries run in a thread of their own, one at a time.
 
     Parameters
     ----------
     ask
-        Returns what there is of these keys.
+        Returns what there is of these keys, which are all different.
     """
 
-    def __init__(self, ask: Callable[[Sequence[str]], Mapping[str, T]]):
+    def __init__(self, ask: Callable[[Sequence[K]], Mapping[K, T]]):
         self._ask = ask
         # The loop's own executor costs less than Starlette's, which can be cancelled.
         self._thread = ThreadPoolExecutor(1, "together")
         self._is_asking = asyncio.Lock()
-        self._gathering: tuple[list[str], asyncio.Task[Mapping[str, T]]] | None = None
+        self._gathering: tuple[list[K], asyncio.Task[Mapping[K, T]]] | None = None
         self._not_before_s = 0.0
 
-    async def get(self, key: str) -> T | None:
+    async def get(self, key: K) -> T | None:
         """Return what there is of a key now, or None; raises what the query raises."""
         if self._gathering is None:
-            keys: list[str] = []
+            keys: list[K] = []
             self._gathering = keys, asyncio.create_task(self._answer(keys))
         keys, answers = self._gathering
         keys.append(key)
         # A client that goes away must not take the answer of the others along.
         return (await asyncio.shield(answers)).get(key)
 
-    async def _answer(self, keys: list[str]) -> Mapping[str, T]:
+    async def _answer(self, keys: list[K]) -> Mapping[K, T]:
         async with self._is_asking:
             loop = asyncio.get_running_loop()
             await asyncio.sleep(self._not_before_s - loop.time())
             self._gathering = None
-            self._not_before_s = loop.time() + (GATHER_S if len(keys) > 1 else 0.0)
-            return await loop.run_in_executor(self._thread, self._ask_in_parts, sorted(set(keys)))
+            pause_s = min(_LONGEST_PAUSE_S, _PAUSE_EACH_S * (len(keys) - 1))
+            self._not_before_s = loop.time() + pause_s
+            different = list(dict.fromkeys(keys))
+            return await loop.run_in_executor(self._thread, self._ask_in_parts, different)
 
-    def _ask_in_parts(self, keys: Sequence[str]) -> Mapping[str, T]:
+    def _ask_in_parts(self, keys: Sequence[K]) -> Mapping[K, T]:
         # A query has room for so many parameters. More than one part is rare: many keys at once
         # means that the database did not answer for a while.
-        answers: dict[str, T] = {}
+        answers: dict[K, T] = {}
         for first in range(0, len(keys), _MOST_KEYS):
             answers |= self._ask(keys[first : first + _MOST_KEYS])
         return answers

@@ -47,7 +47,7 @@ def test_those_who_ask_together_share_a_query(source: Source) -> None:
         return await asyncio.gather(*map(together.get, ("b", "a", "b", "absent")))
 
     assert asyncio.run(ask()) == ["b0", "a0", "b0", None]
-    assert source.queries == [["a", "absent", "b"]]
+    assert source.queries == [["b", "a", "absent"]]
 
 
 def test_no_answer_is_older_than_its_question(source: Source) -> None:
