@@ -38,8 +38,8 @@ from service.api.errors import install_error_handlers
 from service.api.guard import Guard
 from service.api.idempotency import install_replay
 from service.api.middleware import RequestContext
+from service.api.polls import Polls
 from service.api.security_headers import SecurityHeaders
-from service.api.unchanged import UnchangedJobs
 from service.dashboard import routes as dashboard
 from service.db.session import Database
 from service.explanations import Explainer
@@ -124,7 +124,7 @@ def create_app(settings: Settings, queue: JobQueue | None = None) -> FastAPI:
     install_replay(app)
     openapi.install_openapi(app)
     # The last one added is the outermost.
-    app.add_middleware(UnchangedJobs)
+    app.add_middleware(Polls, state=app.state)
     app.add_middleware(BodyLimit, max_bytes=int(settings.max_body_mb * 1_000_000))
     app.add_middleware(Guard, settings=settings)
     if settings.allowed_origins:

@@ -13,7 +13,7 @@ from planner_core.solvers import solver_class
 from service.access.audit import Audit
 from service.api import ask_again
 from service.api.errors import refuse
-from service.api.job_shapes import JobOut, LimitsIn, QuestionIn, etag_of_job, shown
+from service.api.job_shapes import JobOut, LimitsIn, QuestionIn, headers_of, shown
 from service.api.problems import ServiceError
 from service.db.rows import JobRow
 from service.db.session import Database
@@ -131,10 +131,7 @@ def shown_job(session: Session, job: JobRow) -> JobOut:
 
 def describe(response: Response, job: JobRow) -> None:
     """Set the headers that every answer about one job has."""
-    response.headers["ETag"] = etag_of_job(job)
-    seconds = ask_again.seconds_until(job.state, job.created_at)
-    if seconds is not None:
-        response.headers["Retry-After"] = str(seconds)
+    response.headers.update(headers_of(job))
 
 
 def accepted(session: Session, response: Response, job: JobRow) -> JobOut:

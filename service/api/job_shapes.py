@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, cast
 
+import sqlalchemy as sa
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
 
+from service.api import ask_again
 from service.api.shapes import Body, Instant, Name
 from service.db.rows import JobRow
 from service.jobs.lease import JobState
@@ -167,16 +169,18 @@ def shown(job: JobRow, scenario_sha256: str) -> JobOut:
     )
 
 
-def etag_of_job(job: JobRow) -> str:
+def etag_of_job(job: JobRow | sa.Row[Any]) -> str:
     """Return the ETag of a job's present form."""
-    return etag_of_version(job.version)
+    return f'"{job.version}"'
+
+
+def headers_of(job: JobRow | sa.Row[Any]) -> dict[str, str]:
+    """Return the headers that every answer about one job has."""
+    headers = {"ETag": etag_of_job(job)}
+    seconds = ask_again.seconds_until(job.state, job.created_at)
+    return headers if seconds is None else headers | {"Retry-After": str(seconds)}
 
 
 def etag_of_timeline(job_id: str) -> str:
     """Return the ETag of a job's timeline document, which never changes."""
     return f'"{job_id}"'
-
-
-def etag_of_version(version: int) -> str:
-    """Return the ETag of a job of this version."""
-    return f'"{version}"'

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+
 import sqlalchemy as sa
 
 from service.db.rows import JobRow
@@ -118,3 +120,24 @@ def test_a_job_of_another_owner_is_not_unchanged_either(door: Door) -> None:
         assert door.client.get(path, headers=own | known).status_code == 304
         assert_problem(door.client.get(path, headers=stranger | known), 404, "not_found")
         assert door.client.get(path, headers=known).status_code == 401
+
+
+def test_polls_at_once_are_answered_to_each_owner_for_itself(door: Door) -> None:
+    """They share a query and, of the same job, an answer."""
+    keys = {owner: door.key("submit", owner) for owner in ("ops", "science")}
+    paths = {owner: f"/v1/jobs/{door.submit(key)}" for owner, key in keys.items()}
+    calls = [
+        (key | known, path, caller == owner)
+        for owner, path in paths.items()
+        for caller, key in keys.items()
+        for known in ({}, {"If-None-Match": '"1"'})
+    ] * 10
+    with ThreadPoolExecutor(20) as pool:
+        answers = list(pool.map(lambda call: door.client.get(call[1], headers=call[0]), calls))
+    for (headers, path, is_own), answer in zip(calls, answers, strict=True):
+        if is_own:
+            assert answer.status_code == (304 if "If-None-Match" in headers else 200)
+            assert answer.headers["etag"] == '"1"'
+        else:
+            assert_problem(answer, 404, "not_found")
+            assert path.rpartition("/")[2] in answer.json()["detail"]

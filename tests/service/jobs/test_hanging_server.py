@@ -6,6 +6,7 @@ import json
 import logging
 import threading
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 
 import httpx
 import psutil
@@ -151,6 +152,23 @@ def test_the_api_answers_503_while_the_server_hangs(
         (data,) = [line for line in again.text.splitlines() if line.startswith("data:")]
         assert json.loads(data[5:])["state"] == "cancelled"
     queue.close()
+
+
+def test_polls_outlive_their_connections(client: httpx.Client, jobs: Jobs) -> None:
+    path = f"/v1/jobs/{jobs.submit('search')}"
+    known = {"If-None-Match": client.get(path).headers["etag"]}
+    end_others = sa.text(
+        "SELECT count(pg_terminate_backend(pid, 5000)) FROM pg_stat_activity "
+        "WHERE datname = current_database() AND pid <> pg_backend_pid()"
+    )
+    for _ in range(3):
+        assert client.get(path, headers=known).status_code == 304
+        with jobs.database.engine.connect() as connection:
+            assert connection.execute(end_others).scalar_one() > 0
+        with ThreadPoolExecutor(8) as pool:
+            answers = list(pool.map(lambda _: client.get(path, headers=known), range(8)))
+        assert {answer.status_code for answer in answers} == {304}
+        assert client.get(path).status_code == 200
 
 
 def test_a_worker_cut_off_from_a_hanging_server_loses_its_job_and_goes_on(

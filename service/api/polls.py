@@ -1,0 +1,213 @@
+"""Polls of jobs and of timelines, answered before all else: dashboards ask little else."""
+
+from __future__ import annotations
+
+import re
+from collections import OrderedDict
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final, cast
+
+import sqlalchemy as sa
+from sqlalchemy.exc import SQLAlchemyError
+from starlette.datastructures import Headers, State
+from starlette.responses import Response
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from service.access.callers import Caller
+from service.api.job_shapes import etag_of_job, etag_of_timeline, headers_of, shown
+from service.api.shapes import matches
+from service.api.together import Together
+from service.db.rows import JobResultRow, JobRow, ScenarioRow
+from service.db.session import Database
+
+_JSON: Final = "application/json"
+_ACCEPTABLE: Final = (None, "*/*", _JSON)
+# Made once: to make and compile a query takes longer than to run it.
+_THESE: Final = JobRow.id.in_(sa.bindparam("ids", expanding=True))
+_JOBS: Final = sa.select(
+    JobRow.id, JobRow.tenant, JobRow.version, JobRow.state, JobRow.created_at
+).where(_THESE)
+_WHOLE_JOBS: Final = (
+    sa.select(JobRow, ScenarioRow.sha256)
+    .join(ScenarioRow, ScenarioRow.id == JobRow.scenario_id)
+    .where(_THESE)
+)
+_TIMELINES: Final = (
+    sa.select(JobRow.id, JobRow.tenant)
+    .join(JobResultRow, JobRow.id == JobResultRow.job_id)
+    .where(_THESE)
+)
+
+_MOST_KEPT: Final = 200
+_LONGEST_KEPT: Final = 20_000
+
+Poll = tuple[str, str | None]
+"""A job's id and the poll's ``If-None-Match``."""
+
+
+class Polls:
+    """Answer ``GET`` of a job, and 304 where a client has a job's timeline already.
+
+    The routes would answer the same, each call for itself and after finding out what only other
+    calls need. Here polls that come at about the same time share one query, and those who follow
+    the same job its answer. Everything else is left to the routes: refusals, other forms, a
+    database that fails.
+
+    Parameters
+    ----------
+    state
+        The application's, whose ``database`` is asked.
+    """
+
+    def __init__(self, app: ASGIApp, state: State):
+        self.app = app
+        self._polled = [
+            _Polled("", _PolledJobs(state).ask),
+            _Polled("/timeline", _PolledTimelines(state).ask, needs_etag=True),
+        ]
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one request."""
+        answer = await self._answer(scope)
+        await (answer or self.app)(scope, receive, send)
+
+    async def _answer(self, scope: Scope) -> Response | None:
+        if scope["type"] != "http" or scope["method"] != "GET" or scope["query_string"]:
+            return None
+        polled, job_id = self._find(scope["path"])
+        headers = Headers(scope=scope)
+        # The other forms of a timeline have other names.
+        if polled is None or headers.get("accept") not in _ACCEPTABLE:
+            return None
+        known = headers.get("if-none-match")
+        if known is None and polled.needs_etag:
+            return None
+        try:
+            found = await polled.answers.get((job_id, known))
+        except SQLAlchemyError:
+            return None
+        caller = cast(Caller, scope["state"]["caller"])
+        if found is None or caller.visible_owner not in (None, found.owner):
+            return None
+        scope["route"] = polled
+        return found.response()
+
+    def _find(self, path: str) -> tuple[_Polled | None, str]:
+        for polled in self._polled:
+            if job := polled.path.fullmatch(path):
+                return polled, job[1]
+        return None, ""
+
+
+@dataclass(frozen=True, slots=True)
+class _Found:
+    """What a poll is answered; no ``body`` where the client has it."""
+
+    owner: str
+    headers: dict[str, str]
+    body: bytes | None = None
+
+    def response(self) -> Response:
+        if self.body is None:
+            return Response(status_code=304, headers=self.headers)
+        return Response(self.body, media_type=_JSON, headers=self.headers)
+
+
+class _Polled:
+    """What clients ask for again and again.
+
+    ``path_format`` is that of its route, which metrics ask for. Ids are told by their form, as
+    one that the database cannot even read would spoil the query of the others.
+    """
+
+    def __init__(
+        self,
+        end: str,
+        ask: Callable[[Sequence[Poll]], Mapping[Poll, _Found]],
+        *,
+        needs_etag: bool = False,
+    ):
+        self.needs_etag = needs_etag
+        self.path_format = "/v1/jobs/{job_id}" + end
+        self.path = re.compile(f"/v1/jobs/([0-9a-f-]{{36}}){end}")
+        self.answers = Together(ask)
+
+
+class _PolledJobs:
+    """Jobs. The last whole answer of each is kept for the others who follow it."""
+
+    def __init__(self, state: State):
+        self._state = state
+        self._kept: OrderedDict[str, tuple[int, bytes]] = OrderedDict()
+
+    def ask(self, polls: Sequence[Poll]) -> Mapping[Poll, _Found]:
+        database = cast(Database, self._state.database)
+        found: dict[Poll, _Found] = {}
+        changed: dict[Poll, sa.Row[Any]] = {}
+        rows = _rows(database, _JOBS, polls)
+        for poll in polls:
+            job_id, known = poll
+            if (row := rows.get(job_id)) is None:
+                continue
+            if matches(known, etag_of_job(row)):
+                found[poll] = _Found(row.tenant, headers_of(row))
+            else:
+                changed[poll] = row
+        whole = self._whole(database, {row.id: row for row in changed.values()})
+        for poll in changed:
+            if poll[0] in whole:
+                found[poll] = whole[poll[0]]
+        return found
+
+    def _whole(self, database: Database, rows: Mapping[str, sa.Row[Any]]) -> Mapping[str, _Found]:
+        whole: dict[str, _Found] = {}
+        for row in rows.values():
+            version, body = self._kept.get(row.id, (None, b""))
+            if version == row.version:
+                whole[row.id] = _Found(row.tenant, headers_of(row), body)
+        missing = rows.keys() - whole.keys()
+        if missing:
+            with database.reading() as session:
+                jobs = session.execute(_WHOLE_JOBS, {"ids": list(missing)}).all()
+            for job, sha256 in jobs:
+                body = shown(job, sha256).model_dump_json().encode()
+                whole[job.id] = _Found(job.tenant, headers_of(job), body)
+                self._keep(job, body)
+        return whole
+
+    def _keep(self, job: JobRow, body: bytes) -> None:
+        self._kept.pop(job.id, None)
+        if len(body) <= _LONGEST_KEPT:
+            self._kept[job.id] = job.version, body
+        if len(self._kept) > _MOST_KEPT:
+            self._kept.popitem(last=False)
+
+
+class _PolledTimelines:
+    """Timelines, which never change: who has one is told so."""
+
+    def __init__(self, state: State):
+        self._state = state
+
+    def ask(self, polls: Sequence[Poll]) -> Mapping[Poll, _Found]:
+        known = [poll for poll in polls if matches(poll[1], etag_of_timeline(poll[0]))]
+        if not known:
+            return {}
+        rows = _rows(cast(Database, self._state.database), _TIMELINES, known)
+        return {
+            (job_id, tags): _Found(
+                rows[job_id].tenant, {"ETag": etag_of_timeline(job_id), "Vary": "Accept"}
+            )
+            for job_id, tags in known
+            if job_id in rows
+        }
+
+
+def _rows(
+    database: Database, query: sa.Select[*tuple[Any, ...]], polls: Sequence[Poll]
+) -> Mapping[str, sa.Row[Any]]:
+    """Return what there is of the polled jobs, by id."""
+    job_ids = list({job_id for job_id, _ in polls})
+    with database.asking() as connection:
+        return {row.id: row for row in connection.execute(query, {"ids": job_ids})}

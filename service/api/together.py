@@ -1,0 +1,67 @@
+"""Many who ask the same kind of question at about the same time, answered by one query."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Final, Generic, TypeVar
+
+K = TypeVar("K", bound=Hashable)
+T = TypeVar("T")
+
+_LONGEST_PAUSE_S: Final = 0.1
+_PAUSE_EACH_S: Final = 0.02
+_MOST_KEYS: Final = 500
+
+
+class Together(Generic[K, T]):
+    """Gathers what is asked for while a query runs, and asks for it all with the next one.
+
+    No answer is older than its question: the query that answers it begins after it was asked.
+    Whoever asks alone does not wait. The more have shared a query, the longer is the pause before
+    the next one: many clients cost no more than ten queries a second.
+
+    For one event loop; the queries run in a thread of their own, one at a time.
+
+    Parameters
+    ----------
+    ask
+        Returns what there is of these keys, which are all different.
+    """
+
+    def __init__(self, ask: Callable[[Sequence[K]], Mapping[K, T]]):
+        self._ask = ask
+        # The loop's own executor costs less than Starlette's, which can be cancelled.
+        self._thread = ThreadPoolExecutor(1, "together")
+        self._is_asking = asyncio.Lock()
+        self._gathering: tuple[list[K], asyncio.Task[Mapping[K, T]]] | None = None
+        self._not_before_s = 0.0
+
+    async def get(self, key: K) -> T | None:
+        """Return what there is of a key now, or None; raises what the query raises."""
+        if self._gathering is None:
+            keys: list[K] = []
+            self._gathering = keys, asyncio.create_task(self._answer(keys))
+        keys, answers = self._gathering
+        keys.append(key)
+        # A client that goes away must not take the answer of the others along.
+        return (await asyncio.shield(answers)).get(key)
+
+    async def _answer(self, keys: list[K]) -> Mapping[K, T]:
+        async with self._is_asking:
+            loop = asyncio.get_running_loop()
+            await asyncio.sleep(self._not_before_s - loop.time())
+            self._gathering = None
+            pause_s = min(_LONGEST_PAUSE_S, _PAUSE_EACH_S * (len(keys) - 1))
+            self._not_before_s = loop.time() + pause_s
+            different = list(dict.fromkeys(keys))
+            return await loop.run_in_executor(self._thread, self._ask_in_parts, different)
+
+    def _ask_in_parts(self, keys: Sequence[K]) -> Mapping[K, T]:
+        # A query has room for so many parameters. More than one part is rare: many keys at once
+        # means that the database did not answer for a while.
+        answers: dict[K, T] = {}
+        for first in range(0, len(keys), _MOST_KEYS):
+            answers |= self._ask(keys[first : first + _MOST_KEYS])
+        return answers
