@@ -1,7 +1,7 @@
 """The solver's process: what happens between fork and exit.
 
-It talks to its worker over one pipe: ``Cancel`` and ``Expire`` come in, progress and at last
-one ending go out. When the worker's end closes, the process is gone at once.
+It talks to its worker over one pipe: ``Cancel`` and ``Expire`` come in, progress, the blocks of
+an answer and at last one ending go out. When the worker's end closes, the process is gone at once.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import signal
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum, auto
 from multiprocessing.connection import Connection
 from typing import Any, Final, cast
@@ -87,7 +87,13 @@ def main(
     budget = Budget(time_s, outbox.report, num_threads)
     outbox.send(Started())
     threading.Thread(target=_obey, args=(connection, budget), daemon=True).start()
-    outbox.send(_do(load(work), request, budget))
+    ending = _do(load(work), request, budget)
+    if isinstance(ending, Answered):
+        # One by one, so that neither side holds the answer as messages too.
+        for block in ending.answer.blocks:
+            outbox.send(block)
+        ending = Answered(replace(ending.answer, blocks=()))
+    outbox.send(ending)
 
 
 def load(name: str) -> WorkFunction:

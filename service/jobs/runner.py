@@ -7,7 +7,7 @@ import math
 import os
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum, auto
 from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
@@ -17,6 +17,7 @@ from typing import Any, Final
 import psutil
 
 from planner_core.solvers.base import Progress
+from service.blocks import Block
 from service.jobs import child
 from service.jobs.child import Answered, Command, Ending, Refused, Started, Stopped
 from service.jobs.plan_job import PlanRequest
@@ -128,6 +129,7 @@ class Runner:
         try:
             process.start()
             theirs.close()
+            request.opportunity_block.take()  # it is sent: only the solver needs it
             return _Run(process, ours, limits, tick_s, tick, on_phase).until_end()
         finally:
             ours.close()
@@ -154,6 +156,7 @@ class _Run:
         self._on_phase = on_phase
         self._phase: str | None = None
         self._progress: Progress | None = None
+        self._blocks: list[Block] = []
         self._verifying = False
         self._next_tick_s = 0.0
         self._expire_at_s = math.inf
@@ -181,8 +184,12 @@ class _Run:
         return None
 
     def _hear(self, message: object) -> Ending | None:
-        if isinstance(message, Answered | Refused | Stopped):
+        if isinstance(message, Answered):
+            return Answered(replace(message.answer, blocks=tuple(self._blocks)))
+        if isinstance(message, Refused | Stopped):
             return self._settled(message)
+        if isinstance(message, Block):
+            self._blocks.append(message)
         if isinstance(message, Started):
             self._started = True
             self._expire_at_s = time.monotonic() + self._limits.time_s
