@@ -114,6 +114,11 @@ def answered(mission: Mission) -> Answered:
 @pytest.fixture
 def job_path(service: Service, mission: Mission) -> str:
     """Store the mission as a job that has succeeded; return its address."""
+    return store_job(service, mission)
+
+
+def store_job(service: Service, mission: Mission) -> str:
+    """Store a mission as a job that has succeeded; return its address."""
     scenario_id, job_id = new_id(), new_id()
     with service.database.transaction() as session:
         session.add(
