@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import islice
 from typing import Annotated, Any, Final
@@ -126,6 +127,7 @@ def list_outcomes(
     paging: PagingDep,
     outcome: Annotated[Outcome | None, Query(description="Only this outcome.")] = None,
     reason: Annotated[str | None, Query(description="Only this code of a reason.")] = None,
+    target_id: Annotated[str | None, Query(description="Only this target.")] = None,
 ) -> Listed[TargetItem]:
     """List every target of the scenario once, with its outcome and why it was left out."""
     after = paging.after_number()
@@ -140,8 +142,10 @@ def list_outcomes(
     found = (
         (position, target)
         for entry, text in answer_store.texts(database.reading, job_id, entries)
+        if target_id is None or json.dumps(target_id) in text
         for position, target in enumerate(items_in(text), entry.first)
         if position > after
+        and target_id in (None, target["target_id"])
         and outcome in (None, target["outcome"])
         and reason in (None, (target["reason"] or {}).get("code"))
     )
