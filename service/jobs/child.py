@@ -43,6 +43,11 @@ class Started:
 
 
 @dataclass(frozen=True, slots=True)
+class OpportunitiesFollow:
+    """The next message is the answer's opportunity block, as bytes."""
+
+
+@dataclass(frozen=True, slots=True)
 class Answered:
     """The work is done, or was cut short and has a plan all the same."""
 
@@ -89,10 +94,13 @@ def main(
     threading.Thread(target=_obey, args=(connection, budget), daemon=True).start()
     ending = _do(load(work), request, budget)
     if isinstance(ending, Answered):
-        # One by one, so that neither side holds the answer as messages too.
-        for block in ending.answer.blocks:
+        # In pieces, so that neither side holds the answer as a message too.
+        answer = ending.answer
+        for block in answer.blocks:
             outbox.send(block)
-        ending = Answered(replace(ending.answer, blocks=()))
+        if answer.opportunity_block is not None:
+            outbox.send_opportunities(answer.opportunity_block)
+        ending = Answered(replace(answer, blocks=(), opportunity_block=None))
     outbox.send(ending)
 
 
@@ -128,6 +136,11 @@ class _Outbox:
     def send(self, message: object) -> None:
         with self._lock:
             self._connection.send(message)
+
+    def send_opportunities(self, block: bytes) -> None:
+        with self._lock:
+            self._connection.send(OpportunitiesFollow())
+            self._connection.send_bytes(block)
 
     def report(self, progress: Progress) -> None:
         now_s = time.monotonic()

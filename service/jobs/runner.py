@@ -19,7 +19,15 @@ import psutil
 from planner_core.solvers.base import Progress
 from service.blocks import Block
 from service.jobs import child
-from service.jobs.child import Answered, Command, Ending, Refused, Started, Stopped
+from service.jobs.child import (
+    Answered,
+    Command,
+    Ending,
+    OpportunitiesFollow,
+    Refused,
+    Started,
+    Stopped,
+)
 from service.jobs.plan_job import PlanRequest
 
 log = logging.getLogger(__name__)
@@ -157,6 +165,7 @@ class _Run:
         self._phase: str | None = None
         self._progress: Progress | None = None
         self._blocks: list[Block] = []
+        self._opportunity_block: bytes | None = None
         self._verifying = False
         self._next_tick_s = 0.0
         self._expire_at_s = math.inf
@@ -185,12 +194,15 @@ class _Run:
 
     def _hear(self, message: object) -> Ending | None:
         if isinstance(message, Answered):
-            return Answered(replace(message.answer, blocks=tuple(self._blocks)))
+            blocks, opportunities = tuple(self._blocks), self._opportunity_block
+            return Answered(replace(message.answer, blocks=blocks, opportunity_block=opportunities))
         if isinstance(message, Refused | Stopped):
             return self._settled(message)
         if isinstance(message, Block):
             self._blocks.append(message)
-        if isinstance(message, Started):
+        elif isinstance(message, OpportunitiesFollow):
+            self._opportunity_block = self._pipe.recv_bytes()
+        elif isinstance(message, Started):
             self._started = True
             self._expire_at_s = time.monotonic() + self._limits.time_s
             self._kill_at_s = self._expire_at_s + TIME_GRACE_S

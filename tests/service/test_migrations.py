@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +17,17 @@ from service.blocks import Block, blocks_of_timeline, contents_of, proof_blocks,
 from service.db.migrate import config_on
 from service.db.session import Database
 from service.stores import answer_store
+from tests.service.jobs.conftest import SERVER_URL, create_database
 from tests.service.test_blocks import target, timeline_of
 
 Change = Callable[[Config, str], None]
 
-AT = "2026-01-01 00:00:00.000000"
+AT = datetime(2026, 1, 1, tzinfo=UTC)
+JOB: dict[str, Any] = {
+    "scenario_id": "s", "tenant": "local", "state": "succeeded", "solver": "rule", "params": {},
+    "seed": 0, "limits": {}, "priority": 5, "dispatch": 1, "run": 1, "lost_runs": 0,
+    "dispatched_at": AT, "cancel_requested": False, "version": 1, "created_at": AT,
+}  # fmt: skip
 OLD = ("timeline", "targets", "proof")
 
 
@@ -40,30 +47,26 @@ ANSWERS = {
 
 
 @pytest.fixture
-def database(tmp_path: Path) -> Database:
+def database(tmp_path: Path) -> Iterator[Database]:
     """A database of the version before blocks, with some answers."""
-    database = Database(f"sqlite:///{tmp_path / 'old.db'}")
+    url = f"sqlite:///{tmp_path / 'old.db'}"
+    if SERVER_URL is not None:
+        url = create_database(SERVER_URL, "template1")
+    database = Database(url)
     move(database, command.upgrade, "0009")
     with database.engine.begin() as connection:
-        connection.exec_driver_sql(
-            "INSERT INTO scenario (id, sha256, summary, content, created_at) "
-            f"VALUES ('s', 's', '{{}}', '{{}}', '{AT}')"
-        )
+        store(connection, "scenario", id="s", sha256="s", summary={}, content="{}", created_at=AT)
         for job_id, texts in ANSWERS.items():
-            connection.exec_driver_sql(
-                "INSERT INTO job (id, scenario_id, tenant, state, solver, params, seed, limits, "
-                "priority, dispatch, run, lost_runs, dispatched_at, cancel_requested, version, "
-                f"created_at) VALUES ('{job_id}', 's', 'local', 'succeeded', 'rule', '{{}}', 0, "
-                f"'{{}}', 5, 1, 1, 0, '{AT}', 0, 1, '{AT}')"
-            )
-            connection.execute(
-                sa.text(
-                    "INSERT INTO job_result (job_id, timeline, targets, proof, created_at) "
-                    f"VALUES ('{job_id}', :timeline, :targets, :proof, '{AT}')"
-                ),
-                texts,
-            )
-    return database
+            store(connection, "job", id=job_id, **JOB)
+            store(connection, "job_result", job_id=job_id, created_at=AT, **texts)
+    yield database
+    database.close()
+
+
+def store(connection: sa.Connection, table: str, **values: object) -> None:
+    """Insert a row into a table as it is at this version."""
+    found = sa.Table(table, sa.MetaData(), autoload_with=connection)
+    connection.execute(sa.insert(found).values(**values))
 
 
 def move(database: Database, change: Change, revision: str) -> None:
