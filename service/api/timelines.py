@@ -133,7 +133,7 @@ def list_outcomes(
     after = paging.after_number()
     with database.reading() as session:
         intake.require_answer(session, intake.find_job(session, job_id))
-        contents = answer_store.contents(session, job_id, ("targets",))
+        contents = answer_store.contents(session, job_id, "targets")
     entries = (
         entry
         for entry in contents
@@ -165,7 +165,7 @@ def _answer(database: Database, request: Request, job: JobRow, form: Form | None
         finished_at = intake.require_answer(session, job)
         if matches(request.headers.get("if-none-match"), headers["ETag"]):
             return Response(status_code=304, headers=headers)
-        contents = answer_store.contents(session, job.id, (*TIMELINE, "targets"))
+        contents = answer_store.contents(session, job.id, *TIMELINE, "targets")
         content = "" if form is None else store.content_of(session, job.id)
 
     def texts(entries: Iterable[Entry]) -> Iterator[tuple[Entry, str]]:

@@ -28,34 +28,39 @@ class StoredQuestion:
     def __init__(self, content: str):
         self._content = content
         self._decoder = json.JSONDecoder()
-        self._members, self._targets_at = self._before_targets()
 
     @cached_property
     def horizon(self) -> Horizon:
         """Return the span that is planned."""
-        return horizon_from(HorizonIn.model_validate(self._members["horizon"]))
+        return horizon_from(HorizonIn.model_validate(self._before_targets[0]["horizon"]))
 
     @cached_property
     def satellites(self) -> tuple[Satellite, ...]:
         """Return the satellites."""
-        bodies = (FileSatellite.model_validate(one) for one in self._members["satellites"])
+        bodies = (
+            FileSatellite.model_validate(one) for one in self._before_targets[0]["satellites"]
+        )
         return tuple(satellite_from(body, str(body.id)) for body in bodies)
 
     @cached_property
     def ground_stations(self) -> tuple[GroundStation, ...]:
         """Return the stations."""
-        bodies = (FileGroundStation.model_validate(one) for one in self._members["ground_stations"])
+        bodies = (
+            FileGroundStation.model_validate(one)
+            for one in self._before_targets[0]["ground_stations"]
+        )
         return tuple(ground_station_from(body, str(body.id)) for body in bodies)
 
     def each_target(self) -> Iterator[Target]:
         """Yield the targets, in their order."""
-        at = self._targets_at
+        _, at = self._before_targets
         while self._content[at] != "]":
             fields, at = self._decoder.raw_decode(self._content, at)
             body = FileTarget.model_validate(fields)
             yield target_from(body, body.catalog_id)
             at += self._content[at] == ","
 
+    @cached_property
     def _before_targets(self) -> tuple[dict[str, Any], int]:
         """Return what stands before the targets, and where their list begins.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from datetime import datetime
 from typing import Any, Final
@@ -51,7 +51,7 @@ def answered_at(session: Session, job_id: str) -> datetime | None:
     return session.scalar(sa.select(JobResultRow.created_at).where(JobResultRow.job_id == job_id))
 
 
-def contents(session: Session, job_id: str, kinds: Collection[Kind]) -> list[Entry]:
+def contents(session: Session, job_id: str, *kinds: Kind) -> list[Entry]:
     """Return the table of contents of a job's answer, as far as it is of these kinds."""
     row = JobBlockRow
     columns = (row.position, row.kind, row.first, row.num_items, row.size, row.tally)
@@ -90,15 +90,15 @@ def texts(
 
 def timeline_of(session: Session, job_id: str) -> str | None:
     """Return a job's timeline document as a whole, or None where there is none (yet)."""
-    return _whole(session, job_id, TIMELINE)
+    return _whole(session, job_id, *TIMELINE)
 
 
 def proof_of(session: Session, job_id: str) -> str | None:
     """Return what proves a job's bound as JSON text, or None where there is none."""
-    return _whole(session, job_id, ("proof",))
+    return _whole(session, job_id, "proof")
 
 
-def _whole(session: Session, job_id: str, kinds: Collection[Kind]) -> str | None:
+def _whole(session: Session, job_id: str, *kinds: Kind) -> str | None:
     wanted = sa.select(JobBlockRow.text).where(
         JobBlockRow.job_id == job_id, JobBlockRow.kind.in_(kinds)
     )

@@ -107,7 +107,7 @@ def test_a_filtered_page_passes_over_blocks_without_what_is_wanted(
     service: Service, client: httpx.Client, large: Large
 ) -> None:
     spoil_targets(service, NUM_LEFT_OUT)
-    query = {"outcome": "collected", "limit": 100}
+    query: dict[str, str | int] = {"outcome": "collected", "limit": 100}
     page = client.get(f"{large.path}/targets", params=query).json()
     first = NUM_LEFT_OUT
     assert [one["target_id"] for one in page["items"]] == [f"t{first + n}" for n in range(100)]

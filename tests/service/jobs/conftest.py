@@ -98,7 +98,7 @@ class Jobs:
         """Return timeline and targets of a job."""
         with self.database.reading() as session:
             timeline = answer_store.timeline_of(session, job_id)
-            contents = answer_store.contents(session, job_id, ("targets",))
+            contents = answer_store.contents(session, job_id, "targets")
         texts = answer_store.texts(self.database.reading, job_id, contents)
         targets = "".join(text for _, text in texts)
         return None if timeline is None else (timeline, f"[{targets}]")
