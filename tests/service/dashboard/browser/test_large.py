@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
+from functools import partial
 from urllib.parse import urlsplit
 
 import httpx
 import pytest
+from selenium.webdriver import ActionChains
 
 from tests.service.dashboard.browser.conftest import Browser
 from tests.service.dashboard.browser.missions import Json, large_mission, planned
@@ -71,6 +73,45 @@ def test_a_large_timeline_is_shown_whole_and_moved_through(
     assert max(bars) <= KINDS * len(timeline["satellites"]) * width
     # The busiest satellite has more actions than its lanes have pixels: some share a pixel.
     assert bars[-1] < num_actions + sum(len(one["eclipses"]) for one in timeline["satellites"])
+
+
+def test_a_click_takes_an_action_of_the_row_that_it_is_on(
+    browser: Browser, api: httpx.Client, job: Json
+) -> None:
+    browser.open(f"/jobs/{job['id']}")
+    path = browser.wait_for_answer()
+    timeline = api.get(f"{path}/timeline").json()
+    canvas = browser.find("#gantt canvas")
+    axis, height = 24, canvas.size["height"]
+    row_height = (height - 2 * axis) / len(timeline["satellites"])
+    busy = [
+        (row, satellite["name"], action)
+        for row, satellite in enumerate(timeline["satellites"])
+        for action in satellite["actions"]
+        if action["mode"] == "collect"
+    ]
+    for row, name, collect in (busy[0], busy[-1]):
+        share = browser.run(
+            "const [at, from, to] = [...arguments].map((one) => Date.parse(one));"
+            "return (at - from) / (to - from)",
+            *(collect["start"], timeline["horizon"]["start"], timeline["horizon"]["end"]),
+        )
+        x, y = 120 + share * (canvas.size["width"] - 132), axis + (row + 0.2) * row_height
+        # As high as a screen is: the row must be in sight.
+        browser.run(
+            "arguments[0].scrollIntoView({block: arguments[1]})",
+            canvas,
+            "start" if row < 6 else "end",
+        )
+        chain = ActionChains(browser.driver)
+        offset = round(x - canvas.size["width"] / 2), round(y - height / 2)
+        chain.move_to_element_with_offset(canvas, *offset).click().perform()
+        browser.wait(partial(tells_of, browser, name))
+        browser.click("#zoom-all")
+
+
+def tells_of(browser: Browser, satellite_name: str) -> bool:
+    return satellite_name in browser.text("#selected dl:first-child").splitlines()
 
 
 def test_nothing_large_is_asked_for_twice_and_outcomes_come_by_the_page(
