@@ -29,7 +29,7 @@ from benchmarks import pollers
 from service.api.shapes import parse_instant
 from service.commands import demo_mission
 from service.commands.demo import create_mission
-from service.db.rows import JobResultRow, JobRow
+from service.db.rows import JobBlockRow, JobResultRow, JobRow
 from service.db.session import Database
 from service.ids import new_id
 from service.instants import instant_text
@@ -233,11 +233,12 @@ def many_jobs(service: Served, mission: Json) -> None:
 def copy_job(database: Database, job_id: str, copies: int) -> None:
     with database.transaction() as session:
         ids = [new_id() for _ in range(copies)]
-        for kind, key in ((JobRow, "id"), (JobResultRow, "job_id")):
+        for kind, key in ((JobRow, "id"), (JobResultRow, "job_id"), (JobBlockRow, "job_id")):
             table = kind.__table__
-            found = session.execute(sa.select(table).where(table.c[key] == job_id)).mappings().one()
-            changes = {"label": "stored"} if "label" in found else {}
-            session.execute(sa.insert(kind), [{**found, **changes, key: copy} for copy in ids])
+            found = session.execute(sa.select(table).where(table.c[key] == job_id)).mappings().all()
+            changes = {"label": "stored"} if kind is JobRow else {}
+            rows = [{**row, **changes, key: copy} for copy in ids for row in found]
+            session.execute(sa.insert(kind), rows)
 
 
 def uploads(service: Served) -> None:

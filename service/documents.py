@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,7 @@ _COMPARED = (
 
 
 def figures_of(timeline: Document) -> Document:
-    """Return the numbers of a timeline document that a table of several plans shows."""
+    """Return the numbers of a timeline (its head will do) that a table of several plans shows."""
     totals, runtime_s = timeline["totals"], timeline["runtime_s"]
     return {
         **{name: totals[name] for name in _COMPARED},
@@ -46,42 +47,12 @@ class Documents(Wording):
         self.scenario_sha256 = scenario_sha256
         self._seen = _seen_at_own_starts(judged)
 
-    def timeline(
+    def head(
         self, *, solver: str, params: Mapping[str, Any], seed: int, termination: str
     ) -> Document:
-        """Return the timeline document of api.md."""
+        """Return the timeline document of api.md, but for its satellites."""
         judged, horizon = self.judged, self.judged.scenario.horizon
         runtime = judged.runtime_s
-        number = 0
-        satellites = []
-        for satellite, line, lit in zip(
-            judged.problem.satellites,
-            judged.timeline.satellites,
-            judged.opportunities.sunlight,
-            strict=True,
-        ):
-            actions = []
-            for action in line.actions:
-                number += 1
-                actions.append(self._action(f"a{number}", action))
-            satellites.append(
-                {
-                    "id": satellite.id,
-                    "name": satellite.name,
-                    "actions": actions,
-                    "eclipses": [
-                        {"start": self._instant(start_s), "end": self._instant(end_s)}
-                        for start_s, end_s in lit.gaps(judged.problem.horizon_s)
-                    ],
-                    "resources": None
-                    if line.resources is None
-                    else {
-                        **self._curves(line.resources),
-                        "battery_min_fraction": satellite.resources.battery_min_fraction,
-                        "recorder_max_fraction": satellite.resources.recorder_max_fraction,
-                    },
-                }
-            )
         return {
             "schema_version": SCHEMA_VERSION,
             "job": self.job_id,
@@ -113,12 +84,37 @@ class Documents(Wording):
                 "earth_orientation": "IERS daily dUT1 and polar motion",
                 "nadir": {s.id: s.sensor.nadir for s in judged.scenario.satellites},
             },
-            "satellites": satellites,
         }
 
-    def targets(self) -> list[Document]:
-        """Return every target once, with outcome and reason."""
-        return [self._target(outcome) for outcome in self.judged.outcomes]
+    def satellites(self) -> Iterator[tuple[Document, Iterator[Document], Document]]:
+        """Yield what the timeline says of each satellite before, in and behind its actions."""
+        judged, numbers = self.judged, count(1)
+        for satellite, line, lit in zip(
+            judged.problem.satellites,
+            judged.timeline.satellites,
+            judged.opportunities.sunlight,
+            strict=True,
+        ):
+            about = {"id": satellite.id, "name": satellite.name}
+            actions = (self._action(f"a{next(numbers)}", action) for action in line.actions)
+            rest = {
+                "eclipses": [
+                    {"start": self._instant(start_s), "end": self._instant(end_s)}
+                    for start_s, end_s in lit.gaps(judged.problem.horizon_s)
+                ],
+                "resources": None
+                if line.resources is None
+                else {
+                    **self._curves(line.resources),
+                    "battery_min_fraction": satellite.resources.battery_min_fraction,
+                    "recorder_max_fraction": satellite.resources.recorder_max_fraction,
+                },
+            }
+            yield about, actions, rest
+
+    def targets(self) -> Iterator[Document]:
+        """Yield every target once, with outcome and reason."""
+        return (self._target(outcome) for outcome in self.judged.outcomes)
 
     def _totals(self) -> Document:
         judged, timeline = self.judged, self.judged.timeline

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from datetime import datetime
 from typing import Any, Final
 
 from fastapi import Request, Response
@@ -23,8 +24,8 @@ from service.scenarios.inputs import ScenarioFile, ScenarioIn
 from service.scenarios.translate import inside, read_file
 from service.settings import Settings
 from service.solver_params import params_of, parse_params
+from service.stores import answer_store, scenario_store
 from service.stores import job_store as store
-from service.stores import scenario_store
 from service.stores.scenario_store import FrozenScenario
 
 _QUEUE_FULL_S: Final = 30
@@ -116,9 +117,17 @@ def not_ready(job: JobRow) -> ServiceError:
     return ServiceError("not_ready", f"The job is {job.state} and left no answer: {why}.")
 
 
+def require_answer(session: Session, job: JobRow) -> datetime:
+    """Return when a job's answer was stored; 409 where it has none."""
+    finished_at = answer_store.answered_at(session, job.id)
+    if finished_at is None:
+        raise not_ready(job)
+    return finished_at
+
+
 def find_timeline(session: Session, job: JobRow) -> str:
     """Return a job's timeline document; 409 where there is none."""
-    timeline = store.timeline_of(session, job.id)
+    timeline = answer_store.timeline_of(session, job.id)
     if timeline is None:
         raise not_ready(job)
     return timeline

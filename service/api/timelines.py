@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import islice
 from typing import Annotated, Any, Final
 
 from fastapi import APIRouter, Depends, Path, Query, Request, Response
@@ -20,10 +21,12 @@ from service.api.paging import Listed, PagingDep
 from service.api.problems import ServiceError
 from service.api.shapes import matches
 from service.api.timeline_shapes import JSON_PROOF, JSON_TIMELINE
+from service.blocks import TIMELINE, Entry, holds, items_in
 from service.db.rows import JobRow
 from service.db.session import Database
-from service.exports.answered import Answered
+from service.exports.answered import Answered, in_chunks
 from service.exports.forms import FORMS, Form
+from service.stores import answer_store
 from service.stores import job_store as store
 
 router = APIRouter(prefix="/v1/jobs", tags=["timelines"], dependencies=[Depends(own_job_only)])
@@ -110,9 +113,8 @@ def get_proof(job_id: str, database: DatabaseDep, request: Request) -> Response:
     etag = f'"{job_id}"'
     with database.reading() as session:
         job = intake.find_job(session, job_id)
-        if store.timeline_of(session, job_id) is None:
-            raise intake.not_ready(job)
-        proof = store.proof_of(session, job_id)
+        intake.require_answer(session, job)
+        proof = answer_store.proof_of(session, job_id)
     if matches(request.headers.get("if-none-match"), etag):
         return Response(status_code=304, headers={"ETag": etag})
     return Response(proof or "null", media_type=_JSON, headers={"ETag": etag})
@@ -125,21 +127,29 @@ def list_outcomes(
     paging: PagingDep,
     outcome: Annotated[Outcome | None, Query(description="Only this outcome.")] = None,
     reason: Annotated[str | None, Query(description="Only this code of a reason.")] = None,
+    target_id: Annotated[str | None, Query(description="Only this target.")] = None,
 ) -> Listed[TargetItem]:
     """List every target of the scenario once, with its outcome and why it was left out."""
+    after = paging.after_number()
     with database.reading() as session:
-        job = intake.find_job(session, job_id)
-        targets = store.targets_of(session, job_id)
-    if targets is None:
-        raise intake.not_ready(job)
-    found = [
+        intake.require_answer(session, intake.find_job(session, job_id))
+        contents = answer_store.contents(session, job_id, "targets")
+    entries = (
+        entry
+        for entry in contents
+        if entry.first + entry.num_items - 1 > after and holds(entry.tally, outcome, reason)
+    )
+    found = (
         (position, target)
-        for position, target in enumerate(json.loads(targets))
-        if position > paging.after_number()
+        for entry, text in answer_store.texts(database.reading, job_id, entries)
+        if target_id is None or json.dumps(target_id) in text
+        for position, target in enumerate(items_in(text), entry.first)
+        if position > after
+        and target_id in (None, target["target_id"])
         and outcome in (None, target["outcome"])
         and reason in (None, (target["reason"] or {}).get("code"))
-    ]
-    page = paging.answer(found[: paging.limit + 1], lambda row: row[0])
+    )
+    page = paging.answer(list(islice(found, paging.limit + 1)), lambda row: row[0])
     return Listed(items=[TargetItem(**target) for _, target in page.rows], next=page.next)
 
 
@@ -152,17 +162,21 @@ def _answer(database: Database, request: Request, job: JobRow, form: Form | None
         "Content-Disposition": f'inline; filename="timeline-{job.id}.{suffix}"',
     }
     with database.reading() as session:
-        if not store.has_timeline(session, job.id):
-            raise intake.not_ready(job)
+        finished_at = intake.require_answer(session, job)
         if matches(request.headers.get("if-none-match"), headers["ETag"]):
             return Response(status_code=304, headers=headers)
-        if form is None:
-            text = store.timeline_of(session, job.id)
-            return Response(text, media_type=_JSON, headers=headers)
-        stored = store.answer_of(session, job.id)
-    return StreamingResponse(
-        form.write(Answered.of(*stored)), media_type=form.media_type, headers=headers
-    )
+        contents = answer_store.contents(session, job.id, *TIMELINE, "targets")
+        content = "" if form is None else store.content_of(session, job.id)
+
+    def texts(entries: Iterable[Entry]) -> Iterator[tuple[Entry, str]]:
+        return answer_store.texts(database.reading, job.id, entries)
+
+    if form is None:
+        entries = (entry for entry in contents if entry.kind in TIMELINE)
+        pieces = in_chunks(text for _, text in texts(entries))
+        return StreamingResponse(pieces, media_type=_JSON, headers=headers)
+    answered = Answered(contents, texts, content, finished_at)
+    return StreamingResponse(form.write(answered), media_type=form.media_type, headers=headers)
 
 
 def _etag(job_id: str, form: Form | None) -> str:

@@ -18,8 +18,8 @@ from service.opportunities import OpportunityReader
 from service.scenarios.change_inputs import ChangeIn
 from service.scenarios.variations import Asked, Variations
 from service.settings import Settings
+from service.stores import answer_store, opportunity_store, scenario_store
 from service.stores import job_store as store
-from service.stores import opportunity_store, scenario_store
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[Depends(own_job_only)])
 
@@ -62,7 +62,7 @@ def create_what_if(
     queue = intake.queue_of(request)
     with database.reading() as session:
         job = intake.find_job(session, job_id)
-        timeline = store.timeline_of(session, job_id)
+        timeline = answer_store.timeline_of(session, job_id)
         scenario = session.get_one(ScenarioRow, job.scenario_id)
         content, sha256 = scenario.content, scenario.sha256
     if timeline is None and body.needs_plan:

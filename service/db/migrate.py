@@ -25,7 +25,7 @@ def upgrade(database_url: str) -> None:
     try:
         with engine.begin() as connection:
             _wait_for_turn(connection)
-            command.upgrade(_config(connection), "head")
+            command.upgrade(config_on(connection), "head")
     finally:
         engine.dispose()
 
@@ -35,7 +35,8 @@ def _wait_for_turn(connection: sa.Connection) -> None:
         connection.execute(sa.select(sa.func.pg_advisory_xact_lock(_ADVISORY_LOCK)))
 
 
-def _config(connection: sa.Connection) -> Config:
+def config_on(connection: sa.Connection) -> Config:
+    """Return what Alembic needs to work on a connection, in its transaction."""
     config = Config()
     folder = Path(migrations.__file__).parent
     # Alembic reads "%" in options as interpolation.

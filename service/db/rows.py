@@ -190,7 +190,7 @@ class JobRow(Row):
 
 
 class JobResultRow(Row):
-    """The answer of a job, written in the transaction that ends it: documents as JSON text.
+    """That a job has an answer, written in the transaction that ends it, with all its blocks.
 
     ``figures`` repeats the numbers of the timeline that tables show.
     """
@@ -199,10 +199,25 @@ class JobResultRow(Row):
 
     job_id: Mapped[str] = mapped_column(sa.ForeignKey("job.id"), primary_key=True)
     figures: Mapped[Json | None]
-    timeline: Mapped[str] = mapped_column(sa.Text, deferred=True)
-    targets: Mapped[str] = mapped_column(sa.Text, deferred=True)
-    proof: Mapped[str | None] = mapped_column(sa.Text, deferred=True)
     created_at: Mapped[datetime]
+
+
+class JobBlockRow(Row):
+    """A piece of a job's answer (``service.blocks``), which never changes.
+
+    ``size`` counts the characters of ``text``.
+    """
+
+    __tablename__ = "job_block"
+
+    job_id: Mapped[str] = mapped_column(sa.ForeignKey("job_result.job_id"), primary_key=True)
+    position: Mapped[int] = mapped_column(primary_key=True)
+    kind: Mapped[str] = mapped_column(sa.String(16))
+    first: Mapped[int]
+    num_items: Mapped[int]
+    size: Mapped[int]
+    tally: Mapped[Json | None] = mapped_column(sa.JSON(none_as_null=True))
+    text: Mapped[str]
 
 
 class ComparisonRow(Row):

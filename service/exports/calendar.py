@@ -42,7 +42,7 @@ def _parts(answered: Answered) -> Iterator[str]:
     calendar.add("x-wr-calname", "Contacts")  # what calendars show that do not know NAME
     head, end, _ = calendar.to_ical().decode().partition("END:VCALENDAR")
     yield head
-    stations = {station.id: station for station in answered.scenario.ground_stations}
+    stations = {station.id: station for station in answered.question.ground_stations}
     seen: Counter[str] = Counter()
     for satellite, action in answered.each_action():
         if action["mode"] == "contact":
@@ -70,7 +70,7 @@ def _event(
     event.add("summary", what)
     event.add("location", station.name)
     event.add("geo", (round(station.lat_deg, 6), round(_signed(station.lon_deg), 6)))
-    event.add("description", _description(answered.timeline, action))
+    event.add("description", _description(answered.head, action))
     event.add("categories", ["Contact"])
     alarm = Alarm()
     alarm.add("action", "DISPLAY")
@@ -92,8 +92,8 @@ def _signed(lon_deg: float) -> float:
     return lon_deg - 360.0 if lon_deg > 180.0 else lon_deg
 
 
-def _description(timeline: Document, action: Document) -> str:
+def _description(head: Document, action: Document) -> str:
     return (
         f"{action['start']} to {action['end']}, azimuth {action['azimuth_deg']:.0f} deg at the "
-        f"middle.\nAction {action['id']} of job {timeline['job']}."
+        f"middle.\nAction {action['id']} of job {head['job']}."
     )

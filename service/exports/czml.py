@@ -50,23 +50,24 @@ def _parts(answered: Answered) -> Iterator[str]:
 
 
 def _packets(answered: Answered) -> Iterator[Document]:
-    scenario = answered.scenario
+    question = answered.question
     yield _document(answered)
-    for number, satellite in enumerate(scenario.satellites):
-        yield _satellite(satellite, scenario.horizon, _TRACKS[number % len(_TRACKS)])
-    for station in scenario.ground_stations:
+    for number, satellite in enumerate(question.satellites):
+        yield _satellite(satellite, question.horizon, _TRACKS[number % len(_TRACKS)])
+    for station in question.ground_stations:
         yield _station(station)
-    for target, told in zip(scenario.targets, answered.targets, strict=True):
+    for target, told in zip(question.each_target(), answered.each_target(), strict=True):
         yield _target(target, told)
-    for satellite in answered.timeline["satellites"]:
-        yield from _contacts(satellite, scenario.ground_stations)
+    for number, about in enumerate(answered.satellites):
+        contacts = [a for a in answered.actions_of(number) if a["mode"] == "contact"]
+        yield from _contacts(about, contacts, question.ground_stations)
 
 
 def _document(answered: Answered) -> Document:
-    horizon = answered.scenario.horizon
+    horizon = answered.question.horizon
     return {
         "id": "document",
-        "name": f"Timeline of job {answered.timeline['job']}",
+        "name": f"Timeline of job {answered.head['job']}",
         "version": "1.0",
         "clock": {
             "interval": _interval(instant_text(horizon.start), instant_text(horizon.end)),
@@ -132,10 +133,11 @@ def _target(target: Target, told: Document) -> Document:
     }
 
 
-def _contacts(satellite: Document, stations: Iterable[GroundStation]) -> Iterator[Document]:
+def _contacts(
+    satellite: Document, contacts: list[Document], stations: Iterable[GroundStation]
+) -> Iterator[Document]:
     """Yield a line to each station that the satellite talks to, there during its contacts."""
     names = {station.id: station.name for station in stations}
-    contacts = [a for a in satellite["actions"] if a["mode"] == "contact"]
     contacts.sort(key=itemgetter("station_id", "start"))
     for station_id, actions in groupby(contacts, key=itemgetter("station_id")):
         yield {

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+from array import array
 from collections import Counter
 from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -14,10 +17,13 @@ from planner_core.orbits.ephemeris import Ephemeris, propagate
 from planner_core.orbits.ground_track import sub_points, visibility_ring
 from service.exports.answered import Answered, Document, compact, in_chunks, listed
 from service.exports.antimeridian import Piece, area, pieces_of_line
+from service.instants import instant_text
 
 TRACK_STEP_S = 30.0
 _DECIMALS = 4  # of a degree: eleven metres
 _CLASS_KM = 10.0
+_EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
+_MILLISECOND: Final = timedelta(milliseconds=1)
 
 
 def write(answered: Answered) -> Iterator[str]:
@@ -26,8 +32,8 @@ def write(answered: Answered) -> Iterator[str]:
 
 
 def _parts(answered: Answered) -> Iterator[str]:
-    timeline = answered.timeline
-    head = {name: timeline[name] for name in ("job", "scenario_sha256", "plan_sha256", "horizon")}
+    names = ("job", "scenario_sha256", "plan_sha256", "horizon")
+    head = {name: answered.head[name] for name in names}
     yield f'{{"type":"FeatureCollection",{compact(head)[1:-1]},"features":[\n'
     yield from listed(compact(feature) for feature in _features(answered))
     yield "\n]}\n"
@@ -36,13 +42,13 @@ def _parts(answered: Answered) -> Iterator[str]:
 def _features(answered: Answered) -> Iterator[Document]:
     yield from _targets(answered)
     yield from _stations(answered)
-    horizon = answered.scenario.horizon
+    horizon = answered.question.horizon
     reaches: dict[float, list[str]] = {}
-    for satellite in answered.scenario.satellites:
+    for satellite in answered.question.satellites:
         path = propagate(satellite, horizon)
         yield _track(satellite, horizon, path)
         reaches.setdefault(_altitude_class_km(path), []).append(satellite.id)
-    for station in answered.scenario.ground_stations:
+    for station in answered.question.ground_stations:
         for altitude_km, satellite_ids in sorted(reaches.items()):
             yield _reach(station, altitude_km, satellite_ids)
 
@@ -63,8 +69,9 @@ def _point(lon_deg: float, lat_deg: float) -> Document:
 
 
 def _targets(answered: Answered) -> Iterator[Document]:
-    for target, told in zip(answered.scenario.targets, answered.targets, strict=True):
-        action = answered.actions.get(told["action_id"] or "")
+    spans = _Spans(answered)
+    for target, told in zip(answered.question.each_target(), answered.each_target(), strict=True):
+        start, end = spans.of(told["action_id"])
         reason = told["reason"]
         yield _feature(
             "target",
@@ -78,16 +85,37 @@ def _targets(answered: Answered) -> Iterator[Document]:
                 "reason_detail": reason and reason["detail"],
                 "action_id": told["action_id"],
                 "satellite_id": told["satellite_id"],
-                "start": action and action["start"],
-                "end": action and action["end"],
+                "start": start,
+                "end": end,
                 "reward": target.reward,
             },
         )
 
 
+class _Spans:
+    """When each action begins and ends: 16 bytes of each, for there may be very many."""
+
+    def __init__(self, answered: Answered):
+        spans = array("q")
+        # Action ids count through all satellites: a1, a2, ...
+        for _, action in answered.each_action():
+            for name in ("start", "end"):
+                moment = datetime.fromisoformat(action[name])
+                spans.append((moment - _EPOCH) // _MILLISECOND)
+        self._spans = spans
+
+    def of(self, action_id: str | None) -> tuple[str | None, str | None]:
+        """Return the instants of an action, None of none."""
+        if action_id is None:
+            return None, None
+        at = 2 * (int(action_id.removeprefix("a")) - 1)
+        start, end = (_EPOCH + ms * _MILLISECOND for ms in self._spans[at : at + 2])
+        return instant_text(start), instant_text(end)
+
+
 def _stations(answered: Answered) -> Iterator[Document]:
     contacts = Counter(action["station_id"] for _, action in answered.each_action())
-    for station in answered.scenario.ground_stations:
+    for station in answered.question.ground_stations:
         yield _feature(
             "station",
             station.id,

@@ -7,11 +7,11 @@ start, end, type, color and textColor. An ``id`` lets Open MCT keep an activity'
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from typing import Final
 
-from service.exports.answered import Answered, Document, compact, in_chunks, listed
+from service.exports.answered import Answered, Document, compact, in_chunks
 
 _MODES: Final = {
     "collect": ("collects", "#1b7f4b", "#ffffff"),
@@ -28,24 +28,22 @@ def write(answered: Answered) -> Iterator[str]:
 
 
 def _parts(answered: Answered) -> Iterator[str]:
-    stations = {station.id: station.name for station in answered.scenario.ground_stations}
-    names = Counter(satellite["name"] for satellite in answered.timeline["satellites"])
+    stations = {station.id: station.name for station in answered.question.ground_stations}
+    names = Counter(satellite["name"] for satellite in answered.satellites)
     yield "{\n"
-    yield from listed(_groups(answered.timeline["satellites"], names, stations))
-    yield "\n}\n"
-
-
-def _groups(
-    satellites: Iterable[Document], names: Counter[str], stations: dict[str, str]
-) -> Iterator[str]:
-    for satellite in satellites:
+    separator = ""
+    for number, satellite in enumerate(answered.satellites):
         # Group names are keys: two satellites of one name are told apart by their ids.
         is_unique = names[satellite["name"]] == 1
         title = satellite["name"] if is_unique else f"{satellite['name']} ({satellite['id']})"
+        # Read once for each mode: a group is written before the next one begins.
         for mode, (words, color, text_color) in _MODES.items():
             group = f"{title}: {words}"
-            activities = [
-                {
+            before = f"{separator}{compact(group)}:["
+            for action in answered.actions_of(number):
+                if action["mode"] != mode:
+                    continue
+                activity = {
                     "id": f"{satellite['id']}/{action['id']}",
                     "name": _name(action, stations),
                     "start": _milliseconds(action["start"]),
@@ -54,11 +52,12 @@ def _groups(
                     "color": color,
                     "textColor": text_color,
                 }
-                for action in satellite["actions"]
-                if action["mode"] == mode
-            ]
-            if activities:
-                yield f"{compact(group)}:{compact(activities)}"
+                yield before + compact(activity)
+                before = ","
+            if before == ",":
+                yield "]"
+                separator = ",\n"
+    yield "\n}\n"
 
 
 def _name(action: Document, stations: dict[str, str]) -> str:

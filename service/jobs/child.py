@@ -1,7 +1,7 @@
 """The solver's process: what happens between fork and exit.
 
-It talks to its worker over one pipe: ``Cancel`` and ``Expire`` come in, progress and at last
-one ending go out. When the worker's end closes, the process is gone at once.
+It talks to its worker over one pipe: ``Cancel`` and ``Expire`` come in, progress, the blocks of
+an answer and at last one ending go out. When the worker's end closes, the process is gone at once.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import signal
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum, auto
 from multiprocessing.connection import Connection
 from typing import Any, Final, cast
@@ -40,6 +40,11 @@ class Command(Enum):
 @dataclass(frozen=True, slots=True)
 class Started:
     """The first word: the kernels are loaded and the clock runs."""
+
+
+@dataclass(frozen=True, slots=True)
+class OpportunitiesFollow:
+    """The next message is the answer's opportunity block, as bytes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +92,16 @@ def main(
     budget = Budget(time_s, outbox.report, num_threads)
     outbox.send(Started())
     threading.Thread(target=_obey, args=(connection, budget), daemon=True).start()
-    outbox.send(_do(load(work), request, budget))
+    ending = _do(load(work), request, budget)
+    if isinstance(ending, Answered):
+        # In pieces, so that neither side holds the answer as a message too.
+        answer = ending.answer
+        for block in answer.blocks:
+            outbox.send(block)
+        if answer.opportunity_block is not None:
+            outbox.send_opportunities(answer.opportunity_block)
+        ending = Answered(replace(answer, blocks=(), opportunity_block=None))
+    outbox.send(ending)
 
 
 def load(name: str) -> WorkFunction:
@@ -122,6 +136,11 @@ class _Outbox:
     def send(self, message: object) -> None:
         with self._lock:
             self._connection.send(message)
+
+    def send_opportunities(self, block: bytes) -> None:
+        with self._lock:
+            self._connection.send(OpportunitiesFollow())
+            self._connection.send_bytes(block)
 
     def report(self, progress: Progress) -> None:
         now_s = time.monotonic()

@@ -7,16 +7,18 @@ the database's.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal, cast
 
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
 
+from service.blocks import Block
 from service.db.clock import utc_now
-from service.db.rows import JobResultRow, JobRow
+from service.db.rows import JobRow
 from service.jobs.queue import JobQueue
+from service.stores import answer_store
 from service.webhooks import outbox
 
 JobState = Literal["queued", "running", "cancelling", "succeeded", "failed", "cancelled", "expired"]
@@ -35,7 +37,7 @@ class Lease:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """How a run ended. ``timeline``, ``targets``, ``proof`` are documents as JSON text, or None.
+    """How a run ended. ``blocks`` hold the documents of its answer; none where it has no answer.
 
     ``progress`` is the last report; None leaves the one that the job has. ``figures`` are the
     timeline's numbers for tables.
@@ -45,9 +47,7 @@ class Outcome:
     termination: str | None = None
     error: Mapping[str, str] | None = None
     progress: Mapping[str, Any] | None = None
-    timeline: str | None = None
-    targets: str | None = None
-    proof: str | None = None
+    blocks: Sequence[Block] = ()
     figures: Mapping[str, Any] | None = None
 
     @classmethod
@@ -126,17 +126,8 @@ def finish(session: Session, lease: Lease, outcome: Outcome) -> bool:
         error=sa.null() if outcome.error is None else dict(outcome.error),
         progress=JobRow.progress if outcome.progress is None else dict(outcome.progress),
     )
-    if changed and outcome.timeline is not None and outcome.targets is not None:
-        session.execute(
-            sa.insert(JobResultRow).values(
-                job_id=lease.job_id,
-                timeline=outcome.timeline,
-                targets=outcome.targets,
-                proof=outcome.proof,
-                figures=sa.null() if outcome.figures is None else dict(outcome.figures),
-                created_at=utc_now(),
-            )
-        )
+    if changed and outcome.blocks:
+        answer_store.save(session, lease.job_id, outcome.blocks, outcome.figures)
     return changed
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, cast
 
 from planner_core.bounds import proofs
@@ -12,8 +12,21 @@ from planner_core.build import ScenarioOpportunities
 from planner_core.run import plan_scenario
 from planner_core.solvers import solver_class
 from planner_core.solvers.base import Budget, Solver
+from service.blocks import Block, target_blocks, targets_text, timeline_blocks, timeline_text
 from service.documents import Documents, figures_of
 from service.scenarios.translate import scenario_from_content
+
+
+class Parcel:
+    """Bytes that are handed on once: who takes them is alone in holding them."""
+
+    def __init__(self, content: bytes | None):
+        self._content = content
+
+    def take(self) -> bytes | None:
+        """Return the bytes the first time; None where there are none, or no longer."""
+        content, self._content = self._content, None
+        return content
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,7 +44,7 @@ class PlanRequest:
     limits
         ``time_s`` and ``memory_mb``.
     opportunity_block
-        The scenario's stored opportunities, or None where they are still to be computed.
+        The scenario's stored opportunities; none where they are still to be computed.
     bound
         The best bound known of the scenario with its proof (JSON text), or None.
     """
@@ -44,7 +57,7 @@ class PlanRequest:
     seed: int
     limits: Mapping[str, Any]
     run: int = 1
-    opportunity_block: bytes | None = None
+    opportunity_block: Parcel = field(default_factory=lambda: Parcel(None))
     bound: str | None = None
 
 
@@ -54,10 +67,8 @@ class PlanAnswer:
 
     Attributes
     ----------
-    timeline
-        The timeline document (JSON text).
-    targets
-        Every target with its outcome (JSON text of a list).
+    blocks
+        The timeline document, and every target with its outcome.
     termination
         Why the search ended.
     reward, bound
@@ -70,14 +81,23 @@ class PlanAnswer:
         The timeline's numbers for tables.
     """
 
-    timeline: str
-    targets: str
+    blocks: tuple[Block, ...]
     termination: str
     reward: float
     bound: float | None = None
     proof: str | None = None
     opportunity_block: bytes | None = None
     figures: Mapping[str, Any] | None = None
+
+    @property
+    def timeline(self) -> str:
+        """Return the timeline document (JSON text)."""
+        return timeline_text(self.blocks)
+
+    @property
+    def targets(self) -> str:
+        """Return every target with its outcome (JSON text of a list)."""
+        return targets_text(self.blocks)
 
 
 def run_plan_job(request: PlanRequest, budget: Budget) -> PlanAnswer:
@@ -91,27 +111,31 @@ def run_plan_job(request: PlanRequest, budget: Budget) -> PlanAnswer:
         Where the budget ended before there was any plan.
     """
     make_solver = cast(Callable[..., Solver], solver_class(request.solver))
-    block = request.opportunity_block
+    block = request.opportunity_block.take()
+    known = None if block is None else ScenarioOpportunities.from_bytes(block)
+    del block  # the solver needs the memory
     judged = plan_scenario(
         scenario_from_content(json.loads(request.content)),
         make_solver(**request.params),
         request.seed,
         budget,
-        ScenarioOpportunities.from_bytes(block) if block is not None else None,
+        known,
         proofs.from_json(request.bound) if request.bound is not None else None,
     )
     documents = Documents(judged, job_id=request.job_id, scenario_sha256=request.scenario_sha256)
     termination = judged.solution.termination.value
-    timeline = documents.timeline(
+    head = documents.head(
         solver=request.solver, params=request.params, seed=request.seed, termination=termination
     )
     return PlanAnswer(
-        timeline=json.dumps(timeline),
-        targets=json.dumps(documents.targets()),
+        blocks=(
+            *timeline_blocks(head, documents.satellites()),
+            *target_blocks(documents.targets()),
+        ),
         termination=termination,
         reward=judged.timeline.reward,
         bound=judged.bound.value if judged.bound else None,
         proof=proofs.to_json(judged.bound) if judged.bound else None,
-        opportunity_block=judged.opportunities.to_bytes() if block is None else None,
-        figures=figures_of(timeline),
+        opportunity_block=judged.opportunities.to_bytes() if known is None else None,
+        figures=figures_of(head),
     )

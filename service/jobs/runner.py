@@ -7,7 +7,7 @@ import math
 import os
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum, auto
 from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
@@ -17,8 +17,17 @@ from typing import Any, Final
 import psutil
 
 from planner_core.solvers.base import Progress
+from service.blocks import Block
 from service.jobs import child
-from service.jobs.child import Answered, Command, Ending, Refused, Started, Stopped
+from service.jobs.child import (
+    Answered,
+    Command,
+    Ending,
+    OpportunitiesFollow,
+    Refused,
+    Started,
+    Stopped,
+)
 from service.jobs.plan_job import PlanRequest
 
 log = logging.getLogger(__name__)
@@ -128,6 +137,7 @@ class Runner:
         try:
             process.start()
             theirs.close()
+            request.opportunity_block.take()  # it is sent: only the solver needs it
             return _Run(process, ours, limits, tick_s, tick, on_phase).until_end()
         finally:
             ours.close()
@@ -154,6 +164,8 @@ class _Run:
         self._on_phase = on_phase
         self._phase: str | None = None
         self._progress: Progress | None = None
+        self._blocks: list[Block] = []
+        self._opportunity_block: bytes | None = None
         self._verifying = False
         self._next_tick_s = 0.0
         self._expire_at_s = math.inf
@@ -181,9 +193,16 @@ class _Run:
         return None
 
     def _hear(self, message: object) -> Ending | None:
-        if isinstance(message, Answered | Refused | Stopped):
+        if isinstance(message, Answered):
+            blocks, opportunities = tuple(self._blocks), self._opportunity_block
+            return Answered(replace(message.answer, blocks=blocks, opportunity_block=opportunities))
+        if isinstance(message, Refused | Stopped):
             return self._settled(message)
-        if isinstance(message, Started):
+        if isinstance(message, Block):
+            self._blocks.append(message)
+        elif isinstance(message, OpportunitiesFollow):
+            self._opportunity_block = self._pipe.recv_bytes()
+        elif isinstance(message, Started):
             self._started = True
             self._expire_at_s = time.monotonic() + self._limits.time_s
             self._kill_at_s = self._expire_at_s + TIME_GRACE_S

@@ -19,6 +19,7 @@ from sqlalchemy.orm import Session
 
 from planner_core.solvers.base import Progress
 from service import tracing
+from service.blocks import proof_blocks
 from service.db.clock import utc_now
 from service.db.failures import why_unavailable
 from service.db.rows import JobRow, ScenarioRow, WorkerRow
@@ -26,7 +27,7 @@ from service.db.session import Database
 from service.jobs import lease
 from service.jobs.child import Answered, Ending, Refused, Stopped
 from service.jobs.lease import Lease, Outcome
-from service.jobs.plan_job import PlanAnswer, PlanRequest
+from service.jobs.plan_job import Parcel, PlanAnswer, PlanRequest
 from service.jobs.queue import DbosConsumer, DbosQueue
 from service.jobs.reconcile import Reconciler
 from service.jobs.renewal import Renewal
@@ -252,9 +253,7 @@ def outcome_of(ending: Ending) -> Outcome:
         progress=dataclasses.asdict(
             Progress(phase="verify", fraction=1.0, reward=answer.reward, bound=answer.bound)
         ),
-        timeline=answer.timeline,
-        targets=answer.targets,
-        proof=answer.proof,
+        blocks=(*answer.blocks, *proof_blocks(answer.proof or "")),
         figures=answer.figures,
     )
 
@@ -283,7 +282,7 @@ def _request(session: Session, job_id: str, run: int) -> tuple[PlanRequest, _Ori
         params=job.params,
         seed=job.seed,
         limits=job.limits,
-        opportunity_block=opportunity_store.load(session, sha256),
+        opportunity_block=Parcel(opportunity_store.load(session, sha256)),
         bound=bound_store.load(session, sha256),
     )
     return request, _Origin(request_id=job.request_id, traceparent=job.traceparent)

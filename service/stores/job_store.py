@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
-from datetime import datetime
 from typing import Any, Final
 
 import sqlalchemy as sa
@@ -12,7 +11,7 @@ from sqlalchemy.orm import Session
 
 from service import tracing
 from service.db.clock import utc_now
-from service.db.rows import JobResultRow, JobRow, ScenarioRow
+from service.db.rows import JobRow, ScenarioRow
 from service.ids import new_id
 from service.jobs.queue import JobQueue
 from service.logs import request_id
@@ -129,39 +128,11 @@ def hashes_of(session: Session, ids: Collection[str]) -> dict[str, str]:
     return {row.id: row.sha256 for row in session.execute(wanted)}
 
 
-def timeline_of(session: Session, job_id: str) -> str | None:
-    """Return a job's timeline document, or None where there is none (yet)."""
-    return session.scalar(sa.select(JobResultRow.timeline).where(JobResultRow.job_id == job_id))
-
-
-def has_timeline(session: Session, job_id: str) -> bool:
-    """Return whether a job has an answer."""
-    wanted = sa.select(JobResultRow.job_id).where(JobResultRow.job_id == job_id)
-    return session.scalar(wanted) is not None
-
-
-def answer_of(session: Session, job_id: str) -> tuple[str, str, str, datetime]:
-    """Return a job's timeline, its targets, the scenario file planned, and when that was done."""
+def content_of(session: Session, job_id: str) -> str:
+    """Return the scenario file that a job plans."""
     wanted = (
-        sa.select(
-            JobResultRow.timeline,
-            JobResultRow.targets,
-            ScenarioRow.content,
-            JobResultRow.created_at,
-        )
-        .join(JobRow, JobRow.id == JobResultRow.job_id)
-        .join(ScenarioRow, ScenarioRow.id == JobRow.scenario_id)
-        .where(JobResultRow.job_id == job_id)
+        sa.select(ScenarioRow.content)
+        .join(JobRow, JobRow.scenario_id == ScenarioRow.id)
+        .where(JobRow.id == job_id)
     )
-    timeline, targets, content, created_at = session.execute(wanted).one()
-    return timeline, targets, content, created_at
-
-
-def proof_of(session: Session, job_id: str) -> str | None:
-    """Return what proves a job's bound as JSON text, or None where there is none."""
-    return session.scalar(sa.select(JobResultRow.proof).where(JobResultRow.job_id == job_id))
-
-
-def targets_of(session: Session, job_id: str) -> str | None:
-    """Return a job's list of targets as JSON text, or None where there is none (yet)."""
-    return session.scalar(sa.select(JobResultRow.targets).where(JobResultRow.job_id == job_id))
+    return session.execute(wanted).scalar_one()

@@ -13,7 +13,7 @@ from planner_core.bounds.bound import Bound
 from planner_core.build import build_problem, compute_opportunities
 from planner_core.solvers import SOLVERS
 from planner_core.solvers.base import Budget
-from service.jobs.plan_job import PlanAnswer, PlanRequest, run_plan_job
+from service.jobs.plan_job import Parcel, PlanAnswer, PlanRequest, run_plan_job
 from service.scenarios.translate import canonical, scenario_from_content, sha256_of
 from tests import independent
 from tests.missions import Document, drawn_targets, paper_mission
@@ -32,7 +32,7 @@ def run(
         params=asdict(params),
         seed=0,
         limits={"time_s": 60, "memory_mb": 2048},
-        opportunity_block=block,
+        opportunity_block=Parcel(block),
         bound=bound,
     )
     return run_plan_job(request, Budget())

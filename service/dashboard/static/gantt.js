@@ -16,9 +16,14 @@ export const MARGIN = { left: 120, right: 12 };
 const AXIS = 24;
 const REACH_PX = 4;
 
+/** Of more rows the lower axis may be out of sight: they have another one above. */
+const FEW_ROWS = 8;
+
+/** @typedef {Record<"collects" | "slews" | "opportunities" | "contacts" | "sunpoints", [number, number]>} Lanes */
+
 /**
  * Lanes of a row, as shares of its height from the top.
- * @type {Record<"collects" | "slews" | "opportunities" | "contacts" | "sunpoints", [number, number]>}
+ * @type {Lanes}
  */
 const LANES = {
   collects: [0.08, 0.36],
@@ -27,6 +32,12 @@ const LANES = {
   contacts: [0.56, 0.78],
   sunpoints: [0.86, 0.92],
 };
+
+/**
+ * The same of plans that only take images.
+ * @type {Lanes}
+ */
+const IMAGING_LANES = { ...LANES, collects: [0.1, 0.6], slews: [0.24, 0.46], opportunities: [0.68, 0.9] };
 
 export class Gantt {
   /**
@@ -45,11 +56,15 @@ export class Gantt {
     this.ofTarget = new Map();
     /** @type {Set<string>} */
     this.blocking = new Set();
+    const isFull = plan.rows.some((row) => row.contacts.start.length > 0 || row.sunpoints.start.length > 0);
+    this.lanes = isFull ? LANES : IMAGING_LANES;
+    this.heights = isFull ? [88, 56, 40] : [56, 36, 24];
+    this.top = plan.rows.length > FEW_ROWS ? AXIS : 0;
     const label =
       "Gantt chart: collects, contacts, slews, sun-pointing and eclipses of each satellite. " +
       "Arrow keys move, plus and minus zoom; the tables below hold the same data.";
     this.canvas = new Canvas(host, label, (pen, width, height, colors) => this.draw(pen, width, height, colors));
-    this.canvas.setHeight(plan.rows.length * this.rowHeight() + AXIS);
+    this.canvas.setHeight(this.top + plan.rows.length * this.rowHeight() + AXIS);
     this.tip = h("div", { class: "tip", hidden: true });
     host.append(this.tip);
     view.onChange(() => this.canvas.redraw());
@@ -68,7 +83,7 @@ export class Gantt {
 
   rowHeight() {
     const { length } = this.plan.rows;
-    return length > 16 ? 40 : length > 4 ? 56 : 88;
+    return /** @type {number} */ (this.heights[length > 16 ? 2 : length > 4 ? 1 : 0]);
   }
 
   /**
@@ -81,10 +96,10 @@ export class Gantt {
     const { view } = this;
     const span = width - MARGIN.left - MARGIN.right;
     const bottom = height - AXIS;
-    drawAxis(pen, view, width, bottom, colors);
+    drawAxis(pen, view, width, bottom, colors, this.top);
     let numBars = 0;
     this.plan.rows.forEach((row, index) => {
-      const top = index * this.rowHeight();
+      const top = this.top + index * this.rowHeight();
       pen.fillStyle = colors.ink ?? "";
       pen.fillText(fitted(pen, row.name, MARGIN.left - 12), 4, top + this.rowHeight() / 2);
       pen.save();
@@ -111,8 +126,8 @@ export class Gantt {
   drawRow(pen, row, top, span, colors) {
     const height = this.rowHeight();
     const painter = new LanePainter(pen, this.view, span);
-    const place = (/** @type {keyof typeof LANES} */ lane) => {
-      const [from, to] = LANES[lane];
+    const place = (/** @type {keyof Lanes} */ lane) => {
+      const [from, to] = this.lanes[lane];
       return /** @type {[number, number]} */ ([top + from * height, (to - from) * height]);
     };
     painter.fill(row.eclipses, [top, height], colors.eclipse);
@@ -144,10 +159,11 @@ export class Gantt {
   locate(x, y) {
     const span = this.canvas.element.clientWidth - MARGIN.left - MARGIN.right;
     const perPixel = (this.view.end - this.view.start) / span;
-    const row = this.plan.rows[Math.floor(y / this.rowHeight())];
+    const down = (y - this.top) / this.rowHeight();
+    const row = this.plan.rows[Math.floor(down)];
     const isInside = x >= MARGIN.left && x <= MARGIN.left + span;
     if (!row || !isInside) return null;
-    return { row, t: this.view.start + (x - MARGIN.left) * perPixel, reach: REACH_PX * perPixel, y: (y % this.rowHeight()) / this.rowHeight() };
+    return { row, t: this.view.start + (x - MARGIN.left) * perPixel, reach: REACH_PX * perPixel, y: down % 1 };
   }
 
   /**
@@ -159,7 +175,7 @@ export class Gantt {
     const found = this.locate(x, y);
     if (!found) return null;
     const { row, t, reach } = found;
-    const isLow = found.y > LANES.opportunities[1];
+    const isLow = found.y > this.lanes.opportunities[1];
     const lanes = isLow ? [row.contacts, row.collects] : [row.collects, row.contacts];
     const near = lanes.map((lane) => lane.nearest(t, reach)).find((action) => action !== null);
     return near ?? row.sunpoints.nearest(t, 0);
@@ -183,7 +199,7 @@ export class Gantt {
     const found = this.locate(x, y);
     const lanes = found ? [this.ofTarget.get(found.row.id), this.opportunities.get(found.row.id)] : [];
     const unused = found && lanes.map((lane) => lane?.nearest(found.t, found.reach)).find((one) => one);
-    const isOnUnused = found && found.y >= LANES.opportunities[0] && found.y <= LANES.opportunities[1];
+    const isOnUnused = found && found.y >= this.lanes.opportunities[0] && found.y <= this.lanes.opportunities[1];
     const action = this.actionAt(x, y);
     const text = isOnUnused && unused ? tellOpportunity(unused) : action && tellAction(action);
     this.tip.hidden = !text;
@@ -264,15 +280,18 @@ class LanePainter {
  * @param {number} width
  * @param {number} bottom where the plot ends
  * @param {import("./canvas.js").Colors} colors
+ * @param {number} [top] room for the instants above the plot too
  */
-export function drawAxis(pen, view, width, bottom, colors) {
+export function drawAxis(pen, view, width, bottom, colors, top = 0) {
   const span = width - MARGIN.left - MARGIN.right;
   for (const { at, text } of view.ticks(span)) {
     const x = MARGIN.left + ((at - view.start) / (view.end - view.start)) * span;
     pen.fillStyle = colors.line ?? "";
     pen.fillRect(x, 0, 1, bottom + 4);
     pen.fillStyle = colors.soft ?? "";
-    if (x + 3 + pen.measureText(text).width <= width) pen.fillText(text, x + 3, bottom + 13);
+    if (x + 3 + pen.measureText(text).width > width) continue;
+    pen.fillText(text, x + 3, bottom + 13);
+    if (top > 0) pen.fillText(text, x + 3, top - 11);
   }
   pen.fillStyle = colors.soft ?? "";
   pen.fillText("UTC", 4, bottom + 13);

@@ -10,7 +10,19 @@ import { firstAbove } from "./plan.js";
  * @property {string} name
  * @property {number} lon
  * @property {number} lat
- * @property {string} outcome of a target; empty for a station
+ */
+
+/**
+ * @typedef {object} TargetPlace
+ * @property {string} id
+ * @property {string} name
+ * @property {number} lon
+ * @property {number} lat
+ * @property {string} outcome
+ * @property {string | null} reason code of the reason why it is left out
+ * @property {string | null} why
+ * @property {string | null} actionId
+ * @property {string | null} satelliteId
  */
 
 /**
@@ -22,7 +34,7 @@ import { firstAbove } from "./plan.js";
 
 /**
  * @typedef {object} Geography
- * @property {Place[]} targets
+ * @property {TargetPlace[]} targets
  * @property {Place[]} stations
  * @property {{stationId: string, rings: [number, number][][]}[]} circles
  * @property {Track[]} tracks
@@ -45,9 +57,16 @@ export async function loadGeography(jobId) {
   for (const { geometry, properties } of features) {
     const { kind } = properties;
     if (kind === "target") {
-      found.targets.push(place(geometry, properties.target_id, properties.target_id, properties.outcome));
+      found.targets.push({
+        ...place(geometry, properties.target_id, properties.target_id),
+        outcome: properties.outcome,
+        reason: properties.reason,
+        why: properties.reason_detail,
+        actionId: properties.action_id,
+        satelliteId: properties.satellite_id,
+      });
     } else if (kind === "station") {
-      found.stations.push(place(geometry, properties.station_id, properties.name, ""));
+      found.stations.push(place(geometry, properties.station_id, properties.name));
     } else if (kind === "visibility") {
       const polygons = geometry.type === "Polygon" ? [geometry.coordinates] : geometry.coordinates;
       found.circles.push({ stationId: properties.station_id, rings: polygons.flat() });
@@ -62,11 +81,10 @@ export async function loadGeography(jobId) {
  * @param {{coordinates: [number, number]}} geometry
  * @param {string} id
  * @param {string} name
- * @param {string} outcome
  * @returns {Place}
  */
-function place({ coordinates: [lon, lat] }, id, name, outcome) {
-  return { id, name, lon, lat, outcome };
+function place({ coordinates: [lon, lat] }, id, name) {
+  return { id, name, lon, lat };
 }
 
 /**

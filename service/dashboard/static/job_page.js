@@ -1,7 +1,7 @@
 // @ts-check
 /** One job: followed while it runs, then its answer in linked panels. */
 
-import { call, FINAL, follow, get, list, post } from "./api.js";
+import { call, FINAL, follow, get, post } from "./api.js";
 import { CurveChart } from "./curves.js";
 import { byId, fill, h } from "./dom.js";
 import { duration, gapOf, number, percent, secondsBetween, short, utc, utcLabelled } from "./format.js";
@@ -21,7 +21,6 @@ import { showSummary } from "./summary.js";
 import { TimeView } from "./time_view.js";
 
 /** @typedef {import("./types.js").JobOut} JobOut */
-/** @typedef {import("./types.js").TargetItem} TargetItem */
 
 const jobId = decodeURIComponent(location.pathname.split("/").pop() ?? "");
 const jobPath = `/v1/jobs/${encodeURIComponent(jobId)}`;
@@ -91,11 +90,10 @@ function showState(job) {
 
 /** @param {JobOut} job */
 async function showAnswer(job) {
-  const [timeline, targets] = await Promise.all([
-    get(`${jobPath}/timeline.json`),
-    list(`${jobPath}/targets`).then(({ items }) => /** @type {TargetItem[]} */ (items)),
-  ]);
-  const plan = new Plan(/** @type {any} */ (timeline), targets);
+  // Each thing is asked for once: the map's places are the tables' targets too.
+  const asked = Promise.all([loadGeography(job.id), loadLand()]);
+  asked.catch(() => {}); // told where it is waited for
+  const plan = new Plan(/** @type {any} */ (await get(`${jobPath}/timeline.json`)));
   const view = new TimeView(plan.start, plan.end);
   const selection = new Selection();
   byId("answer").hidden = false;
@@ -103,14 +101,22 @@ async function showAnswer(job) {
   showCurves(plan, view, selection);
   installTools(view, plan);
   installUnused(plan, job, gantt);
-  installDownload();
   showSummary(plan, selection);
-  watchSelection(plan, selection, job.scenario.id, gantt);
-  showLeftOut(plan, selection);
-  showTables(plan, selection);
-  const [geography, land] = await Promise.all([loadGeography(job.id), loadLand()]);
+  watchSelection(plan, selection, job, gantt);
+  const [geography, land] = await asked;
+  plan.setTargets(geography.targets);
+  await frame();
   byId("map-credit").textContent = `${land.credit}. Drag to move, Ctrl and wheel or + and - to zoom.`;
   new WorldMap(byId("map"), geography, land.rings, plan, view, selection);
+  await frame();
+  showLeftOut(plan, selection, jobPath);
+  showTables(plan, selection);
+  installDownload();
+}
+
+/** Let the browser draw and listen between two pieces of work. */
+function frame() {
+  return new Promise((resolve) => setTimeout(resolve));
 }
 
 /**

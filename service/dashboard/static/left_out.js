@@ -3,6 +3,7 @@
 
 import { byId, fill, h } from "./dom.js";
 import { utc } from "./format.js";
+import { OutcomeRows } from "./outcomes.js";
 import { actionButton, targetButton } from "./summary.js";
 import { PagedTable } from "./table.js";
 
@@ -25,29 +26,32 @@ const MEANINGS = {
 /**
  * @param {import("./plan.js").Plan} plan
  * @param {import("./selection.js").Selection} selection
+ * @param {string} jobPath
  */
-export function showLeftOut(plan, selection) {
-  /** @type {Map<string, TargetItem[]>} */
+export function showLeftOut(plan, selection, jobPath) {
+  /** @type {Map<string, string[]>} */
   const groups = new Map();
-  for (const item of plan.targets) {
-    if (item.reason === null) continue;
-    groups.set(item.reason.code, [...(groups.get(item.reason.code) ?? []), item]);
+  for (const { id, reason } of plan.targets) {
+    if (reason === null) continue;
+    const known = groups.get(reason);
+    if (known) known.push(id);
+    else groups.set(reason, [id]);
   }
   const ordered = [...groups].sort((a, b) => b[1].length - a[1].length);
   if (ordered.length === 0) {
     fill(byId("left-out"), "None: every target is collected.");
     return;
   }
-  fill(byId("left-out"), ...ordered.map(([code, items]) => group(plan, selection, code, items)));
+  fill(byId("left-out"), ...ordered.map(([code, ids]) => group(plan, selection, code, new OutcomeRows(jobPath, code, ids))));
 }
 
 /**
  * @param {import("./plan.js").Plan} plan
  * @param {import("./selection.js").Selection} selection
  * @param {string} code
- * @param {TargetItem[]} items
+ * @param {OutcomeRows} source
  */
-function group(plan, selection, code, items) {
+function group(plan, selection, code, source) {
   const table = new PagedTable(
     `Targets left out for ${code.replaceAll("_", " ")}`,
     [
@@ -63,24 +67,16 @@ function group(plan, selection, code, items) {
     "summary",
     {},
     h("strong", {}, code.replaceAll("_", " ")),
-    ` ${items.length}`,
+    ` ${source.length}`,
     MEANINGS[code] && h("small", {}, ` ${MEANINGS[code]}`),
   );
   const details = h("details", { "data-reason": code }, summary, table.element);
-  let isFilled = false;
-  const open = () => {
-    if (!isFilled) table.show(items);
-    isFilled = true;
-  };
-  details.addEventListener("toggle", open);
-  addEventListener("beforeprint", open);
+  // What is folded away is printed all the same, so its first page is here from the beginning.
+  table.showFrom(source);
   selection.onChange(({ targetId }) => {
-    const isHere = targetId !== null && plan.target.get(targetId)?.reason?.code === code;
-    if (isHere) {
-      open();
-      details.open = true;
-    }
-    if (isFilled) table.mark(new Set(isHere && targetId ? [targetId] : []));
+    const isHere = targetId !== null && plan.target.get(targetId)?.reason === code;
+    if (isHere) details.open = true;
+    table.mark(new Set(isHere && targetId ? [targetId] : []));
   });
   return details;
 }

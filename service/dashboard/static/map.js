@@ -9,16 +9,55 @@ import { positionAt } from "./geography.js";
 
 /** @typedef {import("./geography.js").Geography} Geography */
 /** @typedef {import("./geography.js").Place} Place */
+/** @typedef {import("./geography.js").TargetPlace} TargetPlace */
 /** @typedef {import("./canvas.js").Colors} Colors */
 
 /** @typedef {CanvasRenderingContext2D | OffscreenCanvasRenderingContext2D} Pen */
 
 const REACH_PX = 8;
 const TRACK_MS = 50 * 60_000;
-/** Names of more stations would cover the map, unless it is shown this near. */
-const FEW_STATIONS = 10;
+/** Of many satellites, but for the chosen one. */
+const SHORT_TRACK_MS = 6 * 60_000;
+/** Names and long tracks of more would cover the map, unless it is shown this near. */
+const FEW = 10;
+/** More targets are drawn smaller. */
+const FEW_TARGETS = 2000;
+/** Of two targets of one outcome that lie as near as this only one is drawn. */
+const CELL_PX = 1.5;
 const NEAR = 3;
 const OUTCOMES = ["excluded", "unscheduled", "collected", "downlinked"];
+
+/**
+ * Return the picture of a target. Shapes differ as well as colours: disc, square, ring, cross.
+ * @param {string} outcome
+ * @param {number} size
+ * @param {string} color
+ */
+function symbolOf(outcome, size, color) {
+  const half = Math.ceil(size + 1);
+  const symbol = new OffscreenCanvas(2 * half * devicePixelRatio, 2 * half * devicePixelRatio);
+  const pen = /** @type {OffscreenCanvasRenderingContext2D} */ (symbol.getContext("2d"));
+  pen.scale(devicePixelRatio, devicePixelRatio);
+  pen.translate(half, half);
+  pen.fillStyle = color;
+  pen.strokeStyle = color;
+  pen.lineWidth = 1.2;
+  pen.beginPath();
+  if (outcome === "collected") {
+    pen.fillRect(-size * 0.9, -size * 0.9, size * 1.8, size * 1.8);
+  } else if (outcome === "excluded") {
+    pen.moveTo(-size, -size);
+    pen.lineTo(size, size);
+    pen.moveTo(-size, size);
+    pen.lineTo(size, -size);
+    pen.stroke();
+  } else {
+    pen.arc(0, 0, size, 0, 2 * Math.PI);
+    if (outcome === "downlinked") pen.fill();
+    else pen.stroke();
+  }
+  return symbol;
+}
 
 export class WorldMap {
   /**
@@ -31,7 +70,6 @@ export class WorldMap {
    */
   constructor(host, geography, land, plan, view, selection) {
     this.geography = geography;
-    this.land = land;
     this.plan = plan;
     this.view = view;
     this.selection = selection;
@@ -39,9 +77,20 @@ export class WorldMap {
     this.center = { lon: 0, lat: 0 };
     /** @type {{told: string, picture: OffscreenCanvas} | null} */
     this.drawnGround = null;
-    this.byOutcome = new Map(
-      OUTCOMES.map((name) => [name, geography.targets.filter((target) => target.outcome === name)]),
-    );
+    // What is rare lies on top.
+    this.byOutcome = OUTCOMES.map((outcome) => ({
+      outcome,
+      targets: geography.targets.filter((target) => target.outcome === outcome),
+    })).sort((a, b) => b.targets.length - a.targets.length);
+    this.coast = new Path2D();
+    for (const ring of land) {
+      for (let i = 0; i < ring.length; i += 2) {
+        this.coast.lineTo(/** @type {number} */ (ring[i]), /** @type {number} */ (ring[i + 1]));
+      }
+      this.coast.closePath();
+    }
+    /** The canvas in pixels; to ask for it anew for each point would cost more than all else. */
+    this.size = { width: 0, height: 0 };
     const label =
       "Map of targets by outcome, ground tracks around the chosen time, and stations with the " +
       "circles in which they see a satellite. The table of targets holds the same data.";
@@ -63,7 +112,12 @@ export class WorldMap {
   }
 
   scale() {
-    return (this.canvas.element.clientWidth / 360) * this.zoom;
+    return (this.size.width / 360) * this.zoom;
+  }
+
+  measure() {
+    const { clientWidth: width, clientHeight: height } = this.canvas.element;
+    this.size = { width, height };
   }
 
   /**
@@ -72,7 +126,7 @@ export class WorldMap {
    * @returns {[number, number]}
    */
   xy(lon, lat) {
-    const { clientWidth: width, clientHeight: height } = this.canvas.element;
+    const { width, height } = this.size;
     const scale = this.scale();
     return [width / 2 + (lon - this.center.lon) * scale, height / 2 - (lat - this.center.lat) * scale];
   }
@@ -84,6 +138,7 @@ export class WorldMap {
    * @param {Colors} colors
    */
   draw(pen, width, height, colors) {
+    this.size = { width, height };
     pen.drawImage(this.ground(width, height, colors), 0, 0, width, height);
     const t = this.cursor();
     for (const track of this.geography.tracks) this.drawTrack(pen, track, t, colors);
@@ -110,10 +165,9 @@ export class WorldMap {
     pen.fillRect(0, 0, width, height);
     this.drawLand(pen, colors);
     this.drawCircles(pen, colors);
-    const size = Math.min(2.2 + this.zoom / 2, 5);
-    for (const outcome of OUTCOMES) {
-      for (const target of this.byOutcome.get(outcome) ?? []) this.drawTarget(pen, target, size, colors);
-    }
+    const least = this.geography.targets.length > FEW_TARGETS ? 0.7 : 2.2;
+    const size = Math.min(least + this.zoom / 2, 5);
+    for (const { outcome, targets } of this.byOutcome) this.drawTargets(pen, outcome, targets, size, colors);
     for (const station of this.geography.stations) this.drawStation(pen, station, colors);
     this.drawnGround = { told, picture };
     return picture;
@@ -124,17 +178,13 @@ export class WorldMap {
    * @param {Colors} colors
    */
   drawLand(pen, colors) {
-    pen.beginPath();
-    for (const ring of this.land) {
-      for (let i = 0; i < ring.length; i += 2) {
-        const [x, y] = this.xy(/** @type {number} */ (ring[i]), /** @type {number} */ (ring[i + 1]));
-        if (i === 0) pen.moveTo(x, y);
-        else pen.lineTo(x, y);
-      }
-      pen.closePath();
-    }
+    const scale = this.scale();
+    pen.save();
+    pen.translate(...this.xy(0, 0));
+    pen.scale(scale, -scale);
     pen.fillStyle = colors.land ?? "";
-    pen.fill("evenodd");
+    pen.fill(this.coast, "evenodd");
+    pen.restore();
     pen.strokeStyle = colors.line ?? "";
     pen.lineWidth = 0.5;
     pen.beginPath();
@@ -175,12 +225,14 @@ export class WorldMap {
    */
   drawTrack(pen, track, t, colors) {
     const isChosen = track.satelliteId === this.selection.now.satelliteId;
+    const isOneOfFew = this.geography.tracks.length <= FEW;
+    const reach = isChosen || isOneOfFew ? TRACK_MS : SHORT_TRACK_MS;
     pen.strokeStyle = (isChosen ? colors.chosen : colors.soft) ?? "";
     pen.lineWidth = isChosen ? 2 : 1;
     pen.beginPath();
     for (const { time, lon, lat } of track.pieces) {
-      const first = Math.max(firstAbove(time, t - TRACK_MS) - 1, 0);
-      for (let i = first; i < time.length && /** @type {number} */ (time[i]) <= t + TRACK_MS; i++) {
+      const first = Math.max(firstAbove(time, t - reach) - 1, 0);
+      for (let i = first; i < time.length && /** @type {number} */ (time[i]) <= t + reach; i++) {
         const [x, y] = this.xy(/** @type {number} */ (lon[i]), /** @type {number} */ (lat[i]));
         if (i === first) pen.moveTo(x, y);
         else pen.lineTo(x, y);
@@ -194,37 +246,30 @@ export class WorldMap {
     pen.beginPath();
     pen.arc(x, y, 4, 0, 2 * Math.PI);
     pen.fill();
-    pen.fillText(track.name, x + 7, y);
+    if (isChosen || isOneOfFew || this.zoom >= NEAR) pen.fillText(track.name, x + 7, y);
   }
 
   /**
-   * Shapes differ as well as colours: disc, square, ring, cross.
+   * Draw the targets of an outcome, as many as can be told apart.
    * @param {Pen} pen
-   * @param {Place} target
+   * @param {string} outcome
+   * @param {TargetPlace[]} targets
    * @param {number} size
    * @param {Colors} colors
    */
-  drawTarget(pen, target, size, colors) {
-    const [x, y] = this.xy(target.lon, target.lat);
-    const { clientWidth: width, clientHeight: height } = this.canvas.element;
-    if (x < -9 || y < -9 || x > width + 9 || y > height + 9) return;
-    const color = colors[target.outcome] ?? "";
-    pen.fillStyle = color;
-    pen.strokeStyle = color;
-    pen.lineWidth = 1.2;
-    pen.beginPath();
-    if (target.outcome === "collected") {
-      pen.fillRect(x - size * 0.9, y - size * 0.9, size * 1.8, size * 1.8);
-    } else if (target.outcome === "excluded") {
-      pen.moveTo(x - size, y - size);
-      pen.lineTo(x + size, y + size);
-      pen.moveTo(x - size, y + size);
-      pen.lineTo(x + size, y - size);
-      pen.stroke();
-    } else {
-      pen.arc(x, y, size, 0, 2 * Math.PI);
-      if (target.outcome === "downlinked") pen.fill();
-      else pen.stroke();
+  drawTargets(pen, outcome, targets, size, colors) {
+    const { width, height } = this.size;
+    const columns = Math.ceil((width + 18) / CELL_PX);
+    const taken = new Uint8Array(columns * Math.ceil((height + 18) / CELL_PX));
+    const symbol = symbolOf(outcome, size, colors[outcome] ?? "");
+    const half = symbol.width / devicePixelRatio / 2;
+    for (const { lon, lat } of targets) {
+      const [x, y] = this.xy(lon, lat);
+      if (x < -9 || y < -9 || x > width + 9 || y > height + 9) continue;
+      const cell = Math.floor((y + 9) / CELL_PX) * columns + Math.floor((x + 9) / CELL_PX);
+      if (taken[cell]) continue;
+      taken[cell] = 1;
+      pen.drawImage(symbol, x - half, y - half, 2 * half, 2 * half);
     }
   }
 
@@ -241,7 +286,7 @@ export class WorldMap {
     pen.lineTo(x + 5.5, y + 4);
     pen.lineTo(x - 5.5, y + 4);
     pen.fill();
-    const hasRoom = this.geography.stations.length <= FEW_STATIONS || this.zoom >= NEAR;
+    const hasRoom = this.geography.stations.length <= FEW || this.zoom >= NEAR;
     pen.fillStyle = colors.ink ?? "";
     if (hasRoom) pen.fillText(station.name, x + 8, y + 1);
   }
@@ -254,7 +299,7 @@ export class WorldMap {
     const { targetId, actionId } = this.selection.now;
     const stationId = this.plan.actions.get(actionId ?? "")?.station_id ?? null;
     const chosen =
-      this.geography.targets.find((place) => place.id === targetId) ??
+      this.plan.target.get(targetId ?? "") ??
       this.geography.stations.find((place) => place.id === stationId);
     if (!chosen) return;
     const [x, y] = this.xy(chosen.lon, chosen.lat);
@@ -270,9 +315,10 @@ export class WorldMap {
   /**
    * @param {number} x
    * @param {number} y
-   * @returns {Place | null}
+   * @returns {TargetPlace | null}
    */
   targetAt(x, y) {
+    this.measure();
     let best = null;
     let least = REACH_PX;
     for (const target of this.geography.targets) {
@@ -288,8 +334,8 @@ export class WorldMap {
    * @param {number} [x] the point that stays where it is
    * @param {number} [y]
    */
-  zoomBy(factor, x = this.canvas.element.clientWidth / 2, y = this.canvas.element.clientHeight / 2) {
-    const { clientWidth: width, clientHeight: height } = this.canvas.element;
+  zoomBy(factor, x = this.size.width / 2, y = this.size.height / 2) {
+    const { width, height } = this.size;
     const before = this.scale();
     this.zoom = Math.min(Math.max(this.zoom * factor, 1), 40);
     const shrink = 1 / before - 1 / this.scale();

@@ -11,7 +11,7 @@ import { PagedTable } from "./table.js";
 /** @typedef {import("./plan.js").Row} Row */
 /** @typedef {import("./selection.js").Selection} Selection */
 /** @typedef {import("./types.js").Action} Action */
-/** @typedef {import("./types.js").TargetItem} TargetItem */
+/** @typedef {import("./geography.js").TargetPlace} TargetPlace */
 
 /**
  * @param {Plan} plan
@@ -103,19 +103,61 @@ function targetTable(plan, selection) {
   const table = new PagedTable(
     "All targets of the scenario",
     [
-      { title: "Target", cell: (item) => targetButton(plan, selection, item.target_id) },
-      { title: "Outcome", cell: (item) => item.outcome },
-      { title: "Satellite", cell: (item) => item.satellite_id && plan.satelliteName(item.satellite_id) },
-      { title: "Action", cell: (item) => item.action_id && actionButton(plan, selection, item.action_id) },
-      { title: "Start (UTC)", cell: (item) => utc(plan.actions.get(item.action_id ?? "")?.start) },
-      { title: "Reason", cell: (item) => item.reason?.code.replaceAll("_", " ") },
-      { title: "Why", cell: (item) => item.reason?.detail },
+      { title: "Target", cell: (one) => targetButton(plan, selection, one.id) },
+      { title: "Outcome", cell: (one) => one.outcome },
+      { title: "Satellite", cell: (one) => one.satelliteId && plan.satelliteName(one.satelliteId) },
+      { title: "Action", cell: (one) => one.actionId && actionButton(plan, selection, one.actionId) },
+      { title: "Start (UTC)", cell: (one) => utc(plan.actions.get(one.actionId ?? "")?.start) },
+      { title: "Reason", cell: (one) => one.reason?.replaceAll("_", " ") },
+      { title: "Why", cell: (one) => one.why },
     ],
-    (/** @type {TargetItem} */ item) => item.target_id,
+    (/** @type {TargetPlace} */ one) => one.id,
   );
   table.show(plan.targets);
   markSelected(table, selection, ({ targetId }) => targetId);
-  return table.element;
+  return h("div", {}, targetFilter(plan, table), table.element);
+}
+
+/**
+ * Return fields that narrow the table of targets.
+ * @param {Plan} plan
+ * @param {PagedTable<TargetPlace>} table
+ */
+function targetFilter(plan, table) {
+  const find = h("input", { type: "search", id: "target-find" });
+  const outcome = choiceOf("outcome", plan.targets.map((one) => one.outcome));
+  const reason = choiceOf("reason", plan.targets.map((one) => one.reason));
+  const count = h("span", { role: "status", id: "target-count" });
+  const narrow = () => {
+    const text = find.value.trim().toLowerCase();
+    const found = plan.targets.filter(
+      (one) =>
+        (!text || one.id.toLowerCase().includes(text)) &&
+        (!outcome.value || one.outcome === outcome.value) &&
+        (!reason.value || one.reason === reason.value),
+    );
+    table.show(found);
+    count.textContent = `${found.length} of ${plan.targets.length}`;
+  };
+  for (const field of [find, outcome, reason]) field.addEventListener("input", narrow);
+  return h(
+    "div",
+    { class: "row tools" },
+    h("label", {}, "Target id with ", find),
+    h("label", {}, "Outcome ", outcome),
+    h("label", {}, "Reason ", reason),
+    count,
+  );
+}
+
+/**
+ * @param {string} what
+ * @param {(string | null)[]} values
+ */
+function choiceOf(what, values) {
+  const known = [...new Set(values.filter((value) => value !== null))].sort();
+  const options = known.map((value) => h("option", { value }, value.replaceAll("_", " ")));
+  return h("select", { id: `target-${what}` }, h("option", { value: "" }, "any"), ...options);
 }
 
 /**

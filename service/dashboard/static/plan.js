@@ -3,7 +3,7 @@
 
 /** @typedef {import("./types.js").Timeline} Timeline */
 /** @typedef {import("./types.js").Action} Action */
-/** @typedef {import("./types.js").TargetItem} TargetItem */
+/** @typedef {import("./geography.js").TargetPlace} TargetPlace */
 
 /**
  * Spans in order of time.
@@ -90,13 +90,10 @@ export function firstAbove(values, limit) {
  * @property {number} recorderMax
  */
 
-/** A judged plan and its targets. */
+/** A judged plan; its targets come later. */
 export class Plan {
-  /**
-   * @param {Timeline} timeline
-   * @param {TargetItem[]} targets
-   */
-  constructor(timeline, targets) {
+  /** @param {Timeline} timeline */
+  constructor(timeline) {
     this.timeline = timeline;
     this.start = Date.parse(timeline.horizon.start);
     this.end = Date.parse(timeline.horizon.end);
@@ -106,9 +103,18 @@ export class Plan {
     this.satelliteOf = new Map();
     /** @type {Map<string, string[]>} */
     this.actionsOf = new Map();
-    this.targets = targets;
-    this.target = new Map(targets.map((item) => [item.target_id, item]));
+    /** @type {TargetPlace[]} */
+    this.targets = [];
+    /** @type {Map<string, TargetPlace>} */
+    this.target = new Map();
+    this.names = new Map(timeline.satellites.map(({ id, name }) => [id, name]));
     this.rows = timeline.satellites.map((satellite) => this.row(satellite));
+  }
+
+  /** @param {TargetPlace[]} targets */
+  setTargets(targets) {
+    this.targets = targets;
+    this.target = new Map(targets.map((one) => [one.id, one]));
   }
 
   /**
@@ -156,14 +162,14 @@ export class Plan {
 
   /** @param {string} targetId */
   aboutTarget(targetId) {
-    const item = this.target.get(targetId);
-    const actionId = item?.action_id ?? this.actionsOf.get(targetId)?.[0] ?? null;
-    return { actionId, targetId, satelliteId: item?.satellite_id ?? null };
+    const known = this.target.get(targetId);
+    const actionId = known?.actionId ?? this.actionsOf.get(targetId)?.[0] ?? null;
+    return { actionId, targetId, satelliteId: known?.satelliteId ?? null };
   }
 
   /** @param {string} id */
   satelliteName(id) {
-    return this.rows.find((row) => row.id === id)?.name ?? id;
+    return this.names.get(id) ?? id;
   }
 }
 

@@ -5,6 +5,7 @@ import { byId, fill, h } from "./dom.js";
 import { number, percent, utc, utcLabelled } from "./format.js";
 import { blockersOf, changeOf } from "./left_out.js";
 import { lanesOf, opportunitiesOf } from "./opportunities.js";
+import { outcomeOf } from "./outcomes.js";
 import { showError } from "./page.js";
 
 /** @typedef {import("./types.js").OpportunityOut} OpportunityOut */
@@ -12,33 +13,43 @@ import { showError } from "./page.js";
 /**
  * @param {import("./plan.js").Plan} plan
  * @param {import("./selection.js").Selection} selection
- * @param {string} scenarioId
+ * @param {import("./types.js").JobOut} job
  * @param {import("./gantt.js").Gantt} gantt
  */
-export function watchSelection(plan, selection, scenarioId, gantt) {
+export function watchSelection(plan, selection, job, gantt) {
   let asked = 0;
   selection.onChange(({ actionId, targetId, satelliteId }) => {
     asked += 1;
     const action = plan.actions.get(actionId ?? "");
-    const item = plan.target.get(targetId ?? "");
-    gantt.blocking = new Set(item?.reason?.blocking_actions ?? []);
+    const known = plan.target.get(targetId ?? "");
+    gantt.blocking = new Set();
     gantt.ofTarget = new Map();
-    if (!action && !item) {
+    if (!action && !known) {
       fill(byId("selected"), h("p", { class: "hint" }, "Nothing selected."));
       return;
     }
-    const facts = [...(item ? targetFacts(plan, selection, item) : []), ...(action ? actionFacts(plan, action, satelliteId) : [])];
-    const list = h("dl", { class: "facts" }, ...facts.flatMap(([name, value]) => [h("dt", {}, name), h("dd", {}, value)]));
+    const list = factsOf([...(known ? targetFacts(known) : []), ...(action ? actionFacts(plan, action, satelliteId) : [])]);
+    const more = h("div", {});
     const place = h("div", {});
-    fill(byId("selected"), list, place);
-    if (item) {
-      const mine = asked;
-      opportunitiesOf(scenarioId, { target_id: item.target_id })
+    fill(byId("selected"), list, more, place);
+    const mine = asked;
+    if (known && known.reason !== null) {
+      outcomeOf(`/v1/jobs/${encodeURIComponent(job.id)}`, known.id)
+        .then((item) => {
+          if (mine !== asked || !item?.reason) return;
+          gantt.blocking = new Set(item.reason.blocking_actions);
+          gantt.canvas.redraw();
+          fill(more, factsOf(reasonFacts(plan, selection, item.reason)));
+        })
+        .catch(showError);
+    }
+    if (known) {
+      opportunitiesOf(job.scenario.id, { target_id: known.id })
         .then(({ items }) => {
           if (mine !== asked) return;
           gantt.ofTarget = lanesOf(items);
           gantt.canvas.redraw();
-          tellOpportunities(plan, item.target_id, items, place);
+          tellOpportunities(plan, known.id, items, place);
         })
         .catch(showError);
     }
@@ -46,18 +57,31 @@ export function watchSelection(plan, selection, scenarioId, gantt) {
   });
 }
 
+/** @param {[string, import("./dom.js").Child][]} facts */
+function factsOf(facts) {
+  return h("dl", { class: "facts" }, ...facts.flatMap(([name, value]) => [h("dt", {}, name), h("dd", {}, value)]));
+}
+
+/**
+ * @param {import("./geography.js").TargetPlace} known
+ * @returns {[string, import("./dom.js").Child][]}
+ */
+function targetFacts({ id, outcome, reason, why }) {
+  /** @type {[string, import("./dom.js").Child][]} */
+  const facts = [["Target", h("strong", { id: "selected-target" }, id)], ["Outcome", outcome]];
+  if (reason !== null) facts.push(["Reason", reason.replaceAll("_", " ")], ["Why", why]);
+  return facts;
+}
+
 /**
  * @param {import("./plan.js").Plan} plan
  * @param {import("./selection.js").Selection} selection
- * @param {import("./types.js").TargetItem} item
+ * @param {import("./types.js").Reason} reason
  * @returns {[string, import("./dom.js").Child][]}
  */
-function targetFacts(plan, selection, item) {
+function reasonFacts(plan, selection, reason) {
   /** @type {[string, import("./dom.js").Child][]} */
-  const facts = [["Target", h("strong", { id: "selected-target" }, item.target_id)], ["Outcome", item.outcome]];
-  const { reason } = item;
-  if (reason === null) return facts;
-  facts.push(["Reason", `${reason.code.replaceAll("_", " ")} (${reason.certainty})`], ["Why", reason.detail]);
+  const facts = [["Certainty", reason.certainty]];
   if (reason.at !== null) facts.push(["At", utcLabelled(reason.at)]);
   if (reason.blocking_actions.length > 0) facts.push(["Blocked by", blockersOf(plan, selection, reason)]);
   if (reason.change !== null) facts.push(["Would be in with", changeOf(plan, reason.change)]);

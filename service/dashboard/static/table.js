@@ -1,9 +1,14 @@
 // @ts-check
-/** Tables of any length: a page of rows at a time, all of them for print. */
+/** Tables of any length: a page of rows at a time, and few tables may show all of theirs. */
 
 import { fill, h } from "./dom.js";
+import { showError } from "./page.js";
 
 const ROWS = 100;
+/** More rows in one page would make it slow; whoever wants them has the downloads. */
+const MOST_ROWS = 1000;
+/** Rows that are made between two frames. */
+const AT_ONCE = 100;
 
 /**
  * @template T
@@ -11,6 +16,15 @@ const ROWS = 100;
  * @property {string} title
  * @property {(row: T) => import("./dom.js").Child} cell
  * @property {boolean} [isNumber]
+ */
+
+/**
+ * Rows that are here, or come when they are asked for.
+ * @template T
+ * @typedef {object} Source
+ * @property {number} length
+ * @property {(key: string) => number} indexOf where the row of a key is; -1 for none
+ * @property {(first: number, end: number) => T[] | Promise<T[]>} load
  */
 
 /**
@@ -26,12 +40,15 @@ export class PagedTable {
   constructor(caption, columns, keyOf) {
     this.columns = columns;
     this.keyOf = keyOf;
-    /** @type {T[]} */
-    this.rows = [];
+    /** @type {Source<T>} */
+    this.source = { length: 0, indexOf: () => -1, load: () => [] };
     this.first = 0;
     this.size = ROWS;
+    this.numDrawn = 0;
     /** @type {Set<string>} */
     this.marked = new Set();
+    /** @type {Map<string, HTMLTableRowElement>} the lines in the document, by key */
+    this.lines = new Map();
     this.body = h("tbody");
     this.footer = h("p", { class: "pager" });
     const heads = columns.map((c) => h("th", { scope: "col", class: c.isNumber ? "number" : "" }, c.title));
@@ -49,8 +66,18 @@ export class PagedTable {
 
   /** @param {T[]} rows */
   show(rows) {
-    this.rows = rows;
+    this.showFrom({
+      length: rows.length,
+      indexOf: (key) => rows.findIndex((row) => this.keyOf(row) === key),
+      load: (first, end) => rows.slice(first, end),
+    });
+  }
+
+  /** @param {Source<T>} source */
+  showFrom(source) {
+    this.source = source;
     this.first = 0;
+    this.size = ROWS;
     this.draw();
   }
 
@@ -60,41 +87,88 @@ export class PagedTable {
    */
   mark(keys) {
     this.marked = keys;
-    if (keys.size > 0) {
-      const at = this.rows.findIndex((row) => keys.has(this.keyOf(row)));
-      const isInSight = at >= this.first && at < this.first + this.size;
-      if (at >= 0 && !isInSight) this.first = Math.floor(at / this.size) * this.size;
+    const [key] = keys;
+    const at = key === undefined || this.lines.has(key) ? -1 : this.source.indexOf(key);
+    const isInSight = at >= this.first && at < this.first + this.size;
+    if (at >= 0 && !isInSight) {
+      this.first = Math.floor(at / this.size) * this.size;
+      this.draw();
+      return;
     }
-    this.draw();
+    for (const [own, line] of this.lines) line.classList.toggle("marked", keys.has(own));
   }
 
   draw() {
-    const shown = this.rows.slice(this.first, this.first + this.size);
-    fill(this.body, ...shown.map((row) => this.line(row)));
-    const { length } = this.rows;
+    this.numDrawn += 1;
+    const mine = this.numDrawn;
+    const end = Math.min(this.first + this.size, this.source.length);
+    const found = this.source.load(this.first, end);
+    this.drawFooter(end);
+    if (!(found instanceof Promise)) {
+      this.fill(found);
+      return;
+    }
+    this.element.setAttribute("aria-busy", "true");
+    found
+      .then((rows) => {
+        if (mine === this.numDrawn) this.fill(rows);
+      })
+      .catch(showError)
+      .finally(() => this.element.removeAttribute("aria-busy"));
+  }
+
+  /** @param {T[]} rows */
+  fill(rows) {
+    fill(this.body);
+    this.lines.clear();
+    this.append(rows, 0, this.numDrawn);
+  }
+
+  /**
+   * Append rows from one on, some now and the rest after the next frame.
+   * @param {T[]} rows
+   * @param {number} from
+   * @param {number} mine which drawing these are of
+   */
+  append(rows, from, mine) {
+    if (mine !== this.numDrawn) return;
+    const some = rows.slice(from, from + AT_ONCE);
+    this.body.append(...some.map((row) => this.line(row)));
+    if (from + AT_ONCE < rows.length) requestAnimationFrame(() => this.append(rows, from + AT_ONCE, mine));
+  }
+
+  /** @param {number} end */
+  drawFooter(end) {
+    const { length } = this.source;
     if (length <= this.size) {
       fill(this.footer, length > ROWS ? `${length} rows.` : "");
       return;
     }
-    const last = Math.min(this.first + this.size, length);
+    const last = Math.floor((length - 1) / this.size) * this.size;
     fill(
       this.footer,
-      `Rows ${this.first + 1} to ${last} of ${length}. `,
+      `Rows ${this.first + 1} to ${end} of ${length}. `,
+      this.button("First", this.first > 0, () => (this.first = 0)),
       this.button("Earlier", this.first > 0, () => (this.first -= this.size)),
-      this.button("Later", last < length, () => (this.first += this.size)),
-      this.button("All", true, () => {
-        this.first = 0;
-        this.size = length;
-      }),
+      this.button("Later", end < length, () => (this.first += this.size)),
+      this.button("Last", end < length, () => (this.first = last)),
+      length <= MOST_ROWS &&
+        this.button("All", true, () => {
+          this.first = 0;
+          this.size = length;
+        }),
     );
   }
 
   /** @param {T} row */
   line(row) {
+    const key = this.keyOf(row);
     const cells = this.columns.map((column) =>
       h("td", { class: column.isNumber ? "number" : "" }, column.cell(row)),
     );
-    return h("tr", { class: this.marked.has(this.keyOf(row)) ? "marked" : "" }, ...cells);
+    const line = h("tr", { class: this.marked.has(key) ? "marked" : "" }, ...cells);
+    this.lines.set(key, line);
+    return line;
   }
 
   /**

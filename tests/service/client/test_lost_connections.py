@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import socket
 from collections.abc import Callable
 from itertools import pairwise
@@ -10,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from service.blocks import blocks_of_timeline
 from service.client import (
     Client,
     JobFailed,
@@ -32,11 +34,12 @@ BUSY = Answer(503, {"Retry-After": "1"})
 EVENT = b"\n\n"
 
 
-def finish(jobs: Jobs, job_id: str, timeline: str) -> None:
+def finish(jobs: Jobs, job_id: str, filler: str = "") -> None:
+    blocks = tuple(blocks_of_timeline({"filler": filler, "satellites": []}))
     with jobs.database.transaction() as session:
         held = lease.start(session, job_id, 1, lease_s=60.0)
         assert held is not None
-        outcome = Outcome(state="succeeded", timeline=timeline, targets="[]")
+        outcome = Outcome(state="succeeded", blocks=blocks)
         assert lease.finish(session, held, outcome)
 
 
@@ -192,7 +195,7 @@ def test_streams_that_never_say_anything_are_given_up(
     patient: Client, proxy: Proxy, jobs: Jobs
 ) -> None:
     job_id = jobs.submit("rule")
-    finish(jobs, job_id, "{}")
+    finish(jobs, job_id)
     proxy.plan("GET", "/events", LostAnswer(), LostAnswer(), LostAnswer())
     assert patient.jobs.wait(job_id).state == "succeeded"
     assert len(proxy.requests("GET", "/events")) == 3
@@ -240,12 +243,12 @@ def test_an_unchanged_job_is_not_read_again(patient: Client, proxy: Proxy, jobs:
 def test_a_download_that_breaks_begins_anew_and_leaves_a_whole_file(
     patient: Client, proxy: Proxy, jobs: Jobs, folder: Path
 ) -> None:
-    job_id, timeline = jobs.submit("rule"), '{"filler": "%s"}' % ("x" * 500_000)
-    finish(jobs, job_id, timeline)
+    job_id = jobs.submit("rule")
+    finish(jobs, job_id, "x" * 500_000)
     proxy.plan("GET", "/timeline.json", Cut(lambda got: len(got) > 100_000))
     file = patient.jobs.download(job_id, folder / "day.json")
     assert len(proxy.requests("GET", "/timeline.json")) == 2
-    assert file.read_text(encoding="utf-8") == timeline
+    assert json.loads(file.read_text(encoding="utf-8"))["filler"] == "x" * 500_000
     assert list(folder.iterdir()) == [file]
 
 
@@ -253,7 +256,7 @@ def test_a_download_that_fails_leaves_the_file_that_was_there(
     proxy: Proxy, jobs: Jobs, folder: Path
 ) -> None:
     job_id = jobs.submit("rule")
-    finish(jobs, job_id, '{"filler": "%s"}' % ("x" * 500_000))
+    finish(jobs, job_id, "x" * 500_000)
     file = folder / "day.json"
     file.write_text("yesterday's", encoding="utf-8")
     proxy.plan("GET", "/timeline.json", Cut(lambda got: len(got) > 100_000))

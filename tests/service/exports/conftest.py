@@ -10,10 +10,13 @@ import httpx
 import pytest
 import sqlalchemy as sa
 
+from planner_core.domain import Scenario
+from service.blocks import Block, targets_text, timeline_text
 from service.db.rows import JobResultRow, JobRow, ScenarioRow
 from service.exports.answered import Answered
 from service.ids import new_id
-from service.scenarios.translate import canonical, sha256_of
+from service.scenarios.translate import canonical, scenario_from_content, sha256_of
+from service.stores import answer_store
 from tests.missions import PAPER_ORBIT, Document, drawn_targets, paper_mission
 from tests.service.conftest import Service
 from tests.service.test_plan_job import run
@@ -37,8 +40,25 @@ class Mission:
     """A scenario file in its canonical form, and the stored texts of its plan."""
 
     content: str
-    timeline: str
-    targets: str
+    blocks: tuple[Block, ...]
+
+    @property
+    def timeline(self) -> str:
+        return timeline_text(self.blocks)
+
+    @property
+    def targets(self) -> str:
+        return targets_text(self.blocks)
+
+    @property
+    def told(self) -> list[Document]:
+        """What became of each target."""
+        told: list[Document] = json.loads(self.targets)
+        return told
+
+    @property
+    def scenario(self) -> Scenario:
+        return scenario_from_content(json.loads(self.content))
 
     @property
     def document(self) -> Document:
@@ -48,6 +68,11 @@ class Mission:
     @property
     def answered(self) -> Answered:
         return Answered.of(self.timeline, self.targets, self.content, FINISHED_AT)
+
+    def with_timeline(self, **changes: object) -> Answered:
+        """Return the answer with another timeline."""
+        timeline = json.dumps(self.document | changes)
+        return Answered.of(timeline, self.targets, self.content, FINISHED_AT)
 
 
 def mission_file(**flags: object) -> Document:
@@ -78,7 +103,7 @@ def mission_file(**flags: object) -> Document:
 def mission() -> Mission:
     file = mission_file()
     answer = run(file, "rule")
-    return Mission(content=canonical(file), timeline=answer.timeline, targets=answer.targets)
+    return Mission(content=canonical(file), blocks=answer.blocks)
 
 
 @pytest.fixture
@@ -89,6 +114,11 @@ def answered(mission: Mission) -> Answered:
 @pytest.fixture
 def job_path(service: Service, mission: Mission) -> str:
     """Store the mission as a job that has succeeded; return its address."""
+    return store_job(service, mission)
+
+
+def store_job(service: Service, mission: Mission) -> str:
+    """Store a mission as a job that has succeeded; return its address."""
     scenario_id, job_id = new_id(), new_id()
     with service.database.transaction() as session:
         session.add(
@@ -117,14 +147,8 @@ def job_path(service: Service, mission: Mission) -> str:
                 finished_at=FINISHED_AT,
             )
         )
-        session.execute(
-            sa.insert(JobResultRow).values(
-                job_id=job_id,
-                timeline=mission.timeline,
-                targets=mission.targets,
-                created_at=FINISHED_AT,
-            )
-        )
+        answer_store.save(session, job_id, mission.blocks, None)
+        session.execute(sa.update(JobResultRow).values(created_at=FINISHED_AT))
     return f"/v1/jobs/{job_id}"
 
 

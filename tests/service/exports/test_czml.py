@@ -15,6 +15,7 @@ from planner_core.orbits.ephemeris import propagate
 from service.exports import czml
 from service.exports.answered import Answered
 from tests.missions import PAPER_ORBIT, Document
+from tests.service.exports.conftest import Mission
 
 
 @pytest.fixture
@@ -61,9 +62,9 @@ def test_satellites_are_where_another_propagator_sees_them(packets: dict[str, Do
 
 
 def test_interpolation_stays_within_a_metre_of_the_planners_path(
-    answered: Answered, packets: dict[str, Document]
+    mission: Mission, packets: dict[str, Document]
 ) -> None:
-    scenario = answered.scenario
+    scenario = mission.scenario
     for satellite in scenario.satellites:
         packet = packets[f"satellite/{satellite.id}"]
         path = propagate(satellite, scenario.horizon)
@@ -74,11 +75,11 @@ def test_interpolation_stays_within_a_metre_of_the_planners_path(
 
 
 def test_targets_wear_the_colour_of_their_outcome(
-    answered: Answered, packets: dict[str, Document]
+    mission: Mission, packets: dict[str, Document]
 ) -> None:
     colours = {
         (told["outcome"], tuple(packets[f"target/{told['target_id']}"]["point"]["color"]["rgba"]))
-        for told in answered.targets
+        for told in mission.told
     }
     outcomes = {outcome for outcome, _ in colours}
     assert len(colours) == len(outcomes) == len({colour for _, colour in colours}) >= 2

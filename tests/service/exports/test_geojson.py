@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import json
-from dataclasses import replace
 from datetime import datetime, timedelta
 from typing import Any
 
@@ -19,7 +18,9 @@ from planner_core.orbits.ground_track import visibility_ring
 from service.exports import geojson
 from service.exports.answered import Answered
 from service.exports.antimeridian import area
+from service.scenarios.translate import canonical
 from tests.missions import PAPER_ORBIT, Document
+from tests.service.exports.conftest import FINISHED_AT, Mission
 
 LON, LAT = (
     {"type": "number", "minimum": -180, "maximum": 180},
@@ -105,17 +106,19 @@ def test_rings_turn_as_the_standard_says_and_close(collection: Document) -> None
 
 
 def test_every_target_is_there_with_what_became_of_it(
-    collection: Document, answered: Answered
+    collection: Document, mission: Mission
 ) -> None:
     shown = features(collection, "target")
-    assert len(shown) == len(answered.targets) == 63
-    for feature, told in zip(shown, answered.targets, strict=True):
+    actions = {action["id"]: action for _, action in mission.answered.each_action()}
+    assert len(shown) == len(mission.told) == 63
+    for feature, told in zip(shown, mission.told, strict=True):
         properties = feature["properties"]
         for name in ("target_id", "outcome", "action_id", "satellite_id"):
             assert properties[name] == told[name]
         assert properties["reason"] == (told["reason"] or {}).get("code")
-        action = answered.actions.get(told["action_id"])
-        assert properties["start"] == (action["start"] if action else None)
+        action = actions.get(told["action_id"], {})
+        for name in ("start", "end"):
+            assert properties[name] == action.get(name)
     by_id = {f["properties"]["target_id"]: f for f in shown}
     assert by_id["-1+1"]["geometry"]["coordinates"] == [-170.0, 60.0]
     assert by_id['\'=late, "pole"']["properties"]["reward"] == 2.5
@@ -152,10 +155,10 @@ def test_tracks_are_sampled_every_half_minute_and_never_cross_the_map(
             assert np.abs(np.diff(np.array(line)[:, 0])).max() <= 90.0
 
 
-def test_a_track_that_stays_on_the_map_is_one_line(answered: Answered) -> None:
-    horizon = answered.scenario.horizon
-    soon = replace(horizon, end=horizon.start + timedelta(seconds=100))
-    short = replace(answered, scenario=replace(answered.scenario, horizon=soon))
+def test_a_track_that_stays_on_the_map_is_one_line(mission: Mission) -> None:
+    file = json.loads(mission.content)
+    file["horizon"]["end"] = "2019-01-01T00:01:40Z"
+    short = Answered.of(mission.timeline, mission.targets, canonical(file), FINISHED_AT)
     collection = json.loads("".join(geojson.write(short)))
     Draft202012Validator(RFC_7946).validate(collection)
     for track in features(collection, "track"):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from datetime import UTC, datetime
 
 import pytest
@@ -12,6 +11,7 @@ from jsonschema import Draft202012Validator
 from service.exports import openmct
 from service.exports.answered import Answered
 from tests.missions import Document
+from tests.service.exports.conftest import Mission
 
 INSTANT_MS: Document = {"type": "integer", "minimum": 0}
 PLAN: Document = {
@@ -68,13 +68,12 @@ def test_groups_are_satellites_and_modes(plan: Document) -> None:
         assert {activity["type"] for activity in group} == {name}
 
 
-def test_satellites_of_one_name_are_told_apart(answered: Answered) -> None:
-    timeline = answered.timeline
-    satellites = [satellite | {"name": "EYE"} for satellite in timeline["satellites"]]
-    plan = plan_of(replace(answered, timeline=timeline | {"satellites": satellites}))
+def test_satellites_of_one_name_are_told_apart(mission: Mission) -> None:
+    satellites = [satellite | {"name": "EYE"} for satellite in mission.document["satellites"]]
+    plan = plan_of(mission.with_timeline(satellites=satellites))
     assert "EYE (sat/1#a): collects" in plan
     assert len(plan) == 6
 
 
-def test_an_empty_plan_has_no_groups(answered: Answered) -> None:
-    assert plan_of(replace(answered, timeline=answered.timeline | {"satellites": []})) == {}
+def test_an_empty_plan_has_no_groups(mission: Mission) -> None:
+    assert plan_of(mission.with_timeline(satellites=[])) == {}

@@ -22,7 +22,7 @@ from service.commands.cli import main
 from service.exports import table
 from service.exports.answered import Answered
 from service.exports.reading import READERS, Reading, UnreadableTimeline, plan_in
-from service.scenarios.translate import canonical
+from service.scenarios.translate import canonical, scenario_from_content
 from tests.missions import Document, drawn_targets, paper_mission
 from tests.service.exports.conftest import FINISHED_AT, Mission
 from tests.service.test_plan_job import run
@@ -34,15 +34,15 @@ def compiled(scenario: Scenario) -> Problem:
 
 @pytest.fixture(scope="module")
 def problem(mission: Mission) -> Problem:
-    return compiled(mission.answered.scenario)
+    return compiled(mission.scenario)
 
 
 def csv_of(answered: Answered) -> bytes:
     return "".join(table.write(answered)).encode()
 
 
-def read(data: bytes, suffix: str, answered: Answered, problem: Problem) -> Reading:
-    return plan_in(READERS[suffix](data), answered.scenario, problem)
+def read(data: bytes, suffix: str, scenario: Scenario, problem: Problem) -> Reading:
+    return plan_in(READERS[suffix](data), scenario, problem)
 
 
 def rows_of(answered: Answered) -> list[dict[str, str]]:
@@ -93,13 +93,13 @@ def test_exports_come_back_as_the_same_plan(
     suffix: str, mission: Mission, answered: Answered, problem: Problem
 ) -> None:
     data = csv_of(answered) if suffix == ".csv" else mission.timeline.encode()
-    reading = read(data, suffix, answered, problem)
+    reading = read(data, suffix, mission.scenario, problem)
     assert reading.impossible == ()
-    assert plan_sha256(problem, reading.plan) == answered.timeline["plan_sha256"]
+    assert plan_sha256(problem, reading.plan) == answered.head["plan_sha256"]
     verdict = replay(problem, reading.plan)
     assert verdict.is_valid
-    assert verdict.reward == answered.timeline["totals"]["reward"]
-    assert verdict.battery_min == answered.timeline["totals"]["battery_min_fraction"]
+    assert verdict.reward == answered.head["totals"]["reward"]
+    assert verdict.battery_min == answered.head["totals"]["battery_min_fraction"]
 
 
 @pytest.mark.parametrize(
@@ -117,28 +117,29 @@ def test_plans_of_every_kind_of_scenario_come_back(solver: str, flags: dict[str,
     file = paper_mission(drawn_targets(80), **flags)
     answer = run(file, solver)
     answered = Answered.of(answer.timeline, answer.targets, canonical(file), FINISHED_AT)
-    problem = compiled(answered.scenario)
+    scenario = scenario_from_content(file)
+    problem = compiled(scenario)
     for data, suffix in ((csv_of(answered), ".csv"), (answer.timeline.encode(), ".json")):
-        reading = read(data, suffix, answered, problem)
-        assert plan_sha256(problem, reading.plan) == answered.timeline["plan_sha256"]
+        reading = read(data, suffix, scenario, problem)
+        assert plan_sha256(problem, reading.plan) == answered.head["plan_sha256"]
         assert replay(problem, reading.plan).is_valid
-        assert replay(problem, reading.plan).reward == answered.timeline["totals"]["reward"]
+        assert replay(problem, reading.plan).reward == answered.head["totals"]["reward"]
 
 
-def test_an_empty_plan_is_a_header(answered: Answered, problem: Problem) -> None:
+def test_an_empty_plan_is_a_header(mission: Mission, answered: Answered, problem: Problem) -> None:
     header = csv_of(answered).partition(b"\r\n")[0] + b"\r\n"
-    assert read(header, ".csv", answered, problem).plan.actions == ()
+    assert read(header, ".csv", mission.scenario, problem).plan.actions == ()
 
 
 def test_rows_in_any_order_and_without_our_figures_are_the_same_plan(
-    answered: Answered, problem: Problem
+    mission: Mission, answered: Answered, problem: Problem
 ) -> None:
     few = ("satellite_id", "mode", "start", "end", "target_id", "station_id")
     rows = [
         {name: row[name] for name in few} for row in rows_of(answered) if row["mode"] != "sunpoint"
     ]
-    reading = read(written(rows[::-1]), ".csv", answered, problem)
-    assert plan_sha256(problem, reading.plan) == answered.timeline["plan_sha256"]
+    reading = read(written(rows[::-1]), ".csv", mission.scenario, problem)
+    assert plan_sha256(problem, reading.plan) == answered.head["plan_sha256"]
 
 
 @pytest.mark.parametrize(
@@ -155,13 +156,18 @@ def test_rows_in_any_order_and_without_our_figures_are_the_same_plan(
     ],
 )
 def test_what_is_wrong_with_a_row_is_told_with_its_line(
-    change: dict[str, str], code: str, told: str, answered: Answered, problem: Problem
+    change: dict[str, str],
+    code: str,
+    told: str,
+    mission: Mission,
+    answered: Answered,
+    problem: Problem,
 ) -> None:
     rows = rows_of(answered)
     number = next(i for i, row in enumerate(rows) if row["mode"] == "collect")
     rows[number] |= change
     with pytest.raises(UnreadableTimeline) as refusal:
-        read(written(rows), ".csv", answered, problem)
+        read(written(rows), ".csv", mission.scenario, problem)
     (fault,) = refusal.value.faults
     assert (fault.code, fault.row) == (code, number + 2)
     assert told in fault.detail
@@ -176,10 +182,10 @@ def test_what_is_wrong_with_a_row_is_told_with_its_line(
     ],
 )
 def test_what_is_no_table_is_refused(
-    data: bytes, code: str, answered: Answered, problem: Problem
+    data: bytes, code: str, mission: Mission, problem: Problem
 ) -> None:
     with pytest.raises(UnreadableTimeline) as refusal:
-        read(data, ".csv", answered, problem)
+        read(data, ".csv", mission.scenario, problem)
     assert refusal.value.faults[0].code == code
 
 
@@ -194,10 +200,10 @@ def test_what_is_no_table_is_refused(
     ],
 )
 def test_what_is_no_timeline_document_is_refused(
-    data: bytes, pointer: str | None, answered: Answered, problem: Problem
+    data: bytes, pointer: str | None, mission: Mission, problem: Problem
 ) -> None:
     with pytest.raises(UnreadableTimeline) as refusal:
-        read(data, ".json", answered, problem)
+        read(data, ".json", mission.scenario, problem)
     assert refusal.value.faults[0].pointer == pointer
 
 
@@ -222,7 +228,7 @@ def test_the_command_finds_our_own_plan_valid(
     as_json.write_text(mission.timeline, encoding="utf-8")
     assert main(["check", scenario, str(as_json)]) == OK
     assert capsys.readouterr().out == of_csv
-    assert answered.timeline["plan_sha256"] in of_csv
+    assert answered.head["plan_sha256"] in of_csv
     assert of_csv.splitlines()[1].split()[0] == "valid"
 
 

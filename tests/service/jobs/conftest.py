@@ -18,13 +18,14 @@ import sqlalchemy as sa
 
 from service.db.clock import utc_now
 from service.db.migrate import upgrade
-from service.db.rows import JobResultRow, JobRow, ScenarioRow, WorkerRow
+from service.db.rows import JobRow, ScenarioRow, WorkerRow
 from service.db.session import Database
 from service.ids import new_id
 from service.jobs.queue import DbosQueue, migrate_queue
 from service.jobs.supervisor import environment_of
 from service.main import create_app
 from service.settings import Settings
+from service.stores import answer_store
 from tests.missions import Document
 from tests.service.conftest import checked_client, serve
 from tests.service.jobs.mission import Mission, running, small_mission
@@ -95,10 +96,12 @@ class Jobs:
 
     def result(self, job_id: str) -> tuple[str, str] | None:
         """Return timeline and targets of a job."""
-        wanted = sa.select(JobResultRow.timeline, JobResultRow.targets)
         with self.database.reading() as session:
-            row = session.execute(wanted.where(JobResultRow.job_id == job_id)).one_or_none()
-            return None if row is None else (row.timeline, row.targets)
+            timeline = answer_store.timeline_of(session, job_id)
+            contents = answer_store.contents(session, job_id, "targets")
+        texts = answer_store.texts(self.database.reading, job_id, contents)
+        targets = "".join(text for _, text in texts)
+        return None if timeline is None else (timeline, f"[{targets}]")
 
     def starts(self) -> list[str]:
         """Return a line for each time a solver began: job, solver, process."""

@@ -13,6 +13,7 @@ import pytest
 import sqlalchemy as sa
 
 from planner_core.solvers import SOLVERS
+from service.blocks import blocks_of_timeline, proof_blocks, target_blocks
 from service.db.rows import JobRow
 from service.jobs import lease
 from service.jobs.lease import Lease, Outcome
@@ -68,8 +69,7 @@ def finish(jobs: Jobs, job_id: str, outcome: Outcome | None = None) -> None:
     answered = Outcome(
         state="succeeded",
         termination="optimal",
-        timeline=json.dumps(TIMELINE),
-        targets=json.dumps(TARGETS),
+        blocks=(*blocks_of_timeline(TIMELINE), *target_blocks(TARGETS)),
     )
     held = start(jobs, job_id)
     with jobs.database.transaction() as session:
@@ -327,7 +327,8 @@ def test_the_proof_of_a_bound_is_kept_with_the_answer(client: httpx.Client, jobs
     found = {"version": 1, "proof": "lagrangian", "value": 3.0, "prices": [1.0, 2.0]}
     for proof, shown in ((json.dumps(found), found), (None, None)):
         job_id = posted(client, jobs)
-        answered = Outcome(state="succeeded", timeline="{}", targets="[]", proof=proof)
+        blocks = (*blocks_of_timeline(TIMELINE), *proof_blocks(proof or ""))
+        answered = Outcome(state="succeeded", blocks=blocks)
         finish(jobs, job_id, answered)
         path = f"/v1/jobs/{job_id}/proof"
         answer = client.get(path)

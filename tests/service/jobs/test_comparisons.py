@@ -7,12 +7,14 @@ from typing import Any
 import httpx
 import pytest
 
+from service.blocks import blocks_of_timeline
 from service.documents import figures_of
 from service.jobs.lease import Outcome
 from service.main import create_app
 from tests.service.conftest import serve
 from tests.service.jobs.conftest import Jobs
 from tests.service.jobs.test_api import finish, start
+from tests.service.jobs.work import EMPTY
 from tests.service.problems import assert_problem
 
 RUNS = [
@@ -76,8 +78,7 @@ def test_the_table_fills_line_by_line(client: httpx.Client, jobs: Jobs) -> None:
         Outcome(
             state="succeeded",
             termination="horizon_complete",
-            timeline="{}",
-            targets="[]",
+            blocks=tuple(blocks_of_timeline(EMPTY)),
             figures=FIGURES,
         ),
     )

@@ -8,6 +8,7 @@ import pytest
 import sqlalchemy as sa
 from sqlalchemy.exc import IntegrityError
 
+from service.blocks import blocks_of_timeline
 from service.db.clock import utc_now
 from service.db.rows import JobResultRow, JobRow
 from service.ids import new_id
@@ -16,7 +17,9 @@ from service.jobs.lease import Lease, Outcome
 from tests.service.jobs.conftest import Jobs
 
 ANSWERED = Outcome(
-    state="succeeded", termination="optimal", timeline='{"validity": "valid"}', targets="[]"
+    state="succeeded",
+    termination="optimal",
+    blocks=tuple(blocks_of_timeline({"validity": "valid", "satellites": []})),
 )
 
 
@@ -57,14 +60,14 @@ def test_a_finished_job_has_its_state_and_its_result(jobs: Jobs) -> None:
     assert job.started_at is not None
     assert job.finished_at is not None
     assert job.created_at <= job.started_at <= job.finished_at
-    assert jobs.result(job_id) == ('{"validity": "valid"}', "[]")
+    assert jobs.result(job_id) == ('{"validity": "valid", "satellites": []}', "[]")
 
 
 def test_a_result_that_cannot_be_stored_leaves_the_job_unfinished(jobs: Jobs) -> None:
     job_id = jobs.submit("answer")
     held = started(jobs, job_id)
     with jobs.database.transaction() as session:
-        row = {"job_id": job_id, "timeline": "{}", "targets": "[]", "created_at": utc_now()}
+        row = {"job_id": job_id, "created_at": utc_now()}
         session.execute(sa.insert(JobResultRow).values(**row))
     with pytest.raises(IntegrityError):
         finish(jobs, held)

@@ -13,7 +13,7 @@ import pytest
 from planner_core.solvers.base import Progress
 from service.jobs import runner as runner_module
 from service.jobs.child import Answered, Ending, Refused, Stopped
-from service.jobs.plan_job import PlanRequest
+from service.jobs.plan_job import Parcel, PlanRequest
 from service.jobs.runner import Abandoned, Limits, Order, Runner
 from tests.service.jobs.work import WORK
 
@@ -59,6 +59,7 @@ def run(
     *,
     time_s: float = 60.0,
     memory_mb: int = 2048,
+    opportunities: Parcel | None = None,
 ) -> Ending | Abandoned:
     request = PlanRequest(
         job_id="j1",
@@ -68,6 +69,7 @@ def run(
         params={"log": str(log)},
         seed=0,
         limits={},
+        opportunity_block=opportunities or Parcel(None),
     )
     limits = Limits(time_s=time_s, memory_mb=memory_mb)
     return runner.run(request, limits, tick_s=0.05, tick=(watcher or Watcher()).tick)
@@ -77,6 +79,14 @@ def test_an_answer_comes_back(runner: Runner, log: Path) -> None:
     ending = run(runner, log, "answer")
     assert isinstance(ending, Answered)
     assert json.loads(ending.answer.timeline)["job"] == "j1"
+
+
+def test_the_worker_does_not_keep_what_only_the_solver_needs(runner: Runner, log: Path) -> None:
+    parcel = Parcel(b"block")
+    ending = run(runner, log, "answer", opportunities=parcel)
+    assert isinstance(ending, Answered)
+    assert ending.answer.opportunity_block is None  # the solver had it
+    assert parcel.take() is None
 
 
 def test_a_search_that_honours_its_budget_keeps_its_plan_at_the_time_limit(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 import time
@@ -12,6 +11,7 @@ import psutil
 
 from planner_core.errors import Cancelled, InvalidScenario
 from planner_core.solvers.base import Budget, Progress
+from service.blocks import blocks_of_timeline, target_blocks
 from service.jobs.plan_job import PlanAnswer, PlanRequest
 from service.jobs.runner import Work
 
@@ -99,9 +99,8 @@ def answer(request: PlanRequest, termination: str) -> PlanAnswer:
     timeline = EMPTY | {"job": request.job_id, "run": request.run, "termination": termination}
     targets = [{"target_id": "t0", "outcome": "collected", "reason": None}]
     return PlanAnswer(
-        timeline=json.dumps(timeline),
-        targets=json.dumps(targets),
+        blocks=(*blocks_of_timeline(timeline), *target_blocks(targets)),
         termination=termination,
         reward=1.0,
-        opportunity_block=None if request.opportunity_block else b"block",
+        opportunity_block=None if request.opportunity_block.take() else b"block",
     )

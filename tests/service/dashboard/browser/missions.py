@@ -19,15 +19,15 @@ def small_mission(api: httpx.Client) -> str:
     return str(demo.create_mission(api)["id"])
 
 
-def large_mission(api: httpx.Client) -> str:
-    """Store twelve satellites, 2,000 targets and a week; return the id of the scenario."""
+def large_mission(api: httpx.Client, num_satellites: int = 12, num_days: int = 7) -> str:
+    """Store a fleet, 2,000 targets and some days; return the id of the scenario."""
     satellites = [
         post(
             api,
             "/v1/satellites",
             satellite(name=f"EYE-{i + 1}", tle=tle(90100 + i, raan_deg=30.0 * i)),
         )
-        for i in range(12)
+        for i in range(num_satellites)
     ]
     stations = [post(api, "/v1/ground-stations", one) for one in demo_mission.GROUND_STATIONS]
     catalog = api.post(
@@ -36,8 +36,8 @@ def large_mission(api: httpx.Client) -> str:
         headers={"Content-Type": "text/csv"},
     ).json()
     scenario = {
-        "name": "Twelve for a week",
-        "horizon": {"start": "2026-03-01T00:00:00Z", "end": "2026-03-08T00:00:00Z"},
+        "name": f"{num_satellites} satellites for {num_days} days",
+        "horizon": {"start": "2026-03-01T00:00:00Z", "end": f"2026-03-{1 + num_days:02}T00:00:00Z"},
         "satellite_ids": [one["id"] for one in satellites],
         "target_catalog_ids": [catalog["id"]],
         "ground_station_ids": [one["id"] for one in stations],

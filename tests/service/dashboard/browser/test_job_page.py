@@ -109,6 +109,10 @@ def test_an_action_clicked_in_the_chart_is_selected_everywhere(
     browser.wait(lambda: alone["target_id"] in browser.text("#tables tr.marked"))
 
 
+def has_value(browser: Browser, script: str, value: object) -> bool:
+    return bool(browser.run(script) == value)
+
+
 def is_drawn_again(browser: Browser, plot: str, before: int) -> bool:
     return browser.drawn(plot) > before
 
@@ -131,6 +135,7 @@ def test_a_left_out_target_tells_its_reason_and_what_blocks_it(
     browser.click(f"{group} > summary")
     browser.click(f"{group} tbody tr:first-child button")
     browser.wait(lambda: browser.text("#selected-target") == item["target_id"])
+    browser.wait(lambda: item["reason"]["certainty"] in browser.text("#selected"))
     about = browser.text("#selected")
     assert item["reason"]["detail"] in about
     assert code.replace("_", " ") in about
@@ -206,9 +211,9 @@ def test_the_tables_hold_every_action_and_every_target(
         browser.click(f"{section} > summary")
         browser.wait(partial(browser.text, f"{section} tbody tr"))
         browser.click(f"{section} .pager button:last-child")
-        rows = "return document.querySelectorAll(arguments[0]).length"
-        shown = browser.run(rows, f"{section} tbody tr")
-        assert shown == count
+        rows = f"return document.querySelectorAll('{section} tbody tr').length"
+        # They are made a few at a time.
+        browser.wait(partial(has_value, browser, rows, count))
         assert "(UTC)" in browser.text(f"{section} thead")
 
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import sqlalchemy as sa
 
-from service.db.rows import JobResultRow, JobRow
+from service.blocks import head_in
+from service.db.rows import JobBlockRow, JobRow
 from service.jobs.lease import FINAL
 from tests.service.jobs.conftest import Jobs
 
@@ -62,8 +62,8 @@ def read_ledger(jobs: Jobs) -> list[Ended]:
             sa.select(_ENDINGS.c.job_id, sa.func.count()).group_by(_ENDINGS.c.job_id)
         )
         endings = {job_id: number for job_id, number in counted}  # noqa: C416 - rows are no pairs
-        answers = session.execute(sa.select(JobResultRow.job_id, JobResultRow.timeline))
-        runs = {job_id: json.loads(timeline)["run"] for job_id, timeline in answers}
+        heads = sa.select(JobBlockRow.job_id, JobBlockRow.text).where(JobBlockRow.kind == "head")
+        runs = {row.job_id: head_in(row.text)["run"] for row in session.execute(heads)}
         rows = session.scalars(sa.select(JobRow).order_by(JobRow.finished_at))
         return [Ended(job, endings.get(job.id, 0), runs.get(job.id)) for job in rows]
 

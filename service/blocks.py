@@ -1,0 +1,206 @@
+"""The documents of an answer in blocks: no reader and no writer needs to hold one whole.
+
+The texts of a document's blocks, one behind the other, are the document (JSON). Each block also
+says what is in it, so that a reader takes those that it needs, and no others.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import islice
+from typing import Any, Final, Literal, TypeVar
+
+Document = dict[str, Any]
+T = TypeVar("T")
+
+Kind = Literal["head", "satellite", "actions", "rest", "tail", "targets", "proof"]
+TIMELINE: Final[tuple[Kind, ...]] = ("head", "satellite", "actions", "rest", "tail")
+"""The kinds of a timeline's blocks."""
+
+NUM_ITEMS: Final = 200
+"""Actions or targets of a block: some 80 kB."""
+NUM_CHARS: Final = 1 << 16
+"""Of a block that holds no items."""
+
+_HEAD_ENDS: Final = ', "satellites": ['
+_SATELLITE_ENDS: Final = ', "actions": ['
+_BETWEEN: Final = ", "
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Block:
+    """A piece of a document.
+
+    Attributes
+    ----------
+    kind
+        ``head``: a timeline but for its satellites. ``satellite``: id and name of one.
+        ``actions``: some of what the satellite before it does. ``rest``: more text of that
+        satellite, cut anywhere. ``tail``: a timeline's end. ``targets``: some outcomes.
+        ``proof``: text, cut anywhere.
+    first
+        The number of the first action, target or satellite, from 0 through the whole document.
+    num_items
+        How many actions or targets.
+    tally
+        Of targets: how many there are of each ``outcome/code of the reason``.
+    """
+
+    kind: Kind
+    text: str
+    first: int = 0
+    num_items: int = 0
+    tally: Mapping[str, int] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Entry:
+    """A block in a table of contents: all but its text, whose length is ``size``."""
+
+    position: int
+    kind: Kind
+    first: int
+    num_items: int
+    size: int
+    tally: Mapping[str, int]
+
+
+def contents_of(blocks: Iterable[Block]) -> list[Entry]:
+    """Return the table of contents of blocks that stand in this order."""
+    return [
+        Entry(
+            position=position,
+            kind=block.kind,
+            first=block.first,
+            num_items=block.num_items,
+            size=len(block.text),
+            tally=block.tally,
+        )
+        for position, block in enumerate(blocks)
+    ]
+
+
+def timeline_blocks(
+    head: Document, satellites: Iterable[tuple[Document, Iterable[Document], Document]]
+) -> Iterator[Block]:
+    """Yield a timeline.
+
+    Parameters
+    ----------
+    head
+        All of it but the satellites.
+    satellites
+        What stands before the actions of each, its actions, and what stands behind them.
+    """
+    yield Block(kind="head", text=json.dumps(head)[:-1] + _HEAD_ENDS)
+    num_actions = 0
+    for number, (about, actions, rest) in enumerate(satellites):
+        comma = _BETWEEN if number else ""
+        text = comma + json.dumps(about)[:-1] + _SATELLITE_ENDS
+        yield Block(kind="satellite", text=text, first=number)
+        own_first = num_actions
+        for some in _groups(actions):
+            text = _items_text(some, is_first=num_actions == own_first)
+            yield Block(kind="actions", text=text, first=num_actions, num_items=len(some))
+            num_actions += len(some)
+        text = f"], {json.dumps(rest)[1:]}" if rest else "]}"
+        yield from (Block(kind="rest", text=part, first=number) for part in _parts(text))
+    yield Block(kind="tail", text="]}")
+
+
+def blocks_of_timeline(timeline: Document) -> Iterator[Block]:
+    """Yield a timeline that is there as a whole."""
+
+    def parts(satellite: Document) -> tuple[Document, list[Document], Document]:
+        about = {name: satellite[name] for name in ("id", "name")}
+        rest = {k: v for k, v in satellite.items() if k not in ("id", "name", "actions")}
+        return about, satellite["actions"], rest
+
+    head = {name: value for name, value in timeline.items() if name != "satellites"}
+    return timeline_blocks(head, (parts(one) for one in timeline["satellites"]))
+
+
+def target_blocks(targets: Iterable[Document]) -> Iterator[Block]:
+    """Yield a list of targets with their outcomes; its brackets are `targets_text`'s."""
+    first = 0
+    for some in _groups(targets):
+        yield Block(
+            kind="targets",
+            text=_items_text(some, is_first=first == 0),
+            first=first,
+            num_items=len(some),
+            tally=Counter(_tallied(target) for target in some),
+        )
+        first += len(some)
+
+
+def proof_blocks(proof: str) -> Iterator[Block]:
+    """Yield a proof document, given as text."""
+    return (Block(kind="proof", text=part) for part in _parts(proof))
+
+
+def holds(tally: Mapping[str, int], outcome: str | None, reason: str | None) -> bool:
+    """Return whether a block of targets has one of this outcome and reason; None stands for any.
+
+    >>> holds({"unscheduled/battery": 2}, "unscheduled", None), holds({"collected/": 1}, None, "x")
+    (True, False)
+    """
+    for key in tally:
+        own_outcome, _, own_reason = key.partition("/")
+        if outcome in (None, own_outcome) and reason in (None, own_reason):
+            return True
+    return False
+
+
+def head_in(text: str) -> Document:
+    """Return what a ``head`` says."""
+    return _object(f"{text}]}}", "satellites")
+
+
+def satellite_in(text: str) -> Document:
+    """Return what a ``satellite`` says."""
+    return _object(f"{text.removeprefix(_BETWEEN)}]}}", "actions")
+
+
+def items_in(text: str) -> list[Document]:
+    """Return the items of ``actions`` or ``targets``."""
+    items: list[Document] = json.loads(f"[{text.removeprefix(_BETWEEN)}]")
+    return items
+
+
+def timeline_text(blocks: Iterable[Block]) -> str:
+    """Return the timeline among blocks as a whole."""
+    return "".join(block.text for block in blocks if block.kind in TIMELINE)
+
+
+def targets_text(blocks: Iterable[Block]) -> str:
+    """Return the list of targets among blocks as a whole."""
+    return f"[{''.join(block.text for block in blocks if block.kind == 'targets')}]"
+
+
+def _tallied(target: Document) -> str:
+    return f"{target['outcome']}/{(target['reason'] or {}).get('code', '')}"
+
+
+def _items_text(items: Iterable[Document], *, is_first: bool) -> str:
+    text = _BETWEEN.join(json.dumps(item) for item in items)
+    return text if is_first else _BETWEEN + text
+
+
+def _groups(items: Iterable[T]) -> Iterator[list[T]]:
+    remaining = iter(items)
+    while some := list(islice(remaining, NUM_ITEMS)):
+        yield some
+
+
+def _parts(text: str) -> Iterator[str]:
+    return (text[at : at + NUM_CHARS] for at in range(0, len(text), NUM_CHARS))
+
+
+def _object(text: str, without: str) -> Document:
+    found: Document = json.loads(text)
+    del found[without]
+    return found

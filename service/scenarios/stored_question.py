@@ -1,0 +1,76 @@
+"""What exports ask of a stored scenario, read from its canonical form target by target.
+
+As objects a scenario of many targets takes many times the memory of its text.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from functools import cached_property
+from typing import Any, Final
+
+from planner_core.domain import GroundStation, Horizon, Satellite, Target
+from service.scenarios.inputs import FileGroundStation, FileSatellite, FileTarget, HorizonIn
+from service.scenarios.translate import (
+    ground_station_from,
+    horizon_from,
+    satellite_from,
+    target_from,
+)
+
+_TARGETS: Final = "targets"
+
+
+class StoredQuestion:
+    """A scenario file in its canonical form."""
+
+    def __init__(self, content: str):
+        self._content = content
+        self._decoder = json.JSONDecoder()
+
+    @cached_property
+    def horizon(self) -> Horizon:
+        """Return the span that is planned."""
+        return horizon_from(HorizonIn.model_validate(self._before_targets[0]["horizon"]))
+
+    @cached_property
+    def satellites(self) -> tuple[Satellite, ...]:
+        """Return the satellites."""
+        bodies = (
+            FileSatellite.model_validate(one) for one in self._before_targets[0]["satellites"]
+        )
+        return tuple(satellite_from(body, str(body.id)) for body in bodies)
+
+    @cached_property
+    def ground_stations(self) -> tuple[GroundStation, ...]:
+        """Return the stations."""
+        bodies = (
+            FileGroundStation.model_validate(one)
+            for one in self._before_targets[0]["ground_stations"]
+        )
+        return tuple(ground_station_from(body, str(body.id)) for body in bodies)
+
+    def each_target(self) -> Iterator[Target]:
+        """Yield the targets, in their order."""
+        _, at = self._before_targets
+        while self._content[at] != "]":
+            fields, at = self._decoder.raw_decode(self._content, at)
+            body = FileTarget.model_validate(fields)
+            yield target_from(body, body.catalog_id)
+            at += self._content[at] == ","
+
+    @cached_property
+    def _before_targets(self) -> tuple[dict[str, Any], int]:
+        """Return what stands before the targets, and where their list begins.
+
+        Names are in the order of the alphabet, and there are no blanks.
+        """
+        members: dict[str, Any] = {}
+        at = 1
+        while True:
+            name, at = self._decoder.raw_decode(self._content, at)
+            if name == _TARGETS:
+                return members, at + len(":[")
+            members[name], at = self._decoder.raw_decode(self._content, at + len(":"))
+            at += len(",")
