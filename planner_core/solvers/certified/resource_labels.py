@@ -44,7 +44,7 @@ class Ground(NamedTuple):
         Of each opportunity the task of its satellite. Shape ``(n,)``.
     satellite
         Of each opportunity. Shape ``(n,)``.
-    index
+    number
         The satellite.
     target
         Of each task; of contacts, one past the last target.
@@ -62,7 +62,7 @@ class Ground(NamedTuple):
     rows: Ints
     local: Ints
     satellite: Ints
-    index: int
+    number: int
     target: Ints
     worth: Floats
     typical: float
@@ -77,7 +77,7 @@ class Room(NamedTuple):
     ----------
     value, energy, data, source
         Of each label; ``LABELS`` for each task. ``source`` is the label before.
-    count
+    num_labels
         Labels of each task.
     idle_value, idle_energy, idle_data, idle_label
         Labels that every task from here on may follow.
@@ -98,7 +98,7 @@ class Room(NamedTuple):
     energy: Floats
     data: Floats
     source: Ints
-    count: Ints
+    num_labels: Ints
     idle_value: Floats
     idle_energy: Floats
     idle_data: Floats
@@ -128,7 +128,7 @@ def room_for(num_targets: int) -> Room:
         energy=floats(_SLOTS),
         data=floats(_SLOTS),
         source=ints(_SLOTS),
-        count=ints(MAX_NODES),
+        num_labels=ints(MAX_NODES),
         idle_value=floats(LABELS),
         idle_energy=floats(LABELS),
         idle_data=floats(LABELS),
@@ -179,13 +179,13 @@ def best_label(
         other = room.first_idle[at]
         while other >= 0:
             if other + low >= earliest:
-                for i in range(other * LABELS, other * LABELS + room.count[other]):
+                for i in range(other * LABELS, other * LABELS + room.num_labels[other]):
                     num_idle = _keep(
                         room.idle_value, room.idle_energy, room.idle_data, room.idle_label, 0,
                         num_idle, room.value[i], room.energy[i], room.data[i], i,
                     )  # fmt: skip
             other = room.next_idle[other]
-        room.count[at] = 0
+        room.num_labels[at] = 0
         if room.gain[at] == NEVER:
             continue
         begin = at * LABELS
@@ -201,12 +201,12 @@ def best_label(
                 count = _extend(ground, room, low, k, begin, count, 0.0, energy, data, _AT_START)
             elif i >= earliest:
                 first = (i - low) * LABELS
-                for label in range(first, first + room.count[i - low]):
+                for label in range(first, first + room.num_labels[i - low]):
                     count = _extend(
                         ground, room, low, k, begin, count,
                         room.value[label], room.energy[label], room.data[label], label,
                     )  # fmt: skip
-        room.count[at] = count
+        room.num_labels[at] = count
         if network.is_kept[k]:
             num_idle, earliest, starts_open = 0, k, True
             best, best_energy, best_label = -np.inf, -np.inf, NOWHERE

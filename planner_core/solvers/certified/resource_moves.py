@@ -167,7 +167,7 @@ def _weigh(ground: Ground, taken: Taken, room: Room, low: int, high: int, draws:
             room.seen[target] = 0
         room.seen[target] += 1
         held = taken.holder[target]
-        is_here = held != FREE and ground.satellite[held] == ground.index
+        is_here = held != FREE and ground.satellite[held] == ground.number
         if is_here:
             is_here = low <= ground.local[held] < high
         worth = ground.worth[target]
@@ -197,7 +197,7 @@ def _replace(ground: Ground, taken: Taken, room: Room, low: int, high: int, last
         if not ground.network.is_contact[k]:
             held = taken.holder[place[k]]
             if held == FREE or (
-                ground.satellite[held] == ground.index and low <= ground.local[held] < high
+                ground.satellite[held] == ground.number and low <= ground.local[held] < high
             ):
                 worth += ground.worth[place[k]]
         label = room.source[label]

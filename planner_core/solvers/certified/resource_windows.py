@@ -37,7 +37,7 @@ class ResourceWindows:
                 rows=satellite.rows,
                 local=problem.local_row,
                 satellite=table.satellite,
-                index=index,
+                number=index,
                 target=np.where(satellite.kind == COLLECT, satellite.place, num_targets).astype(
                     np.int32
                 ),
@@ -67,7 +67,7 @@ class ResourceWindows:
             ground = self._grounds[self._turn % len(self._grounds)]
             self._turn += 1
             make_moves(
-                ground._replace(is_shut=self._shut(ground.index)), self._taken, self._room,
+                ground._replace(is_shut=self._shut(ground.number)), self._taken, self._room,
                 self._draws, min(num_moves, _MOVES_AT_A_TIME), budget.stop,
             )  # fmt: skip
             num_moves -= _MOVES_AT_A_TIME
