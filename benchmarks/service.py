@@ -35,7 +35,7 @@ from service.ids import new_id
 from service.instants import instant_text
 
 RUNS = 9
-POLLS = 150
+POLLS = 600
 NUM_DASHBOARDS = 200
 NUM_RUNNING = 50
 NUM_STORED = (100, 10_000)

@@ -209,5 +209,5 @@ def _rows(
 ) -> Mapping[str, sa.Row[Any]]:
     """Return what there is of the polled jobs, by id."""
     job_ids = list({job_id for job_id, _ in polls})
-    with database.asking() as connection:
+    with database.asking_untested() as connection:
         return {row.id: row for row in connection.execute(query, {"ids": job_ids})}

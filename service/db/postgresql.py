@@ -38,7 +38,7 @@ def make_postgresql_engine(
         More for ``sa.create_engine``.
     """
     address = sa.make_url(url)
-    engine = sa.create_engine(url, pool_pre_ping=True, **options)
+    engine = sa.create_engine(url, **{"pool_pre_ping": True, **options})
 
     def connect(
         _dialect: object, _record: object, arguments: list[Any], parameters: dict[str, Any]

@@ -35,6 +35,12 @@ class Database:
         if self.engine.dialect.name == "sqlite":
             alone = {_NO_TRANSACTION: True}
         self._asker = self._reader.execution_options(**alone)
+        self._untested = self._asker
+        if self.engine.dialect.name == "postgresql":
+            # To test a connection before each use costs as much as a small query.
+            self._untested = make_postgresql_engine(
+                url, timeout_s, pool_size=1, max_overflow=1, pool_pre_ping=False
+            ).execution_options(**alone, read_only=True)
 
     @contextmanager
     def transaction(self) -> Iterator[Session]:
@@ -54,9 +60,16 @@ class Database:
         with self._asker.begin() as connection:
             yield connection
 
+    @contextmanager
+    def asking_untested(self) -> Iterator[sa.Connection]:
+        """Yield the same, without a look whether it still works: for who can ask another way."""
+        with self._untested.begin() as connection:
+            yield connection
+
     def close(self) -> None:
         """Close all pooled connections."""
         self.engine.dispose()
+        self._untested.dispose()
 
 
 def make_engine(url: str, timeout_s: float | None = DEFAULT_TIMEOUT_S) -> sa.Engine:

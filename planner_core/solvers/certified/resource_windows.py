@@ -63,7 +63,7 @@ class ResourceWindows:
 
     def make_moves(self, num_moves: int, budget: Budget) -> None:
         """Make about so many moves, unless the budget is spent before."""
-        while num_moves > 0 and not budget.is_spent():
+        while self._grounds and num_moves > 0 and not budget.is_spent():
             ground = self._grounds[self._turn % len(self._grounds)]
             self._turn += 1
             make_moves(

@@ -1,0 +1,92 @@
+"""Bounds by energy alone: the programme is the best of all paths, and no plan beats the prices."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import Literal
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from planner_core.bounds.energy_prices import EnergyPrices
+from planner_core.bounds.most_by_energy import EnergyLevels, energy_levels, most_by_energy
+from planner_core.bounds.resource_network import Network, network_of
+from planner_core.problem import Floats
+from planner_core.solvers.base import Budget
+from tests.planner_core.brute_force import best_reward
+from tests.planner_core.problems import TIGHT, random_problem, varied_problem
+
+SEEDS = st.integers(0, 10**6)
+STARVED = replace(TIGHT, battery_min_fraction=0.5, initial_battery_fraction=0.62)
+_problem = partial(varied_problem, scarce=STARVED)
+Dynamics = Literal["physical", "paper"]
+
+
+def best_by_enumeration(network: Network, levels: EnergyLevels, weight: Floats) -> float:
+    """Return the most that any path gains, path by path."""
+
+    def from_here(last: int, energy: int) -> float:
+        best = 0.0
+        for k in range(last + 1, len(weight)):
+            near = network.near_rows[network.near_first[last] : network.near_first[last + 1]]
+            if last >= 0 and k < network.idle_from[last] and k not in near:
+                continue
+            left = min(energy, int(levels.cap[k])) - int(levels.cost[k])
+            if weight[k] > 0.0 and left >= levels.floor[k]:
+                best = max(best, float(weight[k]) + from_here(k, left))
+        return best
+
+    return from_here(-1, levels.start)
+
+
+@pytest.mark.parametrize("dynamics", ["physical", "paper"])
+@settings(max_examples=150, deadline=None)
+@given(seed=SEEDS, per_collect=st.sampled_from([1, 3, 24]))
+def test_the_programme_finds_the_best_path(dynamics: Dynamics, seed: int, per_collect: int) -> None:
+    problem = _problem(seed, dynamics)
+    network = network_of(problem, problem.satellites[0])
+    levels = energy_levels(network, per_collect)
+    rng = np.random.default_rng(seed)
+    m = len(problem.opportunities)
+    weight = rng.uniform(-0.3, 1.0, m)
+    own, num_own = np.empty((m, levels.width)), np.zeros(m, dtype=np.int64)
+    value, path = most_by_energy(network, levels, weight, own, num_own)
+    assert value == pytest.approx(best_by_enumeration(network, levels, weight))
+    assert weight[path].sum() == pytest.approx(value)
+    energy = levels.start
+    for k in path:
+        energy = min(energy, levels.cap[k]) - levels.cost[k]
+        assert energy >= levels.floor[k]
+    assert np.all(np.diff(path) > 0)
+
+
+@pytest.mark.parametrize("dynamics", ["physical", "paper"])
+@settings(max_examples=150, deadline=None)
+@given(seed=SEEDS, num_satellites=st.integers(1, 3))
+def test_no_plan_beats_the_prices(dynamics: Dynamics, seed: int, num_satellites: int) -> None:
+    problem = _problem(seed, dynamics, num_satellites)
+    search = EnergyPrices(problem, np.zeros(len(problem.target_ids)), 30, seed)
+    search.improve(30, Budget().stop)
+    assert search.is_settled
+    assert search.value >= best_reward(problem) - 1e-6
+    assert np.all((search.prices >= 0.0) & (search.prices <= problem.target_reward))
+
+
+def test_prices_lower_what_satellites_gain_that_share_targets() -> None:
+    problem = random_problem(
+        1, num_collects=120, num_targets=30, num_contacts=6, num_satellites=3, span_s=3000.0
+    )
+    problem = replace(problem, horizon_s=3100.0)
+    nothing = np.zeros(len(problem.target_ids))
+    search = EnergyPrices(problem, nothing, 100, 0)
+    search.improve(5, Budget().stop)
+    first = search.value
+    search.improve(95, Budget().stop)
+    assert search.value < 0.97 * first
+    again = EnergyPrices(problem, nothing, 100, 0)
+    again.improve(100, Budget().stop)
+    assert again.value == search.value
+    assert np.array_equal(again.prices, search.prices)

@@ -1,0 +1,151 @@
+"""Plans under battery and recorder by windows: valid, never worse, and near the optimum."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import Literal
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from planner_core.bounds.proofs import from_json, is_proven, to_json
+from planner_core.domain import Agility
+from planner_core.plan import Plan
+from planner_core.problem import Kept, Pinned
+from planner_core.solvers import Certified, Rule
+from planner_core.solvers.base import Budget, Progress
+from planner_core.solvers.certified.choices import ChoiceSearch
+from planner_core.solvers.certified.resource_windows import ResourceWindows
+from planner_core.solvers.certified.turns import TurnSearch
+from planner_core.timeline import replay
+from tests.planner_core.brute_force import best_reward
+from tests.planner_core.problems import TIGHT, random_problem, varied_problem
+
+SEEDS = st.integers(0, 10**6)
+STARVED = replace(TIGHT, battery_min_fraction=0.5, initial_battery_fraction=0.62)
+_problem = partial(varied_problem, scarce=STARVED)
+Dynamics = Literal["physical", "paper"]
+
+
+@pytest.mark.parametrize("slew_rate_deg_s", [1.0, 0.3])
+@settings(max_examples=60, deadline=None)
+@given(
+    seed=SEEDS, dynamics=st.sampled_from(["physical", "paper"]),
+    num_satellites=st.integers(1, 3), has_rewards=st.booleans(),
+    num_offers=st.sampled_from([1, 3]), num_kept=st.integers(0, 2),
+)  # fmt: skip
+def test_plans_stay_valid_and_never_get_worse(
+    slew_rate_deg_s: float,
+    seed: int,
+    dynamics: Dynamics,
+    num_satellites: int,
+    has_rewards: bool,
+    num_offers: int,
+    num_kept: int,
+) -> None:
+    problem = random_problem(
+        seed, num_collects=30, num_targets=15, num_contacts=6, num_satellites=num_satellites,
+        dynamics=dynamics, has_rewards=has_rewards, max_turn_deg=25.0, num_offers=num_offers,
+        agility=Agility(slew_rate_deg_s=slew_rate_deg_s),
+    )  # fmt: skip
+    first = Rule().solve(problem, Budget(), 0).plan
+    must = [action.opportunity for action in first.actions[:num_kept]]
+    kept = tuple(Kept(row=row, pointer=f"/pins/keep/{i}") for i, row in enumerate(must))
+    problem = replace(problem, pinned=Pinned(kept=kept))
+    start = replay(problem, first)
+    search = ResourceWindows(problem, seed)
+    search.adopt(first)
+    assert search.plan == first
+    search.make_moves(400, Budget())
+    timeline = replay(problem, search.plan)
+    if start.is_valid:
+        assert not timeline.violations
+        assert timeline.reward >= start.reward
+        assert search.reward == pytest.approx(timeline.reward)
+        assert set(must) <= {action.opportunity for action in search.plan.actions}
+    again = ResourceWindows(problem, seed)
+    again.adopt(first)
+    again.make_moves(400, Budget())
+    assert again.plan == search.plan
+
+
+def test_small_problems_end_at_the_optimum() -> None:
+    reached = 0
+    for seed in range(30):
+        problem = _problem(seed, "physical" if seed % 2 else "paper", 1 + seed % 3)
+        start = Rule().solve(problem, Budget(), 0).plan
+        budget = Budget()
+        search = TurnSearch(
+            problem, ChoiceSearch(problem, 1.0, seed, budget.stop), start, budget, seed
+        )
+        for _ in range(4):
+            search.turn()
+        timeline = replay(problem, search.plan)
+        assert timeline.is_valid
+        reached += timeline.reward == best_reward(problem)
+    assert reached >= 27
+
+
+def test_windows_better_a_plan_that_the_rule_leaves() -> None:
+    gained = 0.0
+    for seed in range(5):
+        problem = random_problem(
+            seed, num_collects=200, num_targets=80, num_contacts=12, num_satellites=2,
+            span_s=5000.0,
+        )  # fmt: skip
+        problem = replace(problem, horizon_s=5100.0)
+        start = Rule().solve(problem, Budget(), 0).plan
+        search = ResourceWindows(problem, 0)
+        search.adopt(start)
+        before = search.reward
+        search.make_moves(2000, Budget())
+        assert not replay(problem, search.plan).violations
+        gained += search.reward / before
+    assert gained / 5 > 1.1
+
+
+def test_a_search_that_is_stopped_keeps_its_plan() -> None:
+    problem = random_problem(3, num_collects=60, num_targets=30, num_contacts=6)
+    budget = Budget()
+    budget.cancel()
+    search = ResourceWindows(problem, 0)
+    plan = Rule().solve(problem, Budget(), 0).plan
+    search.adopt(plan)
+    search.make_moves(1000, budget)
+    assert search.plan == plan
+
+
+def test_a_satellite_without_tasks_has_no_moves() -> None:
+    problem = random_problem(3, num_collects=0, num_contacts=0, num_satellites=2)
+    search = ResourceWindows(problem, 0)
+    search.make_moves(100, Budget())
+    assert search.plan == Plan()
+
+
+@pytest.mark.parametrize("dynamics", ["physical", "paper"])
+@settings(max_examples=60, deadline=None)
+@given(seed=SEEDS, num_satellites=st.integers(2, 3))
+def test_fleets_end_with_a_plan_and_a_bound_around_the_optimum(
+    dynamics: Dynamics, seed: int, num_satellites: int
+) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("planner_core.solvers.certified.resources._LARGE", 3)
+        patch.setattr("planner_core.solvers.certified.resources._FLEET_PATIENCE", 5)
+        patch.setattr("planner_core.solvers.certified.resources._FLEET_ROUNDS", 40)
+        problem = _problem(seed, dynamics, num_satellites)
+        best = best_reward(problem)
+        reported: list[Progress] = []
+        budget = Budget()
+        budget.report = reported.append
+        solution = Certified().solve(problem, budget, 0)
+    timeline = replay(problem, solution.plan)
+    assert timeline.is_valid
+    assert timeline.reward <= best + 1e-6
+    assert solution.proven is not None
+    assert solution.proven.value >= best - 1e-6
+    assert is_proven(problem, from_json(to_json(solution.proven))) is not False
+    assert all(p.bound is not None and p.bound >= best - 1e-6 for p in reported)
+    assert np.all(np.diff([p.reward or 0.0 for p in reported]) >= 0.0)
