@@ -1,6 +1,7 @@
 """Plans and bounds of whole fleets (``python -m benchmarks.fleet SPACECRAFT CITIES STATIONS``).
 
-Runs each case in a process of its own, after a warm-up, for so many CPU seconds. Prints
+Runs each case in a process of its own, after a warm-up, for so many CPU seconds (with ``--threads``
+above 1: seconds by the clock). Prints
 opportunities, CPU seconds of the access search, of compiling the problem and of ``certified``, what
 plan and bound came to, the most memory that was held, and when the gap was first within some
 shares of the bound. The files are those of the public benchmark (``benchmarks.fleet_missions``).
@@ -69,7 +70,9 @@ def one(files: Files, case: Case, seed: int, num_threads: int) -> dict[str, Any]
         if progress.reward is not None and progress.bound is not None:
             curve.append((time.process_time() - began_s, progress.reward, progress.bound))
 
-    budget = CpuBudget(case.time_s, time.time() + 10.0 * case.time_s)
+    budget: Budget = CpuBudget(case.time_s, time.time() + 10.0 * case.time_s)
+    if num_threads > 1:
+        budget = Budget(case.time_s)
     budget.report, budget.num_threads = watch, num_threads
     began_s, clock_s = time.process_time(), time.perf_counter()
     solution = Certified().solve(problem, budget, seed)

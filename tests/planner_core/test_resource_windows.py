@@ -17,7 +17,6 @@ from planner_core.plan import Plan
 from planner_core.problem import Kept, Pinned
 from planner_core.solvers import Certified, Rule
 from planner_core.solvers.base import Budget, Progress
-from planner_core.solvers.certified.choices import ChoiceSearch
 from planner_core.solvers.certified.resource_windows import ResourceWindows
 from planner_core.solvers.certified.turns import TurnSearch
 from planner_core.timeline import replay
@@ -77,11 +76,8 @@ def test_small_problems_end_at_the_optimum() -> None:
     for seed in range(30):
         problem = _problem(seed, "physical" if seed % 2 else "paper", 1 + seed % 3)
         start = Rule().solve(problem, Budget(), 0).plan
-        budget = Budget()
-        search = TurnSearch(
-            problem, ChoiceSearch(problem, 1.0, seed, budget.stop), start, budget, seed
-        )
-        for _ in range(4):
+        search = TurnSearch(problem, start, 1.0, Budget(), seed)
+        for _ in range(5):
             search.turn()
         timeline = replay(problem, search.plan)
         assert timeline.is_valid

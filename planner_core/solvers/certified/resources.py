@@ -9,7 +9,8 @@ without resources.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Final
 
@@ -40,11 +41,12 @@ _FURTHER_MOVES: Final = 20  # after each round of that
 _FIRST_STEPS: Final = 2  # of the search for prices, where sets of contacts gave new ones
 _STEPS: Final = 8
 _PATIENCE: Final = 3  # rounds without a new set of contacts or a better plan
-_FLEET_PATIENCE: Final = 300  # turns of a fleet without a better plan
-_FLEET_FIRST_TURNS: Final = 8  # of the window search alone
-_FLEET_ROUNDS: Final = 400  # of the search for a fleet's prices
+_FLEET_PATIENCE: Final = 400  # turns of a fleet without a better plan
+_STREAMS: Final = 2  # of a fleet: side by side where a job may use several threads
+_SHORT_PATIENCE: Final = 10  # of a small one
+_FLEET_ROUNDS: Final = 300  # of the search for a fleet's prices
 _ROUNDS_AT_A_TIME: Final = 20
-_FLEET_STEPS: Final = 3  # of prices with recorders, from there
+_FLEET_STEPS: Final = 2  # of prices with recorders, from there
 _SETS_AT_A_TIME: Final = 2
 _AS_GOOD: Final = 0.75  # of a target: sets whose prices count
 _OFFERED: Final = (700, 1000)  # tasks in a search with fixed contacts
@@ -88,9 +90,14 @@ class ResourceSearch:
         return self.is_close or self.budget.is_spent()
 
     @property
+    def is_shared(self) -> bool:
+        """Whether there are several satellites."""
+        return sum(len(satellite) > 0 for satellite in self.problem.satellites) > 1
+
+    @property
     def is_fleet(self) -> bool:
         """Whether several satellites share so much that the whole program is too large."""
-        return len(self.problem.satellites) > 1 and len(self.problem.opportunities) > _LARGE
+        return self.is_shared and len(self.problem.opportunities) > _LARGE
 
     def offer(self, plan: Plan) -> bool:
         """Take a plan if it is better; a valid one is better than any other."""
@@ -288,10 +295,11 @@ def solve_with_resources(problem: Problem, budget: Budget, seed: int, gap: float
     unit = search.unit
     if unit == 0.0 or search.bound.value / unit > _MAX_UNITS:
         unit = max(search.bound.value / _MAX_UNITS, 1e-12)
-    choices = ChoiceSearch(problem, unit, seed, budget.stop)
+    if search.is_shared:
+        _close_in_fleet(search, unit)
     if search.is_fleet:
-        _close_in_fleet(search, choices)
         return search.solution()
+    choices = ChoiceSearch(problem, unit, seed, budget.stop)
     choices.start(search.mask([]), _FIRST_GOAL)
     search.offer(choices.plan)
     search.report("plans")
@@ -306,22 +314,34 @@ def solve_with_resources(problem: Problem, budget: Budget, seed: int, gap: float
     return search.solution()
 
 
-def _close_in_fleet(search: ResourceSearch, choices: ChoiceSearch) -> None:
+def _close_in_fleet(search: ResourceSearch, unit: float) -> None:
     """Search for plans, for prices, and for plans again until that gets nowhere.
 
-    HiGHS is of no help for a fleet.
+    HiGHS is of no help for a large fleet; what is left of a small one it soon settles.
     """
-    turns = TurnSearch(search.problem, choices, search.plan, search.budget, search.seed)
-    turns.windows(_FLEET_FIRST_TURNS)
-    search.offer(turns.plan)
+    num_streams, patience = (_STREAMS, _FLEET_PATIENCE) if search.is_fleet else (1, _SHORT_PATIENCE)
+    streams = [
+        TurnSearch(search.problem, search.plan, unit, search.budget, search.seed + number)
+        for number in range(num_streams)
+    ]
+    with ThreadPoolExecutor(search.budget.num_threads) as pool:
+        _take_turns(search, streams, pool)
+        _price_fleet(search)
+        idle_turns = 0
+        while idle_turns < patience and not search.is_done:
+            idle_turns = 0 if _take_turns(search, streams, pool) else idle_turns + 1
+
+
+def _take_turns(
+    search: ResourceSearch, streams: Sequence[TurnSearch], pool: ThreadPoolExecutor
+) -> bool:
+    """Let each stream take a turn, and offer the best plan; return whether it is better."""
+    for turn in [pool.submit(stream.turn) for stream in streams]:
+        turn.result()
+    best = max(streams, key=lambda stream: stream.reward)
+    is_better = best.reward > search.reward + 1e-12 and search.offer(best.plan)
     search.report("plans")
-    _price_fleet(search)
-    idle_turns = 0
-    while idle_turns < _FLEET_PATIENCE and not search.is_done:
-        turns.turn()
-        is_better = turns.reward > search.reward + 1e-12 and search.offer(turns.plan)
-        idle_turns = 0 if is_better else idle_turns + 1
-        search.report("plans")
+    return is_better
 
 
 def _price_fleet(search: ResourceSearch) -> None:

@@ -16,40 +16,61 @@ from planner_core.solvers.certified.choices import ChoiceSearch
 from planner_core.solvers.certified.resource_windows import ResourceWindows
 
 _MOVES: Final = 250  # of the window search in a turn, for each satellite
-_CHOICES: Final = 1  # moves over a satellite's day, the same
+_FIRST_TURNS: Final = 12  # of the window search alone, at each start
+_STALLED: Final = 80  # turns that lead nowhere, before another start
+_STARTS: Final = 1000  # no search has more
 
 
 class TurnSearch:
-    """Plans by windows and by choices of tasks, in turn.
+    """Plans by windows and by choices of tasks, in turn, from one start after another.
 
-    Attributes
+    The same for the same seed, whatever other searches go on beside it.
+
+    Parameters
     ----------
-    plan, reward
-        The plan as it is now; it never gets worse.
+    start
+        The plan to begin with, and to begin with again where a search leads nowhere.
+    unit
+        Of worth, as the exact programmes count it.
     """
 
-    def __init__(
-        self, problem: Problem, choices: ChoiceSearch, plan: Plan, budget: Budget, seed: int
-    ) -> None:
+    def __init__(self, problem: Problem, start: Plan, unit: float, budget: Budget, seed: int):
+        self._problem, self._start, self._budget = problem, start, budget
         self._num_satellites = sum(len(s) > 0 for s in problem.satellites)
-        self._choices, self._budget = choices, budget
-        self._windows = ResourceWindows(problem, seed)
-        self._windows.adopt(plan)
-
-    def windows(self, num_turns: int) -> None:
-        """Replan windows, as many as in so many turns."""
-        self._windows.make_moves(num_turns * _MOVES * self._num_satellites, self._budget)
+        self._choices = ChoiceSearch(problem, unit, seed, budget.stop)
+        self._seed, self._num_starts, self._idle_turns = seed, 0, _STALLED
 
     def turn(self) -> None:
-        """Let one search go on from where the other got to."""
+        """Let one search go on from where the other got to, or begin afresh where both stall."""
+        if self._idle_turns == _STALLED:
+            self._begin()
+            return
+        before = self._windows.reward
+        self._replan_days()
+        self._replan_windows(1)
+        self._idle_turns = 0 if self._windows.reward > before else self._idle_turns + 1
+
+    def _begin(self) -> None:
+        # A seed of its own for each start of each search.
+        self._windows = ResourceWindows(self._problem, self._seed + _STARTS * self._num_starts)
+        self._windows.adopt(self._start)
+        self._num_starts, self._idle_turns = self._num_starts + 1, 0
+        # Whole days first: once most targets are taken, contacts hardly move.
+        self._replan_days()
+        self._replan_windows(_FIRST_TURNS)
+
+    def _replan_days(self) -> None:
+        """Replan each satellite's whole day by choices of tasks."""
         self._choices.adopt(self._windows.plan)
-        for _ in range(_CHOICES * self._num_satellites):
+        for _ in range(self._num_satellites):
             if self._budget.is_spent():
                 return
             self._choices.move()
         if self._choices.reward >= self._windows.reward:
             self._windows.adopt(self._choices.plan)
-        self.windows(1)
+
+    def _replan_windows(self, num_turns: int) -> None:
+        self._windows.make_moves(num_turns * _MOVES * self._num_satellites, self._budget)
 
     @property
     def plan(self) -> Plan:
