@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import re
 import time
+from http import HTTPStatus
 
 from opentelemetry import trace
 from starlette.datastructures import Headers, MutableHeaders
@@ -53,7 +54,9 @@ class RequestContext:
             seconds = time.perf_counter() - started
             self.counters.count(scope, status, seconds)
             caller: Caller | None = scope["state"].get("caller")
-            logger.info(
+            # Dashboards ask again and again for what has not changed: metrics count that.
+            logger.log(
+                logging.DEBUG if status == HTTPStatus.NOT_MODIFIED else logging.INFO,
                 "request",
                 extra={
                     "method": scope["method"],

@@ -192,6 +192,7 @@ def test_the_last_contact_before_many_images_is_taken(solver: Solver) -> None:
         for i in range(3)
     ]
     problem = make_problem([contact, *images], num_targets=3, resources=strong)
+    solver = replace(solver, contact_above_fraction=0.45)  # type: ignore[type-var]
     plan = solver.solve(problem, Budget(), 0).plan
     assert replay(problem, plan).reward == 3.0
     # A single image leaves no reason to take it.

@@ -11,7 +11,7 @@ from planner_core.model import WAIT, Guidance
 from planner_core.problem import Bytes, Ints
 from planner_core.solvers.mcts.successors import MOST, Successors, successors_of
 from planner_core.solvers.mcts.tree import Tree, new_edge
-from planner_core.solvers.walk import naive_select_action
+from planner_core.solvers.walk import CONTACT_ABOVE, naive_select_action
 from planner_core.track import Track
 
 
@@ -150,7 +150,7 @@ def greedy_action(
         if is_all:
             return len(track.start_s), 0.0
     row = naive_select_action(
-        track, collected, rules.is_hard, True, rules.contact_above,
+        track, collected, rules.is_hard, True, CONTACT_ABOVE,
         row, last, battery, recorder,
     )  # fmt: skip
     return row, 0.0

@@ -25,7 +25,7 @@ from planner_core.solvers.mcts.simulate import Path, search, sunpoint_instead
 from planner_core.solvers.mcts.successors import no_successors
 from planner_core.solvers.mcts.tree import UNSEEN, Tree, copy_branch, empty_tree, new_node
 from planner_core.solvers.sequential import Turn, plan_in_turn
-from planner_core.solvers.walk import CONTACT_ABOVE, contact_above_metadata
+from planner_core.solvers.walk import contact_above_metadata
 from planner_core.track import NO_TASK
 
 MAX_ACTIONS: Final = 10_000_000
@@ -146,9 +146,9 @@ class Mcts:
         metadata=_described("Guidance lost for each broken limit (Table 2).", minimum=0),
     )
     contact_above_fraction: float = field(
-        default=CONTACT_ABOVE,
+        default=0.0,
         metadata=contact_above_metadata(
-            "In A(s) and in rollouts alike; the paper has 0, every contact."
+            "0, the paper's, has every contact in A(s); rollouts heed 0.45 in any case."
         ),
     )
 
