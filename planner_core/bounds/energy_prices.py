@@ -14,7 +14,7 @@ import numpy as np
 
 from planner_core.bounds.most_by_energy import EnergyLevels, energy_levels, most_by_energy
 from planner_core.bounds.resource_network import Network, network_of
-from planner_core.problem import COLLECT, Bytes, Floats, Ints, Longs, Problem, SatelliteProblem
+from planner_core.problem import COLLECT, Bytes, Floats, Ints, Problem, SatelliteProblem
 
 _PER_COLLECT: Final = 24  # levels of energy
 _FIRST_STEP: Final = 0.3  # of a reward, for all satellites together
@@ -24,13 +24,11 @@ _ASKED_EVERY: Final = 5  # rounds
 
 
 class _Part(NamedTuple):
-    """One satellite's programme, with room to work in; ``target`` is one too far for contacts."""
+    """One satellite's programme; ``target`` is one too far for contacts."""
 
     network: Network
     levels: EnergyLevels
     target: Ints
-    own: Floats
-    num_own: Longs
 
     @classmethod
     def of(cls, problem: Problem, satellite: SatelliteProblem) -> _Part:
@@ -42,16 +40,7 @@ class _Part(NamedTuple):
             network=network,
             levels=levels,
             target=target.astype(np.int32),
-            own=np.empty((len(satellite), levels.width)),
-            num_own=np.zeros(len(satellite), dtype=np.int64),
         )
-
-    def answer(self, worth: Floats) -> tuple[float, Ints]:
-        """Return the most that can be gained, and the targets of a path that does."""
-        value, path = most_by_energy(
-            self.network, self.levels, worth[self.target], self.own, self.num_own
-        )
-        return value, self.target[path]
 
 
 class EnergyPrices:
@@ -72,6 +61,11 @@ class EnergyPrices:
 
     def __init__(self, problem: Problem, prices: Floats, num_rounds: int, seed: int) -> None:
         self._parts = [_Part.of(problem, s) for s in problem.satellites if len(s)]
+        # Satellites answer one after another, in the same room.
+        most_rows = max((len(part.target) for part in self._parts), default=0)
+        widest = max((part.levels.width for part in self._parts), default=0)
+        self._own = np.empty((most_rows, widest))
+        self._num_own = np.zeros(most_rows, dtype=np.int64)
         self._reward = np.append(problem.target_reward, 0.0)
         offered = np.diff(problem.target_opportunities[1]) > 0
         self._top = np.where(np.append(offered, False), self._reward, 0.0)
@@ -95,7 +89,7 @@ class EnergyPrices:
             for index in self._rng.permutation(len(self._parts)):
                 if stop[0]:
                     return
-                _, targets = self._parts[index].answer(self._reward - self._now)
+                _, targets = self._answer(self._parts[index], self._now)
                 self._count[index] = np.bincount(targets, minlength=len(self._reward))
                 if self._round == 0:
                     continue
@@ -106,8 +100,14 @@ class EnergyPrices:
             if self._round % _ASKED_EVERY == 0:
                 self._ask()
 
+    def _answer(self, part: _Part, prices: Floats) -> tuple[float, Ints]:
+        """Return the most that a satellite can gain, and the targets of a path that does."""
+        weight = (self._reward - prices)[part.target]
+        value, path = most_by_energy(part.network, part.levels, weight, self._own, self._num_own)
+        return value, part.target[path]
+
     def _ask(self) -> None:
-        gains = sum(part.answer(self._reward - self._mean)[0] for part in self._parts)
+        gains = sum(self._answer(part, self._mean)[0] for part in self._parts)
         value = float(self._mean.sum() + gains)
         if value < self.value:
             self.value, self.prices = value, self._mean[:-1].copy()

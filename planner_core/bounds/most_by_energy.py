@@ -7,15 +7,16 @@ tried by the hundred. Energy is rounded in favour of the satellite: no plan is l
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from planner_core.bounds.resource_network import Network
+from planner_core.bounds.resource_network import Network, may_be_next
 from planner_core.jit import inlined, kernel
 from planner_core.problem import Floats, Ints, Longs
 
-_ROUNDING = 1e-6  # of a level: costs "of the same" length differ by as much
+_ROUNDING: Final = 1e-6  # of a level: costs "of the same" length differ by as much
+_MAX_LEVELS: Final = 1500  # at a time
 
 
 class EnergyLevels(NamedTuple):
@@ -26,7 +27,7 @@ class EnergyLevels(NamedTuple):
     lowest
         The least floor of all rows up to each one.
     width
-        No row has a cap this much above its ``lowest``.
+        How many levels there are from ``lowest`` up that a path can be at.
     """
 
     cap: Ints
@@ -38,10 +39,13 @@ class EnergyLevels(NamedTuple):
 
 
 def energy_levels(network: Network, per_collect: int) -> EnergyLevels:
-    """Return levels of which the cheapest collect costs ``per_collect``."""
+    """Return levels of which the cheapest collect costs ``per_collect``, unless they are many."""
     collects = network.energy_cost[~network.is_contact.astype(np.bool_)]
     positive = collects[collects > 0.0]
     step = float(positive.min()) / per_collect if len(positive) else 1.0
+    left = np.minimum(network.energy_floor, network.energy_cap - network.energy_cost)
+    span = float((network.energy_cap - np.minimum.accumulate(left)).max(initial=0.0))
+    step = max(step, span / _MAX_LEVELS)
     cap = np.ceil(network.energy_cap / step - _ROUNDING).astype(np.int32)
     cost = np.floor(network.energy_cost / step + _ROUNDING).astype(np.int32)
     floor = np.floor(network.energy_floor / step + _ROUNDING).astype(np.int32)
@@ -52,7 +56,7 @@ def energy_levels(network: Network, per_collect: int) -> EnergyLevels:
         floor=floor,
         lowest=lowest,
         start=int(np.ceil(network.energy_start / step - _ROUNDING)),
-        width=int((cap - lowest).max(initial=0)) + 1,
+        width=int((cap - np.minimum(cost, 0) - lowest).max(initial=0)) + 1,
     )
 
 
@@ -67,9 +71,9 @@ def most_by_energy(
     weight
         Worth of each task; what is worth nothing is not taken. Shape ``(m,)``.
     own, num_own
-        Room to work in, shapes ``(m, width)`` and ``(m,)``. Filled with the most gained by a
-        path that ends with each row and leaves at least so much energy, counted from ``lowest``,
-        and with how many such entries there are.
+        Room to work in, of shapes ``(m, width)`` and ``(m,)`` at least. Filled with the most
+        gained by a path that ends with each row and leaves at least so much energy, counted from
+        ``lowest``, and with how many such entries there are.
     """
     m = len(weight)
     idle = np.full(levels.width, -np.inf)
@@ -151,19 +155,9 @@ def _path_to(
             if (
                 x < num_own[before]
                 and own[before, x] + weight[k] == gained
-                and _may_be_next(network, before, k)
+                and may_be_next(network, before, k)
             ):
                 break
             before -= 1
         k = before
     return rows[:length][::-1].copy()
-
-
-@inlined
-def _may_be_next(network: Network, i: int, k: int) -> bool:
-    if k >= network.idle_from[i]:
-        return True
-    for at in range(network.near_first[i], network.near_first[i + 1]):
-        if network.near_rows[at] == k:
-            return True
-    return False

@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from planner_core.bounds.data_levels import DataLevels
-from planner_core.bounds.resource_network import Network
+from planner_core.bounds.resource_network import Network, may_be_next
 from planner_core.jit import inlined, kernel
 from planner_core.problem import Bytes, Floats, Ints, Longs, Singles
 
@@ -188,7 +188,7 @@ def path_of(network: Network, levels: DataLevels, weight: Ints, labels: Labels, 
         found = -1
         i = k - 1
         while i >= 0 and found < 0 and not (i + 1 < k and network.is_kept[i + 1]):
-            if labels.first[i + 1] > labels.first[i] and _may_be_next(network, i, k):
+            if labels.first[i + 1] > labels.first[i] and may_be_next(network, i, k):
                 for at in range(labels.first[i], labels.first[i + 1]):
                     if labels.value[at] == value and _leads_to(
                         network, levels, k, labels.level[at], labels.energy[at], level, energy
@@ -204,16 +204,6 @@ def path_of(network: Network, levels: DataLevels, weight: Ints, labels: Labels, 
         level, energy = labels.level[found], labels.energy[found]
         value -= weight[k]
     return rows[:length][::-1].copy()
-
-
-@inlined
-def _may_be_next(network: Network, i: int, k: int) -> bool:
-    if k >= network.idle_from[i]:
-        return True
-    for at in range(network.near_first[i], network.near_first[i + 1]):
-        if network.near_rows[at] == k:
-            return True
-    return False
 
 
 @inlined

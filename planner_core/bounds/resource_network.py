@@ -22,7 +22,7 @@ import numpy as np
 
 from planner_core.arcs import Arcs, reversed_arcs
 from planner_core.comparable import Order, comes_before, order_of
-from planner_core.jit import kernel
+from planner_core.jit import inlined, kernel
 from planner_core.problem import Floats, Ints, Longs, Problem, SatelliteProblem
 from planner_core.slew import TIME_TOLERANCE_S
 from planner_core.track import STRICT, compile_track
@@ -127,6 +127,17 @@ def _arcs(order: Order) -> tuple[Ints, Longs, Ints]:
                 rows[at] = j
                 at += 1
     return idle_from, first, rows
+
+
+@inlined
+def may_be_next(network: Network, i: int, k: int) -> bool:
+    """Return whether row ``k`` may follow row ``i`` directly."""
+    if k >= network.idle_from[i]:
+        return True
+    for at in range(network.near_first[i], network.near_first[i + 1]):
+        if network.near_rows[at] == k:
+            return True
+    return False
 
 
 @kernel

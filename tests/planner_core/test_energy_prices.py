@@ -15,7 +15,9 @@ from planner_core.bounds.energy_prices import EnergyPrices
 from planner_core.bounds.most_by_energy import EnergyLevels, energy_levels, most_by_energy
 from planner_core.bounds.resource_network import Network, network_of
 from planner_core.problem import Floats
+from planner_core.solvers import Certified
 from planner_core.solvers.base import Budget
+from planner_core.timeline import replay
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import TIGHT, random_problem, varied_problem
 
@@ -73,6 +75,17 @@ def test_no_plan_beats_the_prices(dynamics: Dynamics, seed: int, num_satellites:
     assert search.is_settled
     assert search.value >= best_reward(problem) - 1e-6
     assert np.all((search.prices >= 0.0) & (search.prices <= problem.target_reward))
+
+
+def test_collects_that_cost_next_to_nothing_need_no_endless_table() -> None:
+    frugal = replace(TIGHT, collect_drain_per_s=1e-12, sunpoint_charge_per_s=1e-13)
+    problem = random_problem(3, num_collects=40, num_targets=20, num_satellites=2, resources=frugal)
+    levels = energy_levels(network_of(problem, problem.satellites[0]), 24)
+    assert levels.width < 2000
+    search = EnergyPrices(problem, np.zeros(len(problem.target_ids)), 20, 0)
+    search.improve(20, Budget().stop)
+    free = replace(problem, use_resources=False)
+    assert search.value >= replay(free, Certified().solve(free, Budget(), 0).plan).reward - 1e-6
 
 
 def test_prices_lower_what_satellites_gain_that_share_targets() -> None:

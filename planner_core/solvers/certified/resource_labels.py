@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from planner_core.bounds.resource_network import Network
+from planner_core.bounds.resource_network import Network, may_be_next
 from planner_core.jit import borrowing
 from planner_core.problem import Bools, Floats, Ints, Longs
 
@@ -165,7 +165,7 @@ def best_label(
     if (
         energy >= need
         and data <= bears
-        and (left < 0 or right >= m or _may_follow(network, left, right))
+        and (left < 0 or right >= m or may_be_next(network, left, right))
     ):
         best, best_energy, best_label = 0.0, energy, _AT_START
     for k in range(low, high):
@@ -214,7 +214,7 @@ def best_label(
         if count > 0 and to <= size:
             room.next_idle[at] = room.first_idle[to]
             room.first_idle[to] = at
-        if count > 0 and (right >= m or _may_follow(network, k, right)):
+        if count > 0 and (right >= m or may_be_next(network, k, right)):
             for label in range(begin, begin + count):
                 if room.energy[label] < need or room.data[label] > bears:
                     continue
@@ -224,16 +224,6 @@ def best_label(
                     best, best_energy = room.value[label], room.energy[label]
                     best_label = label
     return best_label
-
-
-@borrowing
-def _may_follow(network: Network, i: int, k: int) -> bool:
-    if k >= network.idle_from[i]:
-        return True
-    for at in range(network.near_first[i], network.near_first[i + 1]):
-        if network.near_rows[at] == k:
-            return True
-    return False
 
 
 @borrowing

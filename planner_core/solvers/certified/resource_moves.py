@@ -7,13 +7,13 @@ elsewhere for nothing.
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
 from planner_core.draws import Uint64s, next_draw
 from planner_core.jit import borrowing
-from planner_core.problem import Bools, Bytes, Ints
+from planner_core.problem import Bytes
 from planner_core.solvers.certified.resource_labels import (
     LABELS,
     MAX_NODES,
@@ -23,9 +23,7 @@ from planner_core.solvers.certified.resource_labels import (
     Room,
     best_label,
 )
-
-FREE: Final = -1
-"""Holder of a target that no task images."""
+from planner_core.solvers.window_moves import FREE, Taken
 
 _FEWEST_TASKS: Final = 2
 _MORE_TASKS: Final = 14
@@ -36,20 +34,12 @@ _TIE: Final = 0.01  # of a target's worth
 _CONTACT: Final = 0.05  # of a typical target: what one contact fewer is worth
 
 
-class Taken(NamedTuple):
-    """Whether each opportunity is taken, and for each target which images it, or ``FREE``."""
-
-    is_taken: Bools
-    holder: Ints
-
-
 @borrowing
 def make_moves(
     ground: Ground, taken: Taken, room: Room, draws: Uint64s, num_moves: int, stop: Bytes
-) -> int:
-    """Make moves on one satellite's part of a plan, in place; return how many bettered it."""
+) -> None:
+    """Make moves on one satellite's part of a plan, in place."""
     m = len(ground.rows)
-    num_better = 0
     for _ in range(num_moves):
         if stop[0] or m == 0:
             break
@@ -65,9 +55,8 @@ def make_moves(
             continue
         _weigh(ground, taken, room, low, high, draws)
         last = best_label(ground, room, left, low, high, right, energy, data, need, bears)
-        if last != NOWHERE and _replace(ground, taken, room, low, high, last):
-            num_better += 1
-    return num_better
+        if last != NOWHERE:
+            _replace(ground, taken, room, low, high, last)
 
 
 @borrowing
@@ -182,11 +171,8 @@ def _weigh(ground: Ground, taken: Taken, room: Room, low: int, high: int, draws:
 
 
 @borrowing
-def _replace(ground: Ground, taken: Taken, room: Room, low: int, high: int, last: int) -> bool:
-    """Let a path take the place of what is in the window, unless the plan is worth less then.
-
-    Returns whether it is worth more.
-    """
+def _replace(ground: Ground, taken: Taken, room: Room, low: int, high: int, last: int) -> None:
+    """Let a path take the place of what is in the window, unless the plan is worth less then."""
     place = ground.target
     num_new, worth = 0, 0.0
     label = last
@@ -209,7 +195,7 @@ def _replace(ground: Ground, taken: Taken, room: Room, low: int, high: int, last
             if not ground.network.is_contact[k]:
                 worth -= ground.worth[place[k]]
     if worth < -1e-9:
-        return False
+        return
     for i in range(num_old):
         k = room.old[i]
         taken.is_taken[ground.rows[k]] = False
@@ -223,4 +209,3 @@ def _replace(ground: Ground, taken: Taken, room: Room, low: int, high: int, last
                 taken.is_taken[held] = False
             taken.holder[place[k]] = ground.rows[k]
         taken.is_taken[ground.rows[k]] = True
-    return worth > 1e-9

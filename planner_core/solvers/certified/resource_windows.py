@@ -13,8 +13,9 @@ from planner_core.plan import Plan
 from planner_core.problem import COLLECT, CONTACT, Bools, Problem
 from planner_core.solvers.base import Budget
 from planner_core.solvers.certified.resource_labels import Ground, room_for
-from planner_core.solvers.certified.resource_moves import FREE, Taken, make_moves
+from planner_core.solvers.certified.resource_moves import make_moves
 from planner_core.solvers.sequential import blocked_rows
+from planner_core.solvers.window_moves import FREE, Taken
 
 _MOVES_AT_A_TIME: Final = 100
 

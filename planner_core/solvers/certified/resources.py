@@ -295,7 +295,7 @@ def solve_with_resources(problem: Problem, budget: Budget, seed: int, gap: float
     unit = search.unit
     if unit == 0.0 or search.bound.value / unit > _MAX_UNITS:
         unit = max(search.bound.value / _MAX_UNITS, 1e-12)
-    if search.is_shared:
+    if search.is_shared and not search.is_done:
         _close_in_fleet(search, unit)
     if search.is_fleet:
         return search.solution()
