@@ -55,7 +55,8 @@ def warm_up() -> None:
     _plan(replace(few, satellites=_two(few.satellites[0])), [Rule(), Certified()])
     fed = _mission(over_the_globe, use_resources=True)
     _plan(replace(fed, continuous_starts=True), [Rule(), Certified(gap=0.5)])
-    _plan(replace(fed, satellites=_two(fed.satellites[0])), [Certified(gap=0.01)])
+    shared = replace(crowded, satellites=_two(crowded.satellites[0]), use_resources=True)
+    _plan(shared, [Certified(gap=0.1)])
 
 
 def _plan(scenario: Scenario, solvers: Iterable[Solver]) -> None:
