@@ -21,11 +21,13 @@ _FIRST_STEP: Final = 0.3  # of a reward, for all satellites together
 _LAST_STEP: Final = 1e-3  # of the first
 _NEWEST: Final = 0.15  # share of a round's prices in the mean
 _ASKED_EVERY: Final = 5  # rounds
+_NOTED_FROM: Final = 1 / 3  # of all rounds: from there on answers are near the best plans
 
 
 class _Part(NamedTuple):
     """One satellite's programme; ``target`` is one too far for contacts."""
 
+    rows: Ints
     network: Network
     levels: EnergyLevels
     target: Ints
@@ -37,9 +39,7 @@ class _Part(NamedTuple):
         num_targets = len(problem.target_ids)
         target = np.where(satellite.kind == COLLECT, satellite.place, num_targets)
         return cls(
-            network=network,
-            levels=levels,
-            target=target.astype(np.int32),
+            rows=satellite.rows, network=network, levels=levels, target=target.astype(np.int32)
         )
 
 
@@ -57,6 +57,8 @@ class EnergyPrices:
     ----------
     value, prices
         The least bound so far, recorders left out, and what proves it.
+    usage
+        How many of the latest answers took each opportunity. Shape ``(n,)``.
     """
 
     def __init__(self, problem: Problem, prices: Floats, num_rounds: int, seed: int) -> None:
@@ -75,6 +77,7 @@ class EnergyPrices:
         self._rng = np.random.default_rng(seed)
         self._round, self._num_rounds = 0, max(1, num_rounds)
         self.value, self.prices = float(self._top.sum()), self._top[:-1]
+        self.usage = np.zeros(len(problem.opportunities))
 
     @property
     def is_settled(self) -> bool:
@@ -89,8 +92,11 @@ class EnergyPrices:
             for index in self._rng.permutation(len(self._parts)):
                 if stop[0]:
                     return
-                _, targets = self._answer(self._parts[index], self._now)
-                self._count[index] = np.bincount(targets, minlength=len(self._reward))
+                part = self._parts[index]
+                _, path = self._answer(part, self._now)
+                self._count[index] = np.bincount(part.target[path], minlength=len(self._reward))
+                if self._round >= _NOTED_FROM * self._num_rounds:
+                    self.usage[part.rows[path]] += 1.0
                 if self._round == 0:
                     continue
                 excess = self._count.sum(axis=0) - 1.0
@@ -101,10 +107,9 @@ class EnergyPrices:
                 self._ask()
 
     def _answer(self, part: _Part, prices: Floats) -> tuple[float, Ints]:
-        """Return the most that a satellite can gain, and the targets of a path that does."""
+        """Return the most that a satellite can gain, and the tasks of a path that does."""
         weight = (self._reward - prices)[part.target]
-        value, path = most_by_energy(part.network, part.levels, weight, self._own, self._num_own)
-        return value, part.target[path]
+        return most_by_energy(part.network, part.levels, weight, self._own, self._num_own)
 
     def _ask(self) -> None:
         gains = sum(self._answer(part, self._mean)[0] for part in self._parts)

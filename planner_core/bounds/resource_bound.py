@@ -21,7 +21,16 @@ from planner_core.bounds.lagrangian import lagrangian_bound
 from planner_core.bounds.least_energy import least_energy
 from planner_core.bounds.most_value import STOPPED, UNREACHED, most_value, path_of
 from planner_core.bounds.resource_network import Network, network_of
-from planner_core.problem import COLLECT, Bytes, Floats, Ints, Problem, SatelliteProblem, Singles
+from planner_core.problem import (
+    COLLECT,
+    Bools,
+    Bytes,
+    Floats,
+    Ints,
+    Problem,
+    SatelliteProblem,
+    Singles,
+)
 
 _MAX_CELLS: Final = 30_000_000  # of one table of least energy
 _MAX_UNITS: Final = 2000
@@ -82,6 +91,11 @@ class SatelliteRelaxation:
                 break
             best, least = trial, needs.top
         return best
+
+    def without(self, is_shut: Bools) -> SatelliteRelaxation:
+        """Return the same where some tasks cannot be taken. Shape ``(m,)``."""
+        before = np.where(is_shut, -1, self.levels.before).astype(np.int32)
+        return replace(self, levels=self.levels._replace(before=before))
 
     def weights(self, worth: Ints) -> Ints:
         """Return the worth of each task, from that of each target."""

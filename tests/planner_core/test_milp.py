@@ -21,7 +21,7 @@ from planner_core.solvers import Milp
 from planner_core.solvers.base import Budget, Progress, Termination
 from planner_core.solvers.programs.highs import Engine
 from planner_core.solvers.programs.model import plan_program
-from planner_core.solvers.programs.program import Program
+from planner_core.solvers.programs.program import Program, Rows
 from planner_core.timeline import replay
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import TIGHT, Task, make_problem, random_problem
@@ -330,3 +330,21 @@ def _optimum(program: Program) -> float | None:
     if outcome.columns is None:
         return None
     return round(float(np.concatenate(program.worth) @ outcome.columns), 6)
+
+
+@pytest.mark.parametrize("seed", [2, 6, 9])
+def test_no_bound_is_told_below_the_optimum_of_a_program_without_a_start(seed: int) -> None:
+    # Here what HiGHS does first, with a part of the program, has a lower bound of its own.
+    rng = np.random.default_rng(seed)
+    program = Program()
+    program.add_columns(rng.integers(5, 20, 300).astype(np.float64))
+    groups = [rng.choice(300, 3, replace=False).tolist() for _ in range(330)]
+    program.add_rows(Rows.at_most(groups, [1.0] * len(groups)))
+    engine = Engine(program, Budget(), 0, is_chained=False)
+    assert engine.relaxed() is not None
+    bounds: list[float] = []
+    outcome = engine.search(None, 0.0, 0.05, lambda _reward, bound: bounds.append(bound))
+    assert outcome.columns is not None
+    reward = float(np.concatenate(program.worth) @ outcome.columns)
+    assert outcome.bound == pytest.approx(reward)
+    assert min(bounds) >= reward - 1e-6

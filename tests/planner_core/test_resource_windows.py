@@ -77,8 +77,7 @@ def test_small_problems_end_at_the_optimum() -> None:
         problem = _problem(seed, "physical" if seed % 2 else "paper", 1 + seed % 3)
         start = Rule().solve(problem, Budget(), 0).plan
         search = TurnSearch(problem, start, 1.0, Budget(), seed)
-        for _ in range(5):
-            search.turn()
+        search.turn(5)
         timeline = replay(problem, search.plan)
         assert timeline.is_valid
         reached += timeline.reward == best_reward(problem)

@@ -15,7 +15,7 @@ import highspy
 import numpy as np
 
 from planner_core.plan import Plan
-from planner_core.problem import COLLECT, CONTACT, Bools, Floats, Problem
+from planner_core.problem import COLLECT, CONTACT, Bools, Floats, Ints, Problem
 from planner_core.solvers.base import Budget
 from planner_core.solvers.programs.antichains import violated_antichains
 from planner_core.solvers.programs.highs import CHAIN_TOLERANCE, Engine
@@ -27,6 +27,7 @@ _CENTRAL_ROUNDS: Final = 2
 _CORNER_ROUNDS: Final = 5
 _EFFORT: Final = 0.2
 _MAX_NODES: Final = 200
+_ASIDE: Final = 1e-3  # of what tasks are worth
 _INTERIOR: Final[Mapping[str, str | float]] = {
     "solver": "ipm",
     "run_crossover": "off",
@@ -49,10 +50,22 @@ class _Point(NamedTuple):
 
 
 class _Engine(Engine):
+    def hold(self, columns: Ints, values: Floats) -> None:
+        """Fix some columns anew."""
+        self._highs.changeColsBounds(len(columns), columns, values, values)
+
     def require(self, amount: float) -> None:
         """Look only for points worth this much, until there is one."""
         for option in ("objective_bound", "objective_target"):
             self._highs.setOptionValue(option, amount - 1e-6 * max(1.0, amount))
+
+    def weigh(self, worth: Floats) -> None:
+        """Let columns be worth something else."""
+        self._highs.changeColsCost(len(worth), np.arange(len(worth), dtype=np.int32), worth)
+
+    def look_no_further(self) -> None:
+        """Begin at the relaxation, with what is whole there, and end with that."""
+        self._highs.setOptionValue("mip_max_start_nodes", 1)
 
     def central(self) -> _Point | None:
         """Return a point amid all optima, with prices that are amid all that prove them.
@@ -79,8 +92,7 @@ class _Engine(Engine):
     def _optimize(
         self, sign: float, sense: highspy.ObjSense, options: Mapping[str, str | float]
     ) -> None:
-        worth = sign * np.array(self._highs.getLp().col_cost_)
-        self._highs.changeColsCost(len(worth), np.arange(len(worth), dtype=np.int32), worth)
+        self.weigh(sign * np.array(self._highs.getLp().col_cost_))
         self._highs.changeObjectiveSense(sense)
         for option, value in options.items():
             self._highs.setOptionValue(option, value)
@@ -115,22 +127,38 @@ class Relaxation:
 
 
 class FixedContacts:
-    """The program of one set of contacts over some of the tasks; its bound is not a proof."""
+    """The program of one set of contacts over some of the tasks; its bound is not a proof.
+
+    Parameters
+    ----------
+    offered
+        Collects that may be taken. Shape ``(n,)``.
+    fixed
+        Tasks that must be taken: all contacts, and collects if any.
+    others
+        Contacts that ``fix`` may name.
+    """
 
     def __init__(
-        self, problem: Problem, offered: Bools, contacts: tuple[int, ...], budget: Budget, seed: int
+        self,
+        problem: Problem,
+        offered: Bools,
+        fixed: tuple[int, ...],
+        budget: Budget,
+        seed: int,
+        others: tuple[int, ...] = (),
     ) -> None:
         self._problem = problem
-        must = problem.kept_rows.tolist()
-        contacts = tuple(
-            {*contacts, *(row for row in must if problem.opportunities.kind[row] == CONTACT)}
-        )
         kept = offered & (problem.opportunities.kind == COLLECT)
-        kept[[*contacts, *must]] = True
+        kept[[*fixed, *others, *problem.kept_rows.tolist()]] = True
         self._rows = np.flatnonzero(kept).astype(np.int32)
         self._model = plan_program(problem, "antichain", _CLEAR, self._rows)
-        self._fix(np.isin(self._rows, contacts))
-        self._engine = _Engine(self._model.program, budget, seed, is_chained=True)
+        self._limit(self._is_fixed(fixed))
+        self._budget, self._seed = budget, seed
+        self._engine = self._new_engine()
+        self._cuts: list[Rows] = []
+        self._fixed = fixed
+        self._point: Floats | None = None  # of the last relaxation
 
     def relaxation(self) -> Relaxation:
         """Return what the relaxation tells, with prices amid all that prove it."""
@@ -148,19 +176,52 @@ class FixedContacts:
     def relaxed(self) -> float:
         """Return what the relaxation is worth: a corner, from which the search sets out."""
         point = self._cut(_CORNER_ROUNDS, self._engine.corner)
+        self._point = None if point is None else point.columns
         return -np.inf if point is None else point.value
+
+    def turn_aside(self, rng: np.random.Generator) -> None:
+        """Move to another corner of the relaxation, worth about as much."""
+        worth = np.concatenate(self._model.program.worth)
+        self._engine.weigh(worth * (1.0 + _ASIDE * rng.random(len(worth))))
+        point = self._engine.corner()
+        self._point = None if point is None else point.columns
+        self._engine.weigh(worth)
 
     @property
     def _is_plain(self) -> bool:
         """Whether tasks earn what their targets are worth, in a row for each target."""
         return bool(np.any(self._model.program.worth[0] > 0.0))
 
-    def _fix(self, is_fixed: Bools) -> None:
-        """Fix the contacts, and let rows alone limit the collects, so that they get all prices."""
+    def fix(self, contacts: tuple[int, ...]) -> None:
+        """Fix other contacts than so far, all known to the program."""
+        self._fixed = contacts
+        self._hold(self._engine)
+
+    def _hold(self, engine: _Engine) -> None:
+        at = np.flatnonzero(self._is_contact).astype(np.int32)
+        engine.hold(at, self._is_fixed(self._fixed)[at].astype(np.float64))
+
+    def _new_engine(self) -> _Engine:
+        return _Engine(self._model.program, self._budget, self._seed, is_chained=True)
+
+    @property
+    def _is_contact(self) -> Bools:
+        is_contact: Bools = self._problem.opportunities.kind[self._rows] == CONTACT
+        return is_contact
+
+    def _is_fixed(self, fixed: tuple[int, ...]) -> Bools:
+        """Return which of the program's tasks must be taken."""
+        must = self._is_contact & np.isin(self._rows, self._problem.kept_rows)
+        is_fixed: Bools = np.isin(self._rows, fixed) | must
+        return is_fixed
+
+    def _limit(self, is_fixed: Bools) -> None:
+        """Fix tasks, and let rows alone limit the collects, so that they get all prices."""
         program, m = self._model.program, len(is_fixed)
         lower, upper = np.concatenate(program.lower), np.concatenate(program.upper)
         if self._is_plain:
             upper[:m][upper[:m] > 0.0] = np.inf
+        upper[:m][self._is_contact] = 0.0
         lower[:m][is_fixed] = upper[:m][is_fixed] = 1.0
         program.lower, program.upper = [lower], [upper]
 
@@ -180,14 +241,29 @@ class FixedContacts:
                 continue
             own = self._model.taken[satellite.rows]
             offsets, members = violated_antichains(order, taken[own])
-            self._engine.add_rows(Rows.of(offsets, own[members], upper=1.0))
+            cuts = Rows.of(offsets, own[members], upper=1.0)
+            self._engine.add_rows(cuts)
+            self._cuts.append(cuts)
             is_cut = is_cut or len(offsets) > 1
         return is_cut
 
-    def plan(self, at_least: float) -> Plan | None:
-        """Return a plan worth ``at_least`` if one turns up soon, or else any, or None."""
-        self._engine.require(at_least)
-        outcome = self._engine.search(None, 0.0, _EFFORT, _unwatched, _MAX_NODES)
+    def plan(self, at_least: float, *, is_rounded: bool = False) -> Plan | None:
+        """Return a plan worth ``at_least`` if one turns up soon, or else any, or None.
+
+        Parameters
+        ----------
+        is_rounded
+            Whether to look only near the last corner of the relaxation, and not for long.
+        """
+        engine = self._new_engine()
+        self._hold(engine)
+        for cuts in self._cuts:
+            engine.add_rows(cuts)
+        engine.require(at_least)
+        if is_rounded:
+            engine.look_no_further()
+        max_nodes = 0 if is_rounded else _MAX_NODES
+        outcome = engine.search(self._point, 0.0, _EFFORT, _unwatched, max_nodes)
         if outcome.columns is None:
             return None
         return Plan.of(self._problem, self._rows[outcome.columns[: len(self._rows)] > 0.5])

@@ -33,6 +33,8 @@ class PriceSearch:
 
     Attributes
     ----------
+    satellites
+        The programme of each satellite that has anything to do.
     value, prices, unit
         The best bound and what proves it.
     usage
@@ -49,11 +51,11 @@ class PriceSearch:
         self._typical = float(problem.target_reward[self._is_reachable].mean()) or 1.0
         coarse = relaxations(problem, COARSE)
         num_images = int(value / self._typical / len(coarse))
-        self._satellites = tuple(s.with_data_price(num_images) for s in coarse)
+        self.satellites = tuple(s.with_data_price(num_images) for s in coarse)
         self._now = np.where(self._is_reachable, prices, 0.0)
         self._direction = np.zeros(len(prices))
         # Rows of relaxed plans of each satellite: at any prices the best is no worse than they.
-        self._paths: list[deque[Ints]] = [deque(maxlen=_KEPT_PATHS) for _ in self._satellites]
+        self._paths: list[deque[Ints]] = [deque(maxlen=_KEPT_PATHS) for _ in self.satellites]
         self._stalled = 0
         self.unit = self._unit(value)
         self.value, self.prices = np.inf, self._now
@@ -62,9 +64,9 @@ class PriceSearch:
         self.theta = 1.0
 
     def _unit(self, value: float) -> float:
-        largest = max(len(s.satellite) for s in self._satellites)
+        largest = max(len(s.satellite) for s in self.satellites)
         unit = 2.0 ** np.floor(np.log2(self._typical)) / _UNITS_PER_REWARD
-        while value / len(self._satellites) / unit > _MAX_CELLS / largest:
+        while value / len(self.satellites) / unit > _MAX_CELLS / largest:
             unit *= 2.0
         return float(unit)
 
@@ -107,7 +109,7 @@ class PriceSearch:
         """Note a plan that is known."""
         taken = np.zeros(len(self._problem.opportunities), dtype=np.bool_)
         taken[[action.opportunity for action in plan.actions]] = True
-        for relaxation, paths in zip(self._satellites, self._paths, strict=True):
+        for relaxation, paths in zip(self.satellites, self._paths, strict=True):
             paths.append(np.flatnonzero(taken[relaxation.satellite.rows]).astype(np.int32))
 
     def restart(self, prices: Floats) -> None:
@@ -128,14 +130,14 @@ class PriceSearch:
         worth = whole_worth(self._problem, prices, unit)
         units = 0
         for i, finer in enumerate(relaxations(self._problem)):
-            relaxation = replace(finer, data_price=self._satellites[i].data_price)
+            relaxation = replace(finer, data_price=self.satellites[i].data_price)
             most, _ = relaxation.most(worth, 0, self._stop, near=self._known(i, worth))
             units += most
         return self._total(prices, units, unit), prices, unit
 
     def _known(self, i: int, worth: Ints) -> int | None:
         """Return what a satellite gains on one of the paths that are known, if there are any."""
-        weight = self._satellites[i].weights(worth)
+        weight = self.satellites[i].weights(worth)
         return max((int(weight[path].sum()) for path in self._paths[i]), default=None)
 
     def _total(self, prices: Floats, units: int, unit: float) -> float:
@@ -149,7 +151,7 @@ class PriceSearch:
         counts = np.zeros(len(prices))
         contacts: list[int] = []
         units = 0
-        for i, relaxation in enumerate(self._satellites):
+        for i, relaxation in enumerate(self.satellites):
             near = self._known(i, worth)
             if near is None:
                 near, _ = relaxation.most(worth, 0, self._stop)

@@ -9,7 +9,7 @@ without resources.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Final
@@ -25,6 +25,7 @@ from planner_core.problem import CONTACT, Bools, Floats, Problem
 from planner_core.solvers.base import Budget, Progress, Solution
 from planner_core.solvers.certified.choices import ChoiceSearch
 from planner_core.solvers.certified.contact_sets import FixedContacts, Relaxation
+from planner_core.solvers.certified.program_search import ProgramSearch
 from planner_core.solvers.certified.resource_prices import PriceSearch
 from planner_core.solvers.certified.turns import TurnSearch
 from planner_core.solvers.fleet.search import solve_without_resources
@@ -41,9 +42,10 @@ _FURTHER_MOVES: Final = 20  # after each round of that
 _FIRST_STEPS: Final = 2  # of the search for prices, where sets of contacts gave new ones
 _STEPS: Final = 8
 _PATIENCE: Final = 3  # rounds without a new set of contacts or a better plan
-_FLEET_PATIENCE: Final = 400  # turns of a fleet without a better plan
-_STREAMS: Final = 2  # of a fleet: side by side where a job may use several threads
-_SHORT_PATIENCE: Final = 10  # of a small one
+_FLEET_PATIENCE: Final = 60  # turns of a fleet without a better plan
+_TURN: Final = 6  # steps of the search for a fleet's plans
+_TURN_BESIDE: Final = 12  # that take about as long as what is done with programs
+_SHORT_PATIENCE: Final = 2  # of a small one
 _FLEET_ROUNDS: Final = 300  # of the search for a fleet's prices
 _ROUNDS_AT_A_TIME: Final = 20
 _FLEET_STEPS: Final = 2  # of prices with recorders, from there
@@ -317,50 +319,75 @@ def solve_with_resources(problem: Problem, budget: Budget, seed: int, gap: float
 def _close_in_fleet(search: ResourceSearch, unit: float) -> None:
     """Search for plans, for prices, and for plans again until that gets nowhere.
 
-    HiGHS is of no help for a large fleet; what is left of a small one it soon settles.
+    What is left of a small fleet HiGHS soon settles.
     """
-    num_streams, patience = (_STREAMS, _FLEET_PATIENCE) if search.is_fleet else (1, _SHORT_PATIENCE)
-    streams = [
-        TurnSearch(search.problem, search.plan, unit, search.budget, search.seed + number)
-        for number in range(num_streams)
-    ]
+    turns = TurnSearch(search.problem, search.plan, unit, search.budget, search.seed)
     with ThreadPoolExecutor(search.budget.num_threads) as pool:
-        _take_turns(search, streams, pool)
-        _price_fleet(search)
-        idle_turns = 0
-        while idle_turns < patience and not search.is_done:
-            idle_turns = 0 if _take_turns(search, streams, pool) else idle_turns + 1
+        _take_turns(search, turns, None, pool)
+        prices, usage = _price_fleet(search)
+        _exhaust(search, turns, None, pool, _SHORT_PATIENCE)
+        if search.is_fleet and prices is not None:
+            programs = ProgramSearch(search.problem, prices, usage, search.budget, search.seed)
+            programs.learn(search.plan)
+            _exhaust(search, turns, programs, pool, _FLEET_PATIENCE)
+
+
+def _exhaust(
+    search: ResourceSearch,
+    turns: TurnSearch,
+    programs: ProgramSearch | None,
+    pool: ThreadPoolExecutor,
+    patience: int,
+) -> None:
+    """Let searches take turns, until so many in a row have led nowhere."""
+    idle_turns = 0
+    while idle_turns < patience and not search.is_done:
+        is_better = _take_turns(search, turns, programs, pool)
+        idle_turns = 0 if is_better else idle_turns + 1
 
 
 def _take_turns(
-    search: ResourceSearch, streams: Sequence[TurnSearch], pool: ThreadPoolExecutor
+    search: ResourceSearch,
+    turns: TurnSearch,
+    programs: ProgramSearch | None,
+    pool: ThreadPoolExecutor,
 ) -> bool:
-    """Let each stream take a turn, and offer the best plan; return whether it is better."""
-    for turn in [pool.submit(stream.turn) for stream in streams]:
+    """Let both searches go on, side by side; return whether there is a better plan.
+
+    The programs learn from the other search, which would lead nowhere new from their plans.
+    """
+    work = [pool.submit(turns.turn, _TURN if programs is None else _TURN_BESIDE)]
+    if programs is not None:
+        work.append(pool.submit(programs.turn))
+    for turn in work:
         turn.result()
-    best = max(streams, key=lambda stream: stream.reward)
-    is_better = best.reward > search.reward + 1e-12 and search.offer(best.plan)
+    is_better = search.offer(turns.plan)
+    if programs is not None:
+        programs.learn(turns.plan)
+        is_better = search.offer(programs.plan) or is_better
     search.report("plans")
     return is_better
 
 
-def _price_fleet(search: ResourceSearch) -> None:
+def _price_fleet(search: ResourceSearch) -> tuple[PriceSearch | None, Floats]:
     """Search for prices by energy alone, and see what they prove with recorders.
 
     Of what recorders take from the bound the exact programmes find nearly all at these prices;
-    to search with them takes fifty times as long, and brings next to nothing.
+    to search with them takes fifty times as long, and brings next to nothing. Returns the search
+    that has seen this, if it has come to that, and which tasks the relaxed plans took.
     """
     energy = EnergyPrices(search.problem, search.prices(), _FLEET_ROUNDS, search.seed)
     while not (energy.is_settled or search.is_done):
         energy.improve(_ROUNDS_AT_A_TIME, search.budget.stop)
         search.report("prices")
     if search.is_done:
-        return
+        return None, energy.usage
     prices = PriceSearch(
         search.problem, min(search.bound.value, energy.value), energy.prices, search.budget.stop
     )
     prices.learn(search.plan)
     search.price(prices, _FLEET_STEPS)
+    return prices, energy.usage
 
 
 def _close_in(search: ResourceSearch, choices: ChoiceSearch) -> None:

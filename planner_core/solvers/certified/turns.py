@@ -1,4 +1,4 @@
-"""Two searches for plans under battery and recorder that take turns.
+"""Two searches for plans under battery and recorder, by turns.
 
 The window search finds most in a second. Where it stalls, the exact programmes over choices of
 tasks, each a satellite's whole horizon, lead to other plans that are worth the same: with other
@@ -15,9 +15,9 @@ from planner_core.solvers.base import Budget
 from planner_core.solvers.certified.choices import ChoiceSearch
 from planner_core.solvers.certified.resource_windows import ResourceWindows
 
-_MOVES: Final = 250  # of the window search in a turn, for each satellite
-_FIRST_TURNS: Final = 12  # of the window search alone, at each start
-_STALLED: Final = 80  # turns that lead nowhere, before another start
+_MOVES: Final = 250  # of the window search in a step, for each satellite
+_FIRST_STEPS: Final = 12  # of the window search alone, at each start
+_STALLED: Final = 18  # steps that lead nowhere, before another start
 _STARTS: Final = 1000  # no search has more
 
 
@@ -38,26 +38,27 @@ class TurnSearch:
         self._problem, self._start, self._budget = problem, start, budget
         self._num_satellites = sum(len(s) > 0 for s in problem.satellites)
         self._choices = ChoiceSearch(problem, unit, seed, budget.stop)
-        self._seed, self._num_starts, self._idle_turns = seed, 0, _STALLED
+        self._seed, self._num_starts, self._idle_steps = seed, 0, _STALLED
 
-    def turn(self) -> None:
-        """Let one search go on from where the other got to, or begin afresh where both stall."""
-        if self._idle_turns == _STALLED:
-            self._begin()
-            return
-        before = self._windows.reward
-        self._replan_days()
-        self._replan_windows(1)
-        self._idle_turns = 0 if self._windows.reward > before else self._idle_turns + 1
+    def turn(self, num_steps: int) -> None:
+        """Let each search go on from where the other got to, or begin afresh where both stall."""
+        for _ in range(num_steps):
+            if self._idle_steps == _STALLED:
+                self._begin()
+                continue
+            before = self._windows.reward
+            self._replan_days()
+            self._replan_windows(1)
+            self._idle_steps = 0 if self._windows.reward > before else self._idle_steps + 1
 
     def _begin(self) -> None:
         # A seed of its own for each start of each search.
         self._windows = ResourceWindows(self._problem, self._seed + _STARTS * self._num_starts)
         self._windows.adopt(self._start)
-        self._num_starts, self._idle_turns = self._num_starts + 1, 0
+        self._num_starts, self._idle_steps = self._num_starts + 1, 0
         # Whole days first: once most targets are taken, contacts hardly move.
         self._replan_days()
-        self._replan_windows(_FIRST_TURNS)
+        self._replan_windows(_FIRST_STEPS)
 
     def _replan_days(self) -> None:
         """Replan each satellite's whole day by choices of tasks."""
@@ -69,8 +70,8 @@ class TurnSearch:
         if self._choices.reward >= self._windows.reward:
             self._windows.adopt(self._choices.plan)
 
-    def _replan_windows(self, num_turns: int) -> None:
-        self._windows.make_moves(num_turns * _MOVES * self._num_satellites, self._budget)
+    def _replan_windows(self, num_steps: int) -> None:
+        self._windows.make_moves(num_steps * _MOVES * self._num_satellites, self._budget)
 
     @property
     def plan(self) -> Plan:

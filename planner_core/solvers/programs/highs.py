@@ -131,7 +131,8 @@ class Engine:
         Parameters
         ----------
         start
-            Values of the first columns of a point that is known, or None.
+            Values of the first columns of a point that is known, all integer ones among them;
+            or a fractional one, near which HiGHS looks first; or None.
         gap
             Relative distance of objective and bound at which to stop.
         heuristic_effort
@@ -151,13 +152,17 @@ class Engine:
         highs.setOptionValue("mip_heuristic_effort", heuristic_effort)
         if max_nodes is not None:
             highs.setOptionValue("mip_max_nodes", max_nodes)
+        # Where it is not whole HiGHS begins with a program of its own over what is whole, which
+        # tells bounds too. They hold for nothing else.
+        is_whole = start is not None and bool(np.all(start[integer] == np.round(start[integer])))
         if start is not None:
             highs.setSolution(len(start), np.arange(len(start), dtype=np.int32), start)
 
         def on_interrupt(event: highspy.highs.HighsCallbackEvent) -> None:
             out = event.data_out
             if not self._is_abandoned:
-                self._bound = min(self._bound, float(out.mip_dual_bound))
+                if is_whole:
+                    self._bound = min(self._bound, float(out.mip_dual_bound))
                 watch(float(out.mip_primal_bound), self._bound)
             self._interrupt_if_spent(event)
 
