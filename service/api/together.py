@@ -40,6 +40,11 @@ class Together(Generic[K, T]):
 
     async def get(self, key: K) -> T | None:
         """Return what there is of a key now, or None; raises what the query raises."""
+        if self._is_idle:
+            # Alone, and no task need be made for others to wait for.
+            async with self._is_asking:
+                loop = asyncio.get_running_loop()
+                return (await loop.run_in_executor(self._thread, self._ask, [key])).get(key)
         if self._gathering is None:
             keys: list[K] = []
             self._gathering = keys, asyncio.create_task(self._answer(keys))
@@ -47,6 +52,12 @@ class Together(Generic[K, T]):
         keys.append(key)
         # A client that goes away must not take the answer of the others along.
         return (await asyncio.shield(answers)).get(key)
+
+    @property
+    def _is_idle(self) -> bool:
+        if self._gathering is not None or self._is_asking.locked():
+            return False
+        return asyncio.get_running_loop().time() >= self._not_before_s
 
     async def _answer(self, keys: list[K]) -> Mapping[K, T]:
         async with self._is_asking:

@@ -39,15 +39,15 @@ def source() -> Source:
     return Source()
 
 
-def test_those_who_ask_together_share_a_query(source: Source) -> None:
+def test_those_who_ask_while_a_query_runs_share_the_next_one(source: Source) -> None:
     source.may_go_on.set()
 
     async def ask() -> list[str | None]:
         together = Together(source.ask)
-        return await asyncio.gather(*map(together.get, ("b", "a", "b", "absent")))
+        return await asyncio.gather(*map(together.get, ("b", "a", "b", "absent", "a")))
 
-    assert asyncio.run(ask()) == ["b0", "a0", "b0", None]
-    assert source.queries == [["b", "a", "absent"]]
+    assert asyncio.run(ask()) == ["b0", "a0", "b0", None, "a0"]
+    assert source.queries == [["b"], ["a", "b", "absent"]]
 
 
 def test_no_answer_is_older_than_its_question(source: Source) -> None:
