@@ -18,6 +18,7 @@ import numpy as np
 from planner_core.bounds.data_levels import data_levels
 from planner_core.bounds.least_energy import least_energy
 from planner_core.bounds.most_value import UNREACHED, most_value
+from planner_core.bounds.resource_bound import FINE
 from planner_core.bounds.resource_network import network_of, part_of
 from planner_core.comparable import Order, are_comparable, order_of, transitive_closure
 from planner_core.domain import Scenario
@@ -362,7 +363,7 @@ def _can_keep(problem: Problem, satellite: SatelliteProblem, kept: list[Kept]) -
     if len(rows) == 0:
         return False
     network = part_of(network, rows)
-    levels = data_levels(network, 2, is_optimistic=True)
+    levels = data_levels(network, FINE, is_optimistic=True)
     nothing = np.zeros(len(rows), dtype=np.int32)
     idle, after = least_energy(network, nothing, 0)
     credit = np.zeros(levels.num_levels, dtype=np.int32)
