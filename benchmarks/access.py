@@ -15,6 +15,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -158,12 +159,12 @@ def main() -> None:
     for case in cases():
         ours(case)
         big = len(case.satellites) > 1
-        ours_s, found = timed(lambda c=case: ours(c), 3 if big else 9)  # type: ignore[misc]
+        ours_s, found = timed(partial(ours, case), 3 if big else 9)
         line = f"{case.name:<30}{ours_s:9.4f}"
-        two = f"{timed(lambda c=case: ours(c, 2), 3)[0]:10.4f}" if big else f"{'':10}"  # type: ignore[misc]
+        two = f"{timed(partial(ours, case, 2), 3)[0]:10.4f}" if big else f"{'':10}"
         line += f"{two}{found:9}{ours_s / found * 1e6:10.2f}"
         if brahe is not None and not big:
-            peer_s, theirs = timed(lambda c=case: brahe_windows(c, brahe), 1)  # type: ignore[misc]
+            peer_s, theirs = timed(partial(brahe_windows, case, brahe), 1)
             line += f"{peer_s:9.3f}{theirs:9}{peer_s / ours_s:7.0f}"
         print(line)
 

@@ -19,6 +19,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import timedelta
+from functools import partial
 from typing import Any
 
 import httpx
@@ -126,7 +127,7 @@ def submit_to_timeline(service: Served, mission: Json) -> None:
             for name, instant in demo_mission.HORIZON.items()
         }
         scenario_id = post(service.client, "/v1/scenarios", asked(mission, horizon=horizon))["id"]
-        cold.append(median_s(lambda own=scenario_id: plan(service.client, own), 1))  # type: ignore[misc]
+        cold.append(median_s(partial(plan, service.client, scenario_id), 1))
     plan(service.client, mission["id"])
     stored_s = median_s(lambda: plan(service.client, mission["id"]))
     print(f"submit to timeline, 1,000 targets, forward search: p50 {statistics.median(cold):.3f} s "
@@ -219,7 +220,7 @@ def many_jobs(service: Served, mission: Json) -> None:
             "/v1/jobs?label=stored",
             f"/v1/jobs/{pattern}",
         )
-        found[num_jobs] = [median_s(lambda own=c: service.client.get(own), 60) for c in calls]  # type: ignore[misc]
+        found[num_jobs] = [median_s(partial(service.client.get, call), 60) for call in calls]
     database.close()
     few, many = (found[num_jobs] for num_jobs in NUM_STORED)
     for name, few_s, many_s in zip(

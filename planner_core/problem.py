@@ -244,7 +244,7 @@ class Pinned:
     Attributes
     ----------
     skipped
-        Rows that no plan may take, as long as they are in the table.
+        Rows that no plan may take, as long as they are in the table, and the pin that says so.
     forbidden
         Targets that no plan may collect.
     struck
@@ -252,7 +252,7 @@ class Pinned:
     """
 
     kept: tuple[Kept, ...] = ()
-    skipped: frozenset[int] = frozenset()
+    skipped: Mapping[int, str] = field(default_factory=dict)
     blocked: tuple[Blocked, ...] = ()
     forbidden: frozenset[int] = frozenset()
     struck: Mapping[int, tuple[Struck, ...]] = field(default_factory=dict)

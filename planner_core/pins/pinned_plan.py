@@ -54,7 +54,7 @@ def breaches(problem: Problem, plan: Plan) -> list[Breach]:
         if kind == COLLECT and int(table.place[row]) in pinned.forbidden:
             why.append("Its target is forbidden.")
         if row in pinned.skipped:
-            why.append("It is to be skipped.")
+            why.append(f"It is what {pinned.skipped[row]} skips.")
         found += [
             Breach(
                 satellite=satellite, at_s=action.start_s, needed=0.0, available=1.0,

@@ -9,24 +9,20 @@ What is left fits around all kept actions, and solvers need only take those (see
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from datetime import datetime
+from itertools import groupby
 
 import numpy as np
 
-from planner_core.bounds.data_levels import data_levels
-from planner_core.bounds.least_energy import least_energy
-from planner_core.bounds.most_value import UNREACHED, most_value
-from planner_core.bounds.resource_bound import FINE
-from planner_core.bounds.resource_network import network_of, part_of
 from planner_core.comparable import Order, are_comparable, order_of, transitive_closure
 from planner_core.domain import Scenario
 from planner_core.errors import InvalidScenario
 from planner_core.jit import kernel
+from planner_core.pins.limits import check_limits
 from planner_core.pins.pinned_starts import whole_accesses, with_pinned_starts
 from planner_core.pins.pins import PinnedAction
-from planner_core.plan import Plan
 from planner_core.problem import (
     ACCESS_FOUND,
     COLLECT,
@@ -39,13 +35,10 @@ from planner_core.problem import (
     Opportunities,
     Pinned,
     Problem,
-    SatelliteProblem,
     Struck,
 )
 from planner_core.restrict import restricted
 from planner_core.slew import TIME_TOLERANCE_S
-from planner_core.timeline import replay
-from planner_core.track import compile_track
 
 _NEARLY_S = 1.0  # bookings are made in whole seconds
 _KINDS = {"collect": COLLECT, "contact": CONTACT}
@@ -71,11 +64,15 @@ def pinned_problem(scenario: Scenario, problem: Problem) -> Problem:
     if problem.pointing is not None:
         accesses = table.access[skipped]
         problem, kept = with_pinned_starts(scenario, problem, kept)
-        skipped = np.flatnonzero(np.isin(problem.opportunities.access, accesses)).tolist()
-    return apply_pins(problem, resolve(scenario, kept, skipped))
+        skipped_rows = [
+            np.flatnonzero(problem.opportunities.access == own).tolist() for own in accesses
+        ]
+    else:
+        skipped_rows = [[row] for row in skipped]
+    return apply_pins(problem, resolve(scenario, kept, skipped_rows))
 
 
-def resolve(scenario: Scenario, kept: Sequence[int], skipped: Iterable[int]) -> Pinned:
+def resolve(scenario: Scenario, kept: Sequence[int], skipped: Sequence[Sequence[int]]) -> Pinned:
     """Return the scenario's pins in terms of its problem, where these rows are meant."""
     pins = scenario.pins
     satellites = {satellite.id: i for i, satellite in enumerate(scenario.satellites)}
@@ -83,7 +80,7 @@ def resolve(scenario: Scenario, kept: Sequence[int], skipped: Iterable[int]) -> 
     offset_s = scenario.horizon.offset_s
     return Pinned(
         kept=tuple(Kept(row=row, pointer=f"/pins/keep/{i}") for i, row in enumerate(kept)),
-        skipped=frozenset(skipped),
+        skipped={row: f"/pins/skip/{i}" for i, rows in enumerate(skipped) for row in rows},
         blocked=tuple(
             Blocked(
                 satellite=satellites[pin.satellite_id],
@@ -171,12 +168,12 @@ def apply_pins(problem: Problem, pinned: Pinned) -> Problem:
         part,
         pinned=replace(
             part.pinned,
-            skipped=frozenset(),
+            skipped={},
             struck=_struck(problem, is_struck, keepers),
         ),
         target_access=_access_left(problem, part),
     )
-    _check_limits(part)
+    check_limits(part, whole, _pins_that_rule_out(problem, pinned))
     return part
 
 
@@ -235,15 +232,24 @@ def _ruled_out(problem: Problem, pinned: Pinned) -> Bools:
     """Return the opportunities that are forbidden or lie in a blocked interval."""
     table = problem.opportunities
     is_out: Bools = (table.kind == COLLECT) & np.isin(table.place, sorted(pinned.forbidden))
-    is_out[sorted(pinned.skipped)] = True
+    for _, rows in _pins_that_rule_out(problem, pinned):
+        is_out[rows] = True
+    return is_out
+
+
+def _pins_that_rule_out(problem: Problem, pinned: Pinned) -> Iterator[tuple[str, Longs]]:
+    """Yield pins that skip or block, and the opportunities that each is about."""
+    table = problem.opportunities
+    for pointer, skipped in groupby(pinned.skipped, key=lambda row: pinned.skipped[row]):
+        yield pointer, np.array(list(skipped))
     for blocked in pinned.blocked:
-        is_out |= (
+        is_out = (
             (table.satellite == blocked.satellite)
             & np.isin(table.kind, sorted(blocked.kinds))
             & (table.start_s < blocked.end_s - TIME_TOLERANCE_S)
             & (table.end_s > blocked.start_s + TIME_TOLERANCE_S)
         )
-    return is_out
+        yield blocked.pointer, np.flatnonzero(is_out)
 
 
 def _kept_that_exclude(problem: Problem, pinned: Pinned) -> list[tuple[Kept, Bools]]:
@@ -323,50 +329,3 @@ def _access_left(problem: Problem, part: Problem) -> np.ndarray:
     """Return why targets have no collect, pins included."""
     is_lost = (problem.target_access == ACCESS_FOUND) & (np.diff(part.target_opportunities[1]) == 0)
     return np.where(is_lost, RULED_OUT, problem.target_access).astype(np.int8)
-
-
-def _check_limits(problem: Problem) -> None:
-    """Raise where battery or recorder cannot bear what one satellite must do.
-
-    Contacts may help; that satellites share antennas is left out.
-    """
-    if not problem.use_resources:
-        return
-    for satellite in problem.satellites:
-        kept = sorted(
-            (k for k in problem.pinned.kept if k.row in set(satellite.rows.tolist())),
-            key=lambda k: k.row,
-        )
-        if not kept or _can_keep(problem, satellite, kept) or not _can_keep(problem, satellite, []):
-            continue
-        for number in range(1, len(kept) + 1):
-            if _can_keep(problem, satellite, kept[:number]):
-                continue
-            alone = replace(problem, pinned=Pinned())
-            timeline = replay(alone, Plan.of(problem, [k.row for k in kept[:number]]))
-            broken = [v for v in timeline.violations if v.code in ("battery", "recorder")]
-            why = broken[0].detail if broken else "Battery or recorder would reach its limit."
-            raise InvalidScenario(
-                "pin_breaks_limits",
-                f"With it and the kept actions before it no plan keeps the limits: {why}",
-                pointer=kept[number - 1].pointer,
-            )
-
-
-def _can_keep(problem: Problem, satellite: SatelliteProblem, kept: list[Kept]) -> bool:
-    """Return whether these and contacts alone may keep the limits; False is proven."""
-    trial = replace(problem, pinned=Pinned(kept=tuple(kept)))
-    if compile_track(trial, satellite, np.zeros(len(satellite), dtype=np.uint8)).is_guarded:
-        return True
-    network = network_of(trial, satellite)
-    rows = np.flatnonzero((network.is_contact == 1) | network.is_kept).astype(np.int32)
-    if len(rows) == 0:
-        return False
-    network = part_of(network, rows)
-    levels = data_levels(network, FINE, is_optimistic=True)
-    nothing = np.zeros(len(rows), dtype=np.int32)
-    idle, after = least_energy(network, nothing, 0)
-    credit = np.zeros(levels.num_levels, dtype=np.int32)
-    stop = np.zeros(1, dtype=np.uint8)
-    value, _ = most_value(network, levels, nothing, idle, after, credit, 0, 0, False, stop)
-    return value != UNREACHED

@@ -77,6 +77,7 @@ def install_openapi(app: FastAPI) -> None:
             )
         return app.openapi_schema
 
+    # As FastAPI's documentation has it.
     app.openapi = document  # type: ignore[method-assign]
 
 

@@ -218,7 +218,7 @@ KINDS: dict[str, ProblemKind] = {
     ),
     "pin_breaks_limits": ProblemKind(
         422,
-        "A kept action breaks the limits",
+        "A pin breaks the limits",
         "Whatever else is planned, battery or recorder would reach its limit.",
     ),
     "idempotency_key_reused": ProblemKind(

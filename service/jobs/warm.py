@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from typing import Final
@@ -22,6 +23,8 @@ from planner_core.domain import (
     Scenario,
     Target,
 )
+from planner_core.errors import InvalidScenario
+from planner_core.pins.pins import BlockedInterval, Pins
 from planner_core.run import plan_scenario
 from planner_core.solvers import SOLVERS, Certified, Graph, Rule
 from planner_core.solvers.base import Budget, Solver
@@ -42,7 +45,11 @@ def warm_up() -> None:
     over_the_globe = [(lat, lon) for lat in range(-80, 81, 20) for lon in range(-180, 180, 30)]
     _plan(_mission(over_the_globe, use_resources=True), [solver() for solver in SOLVERS.values()])
     # Where a battery is low and a recorder full, reasons are looked for as nowhere else.
-    _plan(_mission(over_the_globe, use_resources=True, is_worn=True), [Rule()])
+    worn = _mission(over_the_globe, use_resources=True, is_worn=True)
+    _plan(worn, [Rule()])
+    always = BlockedInterval(satellite_id="warm-up", start=worn.horizon.start, end=worn.horizon.end)
+    with suppress(InvalidScenario):  # the recorder does not bear that no contact is left
+        _plan(replace(worn, pins=Pins(block=(always,))), [Rule()])
     # Near the pole targets are in each other's way: proofs need all there is to prove with.
     random = np.random.default_rng(0)
     crowd = zip(random.uniform(60, 85, 120), random.uniform(-180, 180, 120), strict=True)

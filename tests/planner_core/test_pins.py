@@ -7,18 +7,19 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import event, example, given, settings
 from hypothesis import strategies as st
 
 from planner_core.domain import Agility, Dynamics
 from planner_core.errors import Fault, InvalidScenario
+from planner_core.pins.limits import _keep_best
 from planner_core.pins.pinning import apply_pins
 from planner_core.problem import COLLECT, CONTACT, Blocked, Kept, Pinned, Problem
 from planner_core.solvers import Certified, ForwardSearch, Graph, Mcts, Milp, Rule
 from planner_core.solvers.base import Budget, Solver, Termination
 from planner_core.timeline import replay
 from tests.planner_core.brute_force import best_plan
-from tests.planner_core.problems import ECLIPSES, random_problem
+from tests.planner_core.problems import ECLIPSES, TIGHT, random_problem
 
 SEEDS = st.integers(0, 10**6)
 DYNAMICS = st.sampled_from(["physical", "paper"])
@@ -53,7 +54,9 @@ def pinned_at_random(problem: Problem, seed: int, num_kept: int) -> Pinned:
     forbidden = frozenset([int(rng.integers(len(problem.target_ids)))] * int(rng.integers(2)))
     return Pinned(
         kept=tuple(Kept(row=int(row), pointer=f"/pins/keep/{i}") for i, row in enumerate(kept)),
-        skipped=frozenset(rng.choice(len(table), size=int(rng.integers(2))).tolist()),
+        skipped=dict.fromkeys(
+            rng.choice(len(table), size=int(rng.integers(2))).tolist(), "/pins/skip/0"
+        ),
         blocked=(blocked,) * int(rng.integers(2)),
         forbidden=forbidden,
     )
@@ -88,6 +91,7 @@ def drawn(seed: int, **more: Any) -> Problem:
     num_kept=st.integers(0, 3),
 )
 @example(seed=1825, dynamics="physical", use_resources=True, num_satellites=1, num_kept=3)
+@example(seed=1825, dynamics="paper", use_resources=True, num_satellites=1, num_kept=3)
 def test_plans_with_pins_are_the_best_that_honour_them(
     seed: int, dynamics: Dynamics, use_resources: bool, num_satellites: int, num_kept: int
 ) -> None:
@@ -101,14 +105,12 @@ def test_plans_with_pins_are_the_best_that_honour_them(
     if fault is not None:
         # A second image of a target breaks nothing, but no plan has one.
         assert best is None or "another image" in fault.detail
-        assert (fault.pointer or "").startswith("/pins/keep/")
+        assert (fault.pointer or "").startswith(("/pins/keep/", "/pins/skip/", "/pins/block/"))
         return
     if best is None:
-        # Two satellites may need the same antenna, which only a search can tell. And where there
-        # is no plan without the kept actions either, these are not to blame.
+        # Two satellites may need the same antenna, which only a search can tell.
         assert use_resources
-        free = replace(pinned, kept=())
-        assert num_satellites > 1 or best_plan(replace(whole, pinned=free)) is None
+        assert num_satellites > 1 or best_plan(whole) is None
         return
     reward = replay(whole, best).reward
     for solver in EXACT:
@@ -173,3 +175,46 @@ def test_a_satellite_that_turns_slower_than_it_tracks_honours_pins_too(
     for solver in HEURISTICS:
         timeline = replay(problem, solver.solve(problem, Budget(), 0).plan)
         assert not [v for v in timeline.violations if v.code == "pin"], solver
+
+
+@settings(max_examples=150, deadline=None)
+@given(seed=SEEDS, dynamics=DYNAMICS)
+def test_contacts_ruled_out_are_refused_exactly_where_no_plan_is_left(
+    seed: int, dynamics: Dynamics
+) -> None:
+    rng = np.random.default_rng(seed)
+    chatty = replace(TIGHT, telemetry_per_s=float(rng.uniform(3e-4, 1.2e-3)))
+    whole = random_problem(
+        seed, dynamics=dynamics, resources=chatty, num_collects=3, num_contacts=5
+    )
+    contacts = np.flatnonzero(whole.opportunities.kind == CONTACT)
+    names = [f"/pins/skip/{i}" for i in range(3)]
+    skipped = dict(zip(rng.choice(contacts, 3, replace=False).tolist(), names, strict=True))
+    block = Blocked(
+        satellite=0, start_s=600.0, end_s=1000.0, kinds=frozenset({CONTACT}),
+        pointer="/pins/block/0",
+    )  # fmt: skip
+    steps = [
+        Pinned(skipped=dict(list(skipped.items())[:number]), blocked=blocked)
+        for number, blocked in ((0, ()), (1, ()), (2, ()), (3, ()), (3, (block,)))
+    ]
+    has_plan = [best_plan(replace(whole, pinned=pinned)) is not None for pinned in steps]
+    _, fault = pinned_or_refused(whole, steps[-1])
+    event("refused" if fault else "borne" if has_plan[-1] else "hopeless before")
+    if all(has_plan) or not has_plan[0]:
+        assert fault is None
+    else:
+        assert fault is not None
+        assert fault.code == "pin_breaks_limits"
+        assert fault.pointer == [*names, block.pointer][has_plan.index(False) - 1]
+
+
+def test_states_that_count_as_one_are_no_worse_than_each() -> None:
+    rng = np.random.default_rng(3)
+    found = rng.uniform(size=(5000, 2))
+    found = np.concatenate([found, np.column_stack([found[:, 0], found[:, 0]])])
+    battery, recorder = np.full(200, np.nan), np.full(200, np.nan)
+    num_states = _keep_best(found.copy(), battery, recorder)
+    assert 0 < num_states <= 200
+    for left, filled in found:
+        assert ((battery[:num_states] >= left) & (recorder[:num_states] <= filled)).any()

@@ -64,8 +64,6 @@ class ProgramSearch:
         self._prices, self._unit = prices.prices, prices.unit
         self._satellites = prices.satellites
         self._is_promising = usage > 0.0
-        # Of each satellite's last relaxed plan: what it is worth at other prices is worth knowing.
-        self._paths: dict[int, Ints] = {}
         self._rng = np.random.default_rng(seed)
         self._gain = reward_unit(problem)
         self._work = self._steps()

@@ -66,7 +66,7 @@ class Engine:
         self._incumbent: Floats | None = None
         self._is_abandoned = False
         self._messages: list[str] = []
-        self._highs = highs = highspy.Highs()  # type: ignore[no-untyped-call]
+        self._highs = highs = highspy.Highs()  # type: ignore[no-untyped-call]  # it has no types
         options: dict[str, bool | int | float | str] = {
             "output_flag": True,
             "log_to_console": False,
