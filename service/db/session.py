@@ -35,12 +35,14 @@ class Database:
         if self.engine.dialect.name == "sqlite":
             alone = {_NO_TRANSACTION: True}
         self._asker = self._reader.execution_options(**alone)
-        self._untested = self._asker
+        self._untested: sa.Engine = self._asker
         if self.engine.dialect.name == "postgresql":
             # To test a connection before each use costs as much as a small query.
+            # Nor is one set up for each, or tidied after it: there is no transaction to end.
             self._untested = make_postgresql_engine(
-                url, timeout_s, pool_size=1, max_overflow=1, pool_pre_ping=False
-            ).execution_options(**alone, read_only=True)
+                url, timeout_s, pool_size=1, max_overflow=1, pool_pre_ping=False,
+                pool_reset_on_return=None, **alone,
+            )  # fmt: skip
 
     @contextmanager
     def transaction(self) -> Iterator[Session]:
