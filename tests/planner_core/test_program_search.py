@@ -19,6 +19,7 @@ from planner_core.solvers import Rule
 from planner_core.solvers.base import Budget
 from planner_core.solvers.certified import program_search
 from planner_core.solvers.certified.contact_sets import FixedContacts
+from planner_core.solvers.certified.plan_pool import PlanPool, rows_of
 from planner_core.solvers.certified.program_search import ProgramSearch
 from planner_core.solvers.certified.resource_prices import PriceSearch
 from planner_core.timeline import replay
@@ -31,15 +32,17 @@ STARVED = replace(TIGHT, battery_min_fraction=0.5, initial_battery_fraction=0.62
 _problem = partial(varied_problem, scarce=STARVED)
 
 
-def search_of(problem: Problem, start: Plan, seed: int = 0) -> ProgramSearch:
-    budget = Budget()
+def search_of(
+    problem: Problem, start: Plan, seed: int = 0, budget: Budget | None = None
+) -> tuple[ProgramSearch, PlanPool]:
+    budget = budget or Budget()
     energy = EnergyPrices(problem, np.zeros(len(problem.target_ids)), 30, seed)
     energy.improve(30, budget.stop)
     prices = PriceSearch(problem, max(energy.value, 1.0), energy.prices, budget.stop)
     prices.step(0.0)
-    search = ProgramSearch(problem, prices, energy.usage, budget, seed)
-    search.learn(start)
-    return search
+    pool = PlanPool(problem, budget, seed)
+    pool.add(start)
+    return ProgramSearch(problem, pool, prices, energy.usage, budget, seed), pool
 
 
 @settings(max_examples=40, deadline=None)
@@ -49,30 +52,30 @@ def test_plans_stay_valid_and_below_the_optimum(
 ) -> None:
     problem = _problem(seed, dynamics, num_satellites)
     start = Rule().solve(problem, Budget(), 0).plan
-    search = search_of(problem, start, seed)
-    rewards = [search.reward]
+    search, pool = search_of(problem, start, seed)
+    rewards = [pool.reward]
     for _ in range(10):
         search.turn()
-        rewards.append(search.reward)
-    timeline = replay(problem, search.plan)
+        rewards.append(pool.reward)
+    timeline = replay(problem, pool.plan)
     assert timeline.is_valid
-    assert timeline.reward == pytest.approx(search.reward)
+    assert timeline.reward == pytest.approx(pool.reward)
     assert np.all(np.diff(rewards) >= 0.0)
-    assert search.reward <= best_reward(problem) + 1e-6
-    again = search_of(problem, start, seed)
+    assert pool.reward <= best_reward(problem) + 1e-6
+    again, its_pool = search_of(problem, start, seed)
     for _ in range(10):
         again.turn()
-    assert again.plan == search.plan
+    assert its_pool.plan == pool.plan
 
 
 def test_small_problems_end_at_the_optimum() -> None:
     reached = 0
     for seed in range(30):
         problem = _problem(seed, "physical" if seed % 2 else "paper", 1 + seed % 3)
-        search = search_of(problem, Rule().solve(problem, Budget(), 0).plan)
+        search, pool = search_of(problem, Rule().solve(problem, Budget(), 0).plan)
         for _ in range(20):
             search.turn()
-        reached += replay(problem, search.plan).reward == best_reward(problem)
+        reached += replay(problem, pool.plan).reward == best_reward(problem)
     assert reached >= 27
 
 
@@ -80,6 +83,7 @@ def test_a_program_of_some_satellites_leaves_the_others_alone(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(program_search, "_MOST_OFFERED", 1)
+    monkeypatch.setattr(PlanPool, "merge", lambda _: None)
     gained = 0
     for seed in range(6):
         problem = random_problem(
@@ -87,16 +91,14 @@ def test_a_program_of_some_satellites_leaves_the_others_alone(
             span_s=3000.0, resources=STARVED,
         )  # fmt: skip
         problem = replace(problem, horizon_s=3100.0)
-        search = search_of(problem, Rule().solve(problem, Budget(), 0).plan, seed)
+        search, pool = search_of(problem, Rule().solve(problem, Budget(), 0).plan, seed)
         for _ in range(20):
-            before = search.plan
+            before = pool.plan
             search.turn()
-            changed = {a.opportunity for a in before.actions} ^ {
-                a.opportunity for a in search.plan.actions
-            }
+            changed = {*rows_of(before)} ^ {*rows_of(pool.plan)}
             assert len(set(problem.opportunities.satellite[list(changed)])) <= 1
-            gained += search.plan != before
-        assert replay(problem, search.plan).is_valid
+            gained += pool.plan != before
+        assert replay(problem, pool.plan).is_valid
     assert gained > 0
 
 
@@ -144,8 +146,10 @@ def test_what_is_shut_is_on_no_path(seed: int, dynamics: Dynamics) -> None:
 def test_a_search_that_is_stopped_keeps_its_plan() -> None:
     problem = random_problem(3, num_collects=60, num_targets=30, num_contacts=6, num_satellites=2)
     plan = Rule().solve(problem, Budget(), 0).plan
-    search = search_of(problem, plan)
-    search._budget.cancel()
+    budget = Budget()
+    search, pool = search_of(problem, plan, budget=budget)
+    budget.cancel()
     for _ in range(5):
         search.turn()
-    assert search.plan == plan
+    pool.merge()
+    assert pool.plan == plan

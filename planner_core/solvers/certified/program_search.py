@@ -10,36 +10,38 @@ satellite after another where they share antennas. The relaxation tells good set
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import chain
 from typing import Final
 
 import numpy as np
 
-from planner_core.bounds.bound import reward_unit
 from planner_core.bounds.resource_bound import leaving_whole_units, whole_worth
 from planner_core.bounds.resource_network import Network
-from planner_core.plan import Plan
 from planner_core.problem import CONTACT, Bools, Floats, Ints, Problem
 from planner_core.solvers.base import Budget
 from planner_core.solvers.certified.contact_sets import FixedContacts
+from planner_core.solvers.certified.plan_pool import PlanPool, Rows, rows_of
 from planner_core.solvers.certified.resource_prices import PriceSearch
 from planner_core.solvers.sequential import blocked_rows
-from planner_core.timeline import replay
 
 _BEST: Final = 2  # of those sets that are planned with
 _TRIES: Final = 2  # of a program without a better plan
 _DRAWS: Final = 3  # sets of contacts beside those of plans
 _OFF: Final = 0.2  # of a reward: what prices are off by at a draw
 _MOST_OFFERED: Final = 6000  # tasks of a program: of a larger fleet it takes some satellites
-_LEAST_GAIN: Final = 1e-6  # of the reward
-
-Rows = tuple[int, ...]
+# Steps of the other search that take about as long as
+_BESIDE_DRAWS: Final = 18
+_BESIDE_RELAXATIONS: Final = 24
+_BESIDE_PROGRAM: Final = 40
 
 
 class ProgramSearch:
-    """The best plan so far, and turns that try to better it.
+    """Turns that seek plans for a pool.
 
     Parameters
     ----------
+    pool
+        Where plans come from, and go.
     prices
         The satellites' programmes, and the best prices.
     usage
@@ -48,83 +50,62 @@ class ProgramSearch:
 
     Attributes
     ----------
-    plan, reward
-        The plan, and what it is worth.
+    steps_beside
+        How many steps of the other search take about as long as the next turn.
     """
 
     def __init__(
         self,
         problem: Problem,
+        pool: PlanPool,
         prices: PriceSearch,
         usage: Floats,
         budget: Budget,
         seed: int,
     ) -> None:
         self._problem, self._budget, self._seed = problem, budget, seed
+        self._pool = pool
         self._prices, self._unit = prices.prices, prices.unit
         self._satellites = prices.satellites
         self._is_promising = usage > 0.0
         self._rng = np.random.default_rng(seed)
-        self._gain = reward_unit(problem)
         self._work = self._steps()
-        self.plan, self.reward = Plan(), 0.0
-        self._learned: list[int] = []
-
-    def learn(self, plan: Plan) -> None:
-        """Note what another search has found, and go on from there if that is better."""
-        self._learned = [action.opportunity for action in plan.actions]
-        self._offer(plan)
+        self.steps_beside = next(self._work)
 
     def turn(self) -> None:
-        """Draw some sets of contacts, or solve a program with one of the best."""
-        next(self._work, None)
+        """Draw sets of contacts, see what some are worth, or solve a program with one."""
+        self.steps_beside = next(self._work, 1)
 
-    def _steps(self) -> Iterator[None]:
+    def _steps(self) -> Iterator[int]:
+        """Yield how long each turn will take, before it."""
         while not self._budget.is_spent():
+            yield _BESIDE_DRAWS
             group = self._group()
-            program = self._program(group)
-            own = [action.opportunity for action in self.plan.actions]
-            sets = [self._contacts(group, rows) for rows in (own, self._learned)]
-            sets += [self._draw(group) for _ in range(_DRAWS)]
-            if self._budget.is_spent():
-                return
-            ranked = self._ranked(program, group, sets)
-            yield
-            for fixed in ranked[:_BEST]:
+            # What satellites beside do stays the same, though the plan may change meanwhile.
+            beside = self._tasks_beside(group)
+            program = self._program(group, beside)
+            sets = [self._contacts(group, rows) for rows in self._known()]
+            sets += [self._draw(group, beside) for _ in range(_DRAWS)]
+            yield _BESIDE_RELAXATIONS
+            worth: dict[Rows, float] = {}
+            for contacts in dict.fromkeys(sets):
+                fixed = (*beside, *contacts)
+                program.fix(fixed)
+                worth[fixed] = program.relaxed()
+            for fixed in sorted(worth, key=lambda fixed: -worth[fixed])[:_BEST]:
                 yield from self._improve(program, fixed)
 
-    def _ranked(self, program: FixedContacts, group: Bools, sets: Sequence[Rows]) -> list[Rows]:
-        """Return tasks to fix, those with which the relaxation is worth most first."""
-        worth: dict[Rows, float] = {}
-        for contacts in dict.fromkeys(sets):
-            fixed = (*self._tasks_beside(group), *contacts)
-            program.fix(fixed)
-            worth[fixed] = program.relaxed()
-        return sorted(worth, key=lambda fixed: -worth[fixed])
-
-    def _improve(self, program: FixedContacts, fixed: Rows) -> Iterator[None]:
+    def _improve(self, program: FixedContacts, fixed: Rows) -> Iterator[int]:
         """Better the plan with what is fixed, from one corner of the relaxation after another."""
         program.fix(fixed)
         value = program.relaxed()
         num_tries = 0
-        while value >= self._better and num_tries < _TRIES:
-            before = self.reward
-            self._offer(program.plan(self._better, is_rounded=True))
-            num_tries = 0 if self.reward > before else num_tries + 1
-            yield
+        while value >= self._pool.better and num_tries < _TRIES:
+            yield _BESIDE_PROGRAM
+            before = self._pool.reward
+            self._pool.add(program.plan(self._pool.better, is_rounded=True))
+            num_tries = 0 if self._pool.reward > before else num_tries + 1
             program.turn_aside(self._rng)
-
-    @property
-    def _better(self) -> float:
-        """What a better plan is worth at least."""
-        return self.reward + max(self._gain, _LEAST_GAIN * self.reward)
-
-    def _offer(self, plan: Plan | None) -> None:
-        if plan is None:
-            return
-        timeline = replay(self._problem, plan)
-        if timeline.is_valid and timeline.reward > self.reward:
-            self.plan, self.reward = plan, timeline.reward
 
     def _group(self) -> Bools:
         """Return which satellites the next program is for. Shape ``(num_satellites,)``."""
@@ -138,12 +119,15 @@ class ProgramSearch:
             group[self._problem.opportunities.satellite[rows[0]]] = True
         return group
 
-    def _program(self, group: Bools) -> FixedContacts:
-        """Return the program of some satellites; the others do what they do in the plan."""
+    def _known(self) -> tuple[Rows, Rows]:
+        """Return the best plan, and the latest one of the other search."""
+        return rows_of(self._pool.plan), self._pool.latest
+
+    def _program(self, group: Bools, beside: Rows) -> FixedContacts:
+        """Return the program of some satellites, beside what the others do."""
         offered = self._is_promising.copy()
-        offered[[*self._learned, *(action.opportunity for action in self.plan.actions)]] = True
+        offered[[*chain(*self._known())]] = True
         offered &= group[self._problem.opportunities.satellite]
-        beside = self._tasks_beside(group)
         return FixedContacts(
             self._problem, offered, beside, self._budget, self._seed, self._contacts(group)
         )
@@ -151,8 +135,7 @@ class ProgramSearch:
     def _tasks_beside(self, group: Bools) -> Rows:
         """Return what the plan has the other satellites do."""
         of = self._problem.opportunities.satellite
-        rows = (action.opportunity for action in self.plan.actions)
-        return tuple(row for row in rows if not group[of[row]])
+        return tuple(row for row in rows_of(self._pool.plan) if not group[of[row]])
 
     def _contacts(self, group: Bools, rows: Sequence[int] | None = None) -> Rows:
         """Return the contacts of some satellites, of all or among some opportunities."""
@@ -162,7 +145,7 @@ class ProgramSearch:
             is_one &= np.isin(np.arange(len(table)), rows)
         return tuple(np.flatnonzero(is_one).tolist())
 
-    def _draw(self, group: Bools) -> Rows:
+    def _draw(self, group: Bools, beside: Rows) -> Rows:
         """Return contacts that satellites would have in turn, at prices that are a little off."""
         reward = self._problem.target_reward
         off = _OFF * reward * self._rng.standard_normal(len(reward)) * (self._prices > 0.0)
@@ -170,7 +153,7 @@ class ProgramSearch:
         prices = leaving_whole_units(self._problem, prices, self._unit)
         worth = whole_worth(self._problem, prices, self._unit)
         table = self._problem.opportunities
-        taken = [r for r in self._tasks_beside(group) if table.kind[r] == CONTACT]
+        taken = [r for r in beside if table.kind[r] == CONTACT]
         drawn: list[int] = []
         for index in self._rng.permutation(len(self._satellites)):
             relaxation = self._satellites[index]

@@ -25,6 +25,7 @@ from planner_core.problem import CONTACT, Bools, Floats, Problem
 from planner_core.solvers.base import Budget, Progress, Solution
 from planner_core.solvers.certified.choices import ChoiceSearch
 from planner_core.solvers.certified.contact_sets import FixedContacts, Relaxation
+from planner_core.solvers.certified.plan_pool import PlanPool
 from planner_core.solvers.certified.program_search import ProgramSearch
 from planner_core.solvers.certified.resource_prices import PriceSearch
 from planner_core.solvers.certified.turns import TurnSearch
@@ -44,10 +45,10 @@ _STEPS: Final = 8
 _PATIENCE: Final = 3  # rounds without a new set of contacts or a better plan
 _FLEET_PATIENCE: Final = 60  # turns of a fleet without a better plan
 _TURN: Final = 6  # steps of the search for a fleet's plans
-_TURN_BESIDE: Final = 12  # that take about as long as what is done with programs
+_BESIDE_PRICES: Final = (2, 12)  # such steps, for few opportunities and for many
 _SHORT_PATIENCE: Final = 2  # of a small one
 _FLEET_ROUNDS: Final = 300  # of the search for a fleet's prices
-_ROUNDS_AT_A_TIME: Final = 20
+_ROUNDS_AT_A_TIME: Final = 100
 _FLEET_STEPS: Final = 2  # of prices with recorders, from there
 _SETS_AT_A_TIME: Final = 2
 _AS_GOOD: Final = 0.75  # of a target: sets whose prices count
@@ -317,77 +318,104 @@ def solve_with_resources(problem: Problem, budget: Budget, seed: int, gap: float
 
 
 def _close_in_fleet(search: ResourceSearch, unit: float) -> None:
-    """Search for plans, for prices, and for plans again until that gets nowhere.
+    """Search for plans and prices side by side, and for plans again until that gets nowhere.
 
     What is left of a small fleet HiGHS soon settles.
     """
     turns = TurnSearch(search.problem, search.plan, unit, search.budget, search.seed)
-    with ThreadPoolExecutor(search.budget.num_threads) as pool:
-        _take_turns(search, turns, None, pool)
-        prices, usage = _price_fleet(search)
-        _exhaust(search, turns, None, pool, _SHORT_PATIENCE)
-        if search.is_fleet and prices is not None:
-            programs = ProgramSearch(search.problem, prices, usage, search.budget, search.seed)
-            programs.learn(search.plan)
-            _exhaust(search, turns, programs, pool, _FLEET_PATIENCE)
-
-
-def _exhaust(
-    search: ResourceSearch,
-    turns: TurnSearch,
-    programs: ProgramSearch | None,
-    pool: ThreadPoolExecutor,
-    patience: int,
-) -> None:
-    """Let searches take turns, until so many in a row have led nowhere."""
-    idle_turns = 0
-    while idle_turns < patience and not search.is_done:
-        is_better = _take_turns(search, turns, programs, pool)
-        idle_turns = 0 if is_better else idle_turns + 1
+    pool = PlanPool(search.problem, search.budget, search.seed)
+    with ThreadPoolExecutor(search.budget.num_threads) as threads:
+        pricing = _FleetPricing(search)
+        while not (pricing.is_settled or search.is_done):
+            _take_turns(search, turns, pool, threads, pricing)
+        programs = None
+        if search.is_fleet and pricing.prices is not None:
+            programs = ProgramSearch(
+                search.problem, pool, pricing.prices, pricing.usage, search.budget, search.seed
+            )
+        idle_turns = 0
+        while idle_turns < (_FLEET_PATIENCE if programs else _SHORT_PATIENCE):
+            if search.is_done:
+                return
+            is_better = _take_turns(search, turns, pool, threads, programs)
+            idle_turns = 0 if is_better else idle_turns + 1
 
 
 def _take_turns(
     search: ResourceSearch,
     turns: TurnSearch,
-    programs: ProgramSearch | None,
-    pool: ThreadPoolExecutor,
+    pool: PlanPool,
+    threads: ThreadPoolExecutor,
+    other: _FleetPricing | ProgramSearch | None,
 ) -> bool:
-    """Let both searches go on, side by side; return whether there is a better plan.
+    """Let the search for plans and another go on side by side; return whether a plan is better.
 
-    The programs learn from the other search, which would lead nowhere new from their plans.
+    That search learns from no other: it would lead nowhere new from their plans.
     """
-    work = [pool.submit(turns.turn, _TURN if programs is None else _TURN_BESIDE)]
-    if programs is not None:
-        work.append(pool.submit(programs.turn))
+    num_steps = _TURN if other is None else other.steps_beside
+    work = [threads.submit(turns.turn, num_steps)]
+    if other is not None:
+        work.append(threads.submit(_go_on, other, pool))
     for turn in work:
         turn.result()
-    is_better = search.offer(turns.plan)
-    if programs is not None:
-        programs.learn(turns.plan)
-        is_better = search.offer(programs.plan) or is_better
+    pool.learn(turns.ended, turns.plan)
+    is_better = [search.offer(plan) for plan in (turns.plan, pool.plan)]
     search.report("plans")
-    return is_better
+    return any(is_better)
 
 
-def _price_fleet(search: ResourceSearch) -> tuple[PriceSearch | None, Floats]:
-    """Search for prices by energy alone, and see what they prove with recorders.
+def _go_on(other: _FleetPricing | ProgramSearch, pool: PlanPool) -> None:
+    other.turn()
+    pool.merge()
+
+
+class _FleetPricing:
+    """Prices by energy alone, and what they prove with recorders.
 
     Of what recorders take from the bound the exact programmes find nearly all at these prices;
-    to search with them takes fifty times as long, and brings next to nothing. Returns the search
-    that has seen this, if it has come to that, and which tasks the relaxed plans took.
+    to search with them takes fifty times as long, and brings next to nothing.
+
+    Attributes
+    ----------
+    prices
+        The search that has seen what they prove, once it has come to that.
+    usage
+        How many relaxed plans took each opportunity. Shape ``(n,)``.
+    steps_beside
+        How many steps of the search for plans take about as long as a turn.
     """
-    energy = EnergyPrices(search.problem, search.prices(), _FLEET_ROUNDS, search.seed)
-    while not (energy.is_settled or search.is_done):
-        energy.improve(_ROUNDS_AT_A_TIME, search.budget.stop)
-        search.report("prices")
-    if search.is_done:
-        return None, energy.usage
-    prices = PriceSearch(
-        search.problem, min(search.bound.value, energy.value), energy.prices, search.budget.stop
-    )
-    prices.learn(search.plan)
-    search.price(prices, _FLEET_STEPS)
-    return prices, energy.usage
+
+    def __init__(self, search: ResourceSearch) -> None:
+        self._search = search
+        self.steps_beside = _BESIDE_PRICES[search.is_fleet]
+        self._energy = EnergyPrices(search.problem, search.prices(), _FLEET_ROUNDS, search.seed)
+        self._num_steps = 0
+        self.prices: PriceSearch | None = None
+
+    @property
+    def usage(self) -> Floats:
+        return self._energy.usage
+
+    @property
+    def is_settled(self) -> bool:
+        return self._num_steps >= _FLEET_STEPS
+
+    def turn(self) -> None:
+        """Ask by energy alone some more, or prove something."""
+        search, energy = self._search, self._energy
+        if not energy.is_settled:
+            energy.improve(_ROUNDS_AT_A_TIME, search.budget.stop)
+            return
+        if self.prices is None:
+            self.prices = PriceSearch(
+                search.problem,
+                min(search.bound.value, energy.value),
+                energy.prices,
+                search.budget.stop,
+            )
+            self.prices.learn(search.plan)
+        search.price(self.prices, 1)
+        self._num_steps += 1
 
 
 def _close_in(search: ResourceSearch, choices: ChoiceSearch) -> None:

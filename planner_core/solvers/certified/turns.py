@@ -17,7 +17,7 @@ from planner_core.solvers.certified.resource_windows import ResourceWindows
 
 _MOVES: Final = 250  # of the window search in a step, for each satellite
 _FIRST_STEPS: Final = 12  # of the window search alone, at each start
-_STALLED: Final = 18  # steps that lead nowhere, before another start
+_STALLED: Final = 9  # steps that lead nowhere, before another start
 _STARTS: Final = 1000  # no search has more
 
 
@@ -32,6 +32,11 @@ class TurnSearch:
         The plan to begin with, and to begin with again where a search leads nowhere.
     unit
         Of worth, as the exact programmes count it.
+
+    Attributes
+    ----------
+    ended
+        What each start but the last has led to.
     """
 
     def __init__(self, problem: Problem, start: Plan, unit: float, budget: Budget, seed: int):
@@ -39,6 +44,7 @@ class TurnSearch:
         self._num_satellites = sum(len(s) > 0 for s in problem.satellites)
         self._choices = ChoiceSearch(problem, unit, seed, budget.stop)
         self._seed, self._num_starts, self._idle_steps = seed, 0, _STALLED
+        self.ended: list[Plan] = []
 
     def turn(self, num_steps: int) -> None:
         """Let each search go on from where the other got to, or begin afresh where both stall."""
@@ -52,6 +58,8 @@ class TurnSearch:
             self._idle_steps = 0 if self._windows.reward > before else self._idle_steps + 1
 
     def _begin(self) -> None:
+        if self._num_starts:
+            self.ended.append(self.plan)
         # A seed of its own for each start of each search.
         self._windows = ResourceWindows(self._problem, self._seed + _STARTS * self._num_starts)
         self._windows.adopt(self._start)
