@@ -13,7 +13,7 @@ from planner_core.plan import Plan
 from planner_core.problem import CONTACT, Problem
 from planner_core.solvers import Milp
 from planner_core.solvers.base import Budget
-from planner_core.solvers.certified.contact_sets import FixedContacts
+from planner_core.solvers.programs.contact_sets import FixedContacts
 from planner_core.timeline import replay
 from tests.planner_core.problems import random_problem
 

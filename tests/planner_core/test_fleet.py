@@ -17,6 +17,7 @@ from planner_core.solvers import Certified, Milp
 from planner_core.solvers.base import Budget, Termination
 from planner_core.solvers.fleet.search import FleetSearch
 from planner_core.solvers.fleet.start import priced_start
+from planner_core.solvers.programs.plan_pool import PlanPool
 from planner_core.timeline import replay
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import random_problem
@@ -81,6 +82,22 @@ def test_the_plan_is_the_same_however_many_threads_work(seed: int, slew_rate_deg
     assert timeline.reward == alone.reward > 0.0
     assert together.plan == alone.plan
     assert together.bound == alone.bound
+
+
+def test_what_streams_are_worth_together_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = fleet(3)
+    best = Certified().solve(problem, Budget(), 0).plan
+    known: list[int] = []
+
+    def merge(pool: PlanPool) -> None:
+        known.append(len(pool._worth))
+        pool.add(best)
+
+    monkeypatch.setattr(PlanPool, "merge", merge)
+    search = FleetSearch(problem, Budget(), 0, 0.0)
+    search.search(20.0)
+    assert known[0] == 2  # a plan of each stream
+    assert search.reward >= replay(problem, best).reward
 
 
 def test_a_large_fleet_is_planned_in_one_stream(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,9 +15,9 @@ from planner_core.problem import COLLECT, Problem
 from planner_core.restrict import restricted
 from planner_core.solvers import Rule
 from planner_core.solvers.base import Budget
-from planner_core.solvers.certified import plan_pool
-from planner_core.solvers.certified.plan_pool import PlanPool, rows_of
 from planner_core.solvers.certified.resource_windows import ResourceWindows
+from planner_core.solvers.programs import plan_pool
+from planner_core.solvers.programs.plan_pool import PlanPool, rows_of
 from planner_core.timeline import replay
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import TIGHT, random_problem, varied_problem

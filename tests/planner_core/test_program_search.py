@@ -18,10 +18,10 @@ from planner_core.problem import CONTACT, Problem
 from planner_core.solvers import Rule
 from planner_core.solvers.base import Budget
 from planner_core.solvers.certified import program_search
-from planner_core.solvers.certified.contact_sets import FixedContacts
-from planner_core.solvers.certified.plan_pool import PlanPool, rows_of
 from planner_core.solvers.certified.program_search import ProgramSearch
 from planner_core.solvers.certified.resource_prices import PriceSearch
+from planner_core.solvers.programs.contact_sets import FixedContacts
+from planner_core.solvers.programs.plan_pool import PlanPool, rows_of
 from planner_core.timeline import replay
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import TIGHT, random_problem, varied_problem

@@ -19,9 +19,9 @@ from planner_core.bounds.resource_bound import leaving_whole_units, whole_worth
 from planner_core.bounds.resource_network import Network
 from planner_core.problem import CONTACT, Bools, Floats, Ints, Problem
 from planner_core.solvers.base import Budget
-from planner_core.solvers.certified.contact_sets import FixedContacts
-from planner_core.solvers.certified.plan_pool import PlanPool, Rows, rows_of
 from planner_core.solvers.certified.resource_prices import PriceSearch
+from planner_core.solvers.programs.contact_sets import FixedContacts
+from planner_core.solvers.programs.plan_pool import PlanPool, Rows, rows_of
 from planner_core.solvers.sequential import blocked_rows
 
 _BEST: Final = 2  # of those sets that are planned with

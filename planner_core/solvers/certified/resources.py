@@ -24,14 +24,14 @@ from planner_core.plan import Plan
 from planner_core.problem import CONTACT, Bools, Floats, Problem
 from planner_core.solvers.base import Budget, Progress, Solution
 from planner_core.solvers.certified.choices import ChoiceSearch
-from planner_core.solvers.certified.contact_sets import FixedContacts, Relaxation
-from planner_core.solvers.certified.plan_pool import PlanPool
 from planner_core.solvers.certified.program_search import ProgramSearch
 from planner_core.solvers.certified.resource_prices import PriceSearch
 from planner_core.solvers.certified.turns import TurnSearch
 from planner_core.solvers.fleet.search import solve_without_resources
 from planner_core.solvers.free.search import TOLERANCE, Effort
 from planner_core.solvers.milp import Milp
+from planner_core.solvers.programs.contact_sets import FixedContacts, Relaxation
+from planner_core.solvers.programs.plan_pool import PlanPool
 from planner_core.solvers.rule import Rule
 from planner_core.timeline import replay
 

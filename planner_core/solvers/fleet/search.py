@@ -2,13 +2,14 @@
 
 A high price says that a target is easily had: several satellites would take it. A first plan at
 these prices gives each satellite about its share. Then the window search tries for what has a
-price and is not imaged. What is small enough goes on to cutting planes and HiGHS, as a single
-satellite does.
+price and is not imaged, and what its streams come to is merged. What is small enough goes on to
+cutting planes and HiGHS, as a single satellite does.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Final
 
@@ -26,6 +27,7 @@ from planner_core.solvers.fleet.start import priced_start
 from planner_core.solvers.fleet.stream import WindowStream
 from planner_core.solvers.free.search import TOLERANCE, Effort, FreeSearch, close_in, solve_free
 from planner_core.solvers.lns import WindowSearch, num_choices
+from planner_core.solvers.programs.plan_pool import PlanPool
 from planner_core.solvers.rule import Rule
 from planner_core.timeline import replay
 
@@ -37,6 +39,7 @@ _EPOCHS: Final = (250, 500)  # at least and at most
 _STREAMS: Final = 2  # of a small fleet, that a plan does not hang on one start
 _PATIENCE: Final = 2.0  # moves for each access without any gain before a plan is shaken
 _MOVES_AT_A_TIME: Final = 500
+_MERGED_EVERY: Final = 4  # times of these
 
 
 class FleetSearch:
@@ -140,19 +143,30 @@ class FleetSearch:
             for number in range(num_streams)
         ]  # fmt: skip
         left = int(moves_per_task * num_accesses)
-        with ThreadPoolExecutor(self.budget.num_threads) as pool:
+        pool = PlanPool(self.problem, self.budget, self._seed)
+        with ThreadPoolExecutor(self.budget.num_threads) as threads:
             while left > 0 and not self.budget.is_spent():
                 num_moves = min(left, _MOVES_AT_A_TIME)
-                going = [pool.submit(s.go_on, num_moves, self.budget) for s in streams]
+                going = [threads.submit(s.go_on, num_moves, self.budget) for s in streams]
                 for one in going:
                     one.result()
                 left -= num_moves
-                best = max(stream.reward for stream in streams)
+                if num_streams > 1 and left // _MOVES_AT_A_TIME % _MERGED_EVERY == 0:
+                    self._merge(pool, streams)
+                best = max(pool.reward, *(stream.reward for stream in streams))
                 self.report("window search", best)
                 if self._is_within(self.gap, best):
                     break
+        for plan in (pool.plan, *(stream.plan for stream in streams)):
+            self.offer(plan)
+
+    def _merge(self, pool: PlanPool, streams: Sequence[WindowStream]) -> None:
+        """Seek what the plans of the streams are worth together."""
         for stream in streams:
-            self.offer(stream.plan)
+            for plan in (*stream.ended, stream.plan):
+                pool.add(plan.with_kept(self.problem))
+            stream.ended.clear()
+        pool.merge()
 
     def windows(self, number: int) -> WindowSearch:
         """Return a window search from a start of its own, the first from the best plan."""

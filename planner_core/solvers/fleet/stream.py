@@ -26,12 +26,15 @@ class WindowStream:
     ----------
     plan, reward
         The best plan so far.
+    ended
+        Where moves led nowhere for long, what they had led to.
     """
 
     def __init__(self, windows: WindowSearch, network: Network, seed: int, patience: float) -> None:
         self._windows, self._network, self._patience = windows, network, patience
         self._rng = np.random.default_rng(seed)
         self.plan, self.reward = windows.plan, windows.reward
+        self.ended: list[Plan] = []
         self._highest, self._since = self.reward, 0
 
     def go_on(self, num_moves: int, budget: Budget) -> None:
@@ -44,6 +47,7 @@ class WindowStream:
         if windows.reward > self.reward:
             self.plan, self.reward = windows.plan, windows.reward
         if self._since >= self._patience:
+            self.ended.append(windows.plan)
             if windows.reward == self.reward:
                 self.plan = windows.plan
             windows.adopt(self._shaken())

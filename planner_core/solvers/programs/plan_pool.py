@@ -16,7 +16,7 @@ from planner_core.bounds.bound import reward_unit
 from planner_core.plan import Plan
 from planner_core.problem import CONTACT, Problem
 from planner_core.solvers.base import Budget
-from planner_core.solvers.certified.contact_sets import FixedContacts
+from planner_core.solvers.programs.contact_sets import FixedContacts
 from planner_core.timeline import replay
 
 Rows = tuple[int, ...]
