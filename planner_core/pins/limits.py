@@ -5,7 +5,7 @@ Contacts alone decide it: an image takes energy and memory and gives none back.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -15,27 +15,32 @@ from planner_core.comparable import Order, comes_before, order_of, transitive_cl
 from planner_core.errors import InvalidScenario
 from planner_core.jit import kernel
 from planner_core.plan import Plan
-from planner_core.problem import Bytes, Floats, Kept, Longs, Pinned, Problem
+from planner_core.problem import Bools, Floats, Kept, Longs, Pinned, Problem
 from planner_core.timeline import replay
 from planner_core.track import NO_TASK, STRICT, Track, compile_track, take
 
-_MAX_STATES: Final = (
-    200  # after each task; beyond, neighbours count as one that is at least as good
-)
+# After each task; of more, neighbours count as one that is as good as each.
+_MAX_STATES: Final = 200
 
 
-def check_limits(problem: Problem, whole: Problem, ruled_out: Iterable[tuple[str, Longs]]) -> None:
+def check_limits(
+    problem: Problem,
+    ruled_out: Sequence[tuple[str, Longs]],
+    kept: Sequence[tuple[Kept, Bools]],
+) -> None:
     """Raise where battery or recorder cannot bear what one satellite must or must not do.
 
-    Contacts may help; that satellites share antennas is left out. Where no plan keeps the limits
-    without pins either, these are not to blame.
+    Contacts may help; that satellites share antennas is left out, but for contacts that are kept.
+    Where no plan keeps the limits without pins either, these are not to blame.
 
     Parameters
     ----------
     problem
-        What the pins leave of ``whole``.
+        With all its opportunities.
     ruled_out
-        Pins, and the opportunities of ``whole`` that each rules out.
+        Pins, and the opportunities that each rules out.
+    kept
+        Actions to be kept, and what cannot stand beside each. Shape ``(n,)``.
 
     Raises
     ------
@@ -44,54 +49,60 @@ def check_limits(problem: Problem, whole: Problem, ruled_out: Iterable[tuple[str
     """
     if not problem.use_resources:
         return
+    kept = sorted(kept, key=lambda pair: pair[0].row)
     for index, satellite in enumerate(problem.satellites):
         own = set(satellite.rows.tolist())
-        kept = sorted((k for k in problem.pinned.kept if k.row in own), key=lambda k: k.row)
-        if can_keep(problem, index, kept):
+        must = [one for one, _ in kept if one.row in own]
+        missing = np.zeros(len(problem.opportunities), dtype=np.bool_)
+        for _, rows in ruled_out:
+            missing[rows] = True
+        for _, excluded in kept:
+            missing |= excluded
+        if can_keep(problem, index, must, missing):
             continue
-        if can_keep(problem, index, []):
-            number = next(
-                n for n in range(1, len(kept) + 1) if not can_keep(problem, index, kept[:n])
-            )
-            raise InvalidScenario(
-                "pin_breaks_limits",
-                "With it and the kept actions before it no plan keeps the limits: "
-                + _what_breaks(problem, kept[:number]),
-                pointer=kept[number - 1].pointer,
-            )
-        missing = np.zeros(len(whole.satellites[index]), dtype=np.uint8)
-        is_to_blame = can_keep(whole, index, [], missing)
+        missing[:] = False
+        if not can_keep(problem, index, [], missing):
+            continue
         for pointer, rows in ruled_out:
-            missing[np.isin(whole.satellites[index].rows, rows)] = 1
-            if is_to_blame and not can_keep(whole, index, [], missing):
+            missing[rows] = True
+            if not can_keep(problem, index, [], missing):
                 raise InvalidScenario(
                     "pin_breaks_limits",
                     "Without the contacts that it and the pins before it rule out no plan keeps "
                     f"the limits: {_what_breaks(problem, [])}",
                     pointer=pointer,
                 )
+        must = []
+        for one, excluded in kept:
+            missing |= excluded
+            must += [one] if one.row in own else []
+            if not can_keep(problem, index, must, missing):
+                raise InvalidScenario(
+                    "pin_breaks_limits",
+                    "With it and the kept actions before it no plan keeps the limits: "
+                    + _what_breaks(problem, must),
+                    pointer=one.pointer,
+                )
 
 
-def _what_breaks(problem: Problem, kept: list[Kept]) -> str:
+def _what_breaks(problem: Problem, kept: Sequence[Kept]) -> str:
     alone = replace(problem, pinned=Pinned())
     timeline = replay(alone, Plan.of(problem, [k.row for k in kept]))
     broken = [v for v in timeline.violations if v.code in ("battery", "recorder")]
     return broken[0].detail if broken else "Battery or recorder would reach its limit."
 
 
-def can_keep(problem: Problem, index: int, kept: list[Kept], missing: Bytes | None = None) -> bool:
+def can_keep(problem: Problem, index: int, kept: Sequence[Kept], missing: Bools) -> bool:
     """Return whether a satellite may keep the limits by these and contacts; False is proven.
 
     Parameters
     ----------
     missing
-        Its tasks that are out of the question. Shape ``(m,)``.
+        Opportunities that are out of the question. Shape ``(n,)``.
     """
     satellite = problem.satellites[index]
     trial = replace(problem, pinned=Pinned(kept=tuple(kept)))
-    if missing is None:
-        missing = np.zeros(len(satellite), dtype=np.uint8)
-    track = compile_track(trial, satellite, missing)
+    track = compile_track(trial, satellite, missing[satellite.rows].astype(np.uint8))
     if track.is_guarded:
         return True
     return _has_way(track, order_of(transitive_closure(problem, satellite)))

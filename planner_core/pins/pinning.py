@@ -173,7 +173,7 @@ def apply_pins(problem: Problem, pinned: Pinned) -> Problem:
         ),
         target_access=_access_left(problem, part),
     )
-    check_limits(part, whole, _pins_that_rule_out(problem, pinned))
+    check_limits(problem, list(_pins_that_rule_out(problem, pinned)), beside)
     return part
 
 

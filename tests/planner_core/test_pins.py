@@ -209,6 +209,27 @@ def test_contacts_ruled_out_are_refused_exactly_where_no_plan_is_left(
         assert fault.pointer == [*names, block.pointer][has_plan.index(False) - 1]
 
 
+@settings(max_examples=150, deadline=None)
+@given(seed=SEEDS, dynamics=DYNAMICS, num_kept=st.integers(0, 3))
+def test_pins_are_refused_exactly_where_no_plan_honours_them(
+    seed: int, dynamics: Dynamics, num_kept: int
+) -> None:
+    """What is kept may exclude the contact without which a recorder is full."""
+    rng = np.random.default_rng(seed)
+    chatty = replace(TIGHT, telemetry_per_s=float(rng.uniform(3e-4, 1.2e-3)))
+    whole = random_problem(
+        seed, dynamics=dynamics, resources=chatty, num_collects=4, num_contacts=4, num_targets=4
+    )
+    pinned = pinned_at_random(whole, seed, num_kept)
+    _, fault = pinned_or_refused(whole, pinned)
+    has_plan = best_plan(replace(whole, pinned=pinned)) is not None
+    event(fault.code if fault else "borne" if has_plan else "hopeless before")
+    if fault is None:
+        assert has_plan or best_plan(whole) is None
+    else:
+        assert not has_plan or "another image" in fault.detail
+
+
 def test_states_that_count_as_one_are_no_worse_than_each() -> None:
     rng = np.random.default_rng(3)
     found = rng.uniform(size=(5000, 2))
