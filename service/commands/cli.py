@@ -104,7 +104,7 @@ def _command(
     commands: Any,
     name: str,
     run: Command | None,
-    help: str,  # noqa: A002
+    help: str,  # noqa: A002 - as argparse names it
 ) -> argparse.ArgumentParser:
     parser: argparse.ArgumentParser = commands.add_parser(name, help=help, description=help)
     parser.set_defaults(command=run)

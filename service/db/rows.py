@@ -39,7 +39,7 @@ class UtcDateTime(sa.TypeDecorator[datetime]):
 class Row(DeclarativeBase):
     """Base of all rows."""
 
-    type_annotation_map = {Json: sa.JSON, datetime: UtcDateTime, str: sa.Text}  # noqa: RUF012
+    type_annotation_map = {Json: sa.JSON, datetime: UtcDateTime, str: sa.Text}  # noqa: RUF012 - as SQLAlchemy reads it
 
 
 class SatelliteRow(Row):
