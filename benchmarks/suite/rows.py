@@ -58,7 +58,7 @@ class Row:
 
 def row_of(case: Case, result: Result | str) -> Row:
     """Return the line of a case: its result, or how it failed."""
-    told = {"revision": revision(), "date": f"{datetime.now(UTC):%Y-%m-%d}"}
+    told: dict[str, Any] = {"revision": revision(), "date": f"{datetime.now(UTC):%Y-%m-%d}"}
     if isinstance(result, str):
         return Row(**asdict(case), **told, failure=result)
     is_proven = math.isfinite(result.bound)
