@@ -17,10 +17,10 @@ from numba.core import event
 from benchmarks.cpu_budget import CpuBudget
 from benchmarks.missions import problem_of
 from benchmarks.suite.families import FAMILIES, scenario_of, warm_up_of
+from planner_core.budget import Progress
 from planner_core.problem import Problem
-from planner_core.solvers import Certified
-from planner_core.solvers.base import Progress
-from planner_core.timeline import replay
+from planner_core.referee.replay import replay
+from planner_core.solvers.registry import Certified
 
 LEVELS: Final = (0.02, 0.01, 0.005, 0.0)
 """Gaps of which the suite notes when they were first reached."""

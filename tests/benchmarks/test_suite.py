@@ -12,7 +12,7 @@ from benchmarks.suite import rows
 from benchmarks.suite.compare import line_of, markdown
 from benchmarks.suite.engine import Case, Curve, Result, run_case
 from benchmarks.suite.families import FAMILIES, Family, scenario_of, warm_up_of
-from planner_core.solvers.base import Progress
+from planner_core.budget import Progress
 
 CASE = Case(family="paper-200", draw=0, seed=0, budget_s=5.0)
 RESULT = Result(
