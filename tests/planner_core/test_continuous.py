@@ -42,7 +42,7 @@ def best_reward(problem: Problem) -> float:
     It turns faster than its lines of sight, so each task is best begun as early as it can be.
     """
     spans, view = spans_of(problem, 0), view_of(problem, 0)
-    reward = problem.target_reward
+    reward = problem.best_worth
     best = 0.0
 
     def go_on(last: int, start_s: float, taken: frozenset[int]) -> None:
@@ -102,7 +102,7 @@ def test_whatever_the_prices_the_bound_is_not_below_the_best_plan(
     assert dual is not None
     rng = np.random.default_rng(seed)
     for share in (0.0, 0.3, 1.0):
-        prices = problem.target_reward * np.clip(rng.normal(share, 0.3, 6), 0.0, 1.0)
+        prices = problem.best_worth * np.clip(rng.normal(share, 0.3, 6), 0.0, 1.0)
         assert dual.at(prices)[0] >= best - 1e-9
     solution = solve_continuous(problem, Budget(), 0, 0.0, 20.0)
     reward = replay(problem, solution.plan).reward

@@ -116,13 +116,14 @@ def test_prices_make_a_better_start() -> None:
     gained = 0.0
     for seed in range(10):
         problem = fleet(seed)
-        network, reward = network_of(problem), np.append(problem.target_reward, 0.0)
-        dual = IncrementalPrices(network, reward, 100, 0)
+        network, most = network_of(problem), np.append(problem.best_worth, 0.0)
+        worth = problem.worth[network.row]
+        dual = IncrementalPrices(network, worth, most, 100, 0)
         dual.improve(100, Budget().stop)
-        nothing = np.zeros(len(reward), dtype=np.bool_)
+        nothing = np.zeros(len(most), dtype=np.bool_)
         plans = [
-            Plan.of(problem, priced_start(network, reward, prices, nothing, 0))
-            for prices in (dual.prices, np.zeros(len(reward)))
+            Plan.of(problem, priced_start(network, worth, prices, nothing, 0))
+            for prices in (dual.prices, np.zeros(len(most)))
         ]
         priced, plain = (replay(problem, plan) for plan in plans)
         assert priced.is_valid
@@ -141,4 +142,4 @@ def test_who_cancels_gets_the_plan_so_far_and_its_bound() -> None:
     assert timeline.is_valid
     assert timeline.reward > 0.0
     assert solution.bound is not None
-    assert timeline.reward <= solution.bound <= problem.target_reward.sum()
+    assert timeline.reward <= solution.bound <= problem.best_worth.sum()

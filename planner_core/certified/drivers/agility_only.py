@@ -93,10 +93,8 @@ class FreeSearch:
         self.unit = reward_unit(problem)
         self.plan = Plan().with_kept(problem)
         self.reward = replay(problem, self.plan).reward
-        offered, _ = problem.target_opportunities
-        targets = np.unique(problem.opportunities.place[offered])
-        self.bound = float(problem.target_reward[targets].sum())
-        self.steps = [Multipliers(prices=problem.target_reward.astype(np.float64))]
+        self.bound = float(problem.best_worth.sum())
+        self.steps = [Multipliers(prices=problem.best_worth)]
         self.log: str | None = None
         self.tree: Refutation | None = None
         self.num_parts = 0
@@ -302,7 +300,7 @@ class FreeSearch:
             # Then a plan may need tasks that it is not paid for.
             part = restricted(self.problem, self._rows[is_open])
             program = plan_program(part, "antichain", 0.0).program
-            scale = float(self.problem.target_reward.max())
+            scale = float(self.problem.worth.max())
             program.worth = [worth / scale for worth in program.worth]
         prover = self._prover(program, is_open, amount)
         plan, bound = prover.prove(0.0, self._watch)

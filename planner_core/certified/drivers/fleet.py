@@ -67,9 +67,10 @@ class FleetSearch:
         self._unit = reward_unit(problem)
         self._seed = seed
         self._network = network_of(problem)
-        self._worth = np.append(problem.target_reward, 0.0)
+        self._worth = problem.worth[self._network.row]
+        most = np.append(problem.best_worth, 0.0)
         num_epochs = int(np.clip(default_steps(self._network), *_EPOCHS))
-        self._dual = IncrementalPrices(self._network, self._worth, num_epochs, seed)
+        self._dual = IncrementalPrices(self._network, self._worth, most, num_epochs, seed)
 
     @property
     def prices(self) -> Floats:
@@ -135,7 +136,7 @@ class FleetSearch:
 
     def _priced_plan(self, seed: int) -> Plan:
         table, kept = self.problem.opportunities, self.problem.kept_rows
-        taken = np.zeros(len(self._worth), dtype=np.bool_)
+        taken = np.zeros(len(self.problem.target_ids) + 1, dtype=np.bool_)
         taken[table.place[kept[table.kind[kept] == COLLECT]]] = True
         rows = priced_start(self._network, self._worth, self._dual.prices, taken, seed)
         return Plan.of(self.problem, rows).with_kept(self.problem)
@@ -177,7 +178,7 @@ class FleetSearch:
 
     def windows(self, number: int) -> WindowSearch:
         """Return a window search from a start of its own, the first from the best plan."""
-        share = np.minimum(self.prices / np.maximum(self.problem.target_reward, 1e-300), 1.0)
+        share = np.minimum(self.prices / np.maximum(self.problem.best_worth, 1e-300), 1.0)
         is_small = len(self.problem.opportunities) <= _SMALL
         preference = None if is_small else 1.0 + _PREFERENCE * (0.5 - share)
         seed = self._seed + number

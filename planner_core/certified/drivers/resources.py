@@ -76,12 +76,12 @@ class ResourceSearch:
         self.plan = Plan()
         timeline = replay(problem, self.plan)
         self.is_valid, self.reward = timeline.is_valid, timeline.reward
-        self.bound = Bound(value=float(problem.target_reward.sum()), proof="lagrangian")
+        self.bound = Bound(value=float(problem.best_worth.sum()), proof="lagrangian")
         self._relaxed: dict[tuple[int, ...], Relaxation] = {}
         # By contacts and number of tasks offered: what no plan was found to be worth.
         self._missed: dict[tuple[tuple[int, ...], int], float] = {}
         self._priced, self._refined = np.inf, np.inf  # bounds before they were rounded
-        self._one = float(problem.target_reward.mean()) if len(problem.target_ids) else 1.0
+        self._one = problem.typical_worth
 
     @property
     def is_optimal(self) -> bool:
