@@ -8,7 +8,7 @@ from typing import Final, Literal
 import numpy as np
 
 from planner_core.certified.proofs.certificate import Certificate
-from planner_core.problem import Floats, Problem
+from planner_core.problem import COLLECT, Floats, Problem
 
 Proof = Literal["lagrangian", "milp", "dp", "totals"]
 
@@ -62,3 +62,12 @@ def rounded_bound(problem: Problem, value: float, reward: float) -> float:
     if unit > 0.0:
         safe = float(np.floor((safe + _ROUNDING) / unit) * unit)
     return max(safe, reward)
+
+
+def accessible(problem: Problem) -> Bound:
+    """Return the bound that every accessible target is imaged: prices of the whole reward."""
+    table = problem.opportunities
+    targets = np.unique(table.place[table.kind == COLLECT])
+    value = float(problem.target_reward[targets].sum())
+    prices = problem.target_reward.astype(np.float64)
+    return Bound(value=rounded_bound(problem, value, 0.0), proof="lagrangian", prices=prices)
