@@ -11,7 +11,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget, Progress, Termination
-from planner_core.certified.drivers.agility_only import TOLERANCE
+from planner_core.certified.incumbent import TOLERANCE
 from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.proofs.certificate import (
     Certificate,

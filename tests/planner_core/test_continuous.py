@@ -13,7 +13,8 @@ from planner_core.budget import Budget, Termination
 from planner_core.certified.drivers.continuous import solve_continuous, with_own_starts
 from planner_core.certified.lns.continuous_search import ContinuousSearch
 from planner_core.certified.proofs import documents as proofs
-from planner_core.certified.proofs.continuous import ContinuousDual, accessible, continuous_value
+from planner_core.certified.proofs.bound import accessible
+from planner_core.certified.proofs.continuous import ContinuousDual, continuous_value
 from planner_core.domain import Agility
 from planner_core.precedence.earliest_starts import follows_at_s
 from planner_core.precedence.time_windows import spans_of, view_of
