@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.bounds.lagrangian import lagrangian_bound, lagrangian_value
@@ -13,13 +13,14 @@ from planner_core.domain import Agility
 from planner_core.solvers import ForwardSearch
 from planner_core.solvers.base import Budget
 from planner_core.timeline import replay
+from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import random_problem
 
 SEEDS = st.integers(0, 10**6)
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100)
 @given(
     seed=SEEDS,
     use_resources=st.booleans(),
@@ -40,7 +41,7 @@ def test_no_plan_beats_the_bound(
         assert lagrangian_value(problem, prices)[0] >= best - 1e-9
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(seed=SEEDS)
 def test_a_slow_satellite_may_turn_by_way_of_tasks_that_are_worth_nothing(seed: int) -> None:
     problem = random_problem(
@@ -55,7 +56,7 @@ def test_a_slow_satellite_may_turn_by_way_of_tasks_that_are_worth_nothing(seed: 
         assert lagrangian_value(problem, prices)[0] >= best - 1e-9
 
 
-@settings(max_examples=40, deadline=None)
+@examples(40)
 @given(seed=SEEDS)
 def test_the_stored_prices_prove_the_bound_again(seed: int) -> None:
     problem = random_problem(seed, num_collects=60, num_targets=20, use_resources=False)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.bounds.bound import Bound, rounded_bound
@@ -17,6 +17,7 @@ from planner_core.bounds.prices import improve_prices
 from planner_core.bounds.proofs import from_json, is_proven, to_json
 from planner_core.domain import Agility
 from planner_core.problem import Floats, Problem
+from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import random_problem
 
@@ -43,7 +44,7 @@ def best_known(problem: Problem) -> float:
     return improve_prices(network_of(problem), reward, 0.5 * reward, 0.0, 3000, GO_ON)
 
 
-@settings(max_examples=80, deadline=None)
+@examples(80)
 @given(
     seed=SEEDS, num_satellites=st.integers(2, 3), has_rewards=st.booleans(),
     slew_rate_deg_s=st.sampled_from([1.0, 0.3]), num_epochs=st.sampled_from([0, 1, 7, 60]),

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.access import find_accesses
@@ -22,6 +22,7 @@ from planner_core.limits import Limits
 from planner_core.orbits.ephemeris import propagate
 from planner_core.orbits.places import Places
 from tests.brute_force_windows import BruteForce, Comparison
+from tests.examples import examples
 from tests.geometry import Ground, SkyfieldTable, hours, off_nadir_deg, orbit, satellite
 
 
@@ -112,7 +113,7 @@ def test_orbits_of_every_regime(regime: str, sensor: Sensor) -> None:
         assert errors_ms.max() <= 20.0
 
 
-@settings(max_examples=8, deadline=None)
+@examples(8)
 @given(
     st.floats(11.5, 16.0),
     st.floats(0.0, 0.02),

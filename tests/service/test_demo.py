@@ -15,6 +15,8 @@ import pytest
 
 from planner_core.solvers import SOLVERS
 
+pytestmark = pytest.mark.full_size
+
 WITHIN_S = 60.0
 
 

@@ -43,7 +43,7 @@ def _output(page: str, tmp_path: Path) -> str:
     (tmp_path / "service").symlink_to(ROOT / "service")
     for name, lines in OWN_FILES.items():
         (tmp_path / name).write_text("\n".join(lines) + "\n", encoding="utf-8")
-    with serving(tmp_path, "serve") as (_, line):
+    with serving(tmp_path, "serve", "--workers", "1") as (_, line):
         ran = subprocess.run(
             ["bash", "-eu", "-c", _walk(page, line.split()[-1])],
             cwd=tmp_path,

@@ -208,7 +208,7 @@ def jobs(template_url: str, tmp_path: Path) -> Iterator[Jobs]:
 def client(jobs: Jobs) -> Iterator[httpx.Client]:
     """A client of a server that sends jobs to the queue, with nobody to run them."""
     app = create_app(jobs.settings, jobs.queue)
-    with serve(app) as address, checked_client(app, address) as client:
+    with serve(app) as address, checked_client(address) as client:
         yield client
 
 
@@ -222,14 +222,14 @@ def workers(jobs: Jobs) -> Iterator[Workers]:
         process.wait()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def mission(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Mission]:
-    """A whole service with a worker, for all tests."""
+    """A whole service with a worker, for all tests of these folders."""
     with running(tmp_path_factory.mktemp("mission")) as mission:
         yield mission
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def planned(mission: Mission) -> Document:
     """A job that has planned the small mission; nobody changes it."""
     return mission.plan(small_mission())
