@@ -21,9 +21,16 @@ from typing import Any
 import numpy as np
 from sgp4.exporter import export_tle
 
-from planner_core.access import find_accesses
-from planner_core.domain import Horizon, OrbitElements, Resources, Satellite, Sensor, Target
-from planner_core.limits import Limits, TargetLimits
+from planner_core.access.limits import Limits, TargetLimits
+from planner_core.access.windows import find_accesses
+from planner_core.domain import (
+    Horizon,
+    OrbitElements,
+    Resources,
+    Satellite,
+    Sensor,
+    Target,
+)
 from planner_core.orbits.ephemeris import propagate
 from planner_core.orbits.places import Places
 from planner_core.orbits.sgp4_record import satrec

@@ -28,8 +28,8 @@ import numpy as np
 
 from benchmarks.cpu_budget import CpuBudget
 from benchmarks.missions import paper_scenario, problem_of
+from planner_core.budget import Budget, Progress
 from planner_core.problem import COLLECT, Problem
-from planner_core.solvers.base import Budget, Progress
 
 LIMIT_S = 60.0
 NEAR = 0.005  # of the bound
@@ -53,8 +53,8 @@ def _budget(watch: Callable[[Progress], None] | None = None) -> Budget:
 
 def certified(problem: Problem) -> dict[str, float]:
     """Return reward and bound of our solver, and when they were near each other."""
-    from planner_core.solvers.certified import Certified
-    from planner_core.timeline import replay
+    from planner_core.certified.solver import Certified
+    from planner_core.referee.replay import replay
 
     began, near_s = time.process_time(), []
 
@@ -73,8 +73,8 @@ def certified(problem: Problem) -> dict[str, float]:
 
 def pairwise(problem: Problem) -> dict[str, float]:
     """Return reward and bound of HiGHS on the paper's program, as it comes."""
-    from planner_core.solvers.programs.highs import Engine
-    from planner_core.solvers.programs.model import plan_program
+    from planner_core.certified.mip.highs import Engine
+    from planner_core.certified.mip.model import plan_program
 
     program = plan_program(problem, "pairwise", 0.0).program
     engine = Engine(program, _budget(), 0, is_chained=False)
@@ -89,8 +89,8 @@ def pairwise(problem: Problem) -> dict[str, float]:
 
 def groups_of(problem: Problem) -> dict[str, Any]:
     """Return the program for CP-SAT: a group for each set of tasks that exclude each other."""
-    from planner_core.comparable import order_of
-    from planner_core.solvers.programs.antichains import antichain_cover
+    from planner_core.certified.mip.clique_cuts import antichain_cover
+    from planner_core.precedence.relation import order_of
 
     table = problem.opportunities
     rows, offsets = problem.target_opportunities

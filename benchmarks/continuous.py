@@ -11,9 +11,9 @@ import time
 from dataclasses import replace
 
 from benchmarks.missions import paper_scenario, problem_of
-from planner_core.solvers import Certified
-from planner_core.solvers.base import Budget, Progress
-from planner_core.timeline import replay
+from planner_core.budget import Budget, Progress
+from planner_core.referee.replay import replay
+from planner_core.solvers.registry import Certified
 
 _CASES = ((500, 0), (1000, 0), (1000, 1), (2000, 0))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 
-from planner_core.solvers.base import Budget
+from planner_core.budget import Budget
 
 _PACE_FROM_S = 0.05  # CPU seconds; before that the pace is a guess
 

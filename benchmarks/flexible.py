@@ -38,9 +38,9 @@ def mission(num_targets: int, draw: int, spacing_s: float | None) -> Problem:
 
 def one(num_targets: int, draw: int, spacing_s: float | None) -> dict[str, Any]:
     """Return what one solve came to, after a warm-up."""
-    from planner_core.solvers import Certified, ForwardSearch, Mcts
-    from planner_core.solvers.base import Budget
-    from planner_core.timeline import replay
+    from planner_core.budget import Budget
+    from planner_core.referee.replay import replay
+    from planner_core.solvers.registry import Certified, ForwardSearch, Mcts
 
     for warm_s in (None, 15.0):
         small = mission(WARM_UP, 99, warm_s)

@@ -10,11 +10,12 @@ import statistics
 import time
 
 from benchmarks.missions import paper_scenario, problem_of
-from planner_core.bounds.lagrangian import lagrangian_bound
+from planner_core.budget import Budget
+from planner_core.certified.proofs.lagrangian import lagrangian_bound
 from planner_core.problem import Problem
-from planner_core.solvers import ForwardSearch, Rule
-from planner_core.solvers.base import Budget, Solver
-from planner_core.timeline import replay
+from planner_core.referee.replay import replay
+from planner_core.solvers.base import Solver
+from planner_core.solvers.registry import ForwardSearch, Rule
 
 RUNS = 7
 

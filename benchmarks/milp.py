@@ -10,10 +10,11 @@ import sys
 import time
 
 from benchmarks.missions import paper_scenario, problem_of
+from planner_core.budget import Budget
 from planner_core.problem import Problem
-from planner_core.solvers import Milp
-from planner_core.solvers.base import Budget, Solution
-from planner_core.timeline import replay
+from planner_core.referee.replay import replay
+from planner_core.solvers.base import Solution
+from planner_core.solvers.registry import Milp
 
 LIMIT_S = 60.0
 

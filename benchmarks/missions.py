@@ -6,6 +6,7 @@ from datetime import UTC, datetime, timedelta
 
 import numpy as np
 
+from planner_core.budget import Budget
 from planner_core.build import build_problem, compute_opportunities
 from planner_core.domain import (
     Dynamics,
@@ -18,7 +19,6 @@ from planner_core.domain import (
     Target,
 )
 from planner_core.problem import Problem
-from planner_core.solvers.base import Budget
 from service.catalogs.wrs2 import load_wrs2_land
 
 START = datetime(2019, 1, 1, tzinfo=UTC)

@@ -14,12 +14,13 @@ from collections import Counter
 from collections.abc import Callable
 
 from benchmarks.missions import paper_scenario
+from planner_core.budget import Budget
 from planner_core.build import build_problem, compute_opportunities
 from planner_core.reasons.at_length import explain_target
 from planner_core.reasons.explain import explain
-from planner_core.solvers import ForwardSearch, Rule
-from planner_core.solvers.base import Budget, Solver
-from planner_core.timeline import replay
+from planner_core.referee.replay import replay
+from planner_core.solvers.base import Solver
+from planner_core.solvers.registry import ForwardSearch, Rule
 
 RUNS = 9
 

@@ -11,19 +11,24 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from planner_core import opportunities as tasks
-from planner_core.access import Accesses, find_accesses
-from planner_core.domain import Horizon, Satellite, Scenario, Sensor
-from planner_core.eligibility import Eligibility
+from planner_core.access import opportunities as tasks
+from planner_core.access.eligibility import Eligibility
+from planner_core.access.limits import Limits, TargetLimits
+from planner_core.access.windows import Accesses, find_accesses
+from planner_core.budget import Budget, Progress
+from planner_core.domain import (
+    Horizon,
+    Satellite,
+    Scenario,
+    Sensor,
+)
 from planner_core.errors import Cancelled, InvalidScenario
-from planner_core.limits import Limits, TargetLimits
 from planner_core.orbits import ephemeris as orbits
 from planner_core.orbits.earth_orientation import shipped
 from planner_core.orbits.eclipse import always_sunlit, sunlight
 from planner_core.orbits.ephemeris import Ephemeris, propagate
 from planner_core.orbits.places import Places, View, view
-from planner_core.pins.pinning import pinned_problem
-from planner_core.pointing import Path, Pointing
+from planner_core.pinning.pinned_problem import pinned_problem
 from planner_core.problem import (
     ACCESS_FOUND,
     ACCESS_TOO_SHORT,
@@ -39,7 +44,7 @@ from planner_core.problem import (
     Sunlight,
     build_satellite_problem,
 )
-from planner_core.solvers.base import Budget, Progress
+from planner_core.problem.pointing import Path, Pointing
 
 Longs = npt.NDArray[np.int64]
 Codes = npt.NDArray[np.int8]

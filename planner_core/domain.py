@@ -15,7 +15,7 @@ Horizon
 Epoch
     The instant an element set is given for.
 Pin
-    What a plan must hold, or must not; see ``planner_core.pins.pins``.
+    What a plan must hold, or must not; see ``planner_core.pins``.
 Off-nadir angle
     At the satellite, between nadir and the line of sight. *Elevation* is measured at the ground.
 Slew, settle
@@ -33,7 +33,7 @@ from datetime import UTC, datetime, timedelta
 from typing import Literal
 
 from planner_core.errors import InvalidScenario
-from planner_core.pins.pins import Pins
+from planner_core.pins import Pins
 
 Dynamics = Literal["physical", "paper"]
 Nadir = Literal["geodetic", "geocentric"]

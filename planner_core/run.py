@@ -8,18 +8,19 @@ import time
 from dataclasses import dataclass, replace
 from typing import Final
 
-from planner_core.bounds import continuous
-from planner_core.bounds.bound import Bound
-from planner_core.bounds.lagrangian import lagrangian_bound
-from planner_core.bounds.resource_bound import quick_bound
+from planner_core.budget import Budget, Progress, Termination
 from planner_core.build import ScenarioOpportunities, build_problem, compute_opportunities
+from planner_core.certified.drivers.continuous import with_own_starts
+from planner_core.certified.proofs import continuous
+from planner_core.certified.proofs.bound import Bound
+from planner_core.certified.proofs.lagrangian import lagrangian_bound
+from planner_core.certified.proofs.resource_bound import quick_bound
 from planner_core.domain import Scenario
 from planner_core.problem import Problem
 from planner_core.reasons.explain import explain
 from planner_core.reasons.reason import Search, TargetOutcome
-from planner_core.solvers.base import Budget, Progress, Solution, Solver, Termination
-from planner_core.solvers.continuous.solve import with_own_starts
-from planner_core.timeline import Timeline, replay
+from planner_core.referee.replay import Timeline, replay
+from planner_core.solvers.base import Solution, Solver
 
 log = logging.getLogger(__name__)
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, Final, TypeVar, cast
 
-from planner_core.solvers.base import Budget
+from planner_core.budget import Budget
 from service.api.problems import ServiceError
 
 T = TypeVar("T")

@@ -12,9 +12,9 @@ import numpy as np
 from planner_core import __version__
 from planner_core.build import view_at
 from planner_core.orbits.sgp4_record import GRAVITY
+from planner_core.problem.slew import TIME_TOLERANCE_S
+from planner_core.referee.replay import JudgedAction, Resourceline, plan_sha256
 from planner_core.run import Judged
-from planner_core.slew import TIME_TOLERANCE_S
-from planner_core.timeline import JudgedAction, Resourceline, plan_sha256
 from service.instants import instant_text
 from service.wording import Document, Wording
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from datetime import datetime
 
 import planner_core
+from planner_core.budget import Budget
 from planner_core.reasons.access_changes import OF_TARGETS, AccessChange, access_changes
 from planner_core.reasons.at_length import Attempt, explain_target
-from planner_core.solvers.base import Budget
 from service.background import Background
 from service.instants import instant_text
 from service.opportunities import Described

@@ -8,9 +8,9 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 
+from planner_core.budget import Budget
 from planner_core.build import ScenarioOpportunities, compute_opportunities
 from planner_core.domain import Scenario
-from planner_core.solvers.base import Budget
 from service.background import Background
 from service.db.rows import ScenarioRow
 from service.db.session import Database

@@ -6,13 +6,13 @@ import json
 from dataclasses import dataclass
 from typing import Any
 
+from planner_core.budget import Budget, Termination
 from planner_core.build import ScenarioOpportunities, build_problem
 from planner_core.domain import Scenario
-from planner_core.plan import Plan
 from planner_core.problem import Problem
+from planner_core.problem.plan import Plan
 from planner_core.reasons.reason import Search
-from planner_core.solvers.base import Budget, Termination
-from planner_core.timeline import Timeline, replay
+from planner_core.referee.replay import Timeline, replay
 from service.exports.reading import plan_in, records_of_json
 from service.opportunities import Described
 

@@ -8,7 +8,7 @@ from typing import Any
 from planner_core.domain import Scenario
 from planner_core.problem import Problem
 from planner_core.reasons.reason import Change, TargetOutcome
-from planner_core.timeline import Timeline, Violation
+from planner_core.referee.replay import Timeline, Violation
 from service.instants import instant_text
 
 Document = dict[str, Any]

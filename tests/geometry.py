@@ -18,7 +18,13 @@ from sgp4.conveniences import sat_epoch_datetime
 from skyfield.api import EarthSatellite, load, wgs84
 from skyfield.framelib import itrs
 
-from planner_core.domain import Horizon, OrbitElements, Resources, Satellite, Sensor
+from planner_core.domain import (
+    Horizon,
+    OrbitElements,
+    Resources,
+    Satellite,
+    Sensor,
+)
 from planner_core.orbits.earth_orientation import shipped
 from planner_core.orbits.sgp4_record import satrec
 

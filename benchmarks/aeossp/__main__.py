@@ -15,7 +15,7 @@ from pathlib import Path
 from benchmarks.aeossp.case import read_case, write_solution
 from benchmarks.aeossp.planner import plan_case
 from benchmarks.aeossp.verifier import verify
-from planner_core.solvers import SOLVERS
+from planner_core.solvers.registry import SOLVERS
 
 
 def main() -> None:

@@ -20,15 +20,24 @@ import numpy.typing as npt
 from benchmarks.aeossp.case import Case, Observation
 from benchmarks.aeossp.geometry import Sky, angle_deg, turn_s
 from benchmarks.aeossp.verifier import verify
+from planner_core.budget import Budget, Termination
 from planner_core.build import build_problem, compute_opportunities
-from planner_core.domain import Agility, Horizon, Resources, Satellite, Scenario, Sensor, Target
+from planner_core.certified.lns.search import improved
+from planner_core.domain import (
+    Agility,
+    Horizon,
+    Resources,
+    Satellite,
+    Scenario,
+    Sensor,
+    Target,
+)
 from planner_core.orbits.tle import read_tle
-from planner_core.plan import Plan
 from planner_core.problem import Opportunities, Problem
-from planner_core.restrict import restricted
-from planner_core.solvers.base import Budget, Solver, Termination
-from planner_core.solvers.lns import improved
-from planner_core.timeline import replay
+from planner_core.problem.plan import Plan
+from planner_core.problem.restrict import restricted
+from planner_core.referee.replay import replay
+from planner_core.solvers.base import Solver
 
 Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]

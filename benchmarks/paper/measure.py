@@ -13,10 +13,11 @@ from benchmarks.cpu_budget import CpuBudget
 from benchmarks.missions import problem_of
 from benchmarks.paper.readings import Reading
 from benchmarks.paper.settings import make_solver
-from planner_core.bounds.resource_bound import quick_bound
+from planner_core.budget import Budget, Termination
+from planner_core.certified.proofs.resource_bound import quick_bound
 from planner_core.problem import COLLECT, Problem
-from planner_core.solvers.base import Budget, Solution, Solver, Termination
-from planner_core.timeline import replay
+from planner_core.referee.replay import replay
+from planner_core.solvers.base import Solution, Solver
 
 _TIMED_RUNS = 3
 _REPEAT_WITHIN_S = 0.1  # quicker runs are repeated, and the median time is kept

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
-from planner_core.solvers import SOLVERS, solver_class
 from planner_core.solvers.base import Solver
+from planner_core.solvers.registry import SOLVERS, solver_class
 
 Kind = Literal["paper", "paper_hard", "ours"]
 Params = Mapping[str, Any]

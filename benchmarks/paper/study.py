@@ -31,7 +31,7 @@ from benchmarks.paper.settings import (
     as_text,
     settings,
 )
-from planner_core.solvers import SOLVERS
+from planner_core.solvers.registry import SOLVERS
 
 Done = Mapping[Task, Outcome]
 

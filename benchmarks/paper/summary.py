@@ -12,7 +12,7 @@ from benchmarks.paper.published import TABLE_6, TABLE_7, ForwardRow, MctsRow
 from benchmarks.paper.readings import BASE
 from benchmarks.paper.settings import KINDS, PAPER_MCTS, PAPER_SEARCH, Kind, Params, settings
 from benchmarks.paper.study import Done, Study
-from planner_core.solvers import SOLVERS
+from planner_core.solvers.registry import SOLVERS
 
 _PAPERS: Final = ("rule", "graph", "milp", "forward_search", "mcts")
 METHODS: Final = (*_PAPERS, *(name for name in SOLVERS if name not in _PAPERS))

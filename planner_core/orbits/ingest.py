@@ -20,7 +20,14 @@ from planner_core.domain import OrbitElements
 from planner_core.errors import Fault, InvalidElements
 from planner_core.orbits.element_ranges import epoch_key
 from planner_core.orbits.omm import elements_from_omm, omm_from_elements
-from planner_core.orbits.omm_files import Message, Read, read_csv, read_json, read_kvn, read_xml
+from planner_core.orbits.omm_files import (
+    Message,
+    Read,
+    read_csv,
+    read_json,
+    read_kvn,
+    read_xml,
+)
 from planner_core.orbits.tle_file import read_tle_text
 
 _TEXT_FORMS: dict[str, Callable[[str], Read]] = {

@@ -12,12 +12,12 @@ from typing import Any, Final
 
 import numpy as np
 
+from planner_core.budget import Budget
 from planner_core.build import compute_opportunities
 from planner_core.domain import Scenario, Sensor, Target
 from planner_core.errors import PropagationFailed
-from planner_core.pins.pins import Pins
+from planner_core.pins import Pins
 from planner_core.problem import COLLECT
-from planner_core.solvers.base import Budget
 
 _STEPS_A_DEG: Final = 10  # values are stated to a tenth of a degree
 _LATER: Final = timedelta(days=3)

@@ -12,11 +12,22 @@ from dataclasses import replace
 import numpy as np
 
 from planner_core.jit import kernel
-from planner_core.plan import Plan
-from planner_core.pointing import Agile, Path, agile_of, earliest_start_s
-from planner_core.problem import Floats, Ints, Longs, Problem, line_of_sight
+from planner_core.problem import (
+    Floats,
+    Ints,
+    Longs,
+    Problem,
+    line_of_sight,
+)
+from planner_core.problem.plan import Plan
+from planner_core.problem.pointing import (
+    Agile,
+    Path,
+    agile_of,
+    earliest_start_s,
+)
+from planner_core.problem.retimed import Retimed, offered, with_starts
 from planner_core.reasons.reason import Reason
-from planner_core.retimed import Retimed, offered, with_starts
 
 
 def as_flown(problem: Problem, plan: Plan, targets: Longs) -> tuple[Retimed, Plan]:

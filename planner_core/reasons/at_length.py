@@ -6,14 +6,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner_core.plan import Plan
 from planner_core.problem import Problem
+from planner_core.problem.plan import Plan
 from planner_core.reasons.as_flown import as_flown
 from planner_core.reasons.displacing import displace_each
 from planner_core.reasons.explain import earned_by, explain
 from planner_core.reasons.forcing import PlannedSatellite, force_each
 from planner_core.reasons.reason import UNKNOWN_SEARCH, Search, TargetOutcome
-from planner_core.timeline import Timeline, Violation, replay
+from planner_core.referee.replay import Timeline, Violation, replay
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,6 +7,12 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from planner_core.jit import borrowing
+from planner_core.mdp.track import (
+    NO_TASK,
+    STRICT,
+    Track,
+    take,
+)
 from planner_core.problem import Bools, Bytes, Ints
 from planner_core.reasons.forcing import (
     BATTERY,
@@ -18,7 +24,6 @@ from planner_core.reasons.forcing import (
     follows,
     waited,
 )
-from planner_core.track import NO_TASK, STRICT, Track, take
 
 AT_END: Final = -2
 _MAX_DROPS: Final = 4

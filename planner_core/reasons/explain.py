@@ -2,7 +2,7 @@
 
 For each target left out, each of its opportunities is forced into the final plan: what it
 displaces, which limit would break and when, and what that does to the reward. All targets are
-done at once, with the arithmetic of ``planner_core.track``; ``at_length`` goes through one
+done at once, with the arithmetic of ``planner_core.mdp.track``; ``at_length`` goes through one
 target's opportunities with the referee itself.
 """
 
@@ -14,7 +14,6 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from planner_core.plan import Plan
 from planner_core.problem import (
     ACCESS_TOO_SHORT,
     BETWEEN_STARTS,
@@ -28,9 +27,15 @@ from planner_core.problem import (
     Longs,
     Problem,
 )
+from planner_core.problem.plan import Plan
 from planner_core.reasons.as_flown import as_flown, in_rows_of
 from planner_core.reasons.displacing import displace_each
-from planner_core.reasons.forcing import FITS, Forced, PlannedSatellite, force_each
+from planner_core.reasons.forcing import (
+    FITS,
+    Forced,
+    PlannedSatellite,
+    force_each,
+)
 from planner_core.reasons.reason import (
     UNKNOWN_SEARCH,
     Change,
@@ -41,7 +46,7 @@ from planner_core.reasons.reason import (
     TargetOutcome,
 )
 from planner_core.reasons.teller import Teller
-from planner_core.timeline import Timeline
+from planner_core.referee.replay import Timeline
 
 NO_ACCESS: Final = {
     NEVER_VISIBLE: "No satellite rises above its horizon during the planning horizon.",

@@ -16,10 +16,28 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from planner_core.jit import borrowing, inlined, kernel
-from planner_core.plan import Plan
-from planner_core.problem import Bools, Bytes, Floats, Ints, Problem, may_follow
-from planner_core.slew import INSTANT, TIME_TOLERANCE_S, angle_between_deg, slew_s
-from planner_core.track import NO_TASK, STRICT, Track, compile_track, take
+from planner_core.mdp.track import (
+    NO_TASK,
+    STRICT,
+    Track,
+    compile_track,
+    take,
+)
+from planner_core.problem import (
+    Bools,
+    Bytes,
+    Floats,
+    Ints,
+    Problem,
+    may_follow,
+)
+from planner_core.problem.plan import Plan
+from planner_core.problem.slew import (
+    INSTANT,
+    TIME_TOLERANCE_S,
+    angle_between_deg,
+    slew_s,
+)
 
 FITS: Final = 0
 BATTERY: Final = 1

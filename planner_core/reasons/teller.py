@@ -7,12 +7,23 @@ from typing import Final, Literal
 
 import numpy as np
 
-from planner_core.model import Guidance, Model, State
+from planner_core.mdp.model import Guidance, Model, State
+from planner_core.mdp.track import NO_TASK
 from planner_core.problem import Problem
 from planner_core.reasons.displacing import AT_END, Displaced
-from planner_core.reasons.forcing import BATTERY, RECORDER, Forced, PlannedSatellite
-from planner_core.reasons.reason import Certainty, Change, Reason, ReasonCode, Search
-from planner_core.track import NO_TASK
+from planner_core.reasons.forcing import (
+    BATTERY,
+    RECORDER,
+    Forced,
+    PlannedSatellite,
+)
+from planner_core.reasons.reason import (
+    Certainty,
+    Change,
+    Reason,
+    ReasonCode,
+    Search,
+)
 
 _LIMITS: Final[dict[int, Literal["battery", "recorder"]]] = {
     BATTERY: "battery", RECORDER: "recorder",

@@ -11,9 +11,11 @@ from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from planner_core.actions import is_repeated, may_wait, next_action
+from planner_core.budget import Budget
+from planner_core.certified.lns.search import polished
 from planner_core.jit import borrowing
-from planner_core.model import (
+from planner_core.mdp.actions import is_repeated, may_wait, next_action
+from planner_core.mdp.model import (
     IMAGE_NEEDS,
     WAIT,
     Guidance,
@@ -22,20 +24,23 @@ from planner_core.model import (
     counts_as_made,
     task_reward,
 )
-from planner_core.problem import Bytes, Floats, Ints, Problem
+from planner_core.mdp.track import NO_TASK, Track, take
+from planner_core.problem import (
+    Bytes,
+    Floats,
+    Ints,
+    Problem,
+)
 from planner_core.solvers.base import (
     BreadthCounts,
-    Budget,
     Constraint,
     ContactCounts,
     Feasibility,
     ImageNeeds,
     Solution,
 )
-from planner_core.solvers.lns import polished
 from planner_core.solvers.sequential import Turn, plan_in_turn
 from planner_core.solvers.walk import contact_above_metadata
-from planner_core.track import NO_TASK, Track, take
 
 Discount = Literal["action", "next_action"]
 

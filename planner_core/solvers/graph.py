@@ -12,9 +12,10 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from planner_core.chains import Links
+from planner_core.budget import Budget
+from planner_core.precedence.chains import Links
 from planner_core.problem import Problem
-from planner_core.solvers.base import Budget, Constraint, Feasibility, Solution
+from planner_core.solvers.base import Constraint, Feasibility, Solution
 from planner_core.solvers.sequential import Turn, plan_in_turn
 from planner_core.solvers.walk import (
     CONTACT_ABOVE,

@@ -12,22 +12,23 @@ from typing import ClassVar, Final
 
 import numpy as np
 
-from planner_core.bounds.bound import Bound, rounded_bound
-from planner_core.comparable import is_transitive, num_near_pairs
-from planner_core.plan import Plan
+from planner_core.budget import Budget, Progress, Termination
+from planner_core.certified.drivers.agility_only import MOST_PAIRS, Effort
+from planner_core.certified.drivers.fleet import solve_without_resources
+from planner_core.certified.lns.search import improved
+from planner_core.certified.mip.clique_cuts import violated_antichains
+from planner_core.certified.mip.highs import Engine, Outcome, Watch
+from planner_core.certified.mip.model import Formulation, PlanProgram, plan_program
+from planner_core.certified.mip.program import Rows
+from planner_core.certified.proofs.bound import Bound, rounded_bound
+from planner_core.precedence.relation import is_transitive, num_near_pairs
 from planner_core.problem import COLLECT, Floats, Problem
-from planner_core.solvers.base import Budget, Constraint, Progress, Solution, Termination
-from planner_core.solvers.fleet.search import solve_without_resources
+from planner_core.problem.plan import Plan
+from planner_core.referee.replay import replay
+from planner_core.solvers.base import Constraint, Solution
 from planner_core.solvers.forward_search import ForwardSearch
-from planner_core.solvers.free.search import MOST_PAIRS, Effort
 from planner_core.solvers.graph import Graph
-from planner_core.solvers.lns import improved
-from planner_core.solvers.programs.antichains import violated_antichains
-from planner_core.solvers.programs.highs import Engine, Outcome, Watch
-from planner_core.solvers.programs.model import Formulation, PlanProgram, plan_program
-from planner_core.solvers.programs.program import Rows
 from planner_core.solvers.rule import Rule
-from planner_core.timeline import replay
 
 # The limits are strict, which no linear program can say. The first search lets plans touch
 # them, so that its bound is true; a second one stays clear where the first plan does touch.

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
+from planner_core.budget import Budget
 from planner_core.problem import Problem
-from planner_core.solvers.base import Budget, Constraint, Feasibility, Solution
+from planner_core.solvers.base import Constraint, Feasibility, Solution
 from planner_core.solvers.sequential import Turn, plan_in_turn
 from planner_core.solvers.walk import (
     CONTACT_ABOVE,

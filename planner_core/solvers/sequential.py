@@ -7,11 +7,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner_core.plan import Plan
-from planner_core.problem import CONTACT, Bytes, Ints, Problem, SatelliteProblem
-from planner_core.solvers.base import Budget, Progress, Solution, Termination
+from planner_core.budget import Budget, Progress, Termination
+from planner_core.mdp.track import Track, compile_track
+from planner_core.problem import (
+    CONTACT,
+    Bytes,
+    Ints,
+    Problem,
+    SatelliteProblem,
+)
+from planner_core.problem.plan import Plan
+from planner_core.solvers.base import Solution
 from planner_core.solvers.walk import CONTACT_ABOVE, rule_plan
-from planner_core.track import Track, compile_track
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

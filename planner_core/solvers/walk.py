@@ -9,10 +9,10 @@ from typing import Final
 
 import numpy as np
 
-from planner_core.actions import next_action
 from planner_core.jit import inlined, kernel
+from planner_core.mdp.actions import next_action
+from planner_core.mdp.track import NO_TASK, Track, take
 from planner_core.problem import Bytes, Ints
-from planner_core.track import NO_TASK, Track, take
 
 CONTACT_ABOVE: Final = 0.45
 """How full the recorder is before a contact is worth its power. The paper's mission keeps most

@@ -8,7 +8,7 @@ from typing import Any, Literal
 from fastapi import APIRouter, Depends, Request, Response
 from pydantic import BaseModel, Field
 
-from planner_core.plan_diff import PlannedAction, plan_diff
+from planner_core.referee.plan_diff import PlannedAction, plan_diff
 from service.api import job_intake as intake
 from service.api.conditional import NOT_MODIFIED
 from service.api.deps import CallerDep, DatabaseDep, own_job_only

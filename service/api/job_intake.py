@@ -10,7 +10,7 @@ from fastapi import Request, Response
 from sqlalchemy.orm import Session
 
 from planner_core.errors import Fault
-from planner_core.solvers import solver_class
+from planner_core.solvers.registry import solver_class
 from service.access.audit import Audit
 from service.api import ask_again
 from service.api.errors import refuse

@@ -7,8 +7,8 @@ from typing import Any, Literal
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
-from planner_core.solvers import SOLVERS
 from planner_core.solvers.base import Constraint, Solver
+from planner_core.solvers.registry import SOLVERS
 from service.api.errors import problem_responses
 from service.api.paging import Listed
 from service.api.problems import ServiceError

@@ -8,11 +8,11 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from planner_core.budget import Budget
 from planner_core.build import build_problem, compute_opportunities
 from planner_core.domain import Scenario
 from planner_core.problem import COLLECT, Problem
-from planner_core.solvers.base import Budget
-from planner_core.timeline import Timeline, plan_sha256, replay
+from planner_core.referee.replay import Timeline, plan_sha256, replay
 from service.commands.scenario_files import read_scenario
 from service.commands.summary import table
 from service.exports.reading import READERS, Reading, plan_in

@@ -8,9 +8,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
+from planner_core.budget import Budget
 from planner_core.build import ScenarioOpportunities
-from planner_core.solvers import solver_class
-from planner_core.solvers.base import Budget
+from planner_core.solvers.registry import solver_class
 from service.commands.scenario_files import read_scenario, require_folder
 from service.commands.solve import answer_of
 from service.jobs.plan_job import PlanRequest

@@ -9,8 +9,8 @@ from concurrent.futures import ThreadPoolExecutor, wait
 from pathlib import Path
 from typing import Any, Final
 
-from planner_core.solvers import solver_class
-from planner_core.solvers.base import Budget
+from planner_core.budget import Budget
+from planner_core.solvers.registry import solver_class
 from service.commands.scenario_files import read_scenario, require_folder
 from service.commands.summary import summary
 from service.jobs.plan_job import PlanAnswer, PlanRequest, run_plan_job

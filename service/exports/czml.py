@@ -14,7 +14,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from planner_core.domain import GroundStation, Horizon, Satellite, Target
+from planner_core.domain import (
+    GroundStation,
+    Horizon,
+    Satellite,
+    Target,
+)
 from planner_core.orbits.ephemeris import propagate
 from service.exports.answered import Answered, Document, compact, in_chunks, listed
 from service.instants import instant_text

@@ -16,8 +16,13 @@ import numpy.typing as npt
 
 from planner_core.domain import Scenario
 from planner_core.errors import Fault, InvalidScenario
-from planner_core.plan import Action, Plan
-from planner_core.problem import COLLECT, CONTACT, Opportunities, Problem
+from planner_core.problem import (
+    COLLECT,
+    CONTACT,
+    Opportunities,
+    Problem,
+)
+from planner_core.problem.plan import Action, Plan
 from service.api.shapes import Body, Instant
 from service.exports.table import unguarded
 from service.scenarios.pin_inputs import Id

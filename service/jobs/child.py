@@ -18,8 +18,8 @@ from enum import Enum, auto
 from multiprocessing.connection import Connection
 from typing import Any, Final, cast
 
+from planner_core.budget import Budget, Progress
 from planner_core.errors import Cancelled, PlannerError
-from planner_core.solvers.base import Budget, Progress
 from service.jobs.parent import die_with_parent
 from service.jobs.plan_job import PlanAnswer, PlanRequest
 

@@ -7,11 +7,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, cast
 
-from planner_core.bounds import proofs
+from planner_core.budget import Budget
 from planner_core.build import ScenarioOpportunities
+from planner_core.certified.proofs import documents as proofs
 from planner_core.run import plan_scenario
-from planner_core.solvers import solver_class
-from planner_core.solvers.base import Budget, Solver
+from planner_core.solvers.base import Solver
+from planner_core.solvers.registry import solver_class
 from service.blocks import Block, target_blocks, targets_text, timeline_blocks, timeline_text
 from service.documents import Documents, figures_of
 from service.scenarios.translate import scenario_from_content

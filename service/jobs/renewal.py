@@ -6,7 +6,7 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from typing import Final
 
-from planner_core.solvers.base import Progress
+from planner_core.budget import Progress
 from service.jobs.runner import Order
 
 _PATIENCE_S: Final = 0.25

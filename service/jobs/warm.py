@@ -14,6 +14,7 @@ from typing import Final
 
 import numpy as np
 
+from planner_core.budget import Budget
 from planner_core.domain import (
     GroundStation,
     Horizon,
@@ -24,10 +25,15 @@ from planner_core.domain import (
     Target,
 )
 from planner_core.errors import InvalidScenario
-from planner_core.pins.pins import BlockedInterval, Pins
+from planner_core.pins import BlockedInterval, Pins
 from planner_core.run import plan_scenario
-from planner_core.solvers import SOLVERS, Certified, Graph, Rule
-from planner_core.solvers.base import Budget, Solver
+from planner_core.solvers.base import Solver
+from planner_core.solvers.registry import (
+    SOLVERS,
+    Certified,
+    Graph,
+    Rule,
+)
 
 _START: Final = datetime(2026, 1, 1, tzinfo=UTC)
 _FEW: Final = 40  # targets

@@ -17,7 +17,7 @@ import sqlalchemy as sa
 from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.orm import Session
 
-from planner_core.solvers.base import Progress
+from planner_core.budget import Progress
 from service import tracing
 from service.blocks import proof_blocks
 from service.db.clock import utc_now

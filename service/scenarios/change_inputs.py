@@ -7,7 +7,7 @@ from typing import Annotated, Any, Final
 from pydantic import ConfigDict, Discriminator, Field, JsonValue, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
-from planner_core.pins.pins import PinnedAction
+from planner_core.pins import PinnedAction
 from service.api.shapes import Body, Instant
 from service.scenarios.inputs import AgilityIn, ResourcesIn, SensorIn
 from service.scenarios.pin_inputs import Id, PinnedActionIn, action_from

@@ -8,8 +8,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 from planner_core.errors import PlannerError
-from planner_core.pins.pins import PinnedAction, Pins
-from planner_core.what_if import is_any_image
+from planner_core.pins import PinnedAction, Pins
+from planner_core.reasons.what_if import is_any_image
 from service.scenarios.change_inputs import ChangeIn
 from service.scenarios.pin_inputs import PinnedActionIn
 
@@ -31,7 +31,7 @@ class Places:
         force: Sequence[PinnedAction],
         num_dropped: int,
     ) -> Places:
-        """Return those of ``planner_core.what_if``: the new ones follow those there were."""
+        """Return those of ``reasons.what_if``: the new ones follow those there were."""
         skipped = [f"/forbid/{i}" for i, one in enumerate(forbid) if not is_any_image(one)]
         dropped = [f"/relax/drop_actions/{i}" for i in range(num_dropped)]
         return cls(

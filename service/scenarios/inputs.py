@@ -20,7 +20,13 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from planner_core.domain import CollectAlignment, Dynamics, LookSide, Nadir, OrbitDirection
+from planner_core.domain import (
+    CollectAlignment,
+    Dynamics,
+    LookSide,
+    Nadir,
+    OrbitDirection,
+)
 from service.api.shapes import Body, Instant, Name
 from service.scenarios.pin_inputs import Id, PinsIn
 

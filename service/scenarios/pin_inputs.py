@@ -1,4 +1,4 @@
-"""What clients send to pin actions; `planner_core.pins.pins` has the last word."""
+"""What clients send to pin actions; `planner_core.pins` has the last word."""
 
 from __future__ import annotations
 
@@ -6,7 +6,12 @@ from typing import Annotated
 
 from pydantic import Field, StringConstraints
 
-from planner_core.pins.pins import BlockedInterval, PinnedAction, PinnedMode, Pins
+from planner_core.pins import (
+    BlockedInterval,
+    PinnedAction,
+    PinnedMode,
+    Pins,
+)
 from service.api.shapes import Body, Instant
 
 Id = Annotated[str, StringConstraints(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")]

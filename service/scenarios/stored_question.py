@@ -10,7 +10,12 @@ from collections.abc import Iterator
 from functools import cached_property
 from typing import Any, Final
 
-from planner_core.domain import GroundStation, Horizon, Satellite, Target
+from planner_core.domain import (
+    GroundStation,
+    Horizon,
+    Satellite,
+    Target,
+)
 from service.scenarios.inputs import FileGroundStation, FileSatellite, FileTarget, HorizonIn
 from service.scenarios.translate import (
     ground_station_from,

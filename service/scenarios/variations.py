@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 
 from pydantic import ValidationError
 
+from planner_core.budget import Budget
 from planner_core.build import ScenarioOpportunities, build_problem, compute_opportunities
 from planner_core.domain import Agility, Resources, Scenario
 from planner_core.errors import InvalidScenario
-from planner_core.pins.pins import PinnedAction, Pins
-from planner_core.plan import Plan
-from planner_core.solvers.base import Budget
-from planner_core.what_if import Change, what_if
+from planner_core.pins import PinnedAction, Pins
+from planner_core.problem.plan import Plan
+from planner_core.reasons.what_if import Change, what_if
 from service.api.shapes import parse_instant
 from service.background import Background
 from service.opportunities import Described

@@ -12,7 +12,7 @@ import pytest
 from benchmarks.aeossp.case import Case, Observation, read_case, read_solution, write_solution
 from benchmarks.aeossp.planner import plan_case
 from benchmarks.aeossp.verifier import Verdict, verify
-from planner_core.solvers import Rule
+from planner_core.solvers.registry import Rule
 
 FIXTURES = (
     "battery_depletion_invalid",

@@ -22,7 +22,7 @@ from benchmarks.paper.settings import settings as named_settings
 from benchmarks.paper.store import Store
 from benchmarks.paper.study import Study, best_forward, quick
 from benchmarks.paper.summary import parts, row_params
-from planner_core.solvers import SOLVERS
+from planner_core.solvers.registry import SOLVERS
 
 FLAT = Reading(look_deg=(0.0, 50.0))
 TINY = Study(

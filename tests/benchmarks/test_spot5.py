@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.spot5 import read_instance, solve, worth_of
-from planner_core.solvers.base import Budget
+from planner_core.budget import Budget
 
 
 def test_every_single_orbit_instance_reaches_its_published_optimum(shared_data: Path) -> None:

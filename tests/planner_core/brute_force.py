@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-from planner_core.plan import Plan
 from planner_core.problem import COLLECT, Pinned, Problem
-from planner_core.timeline import replay
+from planner_core.problem.plan import Plan
+from planner_core.referee.replay import replay
 
 
 def best_reward(problem: Problem) -> float:

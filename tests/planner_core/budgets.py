@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from planner_core.solvers.base import Budget, Progress
+from planner_core.budget import Budget, Progress
 
 
 def expiring(is_enough: Callable[[Progress], bool]) -> Budget:

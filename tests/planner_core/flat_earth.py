@@ -7,9 +7,14 @@ from dataclasses import replace
 import numpy as np
 
 from planner_core.domain import Agility, Resources
-from planner_core.pointing import Path, Pointing, sights
-from planner_core.problem import COLLECT, CONTACT, Floats, Problem
-from planner_core.restrict import restricted
+from planner_core.problem import (
+    COLLECT,
+    CONTACT,
+    Floats,
+    Problem,
+)
+from planner_core.problem.pointing import Path, Pointing, sights
+from planner_core.problem.restrict import restricted
 from tests.planner_core.problems import TIGHT, Task, make_problem
 
 _STEP_S = 5.0

@@ -10,9 +10,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner_core.access import Accesses, find_accesses
-from planner_core.domain import GroundStation, Nadir, OrbitElements, Sensor, Target
-from planner_core.limits import Limits
+from planner_core.access.limits import Limits
+from planner_core.access.windows import Accesses, find_accesses
+from planner_core.domain import (
+    GroundStation,
+    Nadir,
+    OrbitElements,
+    Sensor,
+    Target,
+)
 from planner_core.orbits.ephemeris import propagate
 from planner_core.orbits.mask import mask_elevation_deg
 from planner_core.orbits.places import Places

@@ -9,17 +9,35 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner_core.actions import next_action
+from planner_core.budget import Budget
 from planner_core.domain import Dynamics
-from planner_core.problem import COLLECT, CONTACT, Kept, Pinned, Problem, may_follow
-from planner_core.solvers import ForwardSearch, Graph, Mcts, Rule
-from planner_core.solvers.base import Budget, Solver
-from planner_core.solvers.mcts.choices import Rules, expand, greedy_action
-from planner_core.solvers.mcts.successors import no_successors
-from planner_core.solvers.mcts.tree import empty_tree, new_node
+from planner_core.mdp.actions import next_action
+from planner_core.mdp.track import (
+    Track,
+    compile_track,
+    is_safe,
+    take,
+)
+from planner_core.problem import (
+    COLLECT,
+    CONTACT,
+    Kept,
+    Pinned,
+    Problem,
+    may_follow,
+)
+from planner_core.referee.replay import replay
+from planner_core.solvers.base import Solver
+from planner_core.solvers.mcts_choices import Rules, expand, greedy_action
+from planner_core.solvers.mcts_successors import no_successors
+from planner_core.solvers.mcts_tree import empty_tree, new_node
+from planner_core.solvers.registry import (
+    ForwardSearch,
+    Graph,
+    Mcts,
+    Rule,
+)
 from planner_core.solvers.walk import naive_select_action
-from planner_core.timeline import replay
-from planner_core.track import Track, compile_track, is_safe, take
 from tests.examples import examples
 from tests.planner_core.problems import ECLIPSES, TIGHT, Task, make_problem, random_problem
 

@@ -8,11 +8,11 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner_core.bounds.lagrangian import lagrangian_bound, lagrangian_value
+from planner_core.budget import Budget
+from planner_core.certified.proofs.lagrangian import lagrangian_bound, lagrangian_value
 from planner_core.domain import Agility
-from planner_core.solvers import ForwardSearch
-from planner_core.solvers.base import Budget
-from planner_core.timeline import replay
+from planner_core.referee.replay import replay
+from planner_core.solvers.registry import ForwardSearch
 from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import random_problem

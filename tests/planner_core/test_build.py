@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from planner_core.budget import Budget, Progress
 from planner_core.build import (
     ScenarioOpportunities,
     build_problem,
@@ -19,7 +20,14 @@ from planner_core.build import (
     orbit_warnings,
     view_at,
 )
-from planner_core.domain import GroundStation, Horizon, Satellite, Scenario, Sensor, Target
+from planner_core.domain import (
+    GroundStation,
+    Horizon,
+    Satellite,
+    Scenario,
+    Sensor,
+    Target,
+)
 from planner_core.errors import Cancelled, InvalidScenario, PropagationFailed
 from planner_core.orbits.places import View
 from planner_core.problem import (
@@ -31,7 +39,6 @@ from planner_core.problem import (
     OUTSIDE_LIMITS,
     Opportunities,
 )
-from planner_core.solvers.base import Budget, Progress
 from tests.geometry import (
     YEAR_2019,
     Ground,

@@ -10,15 +10,22 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from planner_core.bounds.bound import Bound
-from planner_core.bounds.certificate import Certificate, Cut, Multipliers, Refutation, is_refuted
-from planner_core.bounds.proofs import from_json, is_proven, to_json
+from planner_core.budget import Budget, Progress, Termination
+from planner_core.certified.drivers.agility_only import TOLERANCE
+from planner_core.certified.proofs.bound import Bound
+from planner_core.certified.proofs.certificate import (
+    Certificate,
+    Cut,
+    Multipliers,
+    Refutation,
+    is_refuted,
+)
+from planner_core.certified.proofs.documents import from_json, is_proven, to_json
 from planner_core.domain import Agility
 from planner_core.problem import COLLECT, Problem
-from planner_core.solvers import Certified, Rule
-from planner_core.solvers.base import Budget, Progress, Solution, Termination
-from planner_core.solvers.free.search import TOLERANCE
-from planner_core.timeline import replay
+from planner_core.referee.replay import replay
+from planner_core.solvers.base import Solution
+from planner_core.solvers.registry import Certified, Rule
 from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import Task, make_problem, random_problem

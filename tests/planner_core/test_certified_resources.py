@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner_core.bounds.resource_bound import resource_value
-from planner_core.solvers.base import Budget, Progress, Termination
-from planner_core.solvers.certified import Certified
-from planner_core.timeline import replay
+from planner_core.budget import Budget, Progress, Termination
+from planner_core.certified.proofs.resource_bound import resource_value
+from planner_core.certified.solver import Certified
+from planner_core.referee.replay import replay
 from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import TIGHT, random_problem, varied_problem

@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner_core.chains import Links
+from planner_core.budget import Budget
 from planner_core.domain import Agility
+from planner_core.precedence.chains import Links
 from planner_core.problem import COLLECT
-from planner_core.solvers import Graph
-from planner_core.solvers.base import Budget
-from planner_core.timeline import replay
+from planner_core.referee.replay import replay
+from planner_core.solvers.registry import Graph
 from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import Task, make_problem, random_problem

@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner_core.comparable import transitive_closure
+from planner_core.budget import Budget
 from planner_core.domain import Agility
-from planner_core.slew import INSTANT, slew_s
-from planner_core.solvers import SOLVERS
-from planner_core.solvers.base import Budget
-from planner_core.timeline import replay
+from planner_core.precedence.relation import transitive_closure
+from planner_core.problem.slew import INSTANT, slew_s
+from planner_core.referee.replay import replay
+from planner_core.solvers.registry import SOLVERS
 from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import random_problem

@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner_core.bounds.resource_bound import resource_value
+from planner_core.budget import Budget
+from planner_core.certified.mip.contact_sets import FixedContacts
+from planner_core.certified.proofs.resource_bound import resource_value
 from planner_core.domain import Agility, Dynamics
-from planner_core.plan import Plan
 from planner_core.problem import CONTACT, Problem
-from planner_core.solvers import Milp
-from planner_core.solvers.base import Budget
-from planner_core.solvers.programs.contact_sets import FixedContacts
-from planner_core.timeline import replay
+from planner_core.problem.plan import Plan
+from planner_core.referee.replay import replay
+from planner_core.solvers.registry import Milp
 from tests.examples import examples
 from tests.planner_core.problems import random_problem
 

@@ -9,18 +9,24 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner_core.arrivals import follows_at_s
-from planner_core.bounds import proofs
-from planner_core.bounds.continuous import ContinuousDual, accessible, continuous_value
+from planner_core.budget import Budget, Termination
+from planner_core.certified.drivers.continuous import solve_continuous, with_own_starts
+from planner_core.certified.lns.continuous_search import ContinuousSearch
+from planner_core.certified.proofs import documents as proofs
+from planner_core.certified.proofs.continuous import ContinuousDual, accessible, continuous_value
 from planner_core.domain import Agility
-from planner_core.plan import Plan
-from planner_core.problem import COLLECT, Blocked, Kept, Pinned, Problem
-from planner_core.solvers import SOLVERS, Certified, Rule
-from planner_core.solvers.base import Budget, Termination
-from planner_core.solvers.continuous.search import ContinuousSearch
-from planner_core.solvers.continuous.solve import solve_continuous, with_own_starts
-from planner_core.spans import spans_of, view_of
-from planner_core.timeline import replay
+from planner_core.precedence.earliest_starts import follows_at_s
+from planner_core.precedence.time_windows import spans_of, view_of
+from planner_core.problem import (
+    COLLECT,
+    Blocked,
+    Kept,
+    Pinned,
+    Problem,
+)
+from planner_core.problem.plan import Plan
+from planner_core.referee.replay import replay
+from planner_core.solvers.registry import SOLVERS, Certified, Rule
 from tests.examples import examples
 from tests.planner_core.flat_earth import flat_problem
 

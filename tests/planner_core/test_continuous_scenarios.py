@@ -7,17 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from planner_core.budget import Budget
 from planner_core.build import build_problem, compute_opportunities
 from planner_core.domain import Scenario
 from planner_core.errors import InvalidScenario
-from planner_core.pins.pins import BlockedInterval, PinnedAction, Pins
+from planner_core.pins import BlockedInterval, PinnedAction, Pins
 from planner_core.problem import COLLECT
 from planner_core.reasons.at_length import explain_target
+from planner_core.reasons.what_if import Change, what_if
+from planner_core.referee.replay import replay
 from planner_core.run import Judged, plan_scenario
-from planner_core.solvers import SOLVERS, Certified, Rule
-from planner_core.solvers.base import Budget
-from planner_core.timeline import replay
-from planner_core.what_if import Change, what_if
+from planner_core.solvers.registry import SOLVERS, Certified, Rule
 from tests.planner_core.test_build import scenario as built_scenario
 from tests.planner_core.test_build import two_satellites
 

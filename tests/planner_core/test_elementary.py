@@ -9,23 +9,23 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner_core.bounds.bound import Bound
-from planner_core.bounds.elementary import (
+from planner_core.budget import Budget
+from planner_core.certified.dp.elementary import (
     elementary_paths,
     elementary_value,
     labels_for,
     memory_of,
 )
-from planner_core.bounds.elementary_prices import ElementaryPrices
-from planner_core.bounds.lagrangian import lagrangian_bound, lagrangian_value
-from planner_core.bounds.network import network_of
-from planner_core.bounds.proofs import from_json, is_proven, to_json
+from planner_core.certified.lns.search import improved
+from planner_core.certified.multipliers.elementary import ElementaryPrices
+from planner_core.certified.proofs.bound import Bound
+from planner_core.certified.proofs.documents import from_json, is_proven, to_json
+from planner_core.certified.proofs.lagrangian import lagrangian_bound, lagrangian_value
 from planner_core.domain import Agility
-from planner_core.plan import Plan
+from planner_core.precedence.network import network_of
 from planner_core.problem import COLLECT, Floats, Problem
-from planner_core.solvers.base import Budget
-from planner_core.solvers.lns import improved
-from planner_core.timeline import replay
+from planner_core.problem.plan import Plan
+from planner_core.referee.replay import replay
 from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import Task, make_problem, random_problem

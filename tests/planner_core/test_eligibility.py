@@ -13,14 +13,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner_core.build import (
-    ScenarioOpportunities,
-    build_problem,
-    compute_opportunities,
-)
+from planner_core.budget import Budget
+from planner_core.build import ScenarioOpportunities, build_problem, compute_opportunities
 from planner_core.domain import Scenario, Sensor, Target
 from planner_core.errors import InvalidScenario
-from planner_core.plan import Action, Plan
 from planner_core.problem import (
     ACCESS_FOUND,
     ACCESS_TOO_SHORT,
@@ -30,13 +26,13 @@ from planner_core.problem import (
     OUTSIDE_TIMES,
     WRONG_SENSOR_TYPE,
 )
+from planner_core.problem.plan import Action, Plan
+from planner_core.problem.restrict import restricted
 from planner_core.reasons.access_changes import access_changes
 from planner_core.reasons.explain import explain
-from planner_core.restrict import restricted
-from planner_core.solvers import SOLVERS
-from planner_core.solvers.base import Budget
-from planner_core.timeline import replay
-from planner_core.what_if import Relaxation, relaxed
+from planner_core.reasons.what_if import Relaxation, relaxed
+from planner_core.referee.replay import replay
+from planner_core.solvers.registry import SOLVERS
 from tests.examples import examples
 from tests.geometry import YEAR_2019, hours, orbit, satellite
 from tests.planner_core.brute_force import best_reward

@@ -11,13 +11,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner_core.bounds.energy_prices import EnergyPrices
-from planner_core.bounds.most_by_energy import EnergyLevels, energy_levels, most_by_energy
-from planner_core.bounds.resource_network import Network, network_of
+from planner_core.budget import Budget
+from planner_core.certified.dp.energy_labels import EnergyLevels, energy_levels, most_by_energy
+from planner_core.certified.dp.resource_network import Network, network_of
+from planner_core.certified.multipliers.energy import EnergyPrices
 from planner_core.problem import Floats
-from planner_core.solvers import Certified
-from planner_core.solvers.base import Budget
-from planner_core.timeline import replay
+from planner_core.referee.replay import replay
+from planner_core.solvers.registry import Certified
 from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import TIGHT, random_problem, varied_problem

@@ -7,18 +7,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner_core.bounds.incremental import IncrementalPrices
-from planner_core.bounds.network import network_of
-from planner_core.bounds.proofs import from_json, is_proven, to_json
+from planner_core.budget import Budget, Termination
+from planner_core.certified.drivers.fleet import FleetSearch
+from planner_core.certified.lns.fleet_start import priced_start
+from planner_core.certified.mip.solution_pool import PlanPool
+from planner_core.certified.multipliers.incremental import IncrementalPrices
+from planner_core.certified.proofs.documents import from_json, is_proven, to_json
 from planner_core.domain import Agility
-from planner_core.plan import Plan
+from planner_core.precedence.network import network_of
 from planner_core.problem import Problem
-from planner_core.solvers import Certified, Milp
-from planner_core.solvers.base import Budget, Termination
-from planner_core.solvers.fleet.search import FleetSearch
-from planner_core.solvers.fleet.start import priced_start
-from planner_core.solvers.programs.plan_pool import PlanPool
-from planner_core.timeline import replay
+from planner_core.problem.plan import Plan
+from planner_core.referee.replay import replay
+from planner_core.solvers.registry import Certified, Milp
 from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import random_problem
@@ -103,7 +103,7 @@ def test_what_streams_are_worth_together_is_taken(monkeypatch: pytest.MonkeyPatc
 
 def test_a_large_fleet_is_planned_in_one_stream(monkeypatch: pytest.MonkeyPatch) -> None:
     problem = fleet(4)
-    monkeypatch.setattr("planner_core.solvers.fleet.search._SMALL", 10)
+    monkeypatch.setattr("planner_core.certified.drivers.fleet._SMALL", 10)
     solution = Certified().solve(problem, Budget(), 0)
     timeline = replay(problem, solution.plan)
     assert timeline.is_valid

@@ -9,12 +9,20 @@ import pytest
 
 from benchmarks.missions import paper_scenario, problem_of
 from benchmarks.paper.settings import MCTS_TUNED, PAPER_FORWARD, PAPER_MCTS, make_solver
-from planner_core.bounds import proofs
+from planner_core.budget import Budget, Termination
+from planner_core.certified.proofs import documents as proofs
 from planner_core.domain import Dynamics, GroundStation
 from planner_core.problem import ACCESS_FOUND, Problem
-from planner_core.solvers import Certified, ForwardSearch, Graph, Mcts, Milp, Rule
-from planner_core.solvers.base import Budget, Solver, Termination
-from planner_core.timeline import Timeline, replay
+from planner_core.referee.replay import Timeline, replay
+from planner_core.solvers.base import Solver
+from planner_core.solvers.registry import (
+    Certified,
+    ForwardSearch,
+    Graph,
+    Mcts,
+    Milp,
+    Rule,
+)
 from tests.planner_core.budgets import bounds_told, expiring
 
 pytestmark = pytest.mark.full_size

@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner_core.bounds.bound import Bound, rounded_bound
-from planner_core.bounds.incremental import incremental_prices
-from planner_core.bounds.lagrangian import lagrangian_bound, lagrangian_value
-from planner_core.bounds.network import network_of
-from planner_core.bounds.prices import improve_prices
-from planner_core.bounds.proofs import from_json, is_proven, to_json
+from planner_core.certified.multipliers.incremental import incremental_prices
+from planner_core.certified.multipliers.subgradient import improve_prices
+from planner_core.certified.proofs.bound import Bound, rounded_bound
+from planner_core.certified.proofs.documents import from_json, is_proven, to_json
+from planner_core.certified.proofs.lagrangian import lagrangian_bound, lagrangian_value
 from planner_core.domain import Agility
+from planner_core.precedence.network import network_of
 from planner_core.problem import Floats, Problem
 from tests.examples import examples
 from tests.planner_core.brute_force import best_reward

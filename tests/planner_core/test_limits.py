@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner_core.access import find_accesses
+from planner_core.access.limits import Limits
+from planner_core.access.windows import find_accesses
 from planner_core.domain import Sensor, Target
 from planner_core.errors import InvalidScenario
-from planner_core.limits import Limits
 from planner_core.orbits.ephemeris import Ephemeris, propagate
 from planner_core.orbits.places import Places, view
 from tests.examples import examples

@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from planner_core.budget import Budget
+from planner_core.certified.lns.search import improved
 from planner_core.domain import Agility
-from planner_core.plan import Plan
 from planner_core.problem import Kept, Pinned
-from planner_core.solvers import Graph
-from planner_core.solvers.base import Budget
-from planner_core.solvers.lns import improved
-from planner_core.timeline import replay
+from planner_core.problem.plan import Plan
+from planner_core.referee.replay import replay
+from planner_core.solvers.registry import Graph
 from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import random_problem

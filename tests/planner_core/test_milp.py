@@ -13,16 +13,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner_core.bounds.proofs import is_proven
-from planner_core.comparable import transitive_closure
+from planner_core.budget import Budget, Progress, Termination
+from planner_core.certified.mip.highs import Engine
+from planner_core.certified.mip.model import plan_program
+from planner_core.certified.mip.program import Program, Rows
+from planner_core.certified.proofs.documents import is_proven
 from planner_core.domain import Agility, Dynamics
-from planner_core.problem import COLLECT, CONTACT, Problem, Sunlight
-from planner_core.solvers import Milp
-from planner_core.solvers.base import Budget, Progress, Termination
-from planner_core.solvers.programs.highs import Engine
-from planner_core.solvers.programs.model import plan_program
-from planner_core.solvers.programs.program import Program, Rows
-from planner_core.timeline import replay
+from planner_core.precedence.relation import transitive_closure
+from planner_core.problem import (
+    COLLECT,
+    CONTACT,
+    Problem,
+    Sunlight,
+)
+from planner_core.referee.replay import replay
+from planner_core.solvers.registry import Milp
 from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.budgets import bounds_told, expiring

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner_core.bounds.network import heaviest_through, network_of
 from planner_core.domain import Agility
+from planner_core.precedence.network import heaviest_through, network_of
 from planner_core.problem import Floats, Problem
 from tests.examples import examples
 from tests.planner_core.problems import random_problem

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner_core.access import Accesses
+from planner_core.access.opportunities import MOST_OPPORTUNITIES, place_collects, place_contacts
+from planner_core.access.windows import Accesses
 from planner_core.domain import GroundStation, Target
 from planner_core.errors import InvalidScenario
-from planner_core.opportunities import MOST_OPPORTUNITIES, place_collects, place_contacts
 
 
 def accesses(*windows_ms: tuple[int, int]) -> Accesses:

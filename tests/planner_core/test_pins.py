@@ -10,14 +10,29 @@ import pytest
 from hypothesis import event, example, given
 from hypothesis import strategies as st
 
+from planner_core.budget import Budget, Termination
 from planner_core.domain import Agility, Dynamics
 from planner_core.errors import Fault, InvalidScenario
-from planner_core.pins.limits import _keep_best
-from planner_core.pins.pinning import apply_pins
-from planner_core.problem import COLLECT, CONTACT, Blocked, Kept, Pinned, Problem
-from planner_core.solvers import Certified, ForwardSearch, Graph, Mcts, Milp, Rule
-from planner_core.solvers.base import Budget, Solver, Termination
-from planner_core.timeline import replay
+from planner_core.pinning.limits import _keep_best
+from planner_core.pinning.pinned_problem import apply_pins
+from planner_core.problem import (
+    COLLECT,
+    CONTACT,
+    Blocked,
+    Kept,
+    Pinned,
+    Problem,
+)
+from planner_core.referee.replay import replay
+from planner_core.solvers.base import Solver
+from planner_core.solvers.registry import (
+    Certified,
+    ForwardSearch,
+    Graph,
+    Mcts,
+    Milp,
+    Rule,
+)
 from tests.examples import examples
 from tests.planner_core.brute_force import best_plan
 from tests.planner_core.problems import ECLIPSES, TIGHT, random_problem

@@ -9,16 +9,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from planner_core.budget import Budget
+from planner_core.certified.lns.resource_search import ResourceWindows
+from planner_core.certified.mip import solution_pool as plan_pool
+from planner_core.certified.mip.solution_pool import PlanPool, rows_of
 from planner_core.domain import Dynamics
-from planner_core.plan import Plan
 from planner_core.problem import COLLECT, Problem
-from planner_core.restrict import restricted
-from planner_core.solvers import Rule
-from planner_core.solvers.base import Budget
-from planner_core.solvers.certified.resource_windows import ResourceWindows
-from planner_core.solvers.programs import plan_pool
-from planner_core.solvers.programs.plan_pool import PlanPool, rows_of
-from planner_core.timeline import replay
+from planner_core.problem.plan import Plan
+from planner_core.problem.restrict import restricted
+from planner_core.referee.replay import replay
+from planner_core.solvers.registry import Rule
 from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import TIGHT, random_problem, varied_problem

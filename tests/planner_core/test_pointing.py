@@ -10,12 +10,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from planner_core.budget import Budget
 from planner_core.build import build_problem, compute_opportunities
 from planner_core.domain import Agility, Scenario
 from planner_core.orbits.ephemeris import propagate
 from planner_core.orbits.places import Places, line_of_sight_teme
-from planner_core.plan import Action, Plan
-from planner_core.pointing import (
+from planner_core.problem import (
+    COLLECT,
+    Opportunities,
+    Problem,
+    line_of_sight,
+)
+from planner_core.problem.plan import Action, Plan
+from planner_core.problem.pointing import (
     agile_of,
     earliest_start_s,
     latest_start_s,
@@ -23,10 +30,8 @@ from planner_core.pointing import (
     sight,
     sights,
 )
-from planner_core.problem import COLLECT, Opportunities, Problem, line_of_sight
-from planner_core.retimed import offered, retimed, with_starts
-from planner_core.solvers.base import Budget
-from planner_core.timeline import replay
+from planner_core.problem.retimed import offered, retimed, with_starts
+from planner_core.referee.replay import replay
 from tests.examples import examples
 from tests.geometry import SkyfieldPath, angle_deg, satellite
 from tests.geometry import orbit as paper_orbit

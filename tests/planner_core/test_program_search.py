@@ -10,19 +10,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner_core.bounds.energy_prices import EnergyPrices
-from planner_core.bounds.resource_bound import relaxations, whole_worth
+from planner_core.budget import Budget
+from planner_core.certified.mip import program_search
+from planner_core.certified.mip.contact_sets import FixedContacts
+from planner_core.certified.mip.program_search import ProgramSearch
+from planner_core.certified.mip.solution_pool import PlanPool, rows_of
+from planner_core.certified.multipliers.energy import EnergyPrices
+from planner_core.certified.multipliers.resources import PriceSearch
+from planner_core.certified.proofs.resource_bound import relaxations, whole_worth
 from planner_core.domain import Dynamics
-from planner_core.plan import Plan
 from planner_core.problem import CONTACT, Problem
-from planner_core.solvers import Rule
-from planner_core.solvers.base import Budget
-from planner_core.solvers.certified import program_search
-from planner_core.solvers.certified.program_search import ProgramSearch
-from planner_core.solvers.certified.resource_prices import PriceSearch
-from planner_core.solvers.programs.contact_sets import FixedContacts
-from planner_core.solvers.programs.plan_pool import PlanPool, rows_of
-from planner_core.timeline import replay
+from planner_core.problem.plan import Plan
+from planner_core.referee.replay import replay
+from planner_core.solvers.registry import Rule
 from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import TIGHT, random_problem, varied_problem

@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from planner_core.budget import Budget, Termination
 from planner_core.domain import Agility, Dynamics
 from planner_core.errors import InvalidScenario
-from planner_core.pins.pinning import apply_pins
-from planner_core.plan import Plan
+from planner_core.pinning.pinned_problem import apply_pins
 from planner_core.problem import (
     ACCESS_TOO_SHORT,
     COLLECT,
@@ -27,11 +27,11 @@ from planner_core.problem import (
     Problem,
     build_satellite_problem,
 )
+from planner_core.problem.plan import Plan
 from planner_core.reasons.explain import explain
 from planner_core.reasons.reason import Change, Search
-from planner_core.solvers import ForwardSearch, Milp, Rule
-from planner_core.solvers.base import Budget, Termination
-from planner_core.timeline import Timeline, replay
+from planner_core.referee.replay import Timeline, replay
+from planner_core.solvers.registry import ForwardSearch, Milp, Rule
 from tests.examples import examples
 from tests.planner_core.brute_force import best_plan
 from tests.planner_core.problems import ECLIPSES, TIGHT, Task, make_problem, random_problem

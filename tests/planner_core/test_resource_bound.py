@@ -11,8 +11,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from planner_core.bounds.proofs import is_proven
-from planner_core.bounds.resource_bound import quick_bound, relaxations, resource_value
+from planner_core.certified.proofs.documents import is_proven
+from planner_core.certified.proofs.resource_bound import quick_bound, relaxations, resource_value
 from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import TIGHT, Task, make_problem, random_problem, varied_problem

@@ -11,15 +11,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner_core.bounds.proofs import from_json, is_proven, to_json
+from planner_core.budget import Budget, Progress
+from planner_core.certified.lns.alternating import TurnSearch
+from planner_core.certified.lns.resource_search import ResourceWindows
+from planner_core.certified.proofs.documents import from_json, is_proven, to_json
 from planner_core.domain import Agility
-from planner_core.plan import Plan
 from planner_core.problem import Kept, Pinned
-from planner_core.solvers import Certified, Rule
-from planner_core.solvers.base import Budget, Progress
-from planner_core.solvers.certified.resource_windows import ResourceWindows
-from planner_core.solvers.certified.turns import TurnSearch
-from planner_core.timeline import replay
+from planner_core.problem.plan import Plan
+from planner_core.referee.replay import replay
+from planner_core.solvers.registry import Certified, Rule
 from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import TIGHT, random_problem, varied_problem
@@ -128,9 +128,9 @@ def test_fleets_end_with_a_plan_and_a_bound_around_the_optimum(
     dynamics: Dynamics, seed: int, num_satellites: int
 ) -> None:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("planner_core.solvers.certified.resources._LARGE", 3)
-        patch.setattr("planner_core.solvers.certified.resources._FLEET_PATIENCE", 5)
-        patch.setattr("planner_core.solvers.certified.resources._FLEET_ROUNDS", 40)
+        patch.setattr("planner_core.certified.drivers.resources._LARGE", 3)
+        patch.setattr("planner_core.certified.drivers.resources._FLEET_PATIENCE", 5)
+        patch.setattr("planner_core.certified.drivers.resources._FLEET_ROUNDS", 40)
         problem = _problem(seed, dynamics, num_satellites)
         best = best_reward(problem)
         reported: list[Progress] = []

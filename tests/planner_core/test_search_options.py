@@ -10,16 +10,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from planner_core.budget import Budget
 from planner_core.domain import Dynamics
-from planner_core.model import WAIT, Model
+from planner_core.mdp.model import WAIT, Model
+from planner_core.mdp.track import Track, compile_track
 from planner_core.problem import COLLECT, CONTACT, Problem
-from planner_core.solvers import ForwardSearch, Mcts, Rule
-from planner_core.solvers.base import Budget, Solver
-from planner_core.solvers.mcts.choices import Rules, expand
-from planner_core.solvers.mcts.successors import no_successors
-from planner_core.solvers.mcts.tree import empty_tree, new_node
-from planner_core.timeline import replay
-from planner_core.track import Track, compile_track
+from planner_core.referee.replay import replay
+from planner_core.solvers.base import Solver
+from planner_core.solvers.mcts_choices import Rules, expand
+from planner_core.solvers.mcts_successors import no_successors
+from planner_core.solvers.mcts_tree import empty_tree, new_node
+from planner_core.solvers.registry import ForwardSearch, Mcts, Rule
 from tests.examples import examples
 from tests.planner_core.problems import TIGHT, Task, make_problem, random_problem
 
@@ -137,7 +138,7 @@ def test_a_tree_that_is_full_goes_on_by_rollouts(
     solver = Mcts(num_simulations=200, depth=10, breadth=4, worthless=worthless)
     earned = {10_000_000: 0.0, 100: 0.0, 1: 0.0}
     for most in earned:
-        monkeypatch.setattr("planner_core.solvers.mcts.solver.MAX_ACTIONS", most)
+        monkeypatch.setattr("planner_core.solvers.mcts.MAX_ACTIONS", most)
         for seed in range(10):
             problem = random_problem(
                 seed, num_collects=40, num_targets=30, num_contacts=6, use_resources=seed % 2 == 0

@@ -9,15 +9,22 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from planner_core.budget import Budget, Progress, Termination
 from planner_core.domain import Dynamics
-from planner_core.model import WAIT, Model
-from planner_core.plan import Plan
+from planner_core.mdp.model import WAIT, Model
+from planner_core.mdp.track import NO_TASK, compile_track, take
 from planner_core.problem import Problem
-from planner_core.solvers import SOLVERS, ForwardSearch, Graph, Mcts, Rule
-from planner_core.solvers.base import Budget, Progress, Solver, Termination
+from planner_core.problem.plan import Plan
+from planner_core.referee.replay import plan_sha256, replay
+from planner_core.solvers.base import Solver
 from planner_core.solvers.forward_search import NOTHING, select_action
-from planner_core.timeline import plan_sha256, replay
-from planner_core.track import NO_TASK, compile_track, take
+from planner_core.solvers.registry import (
+    SOLVERS,
+    ForwardSearch,
+    Graph,
+    Mcts,
+    Rule,
+)
 from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import TIGHT, random_problem

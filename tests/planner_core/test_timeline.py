@@ -8,9 +8,14 @@ import numpy as np
 import pytest
 
 from planner_core.domain import Agility
-from planner_core.plan import Action, Plan
-from planner_core.problem import COLLECT, CONTACT, Problem, Sunlight
-from planner_core.timeline import Timeline, plan_sha256, replay
+from planner_core.problem import (
+    COLLECT,
+    CONTACT,
+    Problem,
+    Sunlight,
+)
+from planner_core.problem.plan import Action, Plan
+from planner_core.referee.replay import Timeline, plan_sha256, replay
 from tests.planner_core.problems import TIGHT, Task, make_problem
 
 

@@ -12,19 +12,36 @@ import numpy as np
 import pytest
 
 from benchmarks.missions import paper_scenario
+from planner_core.budget import Budget
 from planner_core.build import ScenarioOpportunities, build_problem, compute_opportunities
 from planner_core.domain import Dynamics, Horizon, Scenario
 from planner_core.errors import InvalidScenario
-from planner_core.pins.pins import BlockedInterval, PinnedAction, Pins
-from planner_core.plan_diff import PlanView, plan_diff
-from planner_core.problem import ACCESS_FOUND, ACCESS_TOO_SHORT, COLLECT, CONTACT, OUTSIDE_LIMITS
+from planner_core.pins import BlockedInterval, PinnedAction, Pins
+from planner_core.problem import (
+    ACCESS_FOUND,
+    ACCESS_TOO_SHORT,
+    COLLECT,
+    CONTACT,
+    OUTSIDE_LIMITS,
+)
 from planner_core.reasons.access_changes import access_changes
 from planner_core.reasons.at_length import explain_target
+from planner_core.reasons.what_if import (
+    Change,
+    Relaxation,
+    relaxed,
+    what_if,
+)
+from planner_core.referee.plan_diff import PlanView, plan_diff
+from planner_core.referee.replay import JudgedAction
 from planner_core.run import Judged, plan_scenario
-from planner_core.solvers import SOLVERS, ForwardSearch, Milp, Rule
-from planner_core.solvers.base import Budget, Solver
-from planner_core.timeline import JudgedAction
-from planner_core.what_if import Change, Relaxation, relaxed, what_if
+from planner_core.solvers.base import Solver
+from planner_core.solvers.registry import (
+    SOLVERS,
+    ForwardSearch,
+    Milp,
+    Rule,
+)
 
 
 @functools.cache

@@ -16,9 +16,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner_core.access import find_accesses
-from planner_core.domain import Horizon, Nadir, OrbitElements, Sensor, Target
-from planner_core.limits import Limits
+from planner_core.access.limits import Limits
+from planner_core.access.windows import find_accesses
+from planner_core.domain import (
+    Horizon,
+    Nadir,
+    OrbitElements,
+    Sensor,
+    Target,
+)
 from planner_core.orbits.ephemeris import propagate
 from planner_core.orbits.places import Places
 from tests.brute_force_windows import BruteForce, Comparison

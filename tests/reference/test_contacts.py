@@ -13,9 +13,9 @@ from collections import defaultdict
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
-from planner_core.access import find_accesses
+from planner_core.access.limits import Limits
+from planner_core.access.windows import find_accesses
 from planner_core.domain import GroundStation, Horizon
-from planner_core.limits import Limits
 from planner_core.orbits.ephemeris import propagate
 from planner_core.orbits.places import Places
 from tests.geometry import orbit_from_omm, satellite

@@ -11,9 +11,9 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from planner_core.access import find_accesses
+from planner_core.access.limits import Limits
+from planner_core.access.windows import find_accesses
 from planner_core.domain import GroundStation
-from planner_core.limits import Limits
 from planner_core.orbits.ephemeris import propagate
 from planner_core.orbits.places import Places
 from tests.geometry import hours, orbit, satellite

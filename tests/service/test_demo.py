@@ -13,7 +13,7 @@ import httpx
 import psutil
 import pytest
 
-from planner_core.solvers import SOLVERS
+from planner_core.solvers.registry import SOLVERS
 
 pytestmark = pytest.mark.full_size
 

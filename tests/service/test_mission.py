@@ -17,7 +17,7 @@ import httpx
 import psutil
 import pytest
 
-from planner_core.solvers import SOLVERS
+from planner_core.solvers.registry import SOLVERS
 from tests import independent
 from tests.missions import (
     PAPER_ORBIT,

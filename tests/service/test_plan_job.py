@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
-from planner_core.bounds import proofs
-from planner_core.bounds.bound import Bound
+from planner_core.budget import Budget
 from planner_core.build import build_problem, compute_opportunities
-from planner_core.solvers import SOLVERS
-from planner_core.solvers.base import Budget
+from planner_core.certified.proofs import documents as proofs
+from planner_core.certified.proofs.bound import Bound
+from planner_core.solvers.registry import SOLVERS
 from service.jobs.plan_job import Parcel, PlanAnswer, PlanRequest, run_plan_job
 from service.scenarios.translate import canonical, scenario_from_content, sha256_of
 from tests import independent

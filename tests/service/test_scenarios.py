@@ -11,10 +11,10 @@ import httpx
 import pytest
 import sqlalchemy as sa
 
+from planner_core.budget import Budget
 from planner_core.build import compute_opportunities
 from planner_core.errors import InvalidScenario
 from planner_core.problem import Opportunities
-from planner_core.solvers.base import Budget
 from service.db.rows import OpportunitySetRow, ScenarioRow
 from service.scenarios.translate import canonical, read_file, scenario_from_content
 from service.stores import opportunity_store

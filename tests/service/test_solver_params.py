@@ -9,10 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from planner_core.budget import Budget, Termination
 from planner_core.errors import InvalidParameters
-from planner_core.plan import Plan
 from planner_core.problem import Problem
-from planner_core.solvers.base import Budget, Constraint, Solution, Termination
+from planner_core.problem.plan import Plan
+from planner_core.solvers.base import Constraint, Solution
 from service.solver_params import params_of, params_schema, parse_params
 
 

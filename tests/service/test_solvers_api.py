@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import httpx
 
-from planner_core.solvers import SOLVERS
+from planner_core.solvers.registry import SOLVERS
 from tests.service.problems import assert_problem
 
 

@@ -15,7 +15,13 @@ from sgp4.api import Satrec
 
 from planner_core.domain import OrbitElements
 from planner_core.orbits.ingest import read_elements
-from planner_core.orbits.omm_writing import Outgoing, write_csv, write_json, write_kvn, write_xml
+from planner_core.orbits.omm_writing import (
+    Outgoing,
+    write_csv,
+    write_json,
+    write_kvn,
+    write_xml,
+)
 from planner_core.orbits.sgp4_record import satrec
 from tests.planner_core.orbits.element_sets import ELEMENTS, omm_elements
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from planner_core.solvers.base import Budget
+from planner_core.budget import Budget
 from service.jobs.plan_job import PlanRequest, run_plan_job
 from service.main import create_app
 from service.scenarios.translate import canonical

@@ -12,11 +12,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from planner_core.budget import Budget
 from planner_core.build import build_problem, compute_opportunities
 from planner_core.domain import Scenario
 from planner_core.problem import Problem
-from planner_core.solvers.base import Budget
-from planner_core.timeline import plan_sha256, replay
+from planner_core.referee.replay import plan_sha256, replay
 from service.commands.bodies import FAILED, OK, WRONG_INPUT
 from service.commands.cli import main
 from service.exports import table

@@ -12,7 +12,7 @@ import httpx
 import pytest
 import sqlalchemy as sa
 
-from planner_core.solvers import SOLVERS
+from planner_core.solvers.registry import SOLVERS
 from service.blocks import blocks_of_timeline, proof_blocks, target_blocks
 from service.db.rows import JobRow
 from service.jobs import lease

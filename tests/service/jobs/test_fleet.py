@@ -8,9 +8,9 @@ import json
 
 import numpy as np
 
-from planner_core.bounds.proofs import from_json, is_proven
+from planner_core.budget import Budget
 from planner_core.build import build_problem, compute_opportunities
-from planner_core.solvers.base import Budget
+from planner_core.certified.proofs.documents import from_json, is_proven
 from service.scenarios.translate import scenario_from_content
 from tests.missions import PAPER_ORBIT, Document, drawn_targets, paper_mission
 from tests.service.jobs.mission import HALF_A_DAY, Mission

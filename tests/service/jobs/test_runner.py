@@ -10,7 +10,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from planner_core.solvers.base import Progress
+from planner_core.budget import Progress
 from service.jobs import runner as runner_module
 from service.jobs.child import Answered, Ending, Refused, Stopped
 from service.jobs.plan_job import Parcel, PlanRequest

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import psutil
 
+from planner_core.budget import Budget, Progress
 from planner_core.errors import Cancelled, InvalidScenario
-from planner_core.solvers.base import Budget, Progress
 from service.blocks import blocks_of_timeline, target_blocks
 from service.jobs.plan_job import PlanAnswer, PlanRequest
 from service.jobs.runner import Work

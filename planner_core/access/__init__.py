@@ -1,0 +1,1 @@
+"""When satellites see places: limits, eligibility, accesses, and the opportunities made of them."""

@@ -1,0 +1,235 @@
+"""Accesses become opportunities: collects placed in them, contacts as a whole.
+
+Times are counted in whole milliseconds, so that no placement depends on rounding.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import fields
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from planner_core.access.windows import Accesses
+from planner_core.domain import (
+    CollectAlignment,
+    GroundStation,
+    Nadir,
+    Target,
+)
+from planner_core.errors import InvalidScenario
+from planner_core.orbits.ephemeris import Ephemeris
+from planner_core.orbits.places import (
+    Places,
+    View,
+    line_of_sight_teme,
+    view,
+)
+from planner_core.problem import COLLECT, Opportunities
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int32]
+Longs = npt.NDArray[np.int64]
+
+Placed = tuple[Longs, Longs, Longs]
+Columns = dict[str, npt.NDArray[Any]]
+
+MOST_OPPORTUNITIES: Final = 10_000_000
+"""Of one scenario: their table takes two gigabytes while it is made."""
+_MS_PER_S: Final = 1000
+_CHUNK: Final = 16_384  # rows whose intermediate results fit the processor's cache
+_SEEN: Final = (
+    "los_start",
+    "los_end",
+    "off_nadir_deg",
+    "elevation_deg",
+    "azimuth_deg",
+    "range_m",
+    "sun_elevation_deg",
+)
+
+
+def check_number(num_opportunities: int) -> None:
+    """Refuse more opportunities than fit a machine's memory.
+
+    Raises
+    ------
+    InvalidScenario
+        ``too_many_opportunities``.
+    """
+    if num_opportunities > MOST_OPPORTUNITIES:
+        raise InvalidScenario(
+            "too_many_opportunities",
+            f"The scenario offers more than {MOST_OPPORTUNITIES} opportunities: plan fewer "
+            "satellites, targets or days, or give a longer collect_spacing_s.",
+        )
+
+
+def place_collects(
+    accesses: Accesses,
+    targets: Sequence[Target],
+    spacing_s: float | None,
+    alignment: CollectAlignment = "access",
+) -> Placed:
+    """Return the collects that accesses offer.
+
+    Without a spacing, one in the middle of each access; with one, starts ``spacing_s`` apart:
+    from the access's start on, and the last start that still fits, or, aligned to the horizon,
+    at multiples of the spacing from the horizon's start.
+
+    Returns
+    -------
+    Row of the access, start and end in milliseconds. Shape ``(n,)`` each.
+    """
+    length_ms, room_ms = _room_ms(accesses, targets)
+    start_ms = _ms(accesses.start_s)
+    row = np.flatnonzero(room_ms >= 0)
+    if spacing_s is None:
+        begin = start_ms[row] + room_ms[row] // 2
+    else:
+        spaced = _spaced if alignment == "access" else _on_grid
+        row, begin = spaced(row, start_ms[row], room_ms[row], max(spacing_s * _MS_PER_S, 1.0))
+    return row, begin, begin + length_ms[row]
+
+
+def have_room(accesses: Accesses, targets: Sequence[Target]) -> npt.NDArray[np.bool_]:
+    """Return which accesses last as long as their target's collect. Shape ``(n,)``."""
+    return np.asarray(_room_ms(accesses, targets)[1] >= 0)
+
+
+def _room_ms(accesses: Accesses, targets: Sequence[Target]) -> tuple[Longs, Longs]:
+    """Return how long each access's collect is, and how far it can be moved."""
+    length_s = np.array([target.collect_s for target in targets], dtype=np.float64)
+    length_ms = np.ceil(length_s * _MS_PER_S - 1e-6).astype(np.int64)[accesses.place]
+    return length_ms, _ms(accesses.end_s) - _ms(accesses.start_s) - length_ms
+
+
+def _spaced(row: Longs, start_ms: Longs, room_ms: Longs, step_ms: float) -> tuple[Longs, Longs]:
+    # Steps are rounded to the millisecond one by one, so half of one may stick out.
+    regular = ((room_ms + 0.5) / step_ms).astype(np.int64)
+    last_ms = np.minimum(np.rint(regular * step_ms).astype(np.int64), room_ms)
+    extra = (room_ms - last_ms > 1).astype(np.int64)
+    counts = regular + 1 + extra
+    check_number(int(counts.sum()))
+    of = np.repeat(np.arange(len(row)), counts)
+    k = np.arange(len(of)) - np.repeat(np.cumsum(counts) - counts, counts)
+    into_ms = np.minimum(np.rint(k * step_ms).astype(np.int64), room_ms[of])
+    return row[of], start_ms[of] + into_ms
+
+
+def _on_grid(row: Longs, start_ms: Longs, room_ms: Longs, step_ms: float) -> tuple[Longs, Longs]:
+    # Multiples are rounded to the millisecond one by one, so half of one may fall outside.
+    first = np.ceil((start_ms - 0.5) / step_ms).astype(np.int64)
+    last = np.floor((start_ms + room_ms + 0.5) / step_ms).astype(np.int64)
+    counts = np.maximum(last - first + 1, 0)
+    check_number(int(counts.sum()))
+    of = np.repeat(np.arange(len(row)), counts)
+    k = first[of] + np.arange(len(of)) - np.repeat(np.cumsum(counts) - counts, counts)
+    begin = np.rint(k * step_ms).astype(np.int64)
+    fits = (begin >= start_ms[of]) & (begin <= start_ms[of] + room_ms[of])
+    return row[of[fits]], begin[fits]
+
+
+def place_contacts(accesses: Accesses, stations: Sequence[GroundStation]) -> Placed:
+    """Return the contacts: whole accesses of at least the station's ``min_contact_s``."""
+    shortest_ms = np.array(
+        [math.ceil(station.min_contact_s * _MS_PER_S - 1e-6) for station in stations],
+        dtype=np.int64,
+    )[accesses.place]
+    start_ms, end_ms = _ms(accesses.start_s), _ms(accesses.end_s)
+    row = np.flatnonzero(end_ms - start_ms >= np.maximum(shortest_ms, 1))
+    return row, start_ms[row], end_ms[row]
+
+
+def _ms(instant_s: Floats) -> Longs:
+    return np.rint(instant_s * _MS_PER_S).astype(np.int64)
+
+
+def rows_of(
+    satellite: int, kind: int, accesses: Accesses, first_access: int, placed: Placed
+) -> Columns:
+    """Return the placed tasks of one satellite as rows of the opportunity table, unseen yet.
+
+    Parameters
+    ----------
+    satellite, kind
+        Index of the satellite; ``COLLECT`` or ``CONTACT``.
+    first_access
+        Number of the first access; the others follow.
+    """
+    row, start_ms, end_ms = placed
+    return {
+        "satellite": np.full(len(row), satellite, dtype=np.int32),
+        "kind": np.full(len(row), kind, dtype=np.int8),
+        "place": accesses.place[row],
+        "access": (first_access + row).astype(np.int32),
+        "start_s": start_ms / _MS_PER_S,
+        "end_s": end_ms / _MS_PER_S,
+        "access_start_s": accesses.start_s[row],
+        "access_end_s": accesses.end_s[row],
+    }
+
+
+def in_order(
+    parts: Sequence[Columns], target_ids: Sequence[str], station_ids: Sequence[str]
+) -> Columns:
+    """Return all rows by (start, end, satellite, kind, place's id as text).
+
+    Empties ``parts`` on the way: a week of a constellation is large.
+    """
+    whole = {name: np.concatenate([part.pop(name) for part in parts]) for name in list(parts[0])}
+    is_collect = whole["kind"] == COLLECT
+    rank = np.where(
+        is_collect,
+        _rank_of(target_ids, whole["place"], is_collect),
+        _rank_of(station_ids, whole["place"], ~is_collect),
+    )
+    order = np.lexsort((rank, whole["kind"], whole["satellite"], whole["end_s"], whole["start_s"]))
+    return {name: whole.pop(name)[order] for name in list(whole)}
+
+
+def _rank_of(ids: Sequence[str], place: Ints, wanted: npt.NDArray[np.bool_]) -> Longs:
+    rank = np.zeros(max(len(ids), 1), dtype=np.int64)
+    rank[sorted(range(len(ids)), key=ids.__getitem__)] = np.arange(len(ids))
+    return np.where(wanted, rank[np.where(wanted, place, 0)], 0)
+
+
+class Described:
+    """The opportunity table while what the satellites see is filled in, one after another.
+
+    The geometry is two thirds of the table. Filling it in place keeps one copy of it, which
+    counts where a week of a constellation has millions of rows.
+    """
+
+    def __init__(self, rows: Columns):
+        count = len(rows["start_s"])
+        self._rows = rows
+        self._seen: Columns = {
+            name: np.empty((count, 3)) if name.startswith("los") else np.empty(count, np.float32)
+            for name in _SEEN
+        }
+        self._seen["in_eclipse"] = np.zeros(count, dtype=np.bool_)
+
+    def fill(
+        self, satellite: int, kind: int, ephemeris: Ephemeris, places: Places, nadir: Nadir
+    ) -> None:
+        """Fill in the rows of one satellite and kind."""
+        all_rows = np.flatnonzero(
+            (self._rows["satellite"] == satellite) & (self._rows["kind"] == kind)
+        )
+        for first in range(0, len(all_rows), _CHUNK):
+            rows = all_rows[first : first + _CHUNK]
+            there = places.at(self._rows["place"][rows])
+            start_s, end_s = self._rows["start_s"][rows], self._rows["end_s"][rows]
+            self._seen["los_start"][rows] = line_of_sight_teme(ephemeris, there, start_s)
+            self._seen["los_end"][rows] = line_of_sight_teme(ephemeris, there, end_s)
+            seen = view(ephemeris, there, 0.5 * (start_s + end_s), nadir)
+            for field in fields(View):
+                self._seen[field.name][rows] = getattr(seen, field.name)
+
+    def table(self) -> Opportunities:
+        """Return the finished table."""
+        return Opportunities(**self._rows, **self._seen)

@@ -1,0 +1,111 @@
+"""What a job may spend, how it tells of its progress, and why it ends."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+Bytes = npt.NDArray[np.uint8]
+
+
+class Termination(StrEnum):
+    """Why a search ended."""
+
+    OPTIMAL = "optimal"
+    GAP_REACHED = "gap_reached"
+    TIME_LIMIT = "time_limit"
+    ITERATION_LIMIT = "iteration_limit"
+    HORIZON_COMPLETE = "horizon_complete"
+    CANCELLED = "cancelled"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Progress:
+    """How far the work is. ``fraction`` counts within the phase, 0 to 1."""
+
+    phase: Literal["access", "compile", "solve", "verify"]
+    fraction: float
+    reward: float | None = None
+    bound: float | None = None
+    message: str = ""
+
+
+def _ignore(_: Progress) -> None:
+    pass
+
+
+class Budget:
+    """Time and patience left for one job; the only clock in the core.
+
+    Parameters
+    ----------
+    time_s
+        Seconds from now, or None for no limit.
+    report
+        Called with each progress report.
+    num_threads
+        How many threads may work at a time. What comes out does not depend on it, but for how
+        far a search gets before its time is over.
+
+    Attributes
+    ----------
+    stop
+        One byte that kernels read inside long loops: not 0 means "stop now". Whoever
+        cancels sets it through ``cancel``, from any thread. Shape ``(1,)``.
+    """
+
+    def __init__(
+        self,
+        time_s: float | None = None,
+        report: Callable[[Progress], None] = _ignore,
+        num_threads: int = 1,
+    ):
+        self.stop: Bytes = np.zeros(1, dtype=np.uint8)
+        self.report = report
+        self.num_threads = num_threads
+        self._deadline = None if time_s is None else time.monotonic() + time_s
+        self._cancelled = False
+
+    def cancel(self) -> None:
+        """Ask the work to stop; safe to call from another thread."""
+        self._cancelled = True
+        self.stop[0] = 1
+
+    def expire(self) -> None:
+        """Stop kernels because the time is over (they cannot read a clock themselves)."""
+        self._deadline = time.monotonic()
+        self.stop[0] = 1
+
+    @property
+    def is_cancelled(self) -> bool:
+        """Whether someone asked the work to stop."""
+        return self._cancelled
+
+    def is_spent(self) -> bool:
+        """Return whether the work should stop now and answer with the best it has."""
+        # Budgets for a part of the work share the stop byte of the whole.
+        return bool(self.stop[0]) or (
+            self._deadline is not None and time.monotonic() >= self._deadline
+        )
+
+    def remaining_s(self) -> float | None:
+        """Return the seconds left, or None where there is no limit."""
+        return None if self._deadline is None else max(0.0, self._deadline - time.monotonic())
+
+    def termination(self) -> Termination:
+        """Return why a spent budget ended the search."""
+        return Termination.CANCELLED if self._cancelled else Termination.TIME_LIMIT
+
+    def ending(self, *, is_optimal: bool, is_close: bool) -> Termination:
+        """Return why a search for plan and bound has ended: by what it found, or by the budget."""
+        if is_optimal:
+            return Termination.OPTIMAL
+        if is_close:
+            return Termination.GAP_REACHED
+        return self.termination() if self.is_spent() else Termination.HORIZON_COMPLETE

@@ -1,0 +1,1 @@
+"""Label-setting dynamic programmes over one satellite's tasks."""

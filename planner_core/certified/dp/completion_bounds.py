@@ -1,0 +1,75 @@
+"""How little energy a satellite needs to gain so much: backward, recorder left out."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planner_core.certified.dp.resource_network import Network
+from planner_core.jit import inlined, kernel
+from planner_core.problem import Ints, Singles
+
+
+@kernel
+def least_energy(network: Network, weight: Ints, top: int) -> tuple[Singles, Singles]:
+    """Return the least energy from which tasks of total weight ``r`` remain possible.
+
+    Parameters
+    ----------
+    weight
+        Whole worth of each task, not negative. Shape ``(m,)``.
+    top
+        The largest total asked for.
+
+    Returns
+    -------
+    Idle before each row (shape ``(m + 1, top + 1)``), and right after each task (shape
+    ``(m, top + 1)``). Levels as in ``Network``, a little too low rather than too high, and
+    infinite where no energy suffices.
+    """
+    m = len(weight)
+    idle = np.full((m + 1, top + 1), np.inf, dtype=np.float32)
+    idle[:, 0] = -np.inf
+    after = np.empty((m, top + 1), dtype=np.float32)
+    reach = np.zeros(m + 1, dtype=np.int64)  # the largest total that some energy suffices for
+    reached = np.zeros(m, dtype=np.int64)
+    for k in range(m - 1, -1, -1):
+        own = after[k]
+        own[:] = idle[network.idle_from[k]]
+        furthest = reach[network.idle_from[k]]
+        for at in range(network.near_first[k], network.near_first[k + 1]):
+            j = network.near_rows[at]
+            end = min(top, reached[j] + weight[j])
+            furthest = max(furthest, end)
+            _lower_by_taking(network, j, weight[j], after[j], own[: end + 1])
+        while furthest > 0 and own[furthest] == np.inf:
+            furthest -= 1
+        reached[k] = furthest
+        end = min(top, furthest + weight[k])
+        reach[k] = max(reach[k + 1], end)
+        idle[k] = idle[k + 1]
+        _lower_by_taking(network, k, weight[k], own, idle[k, : end + 1])
+        while reach[k] > 0 and idle[k, reach[k]] == np.inf:
+            reach[k] -= 1
+    return idle, after
+
+
+@inlined
+def _lower_by_taking(
+    network: Network, row: int, weight: int, after: Singles, values: Singles
+) -> None:
+    """Lower each value to what it takes to do the task and still gain as much with it."""
+    # One step of single precision may be off by this much, so that sums stay on the safe side.
+    rounding = 1.3e-7 * (1.0 + abs(network.energy_floor[-1]))
+    cap = np.float32(network.energy_cap[row] + rounding)
+    cost = np.float32(network.energy_cost[row] - rounding)
+    floor = np.float32(network.energy_floor[row] - rounding)
+    near = min(weight + 1, len(values))
+    if floor + cost <= cap:
+        for r in range(1, near):
+            values[r] = min(values[r], floor + cost)
+    beyond = values[near:]
+    left = after[1 : 1 + len(beyond)]
+    for i in range(len(beyond)):
+        wanted = max(left[i], floor) + cost
+        wanted = wanted if wanted <= cap else np.float32(np.inf)
+        beyond[i] = min(beyond[i], wanted)

@@ -1,0 +1,79 @@
+"""The recorder in whole levels, rounded so that every plan that fits still fits."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from planner_core.certified.dp.resource_network import Network
+from planner_core.jit import kernel
+from planner_core.problem import Floats, Ints
+
+_MAX_LEVELS: Final = 1200
+_ROUNDING: Final = 1e-6  # of a level: tasks of "the same" length differ by as much
+
+
+class DataLevels(NamedTuple):
+    """The data columns of a ``Network`` in levels from 0; shape ``(m,)``."""
+
+    num_levels: int
+    gain: Ints
+    floor: Ints
+    before: Ints
+    after: Ints
+    start: int
+    end: int
+
+
+def data_levels(network: Network, per_collect: int, *, is_optimistic: bool) -> DataLevels:
+    """Return levels of which the smallest collect fills ``per_collect``, where that is not many.
+
+    Optimistic levels are never above what a plan has on board, so that no plan is lost: what
+    tasks add is rounded down, and so is an empty recorder. Others are never below. (A task may
+    be off by a millionth of a level; limits leave room for that.)
+    """
+    m = len(network.place)
+    is_filling = network.data_gain > 0.0
+    lowest = min(0.0, float(network.data_floor.min(initial=0.0)))
+    highest = max(
+        float(network.data_before.max(initial=0.0)), float(network.data_after.max(initial=0.0))
+    )
+    unit = (highest - lowest) / (_MAX_LEVELS - 4) or 1.0
+    if is_filling.any():
+        # Halves of halves: what coarse levels prove, finer ones prove as well.
+        finest = float(network.data_gain[is_filling].min()) / per_collect
+        unit = finest * 2.0 ** np.ceil(np.log2(max(1.0, unit / finest)))
+    sign = 1.0 if is_optimistic else -1.0
+    room = sign * (m + 1) * _ROUNDING
+    base = int(np.floor(lowest / unit - abs(room)))
+
+    def rounded(data: Floats | float, allowance: float) -> Ints:
+        return (sign * np.floor(sign * np.asarray(data) / unit + allowance)).astype(np.int32)
+
+    def limit(data: Floats | float) -> Ints:
+        return np.floor(np.asarray(data) / unit + room).astype(np.int32) - base
+
+    return DataLevels(
+        num_levels=int(limit(highest)) + 1,
+        gain=rounded(network.data_gain, _ROUNDING),
+        floor=rounded(network.data_floor, -abs(room)) - base,
+        before=limit(network.data_before),
+        after=limit(network.data_after),
+        start=int(rounded(network.data_start, _ROUNDING)) - base,
+        end=int(limit(network.data_end)),
+    )
+
+
+@kernel
+def levels_of_part(levels: DataLevels, rows: Ints) -> DataLevels:
+    """Return the levels of some rows only."""
+    return DataLevels(
+        levels.num_levels,
+        levels.gain[rows],
+        levels.floor[rows],
+        levels.before[rows],
+        levels.after[rows],
+        levels.start,
+        levels.end,
+    )

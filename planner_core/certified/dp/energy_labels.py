@@ -1,0 +1,163 @@
+"""The most that one satellite can gain under its battery alone: worth exact, energy in levels.
+
+``most_value`` counts worth in whole units and knows energy exactly; here it is the other way
+round, and the recorder is left out. That takes a fraction of the time, so that prices can be
+tried by the hundred. Energy is rounded in favour of the satellite: no plan is lost.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from planner_core.certified.dp.resource_network import Network, may_be_next
+from planner_core.jit import inlined, kernel
+from planner_core.problem import Floats, Ints, Longs
+
+_ROUNDING: Final = 1e-6  # of a level: costs "of the same" length differ by as much
+_MAX_LEVELS: Final = 1500  # at a time
+
+
+class EnergyLevels(NamedTuple):
+    """The energy columns of a ``Network`` in levels; shape ``(m,)``.
+
+    Attributes
+    ----------
+    lowest
+        The least floor of all rows up to each one.
+    width
+        How many levels there are from ``lowest`` up that a path can be at.
+    """
+
+    cap: Ints
+    cost: Ints
+    floor: Ints
+    lowest: Ints
+    start: int
+    width: int
+
+
+def energy_levels(network: Network, per_collect: int) -> EnergyLevels:
+    """Return levels of which the cheapest collect costs ``per_collect``, unless they are many."""
+    collects = network.energy_cost[~network.is_contact.astype(np.bool_)]
+    positive = collects[collects > 0.0]
+    step = float(positive.min()) / per_collect if len(positive) else 1.0
+    left = np.minimum(network.energy_floor, network.energy_cap - network.energy_cost)
+    span = float((network.energy_cap - np.minimum.accumulate(left)).max(initial=0.0))
+    step = max(step, span / _MAX_LEVELS)
+    cap = np.ceil(network.energy_cap / step - _ROUNDING).astype(np.int32)
+    cost = np.floor(network.energy_cost / step + _ROUNDING).astype(np.int32)
+    floor = np.floor(network.energy_floor / step + _ROUNDING).astype(np.int32)
+    lowest = np.minimum.accumulate(np.minimum(floor, cap - cost)).astype(np.int32)
+    return EnergyLevels(
+        cap=cap,
+        cost=cost,
+        floor=floor,
+        lowest=lowest,
+        start=int(np.ceil(network.energy_start / step - _ROUNDING)),
+        width=int((cap - np.minimum(cost, 0) - lowest).max(initial=0)) + 1,
+    )
+
+
+@kernel
+def most_by_energy(
+    network: Network, levels: EnergyLevels, weight: Floats, own: Floats, num_own: Longs
+) -> tuple[float, Ints]:
+    """Return the most that a path gains, and the rows of one that does.
+
+    Parameters
+    ----------
+    weight
+        Worth of each task; what is worth nothing is not taken. Shape ``(m,)``.
+    own, num_own
+        Room to work in, of shapes ``(m, width)`` and ``(m,)`` at least. Filled with the most
+        gained by a path that ends with each row and leaves at least so much energy, counted from
+        ``lowest``, and with how many such entries there are.
+    """
+    m = len(weight)
+    idle = np.full(levels.width, -np.inf)
+    base = levels.lowest[0] if m else 0
+    idle[: max(0, levels.start - base + 1)] = 0.0
+    merged, best, last = 0, 0.0, -1
+    for k in range(m):
+        _sink(idle, base - levels.lowest[k])
+        base = levels.lowest[k]
+        while merged < m and network.idle_from[network.by_idle[merged]] <= k:
+            i = network.by_idle[merged]
+            _raise_to(idle, own[i, : num_own[i]], levels.lowest[i] - base)
+            merged += 1
+        num_own[k] = 0
+        low = max(0, levels.floor[k] - base)
+        high = levels.cap[k] - levels.cost[k] - base + 1
+        if weight[k] <= 0.0 or high <= low:
+            continue
+        values = own[k, :high]
+        values[:] = -np.inf
+        _raise_to(values[low:], idle, -low - levels.cost[k])
+        for at in range(network.straight_first[k], network.straight_first[k + 1]):
+            i = network.straight_rows[at]
+            up = levels.lowest[i] - base - levels.cost[k]
+            _raise_to(values[low:], own[i, : num_own[i]], up - low)
+        values[:low] = values[low]
+        while high > 0 and values[high - 1] == -np.inf:
+            high -= 1
+        values[:high] += weight[k]
+        num_own[k] = high
+        if high > 0 and own[k, 0] > best:
+            best, last = own[k, 0], k
+    return best, _path_to(network, levels, weight, own, num_own, last)
+
+
+@inlined
+def _sink(idle: Floats, levels: int) -> None:
+    """Let the lowest level be so much lower: whoever has more energy has that much as well."""
+    if levels > 0:
+        width = len(idle)
+        lowest = idle[0]
+        for x in range(width - 1, levels - 1, -1):
+            idle[x] = idle[x - levels]
+        for x in range(min(levels, width)):
+            idle[x] = lowest
+
+
+@inlined
+def _raise_to(values: Floats, others: Floats, up: int) -> None:
+    """Raise values to those of a table that begins ``up`` levels higher, or lower."""
+    if len(others) == 0:
+        return
+    first = others[0]
+    for x in range(min(up, len(values))):
+        values[x] = max(values[x], first)
+    begin, skipped = max(up, 0), max(-up, 0)
+    count = min(len(values) - begin, len(others) - skipped)
+    for x in range(count):
+        values[begin + x] = max(values[begin + x], others[skipped + x])
+
+
+@kernel
+def _path_to(
+    network: Network, levels: EnergyLevels, weight: Floats, own: Floats, num_own: Longs, last: int
+) -> Ints:
+    """Return the rows of a path that ends with a row and gains its most, worked out backward."""
+    rows = np.empty(len(weight), dtype=np.int32)
+    length = 0
+    k, energy = last, levels.lowest[last] if last >= 0 else 0
+    while k >= 0:
+        rows[length] = k
+        length += 1
+        energy = max(energy, levels.floor[k])
+        gained = own[k, energy - levels.lowest[k]]
+        energy += levels.cost[k]
+        before = k - 1
+        while before >= 0:
+            x = max(0, energy - levels.lowest[before])
+            if (
+                x < num_own[before]
+                and own[before, x] + weight[k] == gained
+                and may_be_next(network, before, k)
+            ):
+                break
+            before -= 1
+        k = before
+    return rows[:length][::-1].copy()

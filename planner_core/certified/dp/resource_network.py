@@ -1,0 +1,190 @@
+r"""One satellite's tasks as a network on which plans under battery and recorder are paths.
+
+Levels are held less what idle time adds up to: energy :math:`E = p - C(t)` with the charge
+:math:`C` of all sunlit seconds so far, data :math:`G = d - b\,t` with the telemetry rate
+:math:`b`. Idling is then free, and both dynamics of ``planner_core.mdp.track`` become one step:
+task ``j`` may be taken from :math:`(E, G)` where :math:`G \le` ``data_before[j]``, and leaves
+
+* :math:`E' = \min(E,` ``energy_cap[j]`` :math:`) -` ``energy_cost[j]`` :math:`\ge`
+  ``energy_floor[j]``,
+* :math:`G' = \max(` ``data_floor[j]`` :math:`, G +` ``data_gain[j]`` :math:`) \le`
+  ``data_after[j]``.
+
+After ``i`` the satellite goes straight on to one of its near followers, or it idles: from row
+``idle_from[i]`` on every task may follow, so that it no longer matters which the last one was.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from planner_core.jit import inlined, kernel
+from planner_core.mdp.track import STRICT, compile_track
+from planner_core.precedence.arcs import Arcs, reversed_arcs
+from planner_core.precedence.relation import Order, comes_before, order_of
+from planner_core.problem import (
+    Floats,
+    Ints,
+    Longs,
+    Problem,
+    SatelliteProblem,
+)
+from planner_core.problem.slew import TIME_TOLERANCE_S
+
+_SLACK = 1e-9  # of capacity; above the referee's rounding, far below any task
+
+
+class Network(NamedTuple):
+    """Tasks and arcs of one satellite, relaxed by a hair; shape ``(m,)`` unless said otherwise.
+
+    ``near_rows[near_first[i] : near_first[i + 1]]`` are the rows below ``idle_from[i]`` that
+    may follow ``i``; ``straight_*`` list the same arcs by the later row. ``by_idle`` has all
+    rows in order of ``idle_from``. A path that passes by a row with ``is_kept`` is none.
+    """
+
+    place: Ints
+    is_contact: np.ndarray
+    is_kept: np.ndarray
+    idle_from: Ints
+    by_idle: Ints
+    near_first: Longs
+    near_rows: Ints
+    straight_first: Longs
+    straight_rows: Ints
+    energy_cap: Floats
+    energy_cost: Floats
+    energy_floor: Floats
+    data_gain: Floats
+    data_floor: Floats
+    data_before: Floats
+    data_after: Floats
+    energy_start: float
+    data_start: float
+    data_end: float
+
+
+def network_of(problem: Problem, satellite: SatelliteProblem) -> Network:
+    """Return the network whose paths include every plan that the referee accepts."""
+    return _network(problem, satellite, _SLACK)
+
+
+def strict_network_of(problem: Problem, satellite: SatelliteProblem) -> Network:
+    """Return the network whose paths are plans that the referee accepts (stations aside)."""
+    return _network(problem, satellite, -2.0 * STRICT)
+
+
+def _network(problem: Problem, satellite: SatelliteProblem, slack: float) -> Network:
+    """Return a network; limits are passed by ``slack`` (negative: kept clear of)."""
+    track = compile_track(problem, satellite, np.zeros(len(satellite), dtype=np.uint8))
+    order = order_of(satellite.transitions)
+    idle_from, near_first, near_rows = _arcs(order)
+    straight_first, straight_rows = reversed_arcs(Arcs(near_first, near_rows))
+    charge_from = track.charge_per_s * track.charge_from_s
+    charge_to = track.charge_per_s * track.charge_to_s
+    # A task may begin before another's end by the tolerance, and sunlight counts from there.
+    rounding = track.charge_per_s * TIME_TOLERANCE_S if slack > 0.0 else 0.0
+    data_from = track.telemetry_per_s * track.data_from_s
+    spent = track.telemetry_per_s * (track.data_from_s - track.data_to_s)
+    top = track.recorder_max + slack
+    return Network(
+        place=track.place,
+        is_contact=track.is_contact,
+        is_kept=np.isin(satellite.rows, problem.kept_rows),
+        idle_from=idle_from,
+        by_idle=np.argsort(idle_from, kind="stable").astype(np.int32),
+        near_first=near_first,
+        near_rows=near_rows,
+        straight_first=straight_first,
+        straight_rows=straight_rows,
+        energy_cap=1.0 - charge_to,
+        energy_cost=track.battery_cost + charge_from - charge_to - rounding,
+        energy_floor=track.battery_min - slack - charge_from,
+        data_gain=track.recorder_gain - spent,
+        data_floor=-data_from,
+        data_before=top - track.telemetry_per_s * track.data_peak_s,
+        data_after=top - data_from,
+        energy_start=track.battery_start,
+        data_start=track.recorder_start,
+        data_end=top - track.telemetry_per_s * track.data_end_s,
+    )
+
+
+@kernel
+def _arcs(order: Order) -> tuple[Ints, Longs, Ints]:
+    """Return from where on everything may follow each task, and what may before that."""
+    m = len(order.near_from)
+    idle_from = np.empty(m, dtype=np.int32)
+    first = np.zeros(m + 1, dtype=np.int64)
+    for i in range(m):
+        last = order.far_from[i]
+        while last > order.near_from[i] and comes_before(order, i, last - 1):
+            last -= 1
+        idle_from[i] = last
+        first[i + 1] = first[i]
+        for j in range(order.near_from[i], last):
+            first[i + 1] += comes_before(order, i, j)
+    rows = np.empty(first[m], dtype=np.int32)
+    at = 0
+    for i in range(m):
+        for j in range(order.near_from[i], idle_from[i]):
+            if comes_before(order, i, j):
+                rows[at] = j
+                at += 1
+    return idle_from, first, rows
+
+
+@inlined
+def may_be_next(network: Network, i: int, k: int) -> bool:
+    """Return whether row ``k`` may follow row ``i`` directly."""
+    if k >= network.idle_from[i]:
+        return True
+    for at in range(network.near_first[i], network.near_first[i + 1]):
+        if network.near_rows[at] == k:
+            return True
+    return False
+
+
+@kernel
+def part_of(network: Network, rows: Ints) -> Network:
+    """Return the network of some rows only, ascending; levels stay those of the whole."""
+    m = len(rows)
+    new_row = np.full(len(network.place), -1, dtype=np.int32)
+    for new in range(m):
+        new_row[rows[new]] = new
+    idle_from = np.searchsorted(rows, network.idle_from[rows]).astype(np.int32)
+    first = np.zeros(m + 1, dtype=np.int64)
+    near_rows = np.empty(len(network.near_rows), dtype=np.int32)
+    num_arcs = 0
+    for new in range(m):
+        row = rows[new]
+        for at in range(network.near_first[row], network.near_first[row + 1]):
+            j = new_row[network.near_rows[at]]
+            if j >= 0:
+                near_rows[num_arcs] = j
+                num_arcs += 1
+        first[new + 1] = num_arcs
+    near_rows = near_rows[:num_arcs].copy()
+    straight_first, straight_rows = reversed_arcs(Arcs(first, near_rows))
+    return Network(
+        network.place[rows],
+        network.is_contact[rows],
+        network.is_kept[rows],
+        idle_from,
+        np.argsort(idle_from, kind="mergesort").astype(np.int32),
+        first,
+        near_rows,
+        straight_first,
+        straight_rows,
+        network.energy_cap[rows],
+        network.energy_cost[rows],
+        network.energy_floor[rows],
+        network.data_gain[rows],
+        network.data_floor[rows],
+        network.data_before[rows],
+        network.data_after[rows],
+        network.energy_start,
+        network.data_start,
+        network.data_end,
+    )

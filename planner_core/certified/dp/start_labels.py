@@ -1,0 +1,473 @@
+r"""The heaviest path of one satellite when starts are free: labels over cells of starts.
+
+A label at a cell of a task says: some chain of tasks that ends with this one, begun at
+``start_s`` or later in this cell, is worth at most ``value``, and holds at least the tasks in
+``mask`` whose accesses are still open. Labels go on to the tasks of the table of arrivals. Each
+step only errs on one side:
+
+* A label is left out only where another one is at least as good: it is worth as much, without
+  the tasks that it alone remembers, and starts no later. Or it starts later by no more than
+  m tasks can make up for, and is worth m of the heaviest tasks more: it leaves out the next m
+  tasks of the other's chain and is in time again. (A task left out saves its length, during which
+  lines of sight turn by no more than the greatest rate: see ``spare_s``.)
+* Where a cell has no room for another label two become one with the greater value, the
+  earlier start and what both remember.
+* A task that is remembered is passed through unpaid; one that is forgotten is paid again.
+
+So the greatest value of all labels is never below the heaviest chain that takes no task twice.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from planner_core.jit import borrowing, kernel
+from planner_core.precedence.earliest_starts import (
+    EARLY_S,
+    Arrivals,
+    arrivals_of,
+    cell_of,
+)
+from planner_core.precedence.time_windows import Spans, View
+from planner_core.problem import Floats, Ints
+from planner_core.problem.pointing import (
+    Agile,
+    Vector,
+    earliest_start_s,
+    needed_s,
+    position_m,
+    sight,
+)
+from planner_core.problem.slew import INSTANT, angle_between_deg, slew_s
+
+Masks = npt.NDArray[np.uint64]
+
+_NONE: Final = np.uint64(0)
+_ALL: Final = np.uint64(0xFFFF_FFFF_FFFF_FFFF)
+_ONE: Final = np.uint64(1)
+_LEVELS: Final = 9  # of the table of what opens: ranges of up to 2**8 s
+_DE_BRUIJN: Final = np.uint64(0x03F7_9D71_B4CB_0A89)
+_SHIFT: Final = np.uint64(58)
+_PLACE_OF_BIT: Final[Ints] = np.zeros(64, dtype=np.int32)
+for _bit in range(64):
+    _PLACE_OF_BIT[(((1 << _bit) * int(_DE_BRUIJN)) & int(_ALL)) >> 58] = _bit
+_SOONER_S: Final = 0.02
+_PER_TASK_S: Final = 60.0  # what a second is worth where labels are merged
+
+
+class Cells(NamedTuple):
+    """One satellite's tasks cut into cells, ready for labels.
+
+    Attributes
+    ----------
+    order
+        Cells by left edge. Shape ``(num_cells,)``.
+    task
+        Of each cell. Shape ``(num_cells,)``.
+    bit
+        By which a task is remembered while its access is open; 0 for not at all. Shape ``(n,)``.
+    opened
+        What opens in each second and the 0, 1, 3, 7, ... seconds after it.
+    alive
+        What is open at some time of each second.
+    is_first
+        Whether the task may come first: no other one can be done before it.
+    spare_s
+        How much later a chain may start that leaves out its next task.
+    """
+
+    spans: Spans
+    eye: View
+    arrivals: Arrivals
+    order: Ints
+    task: Ints
+    bit: Masks
+    opened: Masks
+    alive: Masks
+    is_first: npt.NDArray[np.bool_]
+    spare_s: float
+
+
+class Labels(NamedTuple):
+    """Labels of all cells, ``most`` to a cell; of each cell the first ``used``."""
+
+    used: Ints
+    value: Floats
+    start_s: Floats
+    mask: Masks
+    parent: Ints
+    is_paid: npt.NDArray[np.bool_]
+    bit_weight: Floats
+
+
+def labels_of(cells: Cells, most: int) -> Labels:
+    """Return room for labels."""
+    n = len(cells.order)
+    return Labels(
+        used=np.zeros(n, dtype=np.int32),
+        value=np.empty(n * most),
+        start_s=np.empty(n * most),
+        mask=np.empty(n * most, dtype=np.uint64),
+        parent=np.empty(n * most, dtype=np.int32),
+        is_paid=np.empty(n * most, dtype=np.bool_),
+        bit_weight=np.zeros(64),
+    )
+
+
+def cells_of(spans: Spans, view: View, width_s: float) -> Cells | None:
+    """Return a satellite's cells; None where it turns more slowly than lines of sight do.
+
+    An acceleration limit only makes turns longer: here it is left out, for with it a later
+    start may be the earlier arrival.
+    """
+    view = view._replace(agile=Agile(view.agile.rate_deg_s, INSTANT, view.agile.settle_s))
+    share = greatest_rate_deg_s(spans, view) / view.agile.rate_deg_s
+    if share >= 1.0:
+        return None
+    least_s = float(spans.length_s.min()) if len(spans.row) else 1.0
+    arrivals = arrivals_of(spans, view, min(width_s, 0.9 * least_s))
+    count = np.diff(arrivals.first_cell)
+    task = np.repeat(np.arange(len(spans.row), dtype=np.int32), count)
+    edge_s = spans.open_s[task] + arrivals.width_s * (
+        np.arange(len(task)) - arrivals.first_cell[task]
+    )
+    bit = _bits(spans)
+    return Cells(
+        spans=spans,
+        eye=view,
+        arrivals=arrivals,
+        order=np.argsort(edge_s, kind="stable").astype(np.int32),
+        task=task,
+        bit=bit,
+        opened=_opened(spans, bit),
+        alive=_alive(spans, bit),
+        is_first=_first_tasks(spans, view),
+        spare_s=least_s * (1.0 - share) / (1.0 + share),
+    )
+
+
+@kernel
+def greatest_rate_deg_s(spans: Spans, view: View) -> float:
+    """Return a rate that the lines of sight of tasks never exceed.
+
+    The mean rate of each second, and what the rate can gain within one: the second derivative
+    of a direction is at most twice the square of its rate and acceleration over range.
+    """
+    most = 0.0
+    for i in range(len(spans.open_s)):
+        t_s = spans.open_s[i]
+        end_s = spans.close_s[i] + spans.length_s[i]
+        place = spans.place[i]
+        before = sight(view.path, view.places_m, place, t_s)
+        while t_s < end_s:
+            t_s += 1.0
+            now = sight(view.path, view.places_m, place, t_s)
+            x, y, z = position_m(view.path, t_s)
+            x, y, z = (
+                x - view.places_m[place, 0],
+                y - view.places_m[place, 1],
+                z - view.places_m[place, 2],
+            )
+            rate = math.radians(angle_between_deg(before, now))
+            gain = 3.0 * rate * rate + 25.0 / math.sqrt(x * x + y * y + z * z)
+            most = max(most, math.degrees(rate + gain))
+            before = now
+    return most
+
+
+@kernel
+def _bits(spans: Spans) -> Masks:
+    """Give each task a bit that no other one has while both accesses are open."""
+    bit = np.zeros(len(spans.open_s), dtype=np.uint64)
+    free_s = np.full(64, -np.inf)
+    for i in range(len(spans.open_s)):
+        for b in range(64):
+            # Whole seconds apart, as the table of what opens counts them.
+            if free_s[b] < math.floor(spans.open_s[i]) - 1.0:
+                free_s[b] = spans.close_s[i] + spans.length_s[i]
+                bit[i] = _ONE << np.uint64(b)
+                break
+    return bit
+
+
+@kernel
+def _opened(spans: Spans, bit: Masks) -> Masks:
+    last_s = 0.0
+    for i in range(len(spans.open_s)):
+        last_s = max(last_s, spans.close_s[i] + spans.length_s[i])
+    size = int(last_s) + 2
+    opened = np.zeros((_LEVELS, size), dtype=np.uint64)
+    for i in range(len(spans.open_s)):
+        opened[0, int(spans.open_s[i])] |= bit[i]
+    for level in range(1, _LEVELS):
+        half = 1 << (level - 1)
+        for t in range(size):
+            opened[level, t] = opened[level - 1, t] | opened[level - 1, min(t + half, size - 1)]
+    return opened
+
+
+@kernel
+def _alive(spans: Spans, bit: Masks) -> Masks:
+    last_s = 0.0
+    for i in range(len(spans.open_s)):
+        last_s = max(last_s, spans.close_s[i] + spans.length_s[i])
+    alive = np.zeros(int(last_s) + 2, dtype=np.uint64)
+    for i in range(len(spans.open_s)):
+        for t in range(int(spans.open_s[i]), int(spans.close_s[i]) + 1):
+            alive[t] |= bit[i]
+    return alive
+
+
+@kernel
+def _first_tasks(spans: Spans, view: View) -> npt.NDArray[np.bool_]:
+    """Return which tasks no other one can precede; a chain may begin with those alone."""
+    n = len(spans.open_s)
+    is_first = np.ones(n, dtype=np.bool_)
+    agile = view.agile
+    turn_s = slew_s(180.0, agile.rate_deg_s, agile.acceleration_deg_s2) + agile.settle_s
+    far_s = np.inf
+    for b in range(n):
+        if spans.open_s[b] >= far_s:
+            is_first[b:] = False
+            break
+        looks = sight(view.path, view.places_m, spans.place[b], spans.open_s[b])
+        for a in range(b):
+            end_s = spans.open_s[a] + spans.length_s[a]
+            looked = sight(view.path, view.places_m, spans.place[a], end_s)
+            if end_s + needed_s(agile, looked, looks) <= spans.open_s[b]:
+                is_first[b] = False
+                break
+        far_s = min(far_s, spans.open_s[b] + spans.length_s[b] + turn_s)
+    return is_first
+
+
+@borrowing
+def heaviest(
+    cells: Cells, weight: Floats, labels: Labels, most: int, is_exact: bool
+) -> tuple[float, int]:
+    """Return what no chain exceeds, and the label that is worth that; -1 for none.
+
+    Parameters
+    ----------
+    weight
+        Of each task, not negative. Shape ``(n,)``.
+    most
+        Labels that a cell has room for.
+    is_exact
+        Otherwise arrivals are estimates, which is quick and no bound.
+    """
+    spans, view, arrivals = cells.spans, cells.eye, cells.arrivals
+    width_s = arrivals.width_s
+    top, heaviest_task = 0.0, 0.0
+    best = -1
+    for i in range(len(weight)):
+        heaviest_task = max(heaviest_task, weight[i])
+    per_second = weight.mean() / _PER_TASK_S
+    for cell in range(len(cells.order)):
+        labels.used[cell] = 0
+    for task in range(len(weight)):
+        if cells.is_first[task]:
+            _insert(
+                cells, labels, most, heaviest_task, per_second, arrivals.first_cell[task],
+                weight[task], spans.open_s[task], cells.bit[task], -1, True,
+            )  # fmt: skip
+    next_open = 0
+    for at in range(len(cells.order)):
+        cell = cells.order[at]
+        task = cells.task[cell]
+        edge = spans.open_s[task] + (cell - arrivals.first_cell[task]) * width_s
+        # The task that each bit stands for, in the cells that lie ahead.
+        while next_open < len(weight) and spans.open_s[next_open] <= edge + width_s:
+            if cells.bit[next_open] != _NONE:
+                labels.bit_weight[_place_of(cells.bit[next_open])] = weight[next_open]
+            next_open += 1
+        for slot in range(cell * most, cell * most + labels.used[cell]):
+            value, start_s = labels.value[slot], labels.start_s[slot]
+            if value > top:
+                top, best = value, slot
+            end_s = start_s + spans.length_s[task]
+            looked = sight(view.path, view.places_m, spans.place[task], end_s)
+            for arc in range(arrivals.first_arc[cell], arrivals.first_arc[cell + 1]):
+                other = arrivals.to[arc]
+                then_s = max(edge + arrivals.after_s[arc], spans.open_s[other])
+                into = cell_of(arrivals, spans, other, then_s)
+                mask = _left_open(cells, labels.mask[slot], edge + width_s, into, other)
+                bit = cells.bit[other]
+                is_paid = mask & bit == _NONE
+                worth = value + weight[other] if is_paid else value
+                if _is_covered(cells, labels, most, heaviest_task, into, worth, then_s, mask | bit):
+                    continue
+                if start_s > edge:
+                    guess_s = edge + arrivals.after_s[arc] + arrivals.slope[arc] * (start_s - edge)
+                    if is_exact:
+                        guess_s = _not_after_s(cells, end_s, looked, other, guess_s)
+                    if guess_s > spans.close_s[other]:
+                        continue
+                    then_s = max(then_s, guess_s)
+                    again = cell_of(arrivals, spans, other, then_s)
+                    if again != into:
+                        into = again
+                        mask = _left_open(cells, labels.mask[slot], edge + width_s, into, other)
+                        is_paid = mask & bit == _NONE
+                        worth = value + weight[other] if is_paid else value
+                _insert(
+                    cells, labels, most, heaviest_task, per_second, into,
+                    worth, then_s, mask | bit, slot, is_paid,
+                )  # fmt: skip
+    return top, best
+
+
+@borrowing
+def _not_after_s(cells: Cells, end_s: float, looked: Vector, task: int, guess_s: float) -> float:
+    """Return an instant that the earliest start of a task after another is not before.
+
+    That is the guess, less a moment, if the satellite cannot be there by then.
+    """
+    spans, eye = cells.spans, cells.eye
+    first_s = max(end_s + eye.agile.settle_s, spans.open_s[task])
+    guess_s -= _SOONER_S
+    if guess_s <= first_s:
+        return float(first_s)
+    looks = sight(eye.path, eye.places_m, spans.place[task], guess_s)
+    if guess_s < end_s + needed_s(eye.agile, looked, looks):
+        return guess_s
+    exact_s: float = earliest_start_s(
+        eye.agile, end_s, looked, eye.path, eye.places_m,
+        spans.place[task], spans.open_s[task], spans.close_s[task] + EARLY_S,
+    )  # fmt: skip
+    return exact_s - EARLY_S
+
+
+@borrowing
+def _left_open(cells: Cells, mask: np.uint64, from_s: float, into: int, other: int) -> np.uint64:
+    """Return what a chain still remembers at the right edge of the cell it goes into."""
+    if mask == _NONE:
+        return mask
+    arrivals = cells.arrivals
+    to_s = cells.spans.open_s[other] + arrivals.width_s * (into - arrivals.first_cell[other] + 1)
+    first = int(from_s)
+    last = min(int(to_s), len(cells.alive) - 1)
+    mask &= cells.alive[last]
+    size = last - first + 1
+    if size <= 0 or mask == _NONE:
+        return mask
+    level, span = 0, 1
+    while 2 * span <= size:
+        level, span = level + 1, 2 * span
+    if level >= _LEVELS:
+        return _NONE
+    new = cells.opened[level, first] | cells.opened[level, last - span + 1]
+    left: np.uint64 = mask & (new ^ _ALL)
+    return left
+
+
+@borrowing
+def _place_of(bit: np.uint64) -> int:
+    return int(_PLACE_OF_BIT[(bit * _DE_BRUIJN) >> _SHIFT])
+
+
+@borrowing
+def _is_as_good(
+    cells: Cells,
+    labels: Labels,
+    heaviest_task: float,
+    slack: float,
+    late_s: float,
+    extra: np.uint64,
+) -> bool:
+    """Return whether a label makes another one needless.
+
+    Parameters
+    ----------
+    slack, late_s
+        By how much it is worth more, and starts later.
+    extra
+        What it remembers and the other does not.
+    """
+    if late_s > 0.0:
+        slack -= heaviest_task * math.ceil(late_s / cells.spare_s)
+    while slack >= 0.0 and extra != _NONE:
+        low = extra & (~extra + _ONE)
+        slack -= labels.bit_weight[_place_of(low)]
+        extra ^= low
+    return slack >= 0.0
+
+
+@borrowing
+def _is_covered(
+    cells: Cells,
+    labels: Labels,
+    most: int,
+    heaviest_task: float,
+    cell: int,
+    value: float,
+    start_s: float,
+    mask: np.uint64,
+) -> bool:
+    for i in range(cell * most, cell * most + labels.used[cell]):
+        if labels.value[i] >= value and _is_as_good(
+            cells, labels, heaviest_task, labels.value[i] - value,
+            labels.start_s[i] - start_s, labels.mask[i] & (mask ^ _ALL),
+        ):  # fmt: skip
+            return True
+    return False
+
+
+@borrowing
+def _insert(
+    cells: Cells,
+    labels: Labels,
+    most: int,
+    heaviest_task: float,
+    per_second: float,
+    cell: int,
+    value: float,
+    start_s: float,
+    mask: np.uint64,
+    parent: int,
+    is_paid: bool,
+) -> None:
+    if _is_covered(cells, labels, most, heaviest_task, cell, value, start_s, mask):
+        return
+    base = cell * most
+    kept = base
+    for i in range(base, base + labels.used[cell]):
+        if value >= labels.value[i] and _is_as_good(
+            cells, labels, heaviest_task, value - labels.value[i],
+            start_s - labels.start_s[i], mask & (labels.mask[i] ^ _ALL),
+        ):  # fmt: skip
+            continue
+        if kept != i:
+            labels.value[kept], labels.start_s[kept] = labels.value[i], labels.start_s[i]
+            labels.mask[kept], labels.parent[kept] = labels.mask[i], labels.parent[i]
+            labels.is_paid[kept] = labels.is_paid[i]
+        kept += 1
+    if kept < base + most:
+        labels.value[kept], labels.start_s[kept] = value, start_s
+        labels.mask[kept], labels.parent[kept] = mask, parent
+        labels.is_paid[kept] = is_paid
+        labels.used[cell] = kept + 1 - base
+        return
+    labels.used[cell] = most
+    least, into = np.inf, base
+    for i in range(base, kept):
+        gain = abs(labels.value[i] - value)
+        sooner = abs(labels.start_s[i] - start_s) * per_second
+        is_better = (labels.value[i] >= value) == (labels.start_s[i] <= start_s)
+        loss = 0.0 if is_better else min(gain, sooner)
+        forgotten = (labels.mask[i] ^ mask) & (mask if value > labels.value[i] else labels.mask[i])
+        while forgotten != _NONE:
+            low = forgotten & (~forgotten + _ONE)
+            loss += 0.5 * labels.bit_weight[_place_of(low)]
+            forgotten ^= low
+        if loss < least:
+            least, into = loss, i
+    labels.mask[into] &= mask
+    labels.start_s[into] = min(labels.start_s[into], start_s)
+    if value > labels.value[into]:
+        labels.value[into], labels.parent[into] = value, parent
+        labels.is_paid[into] = is_paid

@@ -1,0 +1,1 @@
+"""Who does what when: one driver for each kind of problem."""

@@ -1,0 +1,1 @@
+"""Large neighbourhood search: parts of a plan destroyed and repaired."""

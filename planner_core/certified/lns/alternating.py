@@ -1,0 +1,92 @@
+"""Two searches for plans under battery and recorder, by turns.
+
+The window search finds most in a second. Where it stalls, the exact programmes over choices of
+tasks, each a satellite's whole horizon, lead to other plans that are worth the same: with other
+contacts, and energy left elsewhere.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from planner_core.budget import Budget
+from planner_core.certified.lns.choices import ChoiceSearch
+from planner_core.certified.lns.resource_search import ResourceWindows
+from planner_core.problem import Problem
+from planner_core.problem.plan import Plan
+
+_MOVES: Final = 250  # of the window search in a step, for each satellite
+_FIRST_STEPS: Final = 12  # of the window search alone, at each start
+_STALLED: Final = 9  # steps that lead nowhere, before another start
+_STARTS: Final = 1000  # no search has more
+
+
+class TurnSearch:
+    """Plans by windows and by choices of tasks, in turn, from one start after another.
+
+    The same for the same seed, whatever other searches go on beside it.
+
+    Parameters
+    ----------
+    start
+        The plan to begin with, and to begin with again where a search leads nowhere.
+    unit
+        Of worth, as the exact programmes count it.
+
+    Attributes
+    ----------
+    ended
+        What each start but the last has led to.
+    """
+
+    def __init__(self, problem: Problem, start: Plan, unit: float, budget: Budget, seed: int):
+        self._problem, self._start, self._budget = problem, start, budget
+        self._num_satellites = sum(len(s) > 0 for s in problem.satellites)
+        self._choices = ChoiceSearch(problem, unit, seed, budget.stop)
+        self._seed, self._num_starts, self._idle_steps = seed, 0, _STALLED
+        self.ended: list[Plan] = []
+
+    def turn(self, num_steps: int) -> None:
+        """Let each search go on from where the other got to, or begin afresh where both stall."""
+        for _ in range(num_steps):
+            if self._idle_steps == _STALLED:
+                self._begin()
+                continue
+            before = self._windows.reward
+            self._replan_days()
+            self._replan_windows(1)
+            self._idle_steps = 0 if self._windows.reward > before else self._idle_steps + 1
+
+    def _begin(self) -> None:
+        if self._num_starts:
+            self.ended.append(self.plan)
+        # A seed of its own for each start of each search.
+        self._windows = ResourceWindows(self._problem, self._seed + _STARTS * self._num_starts)
+        self._windows.adopt(self._start)
+        self._num_starts, self._idle_steps = self._num_starts + 1, 0
+        # Whole days first: once most targets are taken, contacts hardly move.
+        self._replan_days()
+        self._replan_windows(_FIRST_STEPS)
+
+    def _replan_days(self) -> None:
+        """Replan each satellite's whole day by choices of tasks."""
+        self._choices.adopt(self._windows.plan)
+        for _ in range(self._num_satellites):
+            if self._budget.is_spent():
+                return
+            self._choices.move()
+        if self._choices.reward >= self._windows.reward:
+            self._windows.adopt(self._choices.plan)
+
+    def _replan_windows(self, num_steps: int) -> None:
+        self._windows.make_moves(num_steps * _MOVES * self._num_satellites, self._budget)
+
+    @property
+    def plan(self) -> Plan:
+        """The plan as it is now."""
+        return self._windows.plan
+
+    @property
+    def reward(self) -> float:
+        """What its targets are worth."""
+        return self._windows.reward

@@ -1,0 +1,238 @@
+"""Plans under battery and recorder: exact programmes over a choice of tasks for each target.
+
+Where each target may be collected at one time only, none can be collected twice, and the exact
+programme finds the best plan of all those, with contacts and energy spread over the whole
+horizon. The search is for the choice: it opens some targets to all their times, lets the
+programme plan, and settles every target collected twice on one of the two, until there is none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from planner_core.certified.dp.completion_bounds import least_energy
+from planner_core.certified.dp.data_levels import DataLevels, data_levels, levels_of_part
+from planner_core.certified.dp.forward_labels import most_value, path_of
+from planner_core.certified.dp.resource_network import Network, part_of, strict_network_of
+from planner_core.problem import (
+    COLLECT,
+    Bools,
+    Bytes,
+    Ints,
+    Problem,
+)
+from planner_core.problem.plan import Plan
+from planner_core.solvers.sequential import blocked_rows
+
+_SETTLED: Final = 0.2  # share of the targets collected once that each round settles as well
+_OPENED: Final = 0.3  # the largest share of the collected targets that a move opens
+_MOST_ROWS: Final = 1200  # open ones, in a move
+_LARGER_STEP: Final = 0.03
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SatelliteChoices:
+    """One satellite's programme for plans: strict limits, levels never below what is on board.
+
+    Attributes
+    ----------
+    target
+        Of each task; -1 for contacts. Shape ``(m,)``.
+    weight
+        Worth of each task in units. Shape ``(m,)``.
+    """
+
+    rows: Ints
+    network: Network
+    levels: DataLevels
+    target: Ints
+    weight: Ints
+
+    @classmethod
+    def of(cls, problem: Problem, index: int, unit: float) -> SatelliteChoices:
+        """Return the programme of a satellite that has opportunities."""
+        satellite = problem.satellites[index]
+        network = strict_network_of(problem, satellite)
+        target = np.where(satellite.kind == COLLECT, satellite.place, -1).astype(np.int32)
+        worth = np.append(problem.target_reward, 0.0)[target]
+        return cls(
+            rows=satellite.rows,
+            network=network,
+            levels=data_levels(network, 2, is_optimistic=False),
+            target=target,
+            weight=np.round(worth / unit).astype(np.int32),
+        )
+
+    def best(self, allowed: Bools, goal: int, stop: Bytes) -> tuple[int, Ints]:
+        """Return units and tasks of the best plan of the allowed tasks worth ``goal`` or more.
+
+        Answers -1 and no tasks where there is none. Targets may be collected again and again.
+        """
+        rows = np.flatnonzero(allowed | self.network.is_kept).astype(np.int32)
+        nothing = rows[:0]
+        if len(rows) == 0:
+            return (0, nothing) if goal <= 0 else (-1, nothing)
+        network, levels = part_of(self.network, rows), levels_of_part(self.levels, rows)
+        weight = self.weight[rows]
+        limit = int(1.15 * max(goal, 0)) + 16 + int(weight.max(initial=0))
+        idle, after = least_energy(network, weight, limit)
+        top = int(np.flatnonzero(idle[0] <= network.energy_start)[-1])
+        if top < goal:
+            return -1, nothing
+        idle, after = idle[:, : top + 1].copy(), after[:, : top + 1].copy()
+        credit = np.zeros(levels.num_levels, dtype=np.int32)
+        value, labels = most_value(
+            network, levels, weight, idle, after, credit, top, max(goal, 0), True, stop
+        )
+        if value < 0:
+            return -1, nothing
+        return value, rows[path_of(network, levels, weight, labels, value)]
+
+
+class ChoiceSearch:
+    """The best plan so far, by satellite, and moves that better it.
+
+    Attributes
+    ----------
+    taken
+        Whether the plan takes each opportunity. Shape ``(n,)``.
+    reward
+        What its targets are worth.
+    usage
+        How many of the plans kept so far took each opportunity. Shape ``(n,)``.
+    """
+
+    def __init__(self, problem: Problem, unit: float, seed: int, stop: Bytes) -> None:
+        self._problem, self._stop = problem, stop
+        self._rng = np.random.default_rng(seed)
+        self._satellites = [
+            (index, SatelliteChoices.of(problem, index, unit))
+            for index, satellite in enumerate(problem.satellites)
+            if len(satellite)
+        ]
+        self._turn = 0
+        self.taken: Bools = np.zeros(len(problem.opportunities), dtype=np.bool_)
+        self.reward = 0.0
+        self.usage = np.zeros(len(problem.opportunities))
+
+    @property
+    def plan(self) -> Plan:
+        """The plan that is taken."""
+        return Plan.of(self._problem, np.flatnonzero(self.taken))
+
+    def adopt(self, plan: Plan) -> None:
+        """Go on from another plan."""
+        self.taken[:] = False
+        self.taken[[action.opportunity for action in plan.actions]] = True
+        self.reward = self._worth(self.taken)
+
+    def start(self, preferred: Bools, first_goal: float) -> None:
+        """Plan each satellite over what the others leave; keep it if that is better.
+
+        Parameters
+        ----------
+        preferred
+            Opportunities that stand for their targets; others offer one at random.
+        first_goal
+            Share of what all of a satellite's targets are worth to try for first.
+        """
+        before = self.taken.copy(), self.reward
+        self.taken = np.zeros_like(self.taken)
+        for index, satellite in self._satellites:
+            others = self._taken_targets(self.taken)
+            own = preferred[satellite.rows] & (satellite.target >= 0)
+            has_own = self._mask(satellite.target[own])
+            allowed = own | (self._one_each(satellite) & ~has_own[satellite.target])
+            allowed &= ~others[satellite.target]
+            self._let_contacts(allowed, index, satellite)
+            goal = int(first_goal * satellite.weight[allowed].sum())
+            value = -1
+            while value < 0 and not self._stop[0]:
+                value, path = self._settled(satellite, allowed, goal)
+                if goal == 0:
+                    break
+                goal = int(goal * (1.0 - _LARGER_STEP))
+            if value >= 0:
+                self.taken[satellite.rows[path]] = True
+        self.reward = self._worth(self.taken)
+        if self.reward < before[1]:
+            self.taken, self.reward = before
+
+    def move(self) -> None:
+        """Replan one satellite with some of its targets open; keep what is worth no less."""
+        index, satellite = self._satellites[self._turn % len(self._satellites)]
+        self._turn += 1
+        own = self.taken[satellite.rows]
+        kept = own & (satellite.target >= 0)
+        kept &= self._rng.random(len(kept)) >= self._rng.random() * _OPENED
+        others = self.taken.copy()
+        others[satellite.rows] = False
+        elsewhere = self._taken_targets(others)
+        is_settled = self._mask(satellite.target[kept])
+        is_open = ~(is_settled | elsewhere)[satellite.target] & (satellite.target >= 0)
+        share = _MOST_ROWS / max(1, int(is_open.sum()))
+        is_open &= self._rng.random(len(is_open)) < share
+        allowed = kept | is_open | (own & (satellite.target >= 0))
+        self._let_contacts(allowed, index, satellite)
+        goal = int(satellite.weight[own].sum())
+        value, path = self._settled(satellite, allowed, goal)
+        if value < 0:
+            return
+        changed = others
+        changed[satellite.rows[path]] = True
+        reward = self._worth(changed)
+        if reward >= self.reward:
+            self.taken, self.reward = changed, reward
+            self.usage += changed
+
+    def _settled(self, satellite: SatelliteChoices, allowed: Bools, goal: int) -> tuple[int, Ints]:
+        """Return the plan that is left when each target has been settled on one task."""
+        allowed = allowed.copy()
+        num_targets = len(self._problem.target_ids)
+        while True:
+            value, path = satellite.best(allowed, goal, self._stop)
+            images = path[satellite.target[path] >= 0]
+            counts = np.bincount(satellite.target[images], minlength=num_targets + 1)
+            if value < 0 or counts.max() <= 1:
+                return value, path
+            images = self._rng.permutation(images)
+            chosen = np.full(num_targets + 1, -1)
+            chosen[satellite.target[images]] = images
+            once = (counts == 1) & (self._rng.random(num_targets + 1) < _SETTLED)
+            settled = (counts > 1) | once
+            allowed &= ~settled[satellite.target]
+            allowed[chosen[settled]] = True
+
+    def _one_each(self, satellite: SatelliteChoices) -> Bools:
+        """Return one task of each target, at random."""
+        order = self._rng.permutation(len(satellite.target))
+        order = order[satellite.target[order] >= 0]
+        _, first = np.unique(satellite.target[order], return_index=True)
+        chosen = np.zeros(len(satellite.target), dtype=np.bool_)
+        chosen[order[first]] = True
+        return chosen
+
+    def _let_contacts(self, allowed: Bools, index: int, satellite: SatelliteChoices) -> None:
+        """Allow the contacts whose stations the other satellites leave free."""
+        others = self.taken.copy()
+        others[satellite.rows] = False
+        taken = [int(row) for row in np.flatnonzero(others)]
+        blocked = blocked_rows(self._problem, self._problem.satellites[index], taken)
+        allowed[(satellite.target < 0) & (blocked == 0)] = True
+
+    def _mask(self, targets: Ints) -> Bools:
+        """Return which targets these are; the last entry stands for contacts."""
+        mask = np.zeros(len(self._problem.target_ids) + 1, dtype=np.bool_)
+        mask[targets] = True
+        mask[-1] = False
+        return mask
+
+    def _taken_targets(self, taken: Bools) -> Bools:
+        table = self._problem.opportunities
+        return self._mask(table.place[taken & (table.kind == COLLECT)])
+
+    def _worth(self, taken: Bools) -> float:
+        return float(self._problem.target_reward[self._taken_targets(taken)[:-1]].sum())

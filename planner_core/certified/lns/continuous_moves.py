@@ -1,0 +1,393 @@
+"""Moves on a route: a few tasks in a row are planned anew by labels over cells of starts.
+
+A label is a chain of tasks from the task before the window, each as early as it can be. In each
+cell of a task's starts the best one is kept. Targets that the satellites image outside the
+window may be taken at next to no gain: where that happens the other image goes, and leaves a
+hole for something else. Arrivals are estimates from the table; the chain that is chosen is
+worked out exactly, and given up where it does not hold.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from planner_core.certified.lns.route import (
+    FIXED,
+    FREE,
+    Route,
+    early_after,
+    position_of,
+    remove,
+    update_early,
+    update_late,
+)
+from planner_core.draws import Uint64s, next_draw
+from planner_core.jit import borrowing
+from planner_core.precedence.earliest_starts import Arrivals, cell_of, edge_s
+from planner_core.precedence.time_windows import Spans, View
+from planner_core.problem import Bytes, Floats, Ints
+from planner_core.problem.pointing import needed_s, sight
+
+_MOST_LABELS: Final = 20_000
+_MOST_BUCKETS: Final = 4096
+_MOST_TASKS: Final = 64  # of a window
+_TIE: Final = 0.01  # of a task's worth: what a free swap is worth, and what breaks ties
+_AIMED: Final = 0.7  # of the moves begin at a target that nobody images
+_ATTEMPTS: Final = 30
+_DONE: Final = -2
+
+
+class Scratch(NamedTuple):
+    """Room for the labels of one move.
+
+    ``mark`` counts the moves: what bears another mark is of an earlier one. Labels: ``task``,
+    ``start_s``, ``value``, ``gain`` (what counts), ``parent`` and ``following`` in the bucket.
+    """
+
+    mark: Ints
+    task: Ints
+    start_s: Floats
+    value: Floats
+    gain: Floats
+    parent: Ints
+    following: Ints
+    bucket: Ints
+    label: Ints
+    label_mark: Ints
+    worth: Floats
+    worth_mark: Ints
+    inside_mark: Ints
+    chosen: Ints
+    chosen_s: Floats
+    old: Route
+
+
+def scratch_of(num_tasks: int, num_cells: int, num_targets: int) -> Scratch:
+    """Return room for the moves on a route."""
+    return Scratch(
+        mark=np.zeros(1, dtype=np.int32),
+        task=np.empty(_MOST_LABELS, dtype=np.int32),
+        start_s=np.empty(_MOST_LABELS),
+        value=np.empty(_MOST_LABELS),
+        gain=np.empty(_MOST_LABELS),
+        parent=np.empty(_MOST_LABELS, dtype=np.int32),
+        following=np.empty(_MOST_LABELS, dtype=np.int32),
+        bucket=np.full(_MOST_BUCKETS, -1, dtype=np.int32),
+        label=np.empty(num_cells, dtype=np.int32),
+        label_mark=np.zeros(num_cells, dtype=np.int32),
+        worth=np.empty(num_tasks),
+        worth_mark=np.zeros(num_tasks, dtype=np.int32),
+        inside_mark=np.zeros(num_targets, dtype=np.int32),
+        chosen=np.empty(_MOST_TASKS, dtype=np.int32),
+        chosen_s=np.empty(_MOST_TASKS),
+        old=Route(
+            size=np.zeros(1, dtype=np.int32),
+            task=np.empty(num_tasks + _MOST_TASKS, dtype=np.int32),
+            early_s=np.empty(num_tasks + _MOST_TASKS),
+            late_s=np.empty(num_tasks + _MOST_TASKS),
+        ),
+    )
+
+
+@borrowing
+def make_moves(
+    spans: Spans,
+    view: View,
+    arrivals: Arrivals,
+    worth: Floats,
+    holder: Ints,
+    route: Route,
+    scratch: Scratch,
+    draws: Uint64s,
+    num_moves: int,
+    longest: int,
+    stop: Bytes,
+) -> None:
+    """Make moves, in place.
+
+    Parameters
+    ----------
+    worth
+        Of each task; what must be kept is worth more than all else. Shape ``(n,)``.
+    holder
+        For each target the task that images it, or ``FREE``, ``ELSEWHERE`` or ``FIXED``. Shape
+        ``(num_targets,)``.
+    longest
+        The most tasks that a window takes up.
+    """
+    n = len(spans.open_s)
+    for _ in range(num_moves):
+        if stop[0] or n == 0:
+            return
+        task = int(next_draw(draws) * n)
+        if next_draw(draws) < _AIMED:
+            for _ in range(_ATTEMPTS):
+                if holder[spans.place[task]] == FREE and worth[task] > 0.0:
+                    break
+                task = int(next_draw(draws) * n)
+        at_s = spans.open_s[task] + next_draw(draws) * (spans.close_s[task] - spans.open_s[task])
+        low, high = 0, route.size[0]
+        while low < high:
+            middle = (low + high) // 2
+            if route.early_s[middle] < at_s:
+                low = middle + 1
+            else:
+                high = middle
+        size = int(next_draw(draws) * (longest + 1))
+        first = max(0, low - int(next_draw(draws) * (size + 1)))
+        replan(
+            spans, view, arrivals, worth, holder, route, scratch, draws,
+            first, min(first + size, route.size[0]),
+        )  # fmt: skip
+
+
+@borrowing
+def replan(
+    spans: Spans,
+    view: View,
+    arrivals: Arrivals,
+    worth: Floats,
+    holder: Ints,
+    route: Route,
+    scratch: Scratch,
+    draws: Uint64s,
+    first: int,
+    end: int,
+) -> bool:
+    """Plan the tasks ``first`` up to ``end`` anew; return whether the route has changed."""
+    scratch.mark[0] += 1
+    mark = scratch.mark[0]
+    old_gain = 0.0
+    for p in range(first, end):
+        old_gain += worth[route.task[p]]
+        scratch.inside_mark[spans.place[route.task[p]]] = mark
+    last = _best_chain(
+        spans, view, arrivals, worth, holder, route, scratch, draws, first, end, old_gain
+    )
+    if last == _DONE:
+        return False
+    size = 0
+    while last >= 0:
+        if size == _MOST_TASKS:
+            return False
+        scratch.chosen[size] = scratch.task[last]
+        size += 1
+        last = scratch.parent[last]
+    if not _time_chain(spans, view, route, scratch, first, end, size):
+        return False
+    for p in range(first, end):
+        holder[spans.place[route.task[p]]] = FREE
+    _put_in(spans, view, route, scratch, first, end, size)
+    for i in range(size - 1, -1, -1):
+        task = scratch.chosen[i]
+        held = holder[spans.place[task]]
+        holder[spans.place[task]] = task
+        if held >= 0:
+            # It is imaged twice now: the other image goes, perhaps of the same access.
+            p = position_of(route, held, first, first + size)
+            if p >= 0:
+                remove(spans, view, route, p)
+                if p < first:
+                    first -= 1
+    return True
+
+
+@borrowing
+def _time_chain(
+    spans: Spans, view: View, route: Route, scratch: Scratch, first: int, end: int, size: int
+) -> bool:
+    """Work out the chain's earliest starts; return whether it fits before what comes after."""
+    before, start_s = -1, 0.0
+    if first > 0:
+        before, start_s = route.task[first - 1], route.early_s[first - 1]
+    for i in range(size - 1, -1, -1):
+        start_s = early_after(spans, view, before, start_s, scratch.chosen[i])
+        if start_s == np.inf:
+            return False
+        scratch.chosen_s[i] = start_s
+        before = scratch.chosen[i]
+    if end < route.size[0]:
+        start_s = early_after(spans, view, before, start_s, route.task[end])
+        return bool(start_s <= route.late_s[end] + 1e-9)
+    return True
+
+
+@borrowing
+def _put_in(
+    spans: Spans, view: View, route: Route, scratch: Scratch, first: int, end: int, size: int
+) -> None:
+    """Put the chain in place of the tasks ``first`` up to ``end``."""
+    n, shift = route.size[0], size - (end - first)
+    if shift > 0:
+        for p in range(n - 1, end - 1, -1):
+            route.task[p + shift] = route.task[p]
+            route.early_s[p + shift] = route.early_s[p]
+            route.late_s[p + shift] = route.late_s[p]
+    elif shift < 0:
+        for p in range(end, n):
+            route.task[p + shift] = route.task[p]
+            route.early_s[p + shift] = route.early_s[p]
+            route.late_s[p + shift] = route.late_s[p]
+    route.size[0] = n + shift
+    for i in range(size):
+        route.task[first + size - 1 - i] = scratch.chosen[i]
+        route.early_s[first + size - 1 - i] = scratch.chosen_s[i]
+    update_early(spans, view, route, first + size, first + size)
+    update_late(spans, view, route, first + size - 1, first - 1)
+
+
+@borrowing
+def _best_chain(
+    spans: Spans,
+    view: View,
+    arrivals: Arrivals,
+    worth: Floats,
+    holder: Ints,
+    route: Route,
+    scratch: Scratch,
+    draws: Uint64s,
+    first: int,
+    end: int,
+    old_gain: float,
+) -> int:
+    """Return the last label of the best chain, -1 for the empty one, ``_DONE`` for none as good."""
+    after, late_s = -1, np.inf
+    looks = (1.0, 0.0, 0.0)
+    if end < route.size[0]:
+        after, late_s = route.task[end], route.late_s[end]
+        looks = sight(view.path, view.places_m, spans.place[after], late_s)
+    count = 0
+    from_s = 0.0
+    if first > 0:
+        before, start_s = route.task[first - 1], route.early_s[first - 1]
+        from_s = start_s + spans.length_s[before]
+        count = _extend(
+            spans, arrivals, worth, holder, scratch, draws, count,
+            before, start_s, -1, from_s, late_s,
+        )  # fmt: skip
+    else:
+        from_s = spans.open_s[0] if len(spans.open_s) else 0.0
+        until_s = min(late_s, from_s + _MOST_BUCKETS * 4.0)
+        for task in range(len(spans.open_s)):
+            if spans.open_s[task] >= until_s:
+                break
+            count = _offer(
+                spans, arrivals, worth, holder, scratch, draws, count,
+                task, spans.open_s[task], -1, from_s, late_s,
+            )  # fmt: skip
+    best, best_value = _DONE, -1.0
+    if old_gain <= 1e-9 and end > first:
+        best, best_value = -1, 0.0
+    for b in range(_MOST_BUCKETS):
+        at = scratch.bucket[b]
+        while at >= 0:
+            scratch.bucket[b] = scratch.following[at]
+            task, start_s = scratch.task[at], scratch.start_s[at]
+            cell = cell_of(arrivals, spans, task, start_s)
+            if scratch.label[cell] == at:
+                if scratch.value[at] > best_value and scratch.gain[at] >= old_gain - 1e-9:
+                    done_s = start_s + spans.length_s[task]
+                    fits = after < 0
+                    if not fits and done_s <= late_s:
+                        looked = sight(view.path, view.places_m, spans.place[task], done_s)
+                        fits = done_s + needed_s(view.agile, looked, looks) <= late_s + 0.02
+                    if fits:
+                        best, best_value = at, scratch.value[at]
+                count = _extend(
+                    spans, arrivals, worth, holder, scratch, draws, count,
+                    task, start_s, at, from_s, late_s,
+                )  # fmt: skip
+            at = scratch.bucket[b]
+    return best
+
+
+@borrowing
+def _extend(
+    spans: Spans,
+    arrivals: Arrivals,
+    worth: Floats,
+    holder: Ints,
+    scratch: Scratch,
+    draws: Uint64s,
+    count: int,
+    task: int,
+    start_s: float,
+    parent: int,
+    from_s: float,
+    late_s: float,
+) -> int:
+    """Offer all that may follow a task at a start; return the number of labels then."""
+    cell = cell_of(arrivals, spans, task, start_s)
+    edge = edge_s(arrivals, spans, task, cell)
+    for arc in range(arrivals.first_arc[cell], arrivals.first_arc[cell + 1]):
+        other = arrivals.to[arc]
+        then_s = edge + arrivals.after_s[arc] + arrivals.slope[arc] * (start_s - edge)
+        then_s = max(then_s, spans.open_s[other])
+        if then_s > spans.close_s[other]:
+            continue
+        count = _offer(
+            spans, arrivals, worth, holder, scratch, draws, count,
+            other, then_s, parent, from_s, late_s,
+        )  # fmt: skip
+    return count
+
+
+@borrowing
+def _offer(
+    spans: Spans,
+    arrivals: Arrivals,
+    worth: Floats,
+    holder: Ints,
+    scratch: Scratch,
+    draws: Uint64s,
+    count: int,
+    task: int,
+    start_s: float,
+    parent: int,
+    from_s: float,
+    late_s: float,
+) -> int:
+    """Keep a chain that goes on to a task, where it is the best in its cell."""
+    if start_s + spans.length_s[task] > late_s or count == _MOST_LABELS:
+        return count
+    mark, place = scratch.mark[0], spans.place[task]
+    is_inside = scratch.inside_mark[place] == mark
+    held = holder[place]
+    if held == FIXED:
+        return count
+    is_new = is_inside or held == FREE
+    if not is_new and held >= 0 and spans.is_kept[held]:
+        return count
+    if scratch.worth_mark[task] != mark:
+        scratch.worth_mark[task] = mark
+        luck = next_draw(draws)
+        extra = 1.0 + _TIE * luck if is_new else _TIE * (2.0 * luck - 1.0)
+        scratch.worth[task] = worth[task] * extra
+    if scratch.worth[task] <= 0.0:
+        return count
+    value = scratch.worth[task]
+    if parent >= 0:
+        value += scratch.value[parent]
+    cell = cell_of(arrivals, spans, task, start_s)
+    for other in range(arrivals.first_cell[task], cell + 1):
+        if scratch.label_mark[other] == mark and scratch.value[scratch.label[other]] >= value:
+            return count
+    at = parent
+    while at >= 0:
+        if spans.place[scratch.task[at]] == place:
+            return count
+        at = scratch.parent[at]
+    bucket = int((start_s - from_s) * 0.25)
+    if bucket >= _MOST_BUCKETS:
+        return count
+    scratch.label[cell], scratch.label_mark[cell] = count, mark
+    scratch.task[count], scratch.start_s[count] = task, start_s
+    scratch.value[count], scratch.parent[count] = value, parent
+    scratch.gain[count] = (scratch.gain[parent] if parent >= 0 else 0.0) + (
+        worth[task] if is_new else 0.0
+    )
+    scratch.following[count] = scratch.bucket[bucket]
+    scratch.bucket[bucket] = count
+    return count + 1

@@ -1,0 +1,194 @@
+"""The search for plans with continuous starts, without resources."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from planner_core.budget import Budget
+from planner_core.certified.lns.continuous_moves import make_moves, scratch_of
+from planner_core.certified.lns.insertion import insert_each
+from planner_core.certified.lns.route import (
+    ELSEWHERE,
+    FIXED,
+    FREE,
+    Route,
+    empty_route,
+    remove,
+    update_early,
+    update_late,
+)
+from planner_core.certified.proofs.continuous import width_for
+from planner_core.draws import draws_of
+from planner_core.precedence.earliest_starts import Arrivals, arrivals_of
+from planner_core.precedence.time_windows import (
+    Spans,
+    View,
+    action_of,
+    spans_of,
+    view_of,
+)
+from planner_core.problem import (
+    COLLECT,
+    Floats,
+    Ints,
+    Problem,
+)
+from planner_core.problem.plan import Plan
+from planner_core.referee.replay import replay
+
+_CELL_S: Final = 10.0
+_LONGEST: Final = 12  # tasks that a window takes up
+_MOVES_AT_A_TIME: Final = 500
+_AT_ONCE: Final = 20
+_MOST_KEPT: Final = 30_000_000  # followers, of 12 bytes each, kept from turn to turn
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Satellite:
+    """What the search knows of one satellite, and its part of the plan."""
+
+    spans: Spans
+    view: View
+    worth: Floats
+    route: Route
+
+    @classmethod
+    def of(cls, problem: Problem, index: int, plan: Plan) -> Satellite:
+        """Return a satellite with its part of a plan, each target in it once."""
+        table = problem.opportunities
+        spans, view = spans_of(problem, index), view_of(problem, index)
+        worth = problem.target_reward[spans.place].astype(np.float64)
+        # What must be taken is worth more than all else, so that no move drops it.
+        worth[spans.is_kept] += 1.0 + float(problem.target_reward.sum())
+        tasks: dict[int, int] = {}
+        for action in plan.actions:
+            i = action.opportunity
+            if table.satellite[i] == index and table.kind[i] == COLLECT:
+                is_its = (table.access[spans.row] == table.access[i]) & (
+                    spans.close_s > action.start_s - 1e-3
+                )
+                tasks.setdefault(int(table.place[i]), int(np.flatnonzero(is_its)[0]))
+        route = empty_route(len(spans.row) + 128)
+        route.size[0] = len(tasks)
+        route.task[: len(tasks)] = list(tasks.values())
+        is_timed = update_early(spans, view, route, 0, len(tasks)) and update_late(
+            spans, view, route, len(tasks) - 1, -1
+        )
+        if not is_timed:
+            route.size[0] = 0
+        return cls(spans=spans, view=view, worth=worth, route=route)
+
+    @property
+    def tasks(self) -> Ints:
+        """Return the tasks of its part of the plan, in order."""
+        return self.route.task[: self.route.size[0]]
+
+
+class ContinuousSearch:
+    """A plan of a problem without resources, and moves that make it better.
+
+    Where the plan to start from has contacts, they are dropped.
+    """
+
+    def __init__(self, problem: Problem, plan: Plan, budget: Budget, seed: int) -> None:
+        self.problem, self.budget = problem, budget
+        timeline = replay(problem, plan)
+        self.plan, self.reward, self._is_valid = plan, timeline.reward, timeline.is_valid
+        self._draws = draws_of(seed)
+        self.satellites = [
+            Satellite.of(problem, index, plan) for index in range(len(problem.satellites))
+        ]
+        self._tables: dict[int, Arrivals] = {}
+        self._num_kept = self._num_calls = 0
+        self._width_s = max(_CELL_S, width_for(problem))
+
+    def arrivals(self, index: int) -> Arrivals:
+        """Return a satellite's table; kept from turn to turn where all of them are small."""
+        table = self._tables.get(index)
+        if table is None:
+            satellite = self.satellites[index]
+            table = arrivals_of(satellite.spans, satellite.view, self._width_s, self.budget.stop)
+            if self._num_kept + len(table.to) <= _MOST_KEPT:
+                self._tables[index] = table
+                self._num_kept += len(table.to)
+        return table
+
+    def fill(self) -> None:
+        """Put into the gaps of the plan what fits, the greatest rewards first."""
+        for index, satellite in enumerate(self.satellites):
+            order = np.lexsort((satellite.spans.open_s, -satellite.worth)).astype(np.int32)
+            insert_each(
+                satellite.spans, satellite.view, order, self._holder(index), satellite.route,
+                self.budget.stop,
+            )  # fmt: skip
+        self._note()
+
+    def move(self, num_moves: int) -> bool:
+        """Make moves on each satellite in turn; return whether the plan earns more.
+
+        A satellite whose table is not kept has its moves all at once, in one call of many.
+        """
+        before = self.reward
+        self._num_calls += 1
+        for index in range(len(self.satellites)):
+            left = num_moves
+            if self._num_calls > 1 and index not in self._tables:
+                if self._num_calls % _AT_ONCE:
+                    continue
+                left = num_moves * _AT_ONCE
+            if self.budget.is_spent() or len(self.satellites[index].spans.row) == 0:
+                continue
+            arrivals = self.arrivals(index)
+            while left > 0 and not self.budget.is_spent():
+                self._turn(index, arrivals, min(left, _MOVES_AT_A_TIME))
+                left -= _MOVES_AT_A_TIME
+        self._note()
+        return self.reward > before
+
+    def _turn(self, index: int, arrivals: Arrivals, num_moves: int) -> None:
+        """Make moves on one satellite."""
+        satellite = self.satellites[index]
+        spans, view = satellite.spans, satellite.view
+        num_cells = int(arrivals.first_cell[-1])
+        scratch = scratch_of(len(spans.row), num_cells, len(self.problem.target_ids))
+        holder = self._holder(index)
+        before = holder.copy()
+        make_moves(
+            spans, view, arrivals, satellite.worth, holder, satellite.route, scratch,
+            self._draws, num_moves, _LONGEST, self.budget.stop,
+        )  # fmt: skip
+        for place in np.flatnonzero((before == ELSEWHERE) & (holder >= 0)).tolist():
+            self._give_up(index, place)
+
+    def _holder(self, index: int) -> Ints:
+        """Return who has each target, as one satellite sees it."""
+        holder = np.full(len(self.problem.target_ids), FREE, dtype=np.int32)
+        for other in self.satellites:
+            is_kept = other.spans.is_kept[other.tasks]
+            holder[other.spans.place[other.tasks]] = np.where(is_kept, FIXED, ELSEWHERE)
+        satellite = self.satellites[index]
+        holder[satellite.spans.place[satellite.tasks]] = satellite.tasks
+        return holder
+
+    def _give_up(self, index: int, place: int) -> None:
+        """Take a target from whoever else holds it."""
+        for other, satellite in enumerate(self.satellites):
+            if other == index:
+                continue
+            for p in np.flatnonzero(satellite.spans.place[satellite.tasks] == place).tolist():
+                remove(satellite.spans, satellite.view, satellite.route, p)
+
+    def _note(self) -> None:
+        """Keep the plan of the routes if it is better."""
+        actions = []
+        for satellite in self.satellites:
+            starts = satellite.route.early_s[: satellite.route.size[0]].tolist()
+            rows = satellite.spans.row[satellite.tasks].tolist()
+            actions += [action_of(self.problem, *pair) for pair in zip(rows, starts, strict=True)]
+        plan = Plan(tuple(sorted(actions)))
+        timeline = replay(self.problem, plan)
+        if (timeline.is_valid, timeline.reward) > (self._is_valid, self.reward):
+            self.plan, self.reward, self._is_valid = plan, timeline.reward, timeline.is_valid

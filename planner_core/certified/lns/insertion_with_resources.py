@@ -1,0 +1,116 @@
+"""Insertion where battery and recorder count: contacts stay, and the referee has the last word.
+
+Tasks move as early as those before them allow. Whatever then fits between two of them by agility
+is put in on trial, the targets of greatest reward first, and stays in where the whole plan
+remains valid.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from planner_core.budget import Budget
+from planner_core.certified.lns.insertion import fitting
+from planner_core.certified.lns.route import (
+    Route,
+    empty_route,
+    update_early,
+    update_late,
+)
+from planner_core.precedence.time_windows import (
+    Spans,
+    View,
+    action_of,
+    spans_of,
+    view_of,
+    with_contacts,
+)
+from planner_core.problem import COLLECT, Problem
+from planner_core.problem.plan import Action, Plan
+from planner_core.referee.replay import replay
+
+_PATIENCE: Final = 80  # trials in vain, after which there is hardly anything to be had
+
+
+def filled_with_resources(problem: Problem, plan: Plan, budget: Budget) -> Plan:
+    """Return a plan that earns no less, with what fits between its tasks once those may move."""
+    timeline = replay(problem, plan)
+    if not timeline.is_valid:
+        return plan
+    for index in range(len(problem.satellites)):
+        if budget.is_spent():
+            break
+        plan = _filled(problem, plan, index, budget)
+    return plan
+
+
+def _filled(problem: Problem, plan: Plan, index: int, budget: Budget) -> Plan:
+    """Return the plan with more collects of one satellite."""
+    table = problem.opportunities
+    own = [a for a in plan.actions if table.satellite[a.opportunity] == index]
+    others = [a for a in plan.actions if table.satellite[a.opportunity] != index]
+    view = view_of(problem, index)
+    contacts = [a.opportunity for a in own if table.kind[a.opportunity] != COLLECT]
+    spans = with_contacts(problem, spans_of(problem, index), np.array(contacts, dtype=np.int32))
+    if len(spans.row) == 0:
+        return plan
+    tasks = [_task_of(problem, spans, action) for action in own]
+    reward = replay(problem, plan).reward
+    left = _PATIENCE
+    while left > 0 and not budget.is_spent():
+        route = _route_of(spans, view, tasks)
+        if route is None:
+            return plan
+        is_free = np.ones(len(problem.target_ids) + len(problem.station_ids), dtype=np.bool_)
+        for action in (*own, *others):
+            if table.kind[action.opportunity] == COLLECT:
+                is_free[table.place[action.opportunity]] = False
+        is_free[len(problem.target_ids) :] = False
+        task, at = fitting(spans, view, route, is_free)
+        order = np.argsort(-problem.target_reward[spans.place[task]], kind="stable")
+        is_better = False
+        for pick in order.tolist():
+            if left == 0 or budget.is_spent():
+                break
+            trial = [*tasks[: at[pick]], int(task[pick]), *tasks[at[pick] :]]
+            actions = _actions(problem, spans, view, trial)
+            if actions is None:
+                continue
+            tried = Plan(tuple(sorted([*others, *actions])))
+            judged = replay(problem, tried)
+            left -= 1
+            if judged.is_valid and judged.reward > reward:
+                plan, reward, tasks, own = tried, judged.reward, trial, actions
+                left, is_better = _PATIENCE, True
+                break
+        if not is_better:
+            break
+    return plan
+
+
+def _task_of(problem: Problem, spans: Spans, action: Action) -> int:
+    table = problem.opportunities
+    is_its = (table.access[spans.row] == table.access[action.opportunity]) & (
+        spans.close_s > action.start_s - 1e-3
+    )
+    return int(np.flatnonzero(is_its)[0])
+
+
+def _route_of(spans: Spans, view: View, tasks: list[int]) -> Route | None:
+    route = empty_route(len(tasks))
+    route.size[0] = len(tasks)
+    route.task[:] = tasks
+    is_timed = update_early(spans, view, route, 0, len(tasks)) and update_late(
+        spans, view, route, len(tasks) - 1, -1
+    )
+    return route if is_timed else None
+
+
+def _actions(problem: Problem, spans: Spans, view: View, tasks: list[int]) -> list[Action] | None:
+    route = _route_of(spans, view, tasks)
+    if route is None:
+        return None
+    pairs = zip(spans.row[tasks].tolist(), route.early_s.tolist(), strict=True)
+    return [action_of(problem, row, start_s) for row, start_s in pairs]

@@ -1,0 +1,289 @@
+"""The best stretch of one satellite's tasks under battery and recorder, between two that stay.
+
+Paths are those of ``bounds.resource_network``. Each task keeps a few labels: what was gained, the
+energy and the data that are left. What comes after the stretch says how much energy it wants, and
+how much data it bears.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from planner_core.certified.dp.resource_network import Network, may_be_next
+from planner_core.jit import borrowing
+from planner_core.problem import (
+    Bools,
+    Floats,
+    Ints,
+    Longs,
+)
+
+MAX_NODES: Final = 1024
+"""How many tasks a window may span."""
+
+LABELS: Final = 5
+"""How many labels a task keeps."""
+
+NEVER: Final = -np.inf
+"""Gain of a task that is not to be taken."""
+
+NOWHERE: Final = -2
+"""Answered where there is no path."""
+
+_SLOTS: Final = MAX_NODES * LABELS
+_AT_START: Final = -1
+
+
+class Ground(NamedTuple):
+    """What moves do not change; one satellite's tasks, shape ``(m,)``, unless said.
+
+    Attributes
+    ----------
+    network
+        Whose paths are plans that the referee accepts, stations aside.
+    rows
+        Of each task in the table of opportunities.
+    local
+        Of each opportunity the task of its satellite. Shape ``(n,)``.
+    satellite
+        Of each opportunity. Shape ``(n,)``.
+    number
+        The satellite.
+    target
+        Of each task; of contacts, one past the last target.
+    worth
+        Of each target, and 0 for contacts. Shape ``(num_targets + 1,)``.
+    typical
+        What a target is worth, about.
+    is_locked
+        Which targets must stay where they are imaged. Shape ``(num_targets + 1,)``.
+    is_shut
+        Contacts whose antenna another satellite holds.
+    """
+
+    network: Network
+    rows: Ints
+    local: Ints
+    satellite: Ints
+    number: int
+    target: Ints
+    worth: Floats
+    typical: float
+    is_locked: Bools
+    is_shut: Bools
+
+
+class Room(NamedTuple):
+    """Working memory of a window: labels, those that idle, and the tasks that begin to.
+
+    Attributes
+    ----------
+    value, energy, data, source
+        Of each label; ``LABELS`` for each task. ``source`` is the label before.
+    num_labels
+        Labels of each task.
+    idle_value, idle_energy, idle_data, idle_label
+        Labels that every task from here on may follow.
+    next_idle, first_idle
+        Lists of tasks by where they begin to idle.
+    gain
+        What each task of the window adds to a label's value.
+    seen
+        How often each target comes up in the window, as of ``marked_at``.
+        Shape ``(num_targets + 1,)``.
+    path, old, dropped
+        Tasks that a move takes, lets go in the window, and opportunities it lets go elsewhere.
+    move
+        Moves so far. Shape ``(1,)``.
+    """
+
+    value: Floats
+    energy: Floats
+    data: Floats
+    source: Ints
+    num_labels: Ints
+    idle_value: Floats
+    idle_energy: Floats
+    idle_data: Floats
+    idle_label: Ints
+    next_idle: Ints
+    first_idle: Ints
+    gain: Floats
+    seen: Ints
+    marked_at: Longs
+    path: Ints
+    old: Ints
+    dropped: Ints
+    move: Longs
+
+
+def room_for(num_targets: int) -> Room:
+    """Return working memory for a problem of so many targets."""
+
+    def floats(length: int) -> Floats:
+        return np.zeros(length)
+
+    def ints(length: int) -> Ints:
+        return np.zeros(length, dtype=np.int32)
+
+    return Room(
+        value=floats(_SLOTS),
+        energy=floats(_SLOTS),
+        data=floats(_SLOTS),
+        source=ints(_SLOTS),
+        num_labels=ints(MAX_NODES),
+        idle_value=floats(LABELS),
+        idle_energy=floats(LABELS),
+        idle_data=floats(LABELS),
+        idle_label=ints(LABELS),
+        next_idle=ints(MAX_NODES),
+        first_idle=ints(MAX_NODES + 1),
+        gain=floats(MAX_NODES),
+        seen=ints(num_targets + 1),
+        marked_at=np.zeros(num_targets + 1, dtype=np.int64),
+        path=ints(MAX_NODES),
+        old=ints(MAX_NODES),
+        dropped=ints(MAX_NODES),
+        move=np.zeros(1, dtype=np.int64),
+    )
+
+
+@borrowing
+def best_label(
+    ground: Ground, room: Room, left: int, low: int, high: int, right: int,
+    energy: float, data: float, need: float, bears: float,
+) -> int:  # fmt: skip
+    """Find the path that gains most between two tasks; return its last label.
+
+    ``_AT_START`` where that is no task at all, ``NOWHERE`` where there is no path.
+    """
+    network = ground.network
+    m, size = len(ground.rows), high - low
+    for at in range(size + 1):
+        room.first_idle[at] = -1
+    num_idle = 0
+    # Labels of tasks ahead of one that must be taken lead nowhere.
+    earliest, starts_open = low, False
+    best, best_energy, best_label = -np.inf, -np.inf, NOWHERE
+    if (
+        energy >= need
+        and data <= bears
+        and (left < 0 or right >= m or may_be_next(network, left, right))
+    ):
+        best, best_energy, best_label = 0.0, energy, _AT_START
+    for k in range(low, high):
+        at = k - low
+        if not starts_open and (left < 0 or network.idle_from[left] <= k):
+            starts_open = True
+            num_idle = _keep(
+                room.idle_value, room.idle_energy, room.idle_data, room.idle_label, 0, num_idle,
+                0.0, energy, data, _AT_START,
+            )  # fmt: skip
+        other = room.first_idle[at]
+        while other >= 0:
+            if other + low >= earliest:
+                for i in range(other * LABELS, other * LABELS + room.num_labels[other]):
+                    num_idle = _keep(
+                        room.idle_value, room.idle_energy, room.idle_data, room.idle_label, 0,
+                        num_idle, room.value[i], room.energy[i], room.data[i], i,
+                    )  # fmt: skip
+            other = room.next_idle[other]
+        room.num_labels[at] = 0
+        if room.gain[at] == NEVER:
+            continue
+        begin = at * LABELS
+        count = 0
+        for i in range(num_idle):
+            count = _extend(
+                ground, room, low, k, begin, count,
+                room.idle_value[i], room.idle_energy[i], room.idle_data[i], room.idle_label[i],
+            )  # fmt: skip
+        for arc in range(network.straight_first[k], network.straight_first[k + 1]):
+            i = network.straight_rows[arc]
+            if i == left and not starts_open:
+                count = _extend(ground, room, low, k, begin, count, 0.0, energy, data, _AT_START)
+            elif i >= earliest:
+                first = (i - low) * LABELS
+                for label in range(first, first + room.num_labels[i - low]):
+                    count = _extend(
+                        ground, room, low, k, begin, count,
+                        room.value[label], room.energy[label], room.data[label], label,
+                    )  # fmt: skip
+        room.num_labels[at] = count
+        if network.is_kept[k]:
+            num_idle, earliest, starts_open = 0, k, True
+            best, best_energy, best_label = -np.inf, -np.inf, NOWHERE
+        to = network.idle_from[k] - low
+        if count > 0 and to <= size:
+            room.next_idle[at] = room.first_idle[to]
+            room.first_idle[to] = at
+        if count > 0 and (right >= m or may_be_next(network, k, right)):
+            for label in range(begin, begin + count):
+                if room.energy[label] < need or room.data[label] > bears:
+                    continue
+                if room.value[label] > best or (
+                    room.value[label] == best and room.energy[label] > best_energy
+                ):
+                    best, best_energy = room.value[label], room.energy[label]
+                    best_label = label
+    return best_label
+
+
+@borrowing
+def _extend(
+    ground: Ground, room: Room, low: int, k: int, begin: int, count: int,
+    value: float, energy: float, data: float, label: int,
+) -> int:  # fmt: skip
+    """Take a task after a label; return how many labels the task has then."""
+    network = ground.network
+    if data > network.data_before[k]:
+        return count
+    energy = min(energy, network.energy_cap[k]) - network.energy_cost[k]
+    data = max(network.data_floor[k], data + network.data_gain[k])
+    if energy < network.energy_floor[k] or data > network.data_after[k]:
+        return count
+    target = ground.target[k]
+    if not network.is_contact[k] and room.seen[target] > 1:
+        before = label
+        while before >= 0:
+            if ground.target[low + before // LABELS] == target:
+                return count
+            before = room.source[before]
+    return _keep(
+        room.value, room.energy, room.data, room.source, begin, count,
+        value + room.gain[k - low], energy, data, label,
+    )  # fmt: skip
+
+
+@borrowing
+def _keep(
+    values: Floats, energies: Floats, datas: Floats, sources: Ints, begin: int, count: int,
+    value: float, energy: float, data: float, source: int,
+) -> int:  # fmt: skip
+    """Add a label unless another is as good; drop those it outdoes, or the poorest of too many."""
+    end = begin + count
+    at = begin
+    while at < end:
+        if values[at] >= value and energies[at] >= energy and datas[at] <= data:
+            return count
+        if values[at] <= value and energies[at] <= energy and datas[at] >= data:
+            end -= 1
+            values[at], energies[at] = values[end], energies[end]
+            datas[at], sources[at] = datas[end], sources[end]
+        else:
+            at += 1
+    if end - begin == LABELS:
+        poorest = begin
+        for i in range(begin + 1, end):
+            if values[i] < values[poorest]:
+                poorest = i
+        if values[poorest] >= value:
+            return end - begin
+        at = poorest
+    else:
+        at = end
+        end += 1
+    values[at], energies[at], datas[at], sources[at] = value, energy, data, source
+    return end - begin

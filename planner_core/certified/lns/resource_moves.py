@@ -1,0 +1,211 @@
+"""Moves of the window search under battery and recorder, contacts among them.
+
+A stretch of one satellite's tasks is planned anew. A target that is imaged outside of it may be on
+the new path too, at next to no worth: its other image is then dropped, which leaves energy
+elsewhere for nothing.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from planner_core.certified.lns.moves import FREE, Taken
+from planner_core.certified.lns.resource_labels import (
+    LABELS,
+    MAX_NODES,
+    NEVER,
+    NOWHERE,
+    Ground,
+    Room,
+    best_label,
+)
+from planner_core.draws import Uint64s, next_draw
+from planner_core.jit import borrowing
+from planner_core.problem import Bytes
+
+_FEWEST_TASKS: Final = 2
+_MORE_TASKS: Final = 14
+_FOR_FREE_TARGET: Final = 0.7  # of all moves
+_TRIALS: Final = 200  # for such a target
+_WITH_OTHERS: Final = 0.5  # of all moves may take targets that are imaged elsewhere
+_TIE: Final = 0.01  # of a target's worth
+_CONTACT: Final = 0.05  # of a typical target: what one contact fewer is worth
+
+
+@borrowing
+def make_moves(
+    ground: Ground, taken: Taken, room: Room, draws: Uint64s, num_moves: int, stop: Bytes
+) -> None:
+    """Make moves on one satellite's part of a plan, in place."""
+    m = len(ground.rows)
+    for _ in range(num_moves):
+        if stop[0] or m == 0:
+            break
+        low, high = _window(ground, taken, _pivot(ground, taken, draws), draws)
+        left, right = low - 1, high
+        while left >= 0 and not taken.is_taken[ground.rows[left]]:
+            left -= 1
+        while right < m and not taken.is_taken[ground.rows[right]]:
+            right += 1
+        energy, data, is_kept_to = _state_after(ground, taken, left)
+        need, bears = _wanted_before(ground, taken, right)
+        if low >= high or not is_kept_to:
+            continue
+        _weigh(ground, taken, room, low, high, draws)
+        last = best_label(ground, room, left, low, high, right, energy, data, need, bears)
+        if last != NOWHERE:
+            _replace(ground, taken, room, low, high, last)
+
+
+@borrowing
+def _pivot(ground: Ground, taken: Taken, draws: Uint64s) -> int:
+    """Return a task at random, mostly one of a target that is not imaged."""
+    m = len(ground.rows)
+    num_trials = _TRIALS if next_draw(draws) < _FOR_FREE_TARGET else 1
+    pivot = 0
+    for _ in range(num_trials):
+        pivot = int(next_draw(draws) * m)
+        target = ground.target[pivot]
+        if taken.holder[target] == FREE and ground.worth[target] > 0.0:
+            break
+    return pivot
+
+
+@borrowing
+def _window(ground: Ground, taken: Taken, pivot: int, draws: Uint64s) -> tuple[int, int]:
+    """Return the tasks between two of the plan, a few apart, around the pivot."""
+    num_tasks = _FEWEST_TASKS + int(next_draw(draws) * _MORE_TASKS)
+    num_before = int(next_draw(draws) * (num_tasks + 1))
+    lowest = max(0, pivot - MAX_NODES // 2)
+    highest = min(len(ground.rows), pivot + MAX_NODES // 2)
+    low, high = pivot, pivot
+    count = 0
+    while low > lowest:
+        if taken.is_taken[ground.rows[low - 1]]:
+            if count == num_before:
+                break
+            count += 1
+        low -= 1
+    count = 0
+    while high < highest:
+        if taken.is_taken[ground.rows[high]]:
+            if count == num_tasks - num_before:
+                break
+            count += 1
+        high += 1
+    return low, high
+
+
+@borrowing
+def _state_after(ground: Ground, taken: Taken, last: int) -> tuple[float, float, bool]:
+    """Return energy and data after the plan's tasks up to one, and whether limits are kept."""
+    network = ground.network
+    energy, data = network.energy_start, network.data_start
+    for k in range(last + 1):
+        if not taken.is_taken[ground.rows[k]]:
+            continue
+        if data > network.data_before[k]:
+            return energy, data, False
+        energy = min(energy, network.energy_cap[k]) - network.energy_cost[k]
+        data = max(network.data_floor[k], data + network.data_gain[k])
+        if energy < network.energy_floor[k] or data > network.data_after[k]:
+            return energy, data, False
+    return energy, data, True
+
+
+@borrowing
+def _wanted_before(ground: Ground, taken: Taken, first: int) -> tuple[float, float]:
+    """Return the least energy and the most data with which the plan's tasks from one on fit."""
+    network = ground.network
+    need, bears = -np.inf, network.data_end
+    k = len(ground.rows) - 1
+    while k >= first:
+        if taken.is_taken[ground.rows[k]]:
+            need = max(need, network.energy_floor[k]) + network.energy_cost[k]
+            if need > network.energy_cap[k]:
+                return np.inf, bears
+            bears = min(bears, network.data_after[k])
+            if network.data_floor[k] > bears:
+                return np.inf, bears
+            bears = min(network.data_before[k], bears - network.data_gain[k])
+        k -= 1
+    return need, bears
+
+
+@borrowing
+def _weigh(ground: Ground, taken: Taken, room: Room, low: int, high: int, draws: Uint64s) -> None:
+    """Say what each task of a window adds to a path, and which targets come up repeatedly.
+
+    Ties are broken at random, so that the search wanders over plans of equal worth.
+    """
+    move = room.move[0] + 1
+    room.move[0] = move
+    with_others = next_draw(draws) < _WITH_OTHERS
+    for k in range(low, high):
+        at = k - low
+        target = ground.target[k]
+        if ground.network.is_contact[k]:
+            room.gain[at] = (
+                NEVER if ground.is_shut[k] else -_CONTACT * ground.typical * next_draw(draws)
+            )
+            continue
+        if room.marked_at[target] != move:
+            room.marked_at[target] = move
+            room.seen[target] = 0
+        room.seen[target] += 1
+        held = taken.holder[target]
+        is_here = held != FREE and ground.satellite[held] == ground.number
+        if is_here:
+            is_here = low <= ground.local[held] < high
+        worth = ground.worth[target]
+        if held == FREE or is_here:
+            room.gain[at] = worth * (1.0 + _TIE * next_draw(draws)) if worth > 0.0 else NEVER
+        elif with_others and not ground.is_locked[target]:
+            room.gain[at] = worth * _TIE * next_draw(draws)
+        else:
+            room.gain[at] = NEVER
+        if ground.network.is_kept[k]:
+            room.gain[at] = max(room.gain[at], 0.0)
+
+
+@borrowing
+def _replace(ground: Ground, taken: Taken, room: Room, low: int, high: int, last: int) -> None:
+    """Let a path take the place of what is in the window, unless the plan is worth less then."""
+    place = ground.target
+    num_new, worth = 0, 0.0
+    label = last
+    while label >= 0:
+        k = low + label // LABELS
+        room.path[num_new] = k
+        num_new += 1
+        if not ground.network.is_contact[k]:
+            held = taken.holder[place[k]]
+            if held == FREE or (
+                ground.satellite[held] == ground.number and low <= ground.local[held] < high
+            ):
+                worth += ground.worth[place[k]]
+        label = room.source[label]
+    num_old = 0
+    for k in range(low, high):
+        if taken.is_taken[ground.rows[k]]:
+            room.old[num_old] = k
+            num_old += 1
+            if not ground.network.is_contact[k]:
+                worth -= ground.worth[place[k]]
+    if worth < -1e-9:
+        return
+    for i in range(num_old):
+        k = room.old[i]
+        taken.is_taken[ground.rows[k]] = False
+        if not ground.network.is_contact[k]:
+            taken.holder[place[k]] = FREE
+    for i in range(num_new):
+        k = room.path[i]
+        if not ground.network.is_contact[k]:
+            held = taken.holder[place[k]]
+            if held != FREE:
+                taken.is_taken[held] = False
+            taken.holder[place[k]] = ground.rows[k]
+        taken.is_taken[ground.rows[k]] = True

@@ -1,0 +1,108 @@
+"""A search for plans under battery and recorder: windows of one satellite replanned, by turns."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from planner_core.budget import Budget
+from planner_core.certified.dp.resource_network import strict_network_of
+from planner_core.certified.lns.moves import FREE, Taken
+from planner_core.certified.lns.resource_labels import Ground, room_for
+from planner_core.certified.lns.resource_moves import make_moves
+from planner_core.draws import draws_of
+from planner_core.precedence.relation import transitive_closure
+from planner_core.problem import (
+    COLLECT,
+    CONTACT,
+    Bools,
+    Problem,
+)
+from planner_core.problem.plan import Plan
+from planner_core.solvers.sequential import blocked_rows
+
+_MOVES_AT_A_TIME: Final = 100
+
+
+class ResourceWindows:
+    """A plan of all satellites, and moves that better it or leave it as good."""
+
+    def __init__(self, problem: Problem, seed: int) -> None:
+        self._problem = problem
+        self._draws = draws_of(seed)
+        num_targets = len(problem.target_ids)
+        self._room = room_for(num_targets)
+        self._worth = np.append(problem.target_reward, 0.0)
+        self._turn = 0
+        is_locked = _locked_targets(problem)
+        table = problem.opportunities
+        self._grounds = [
+            Ground(
+                network=strict_network_of(problem, satellite),
+                rows=satellite.rows,
+                local=problem.local_row,
+                satellite=table.satellite,
+                number=index,
+                target=np.where(satellite.kind == COLLECT, satellite.place, num_targets).astype(
+                    np.int32
+                ),
+                worth=self._worth,
+                typical=float(problem.target_reward.mean()) if num_targets else 1.0,
+                is_locked=is_locked,
+                is_shut=np.zeros(len(satellite), dtype=np.bool_),
+            )
+            for index, satellite in enumerate(problem.satellites)
+            if len(satellite)
+        ]
+        self.adopt(Plan())
+
+    def adopt(self, plan: Plan) -> None:
+        """Go on from another plan."""
+        table = self._problem.opportunities
+        is_taken = np.zeros(len(table), dtype=np.bool_)
+        is_taken[[action.opportunity for action in plan.actions]] = True
+        holder = np.full(len(self._worth), FREE, dtype=np.int32)
+        images = np.flatnonzero(is_taken & (table.kind == COLLECT))[::-1]
+        holder[table.place[images]] = images
+        self._taken = Taken(is_taken=is_taken, holder=holder)
+
+    def make_moves(self, num_moves: int, budget: Budget) -> None:
+        """Make about so many moves, unless the budget is spent before."""
+        while self._grounds and num_moves > 0 and not budget.is_spent():
+            ground = self._grounds[self._turn % len(self._grounds)]
+            self._turn += 1
+            make_moves(
+                ground._replace(is_shut=self._shut(ground.number)), self._taken, self._room,
+                self._draws, min(num_moves, _MOVES_AT_A_TIME), budget.stop,
+            )  # fmt: skip
+            num_moves -= _MOVES_AT_A_TIME
+
+    def _shut(self, index: int) -> Bools:
+        """Return the tasks of a satellite whose antenna another one holds."""
+        table = self._problem.opportunities
+        others = self._taken.is_taken & (table.satellite != index) & (table.kind == CONTACT)
+        taken = [int(row) for row in np.flatnonzero(others)]
+        shut: Bools = blocked_rows(self._problem, self._problem.satellites[index], taken) != 0
+        return shut
+
+    @property
+    def plan(self) -> Plan:
+        """The plan as it is now."""
+        return Plan.of(self._problem, np.flatnonzero(self._taken.is_taken).tolist())
+
+    @property
+    def reward(self) -> float:
+        """What its targets are worth."""
+        return float(self._problem.target_reward[self._taken.holder[:-1] != FREE].sum())
+
+
+def _locked_targets(problem: Problem) -> Bools:
+    """Return which targets stay where they are imaged; the last entry stands for contacts."""
+    locked = np.zeros(len(problem.target_ids) + 1, dtype=np.bool_)
+    table, kept = problem.opportunities, problem.kept_rows
+    locked[table.place[kept[table.kind[kept] == COLLECT]]] = True
+    if any(transitive_closure(problem, s) is not s.transitions for s in problem.satellites):
+        # The tasks around one that is dropped could not do without it.
+        locked[:] = True
+    return locked

@@ -1,0 +1,133 @@
+"""One satellite's sequence of tasks, with the earliest and the latest start of each.
+
+The earliest follow from the tasks before, the latest from those after. Between the two a task
+may move freely, so another one may be put in wherever it fits after the one before it at its
+earliest and before the one after it at its latest.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from planner_core.jit import borrowing
+from planner_core.precedence.time_windows import Spans, View
+from planner_core.problem import Floats, Ints
+from planner_core.problem.pointing import earliest_start_s, latest_start_s, sight
+
+FREE = -1
+"""No task holds the target."""
+ELSEWHERE = -2
+"""Another satellite holds it."""
+FIXED = -3
+"""Another satellite must keep it."""
+
+
+class Route(NamedTuple):
+    """A sequence in arrays with room for more; the first ``size[0]`` entries count.
+
+    Attributes
+    ----------
+    task
+        Spans in order.
+    early_s, late_s
+        Earliest and latest start of each.
+    """
+
+    size: Ints
+    task: Ints
+    early_s: Floats
+    late_s: Floats
+
+
+def empty_route(room: int) -> Route:
+    """Return a route of nothing."""
+    return Route(
+        size=np.zeros(1, dtype=np.int32),
+        task=np.zeros(room, dtype=np.int32),
+        early_s=np.zeros(room),
+        late_s=np.zeros(room),
+    )
+
+
+@borrowing
+def early_after(spans: Spans, view: View, before: int, start_s: float, task: int) -> float:
+    """Return the earliest start of a task after another one, or of all (``before`` of -1)."""
+    if before < 0:
+        return float(spans.open_s[task])
+    end_s = start_s + spans.length_s[before]
+    looked = sight(view.path, view.places_m, spans.place[before], end_s)
+    return earliest_start_s(
+        view.agile, end_s, looked, view.path, view.places_m,
+        spans.place[task], spans.open_s[task], spans.close_s[task],
+    )  # fmt: skip
+
+
+@borrowing
+def late_before(spans: Spans, view: View, task: int, after: int, start_s: float) -> float:
+    """Return the latest start of a task before another one, or of all (``after`` of -1)."""
+    if after < 0:
+        return float(spans.close_s[task])
+    looks = sight(view.path, view.places_m, spans.place[after], start_s)
+    return latest_start_s(
+        view.agile, start_s, looks, view.path, view.places_m,
+        spans.place[task], spans.length_s[task], spans.open_s[task], spans.close_s[task],
+    )  # fmt: skip
+
+
+@borrowing
+def update_early(spans: Spans, view: View, route: Route, first: int, until: int) -> bool:
+    """Work out earliest starts from ``first`` on; after ``until`` as long as they change.
+
+    Returns whether every task can still start in time.
+    """
+    for p in range(first, route.size[0]):
+        before, start_s = -1, 0.0
+        if p > 0:
+            before, start_s = route.task[p - 1], route.early_s[p - 1]
+        now_s = early_after(spans, view, before, start_s, route.task[p])
+        if now_s == np.inf:
+            return False
+        if p >= until and now_s == route.early_s[p]:
+            break
+        route.early_s[p] = now_s
+    return True
+
+
+@borrowing
+def update_late(spans: Spans, view: View, route: Route, last: int, until: int) -> bool:
+    """Work out latest starts from ``last`` back; before ``until`` as long as they change."""
+    for p in range(last, -1, -1):
+        after, start_s = -1, 0.0
+        if p + 1 < route.size[0]:
+            after, start_s = route.task[p + 1], route.late_s[p + 1]
+        now_s = late_before(spans, view, route.task[p], after, start_s)
+        if now_s == -np.inf:
+            return False
+        if p <= until and now_s == route.late_s[p]:
+            break
+        route.late_s[p] = now_s
+    return True
+
+
+@borrowing
+def remove(spans: Spans, view: View, route: Route, p: int) -> None:
+    """Take the task at a position out; what is around it gains."""
+    n = route.size[0]
+    for q in range(p, n - 1):
+        route.task[q] = route.task[q + 1]
+        route.early_s[q] = route.early_s[q + 1]
+        route.late_s[q] = route.late_s[q + 1]
+    route.size[0] = n - 1
+    update_early(spans, view, route, p, p)
+    update_late(spans, view, route, p - 1, p - 1)
+
+
+@borrowing
+def position_of(route: Route, task: int, begin: int, end: int) -> int:
+    """Return where a task stands outside the positions ``begin`` up to ``end``; -1 for nowhere."""
+    for p in range(route.size[0]):
+        if route.task[p] == task and not begin <= p < end:
+            return p
+    return -1

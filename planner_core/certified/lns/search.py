@@ -1,0 +1,193 @@
+"""Large-neighbourhood search on a plan without resources: windows replanned by longest chains."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from planner_core.budget import Budget
+from planner_core.certified.lns.moves import (
+    FREE,
+    Ground,
+    Taken,
+    make_moves,
+    room_for,
+)
+from planner_core.draws import draws_of
+from planner_core.precedence.network import Network, network_of
+from planner_core.precedence.relation import transitive_closure
+from planner_core.problem import (
+    COLLECT,
+    CONTACT,
+    Bools,
+    Floats,
+    Problem,
+)
+from planner_core.problem.plan import Plan
+from planner_core.solvers.base import Solution
+
+_MOVES_AT_A_TIME: Final = 500
+_TRIALS: Final = 8
+_TRIALS_FOR_URGENT: Final = 200
+
+
+class WindowSearch:
+    """A plan of all satellites, and moves that better it or leave it as good.
+
+    Only collects and agility count; contacts are dropped. For the same seed the same moves
+    are made, whatever the number of them asked for at a time.
+
+    Parameters
+    ----------
+    network
+        Of ``problem``, where it is at hand.
+    preference
+        By how much targets not yet imaged are preferred to others of the same reward, as a
+        factor for each; a plan is never given up for one that earns less. Shape
+        ``(num_targets,)``.
+    urgency
+        How much targets not yet imaged are worth trying for, from 0 to 1; all the same by
+        default. Shape ``(num_targets,)``.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        seed: int,
+        network: Network | None = None,
+        preference: Floats | None = None,
+        urgency: Floats | None = None,
+    ) -> None:
+        self.problem = problem
+        network = network or network_of(problem)
+        self._row = network.row
+        self._ground = _ground_of(problem, network, preference, urgency)
+        self._draws = draws_of(seed)
+        self._room = room_for(len(problem.target_ids))
+        self._every = np.ones(len(self._row), dtype=np.bool_)
+        self.adopt(Plan())
+
+    def adopt(self, plan: Plan) -> None:
+        """Go on from another plan."""
+        is_taken = np.zeros(len(self._row), dtype=np.bool_)
+        is_taken[[action.opportunity for action in plan.actions]] = True
+        is_taken[self.problem.opportunities.kind == CONTACT] = False
+        is_taken = is_taken[self._row]
+        holder = np.full(len(self._ground.worth), FREE, dtype=np.int32)
+        own = np.flatnonzero(is_taken)[::-1]
+        holder[self._ground.place[own]] = own
+        # Where it need not stand, a second image of a target only takes up room.
+        part = np.searchsorted(self._ground.first, own, side="right") - 1
+        is_spare = holder[self._ground.place[own]] != own
+        is_spare &= self._ground.is_transitive[part] & ~self._ground.is_kept[own]
+        is_taken[own[is_spare]] = False
+        self._taken = Taken(is_taken=is_taken, holder=holder)
+
+    def make_moves(self, num_moves: int, budget: Budget, offered: Bools | None = None) -> None:
+        """Make so many moves, unless the budget is spent before.
+
+        Parameters
+        ----------
+        offered
+            Opportunities that moves may take, beside those of the plan. Shape ``(n,)``.
+        """
+        nodes = self._every if offered is None else offered[self._row]
+        while num_moves > 0 and not budget.is_spent():
+            make_moves(
+                self._ground, self._taken, nodes, self._room, self._draws,
+                min(num_moves, _MOVES_AT_A_TIME), budget.stop,
+            )  # fmt: skip
+            num_moves -= _MOVES_AT_A_TIME
+
+    @property
+    def plan(self) -> Plan:
+        """The plan as it is now."""
+        return Plan.of(self.problem, np.sort(self._row[self._taken.is_taken]).tolist())
+
+    @property
+    def reward(self) -> float:
+        """What its targets are worth."""
+        is_imaged = self._taken.holder[:-1] != FREE
+        return float(self.problem.target_reward[is_imaged].sum())
+
+
+def num_choices(problem: Problem) -> int:
+    """Return how many accesses offer a collect, at one time or at several."""
+    table = problem.opportunities
+    return len(np.unique(table.access[table.kind == COLLECT]))
+
+
+def improved(
+    problem: Problem,
+    plan: Plan,
+    moves_per_task: float,
+    budget: Budget,
+    seed: int,
+    preference: Floats | None = None,
+) -> Plan:
+    """Return a plan that earns no less, after moves in proportion to the accesses.
+
+    ``preference`` as for ``WindowSearch``.
+    """
+    search = WindowSearch(problem, seed, preference=preference)
+    search.adopt(plan)
+    search.make_moves(int(moves_per_task * num_choices(problem)), budget)
+    return search.plan
+
+
+def polished(
+    problem: Problem, solution: Solution, moves_per_task: float, budget: Budget
+) -> Solution:
+    """Return a search's answer with its plan improved, where agility alone counts."""
+    if problem.use_resources or moves_per_task == 0.0 or budget.is_spent():
+        return solution
+    plan = improved(problem, solution.plan, moves_per_task, budget, 0)
+    return replace(solution, plan=plan)
+
+
+def _ground_of(
+    problem: Problem, network: Network, preference: Floats | None, urgency: Floats | None
+) -> Ground:
+    satellites = problem.satellites
+    tables = [satellite.transitions for satellite in satellites]
+    # Bits of the next satellite begin with a whole byte.
+    starts = np.cumsum([0, *(8 * len(table.bits) for table in tables)])
+    bases = np.cumsum([0, *(len(satellite) for satellite in satellites)]).astype(np.int32)
+    pairs = list(zip(tables, bases[:-1], starts[:-1], strict=True))
+    nothing = np.empty(0, dtype=np.int32)
+    is_transitive = np.array(
+        [transitive_closure(problem, s) is s.transitions for s in satellites], dtype=np.bool_
+    )
+    offered = np.unique(network.place)
+    num_targets = len(problem.target_ids)
+    worth = np.append(problem.target_reward, 0.0)
+    is_kept = np.isin(network.row, problem.kept_rows)
+    is_locked = np.zeros(num_targets + 1, dtype=np.bool_)
+    is_locked[network.place[is_kept]] = True
+    return Ground(
+        place=network.place,
+        first=network.first,
+        arc_from=network.arc_from,
+        before=network.before,
+        far_from=network.far_from,
+        earlier=network.earlier,
+        order_near=np.concatenate([nothing, *(t.near_from + base for t, base, _ in pairs)]),
+        order_far=network.far_from,
+        order_offset=np.concatenate([t.offset[:-1] + start for t, _, start in pairs]),
+        order_bits=tables[0].bits
+        if len(tables) == 1
+        else np.concatenate([table.bits for table in tables]),
+        is_transitive=is_transitive[
+            problem.opportunities.satellite[network.row[network.first[:-1]]]
+        ],
+        worth=worth,
+        preference=np.ones(num_targets + 1) if preference is None else np.append(preference, 1.0),
+        urgency=np.ones(num_targets + 1) if urgency is None else np.append(urgency, 0.0),
+        num_trials=_TRIALS if urgency is None else _TRIALS_FOR_URGENT,
+        is_kept=is_kept,
+        is_locked=is_locked,
+        kept_worth=1.0 + float(problem.target_reward.sum()),
+        is_alike=len(np.unique(worth[offered])) <= 1,
+    )

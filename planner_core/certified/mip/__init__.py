@@ -1,0 +1,1 @@
+"""Mixed-integer programs: relaxations, cuts, proofs by HiGHS, merging of plans."""

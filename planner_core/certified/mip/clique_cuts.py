@@ -1,0 +1,199 @@
+"""Sets of tasks of one satellite that exclude each other: what a plan takes one of at most.
+
+Rows are those of one satellite. Two tasks exclude each other when the order does not relate
+them; a set of such tasks is an antichain.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planner_core.jit import kernel
+from planner_core.precedence.relation import Order, are_comparable, comes_before
+from planner_core.problem import Floats, Ints, Longs
+
+_MIN_VIOLATION = 1e-4
+_MAX_STEPS = 2000  # of a search for one antichain
+
+
+@kernel
+def excluding_pairs(order: Order) -> tuple[Ints, Ints]:
+    """Return all pairs of tasks that exclude each other, the earlier one first."""
+    m = len(order.near_from)
+    count = 0
+    for a in range(m):
+        for b in range(a + 1, order.far_from[a]):
+            count += not comes_before(order, a, b)
+    first, second = np.empty(count, dtype=np.int32), np.empty(count, dtype=np.int32)
+    count = 0
+    for a in range(m):
+        for b in range(a + 1, order.far_from[a]):
+            if not comes_before(order, a, b):
+                first[count], second[count] = a, b
+                count += 1
+    return first, second
+
+
+@kernel
+def _first_near(order: Order) -> Ints:
+    """Return the first row from which each row could be unrelated."""
+    m = len(order.near_from)
+    first = np.empty(m, dtype=np.int32)
+    at = 0
+    for b in range(m):
+        while at < b and order.far_from[at] <= b:
+            at += 1
+        first[b] = at
+    return first
+
+
+@kernel
+def antichain_cover(order: Order) -> tuple[Longs, Ints]:
+    """Return antichains that together hold every pair of tasks that exclude each other.
+
+    Greedy: each pair not yet covered is extended, in order of time, by every task that
+    excludes all members so far. Answers offsets, and the members of all of them.
+    """
+    m = len(order.near_from)
+    first_near = _first_near(order)
+    base = np.zeros(m + 1, dtype=np.int64)
+    for a in range(m):
+        base[a + 1] = base[a] + max(0, order.far_from[a] - a - 1)
+    covered = np.zeros(base[m], dtype=np.bool_)
+    offsets = [np.int64(0)]
+    members = [np.int32(0) for _ in range(0)]
+    clique = np.empty(m, dtype=np.int32)
+    for a in range(m):
+        for b in range(a + 1, order.far_from[a]):
+            if covered[base[a] + b - a - 1] or comes_before(order, a, b):
+                continue
+            clique[0], clique[1] = a, b
+            size = _extend(order, clique, 2, first_near[a], order.far_from[a])
+            for i in range(size):
+                members.append(clique[i])
+                for j in range(size):
+                    if clique[i] < clique[j]:
+                        covered[base[clique[i]] + clique[j] - clique[i] - 1] = True
+            offsets.append(np.int64(len(members)))
+    return np.array(offsets), np.array(members)
+
+
+@kernel
+def _extend(order: Order, clique: Ints, size: int, from_row: int, to_row: int) -> int:
+    """Add every row of the range that excludes all members; return the new size."""
+    for row in range(from_row, to_row):
+        is_free = True
+        for i in range(size):
+            if clique[i] == row or are_comparable(order, clique[i], row):
+                is_free = False
+                break
+        if is_free:
+            clique[size] = row
+            size += 1
+    return size
+
+
+@kernel
+def violated_antichains(order: Order, taken: Floats) -> tuple[Longs, Ints]:
+    """Return antichains of which a fractional plan takes more than one task.
+
+    For each fractional task: the most taken antichain in which it is the first, if that is
+    too much, made as large as it can be.
+
+    Parameters
+    ----------
+    taken
+        How much of each task the plan takes, 0 to 1. Shape ``(m,)``.
+    """
+    m = len(taken)
+    first_near = _first_near(order)
+    offsets = [np.int64(0)]
+    members = [np.int32(0) for _ in range(0)]
+    clique = np.empty(m, dtype=np.int32)
+    for row in range(m):
+        if taken[row] <= _MIN_VIOLATION or taken[row] >= 1.0 - _MIN_VIOLATION:
+            continue
+        near = np.arange(row + 1, max(row + 1, order.far_from[row])).astype(np.int32)
+        wanted = near[taken[near] > _MIN_VIOLATION]
+        size, total = _heaviest_antichain(order, taken, row, wanted, clique)
+        if total <= 1.0 + _MIN_VIOLATION:
+            continue
+        size = _extend(order, clique, size, first_near[row], order.far_from[row])
+        for member in np.sort(clique[:size]):
+            members.append(member)
+        offsets.append(np.int64(len(members)))
+    return np.array(offsets), np.array(members)
+
+
+@kernel
+def _heaviest_antichain(
+    order: Order, taken: Floats, row: int, wanted: Ints, clique: Ints
+) -> tuple[int, float]:
+    """Fill ``clique`` with ``row`` and the heaviest antichain of ``wanted`` beside it.
+
+    Depth first over the candidates by falling weight, with the sum of what remains as the
+    bound; cut short where that would take long, for a good antichain is enough.
+    """
+    excluded = np.array([not are_comparable(order, row, other) for other in wanted], dtype=np.bool_)
+    others = wanted[excluded]
+    others = others[np.argsort(-taken[others], kind="mergesort")]
+    k = len(others)
+    # What follows each candidate, at each depth: the candidates that are still free.
+    free = np.zeros((k + 1, k), dtype=np.bool_)
+    free[0] = True
+    at = np.zeros(k + 2, dtype=np.int64)
+    chosen = np.empty(k + 1, dtype=np.int64)
+    weight = np.zeros(k + 2)
+    weight[0] = taken[row]
+    best, best_size = 0.0, 0
+    depth, steps = 0, 0
+    while depth >= 0:
+        if weight[depth] > best:
+            best, best_size = weight[depth], depth + 1
+            clique[0] = row
+            for i in range(depth):
+                clique[i + 1] = others[chosen[i]]
+        steps += 1
+        i = at[depth]
+        while i < k and not free[depth, i]:
+            i += 1
+        remaining = 0.0
+        for j in range(i, k):
+            if free[depth, j]:
+                remaining += taken[others[j]]
+        if i == k or steps > _MAX_STEPS or weight[depth] + remaining <= best + 1e-9:
+            depth -= 1
+            continue
+        at[depth] = i + 1
+        chosen[depth] = i
+        for j in range(i + 1, k):
+            free[depth + 1, j] = free[depth, j] and not are_comparable(order, others[i], others[j])
+        free[depth + 1, : i + 1] = False
+        weight[depth + 1] = weight[depth] + taken[others[i]]
+        at[depth + 1] = i + 1
+        depth += 1
+    return best_size, best
+
+
+@kernel
+def detours(direct: Order, closed: Order) -> tuple[Ints, Ints, Longs, Ints]:
+    """Return the pairs of tasks that need another between them, and which ones may be it.
+
+    Answers the earlier and the later tasks, then offsets and rows of the tasks of which
+    one must come right after the earlier one.
+    """
+    first = [np.int32(0) for _ in range(0)]
+    second = [np.int32(0) for _ in range(0)]
+    offsets = [np.int64(0)]
+    between = [np.int32(0) for _ in range(0)]
+    for a in range(len(direct.near_from)):
+        for b in range(direct.near_from[a], direct.far_from[a]):
+            if comes_before(direct, a, b) or not comes_before(closed, a, b):
+                continue
+            first.append(np.int32(a))
+            second.append(np.int32(b))
+            for c in range(direct.near_from[a], b):
+                if comes_before(direct, a, c) and comes_before(closed, c, b):
+                    between.append(np.int32(c))
+            offsets.append(np.int64(len(between)))
+    return np.array(first), np.array(second), np.array(offsets), np.array(between)

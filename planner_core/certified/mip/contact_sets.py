@@ -1,0 +1,280 @@
+"""The best plan with given contacts, by mixed-integer programming over promising tasks.
+
+With its contacts fixed the linear relaxation is nearly tight; with contacts free it is not. Its
+prices are nearly the best for all plans, and the tasks that it takes at no or little loss hold
+good plans.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import highspy
+import numpy as np
+
+from planner_core.budget import Budget
+from planner_core.certified.mip.clique_cuts import violated_antichains
+from planner_core.certified.mip.highs import CHAIN_TOLERANCE, Engine
+from planner_core.certified.mip.model import plan_program
+from planner_core.certified.mip.program import Rows
+from planner_core.problem import (
+    COLLECT,
+    CONTACT,
+    Bools,
+    Floats,
+    Ints,
+    Problem,
+)
+from planner_core.problem.plan import Plan
+
+_CLEAR: Final = 1e-7  # from the limits, so that the referee accepts the plan
+_CENTRAL_ROUNDS: Final = 2
+_CORNER_ROUNDS: Final = 5
+_EFFORT: Final = 0.2
+_MAX_NODES: Final = 200
+_ASIDE: Final = 1e-3  # of what tasks are worth
+_INTERIOR: Final[Mapping[str, str | float]] = {
+    "solver": "ipm",
+    "run_crossover": "off",
+    "primal_feasibility_tolerance": 1e-7,
+}
+_CORNER: Final[Mapping[str, str | float]] = {
+    "solver": "choose",
+    "run_crossover": "on",
+    "primal_feasibility_tolerance": CHAIN_TOLERANCE,
+}
+
+
+class _Point(NamedTuple):
+    """An optimum of a relaxation, and what its rows and columns are worth."""
+
+    value: float
+    columns: Floats
+    row_prices: Floats
+    losses: Floats
+
+
+class _Engine(Engine):
+    def hold(self, columns: Ints, values: Floats) -> None:
+        """Fix some columns anew."""
+        self._highs.changeColsBounds(len(columns), columns, values, values)
+
+    def require(self, amount: float) -> None:
+        """Look only for points worth this much, until there is one."""
+        for option in ("objective_bound", "objective_target"):
+            self._highs.setOptionValue(option, amount - 1e-6 * max(1.0, amount))
+
+    def weigh(self, worth: Floats) -> None:
+        """Let columns be worth something else."""
+        self._highs.changeColsCost(len(worth), np.arange(len(worth), dtype=np.int32), worth)
+
+    def look_no_further(self) -> None:
+        """Begin at the relaxation, with what is whole there, and end with that."""
+        self._highs.setOptionValue("mip_max_start_nodes", 1)
+
+    def central(self) -> _Point | None:
+        """Return a point amid all optima, with prices that are amid all that prove them.
+
+        Such prices hold for other contacts as well, better than those of a corner. HiGHS has
+        the sign of them right where it minimizes.
+        """
+        highs = self._highs
+        self._optimize(-1.0, highspy.ObjSense.kMinimize, _INTERIOR)
+        if not self._run():
+            return None
+        point = None
+        if highs.getModelStatus() == highspy.HighsModelStatus.kOptimal:
+            point = self._point(-float(highs.getInfo().objective_function_value))
+        self._optimize(-1.0, highspy.ObjSense.kMaximize, _CORNER)
+        return point or self.corner()
+
+    def corner(self) -> _Point | None:
+        """Return a corner of the relaxation."""
+        if self.relaxed() is None:
+            return None
+        return self._point(float(self._highs.getInfo().objective_function_value))
+
+    def _optimize(
+        self, sign: float, sense: highspy.ObjSense, options: Mapping[str, str | float]
+    ) -> None:
+        self.weigh(sign * np.array(self._highs.getLp().col_cost_))
+        self._highs.changeObjectiveSense(sense)
+        for option, value in options.items():
+            self._highs.setOptionValue(option, value)
+
+    def _point(self, value: float) -> _Point:
+        solution = self._highs.getSolution()
+        return _Point(
+            value=value,
+            columns=np.array(solution.col_value),
+            row_prices=np.abs(np.array(solution.row_dual)),
+            losses=np.abs(np.array(solution.col_dual)),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Relaxation:
+    """What the relaxation of a program with fixed contacts tells.
+
+    Attributes
+    ----------
+    value
+        With antichain cuts; minus infinity where there is no point.
+    prices
+        What it says that each target is worth by itself. Shape ``(num_targets,)``.
+    losses
+        What taking an opportunity would cost; infinite where it may not. Shape ``(n,)``.
+    """
+
+    value: float
+    prices: Floats
+    losses: Floats
+
+
+class FixedContacts:
+    """The program of one set of contacts over some of the tasks; its bound is not a proof.
+
+    Parameters
+    ----------
+    offered
+        Collects that may be taken. Shape ``(n,)``.
+    fixed
+        Tasks that must be taken: all contacts, and collects if any.
+    others
+        Contacts that ``fix`` may name.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        offered: Bools,
+        fixed: tuple[int, ...],
+        budget: Budget,
+        seed: int,
+        others: tuple[int, ...] = (),
+    ) -> None:
+        self._problem = problem
+        kept = offered & (problem.opportunities.kind == COLLECT)
+        kept[[*fixed, *others, *problem.kept_rows.tolist()]] = True
+        self._rows = np.flatnonzero(kept).astype(np.int32)
+        self._model = plan_program(problem, "antichain", _CLEAR, self._rows)
+        self._limit(self._is_fixed(fixed))
+        self._budget, self._seed = budget, seed
+        self._engine = self._new_engine()
+        self._cuts: list[Rows] = []
+        self._fixed = fixed
+        self._point: Floats | None = None  # of the last relaxation
+
+    def relaxation(self) -> Relaxation:
+        """Return what the relaxation tells, with prices amid all that prove it."""
+        reward = self._problem.target_reward
+        prices, losses = np.zeros(len(reward)), np.full(len(self._problem.opportunities), np.inf)
+        point = self._cut(_CENTRAL_ROUNDS, self._engine.central)
+        if point is not None:
+            # The rows of the targets come first in the program.
+            worth = point.row_prices[: len(reward)]
+            prices = np.clip(worth if self._is_plain else reward - worth, 0.0, reward)
+            losses[self._rows] = point.losses[: len(self._rows)]
+        value = -np.inf if point is None else point.value
+        return Relaxation(value=value, prices=prices, losses=losses)
+
+    def relaxed(self) -> float:
+        """Return what the relaxation is worth: a corner, from which the search sets out."""
+        point = self._cut(_CORNER_ROUNDS, self._engine.corner)
+        self._point = None if point is None else point.columns
+        return -np.inf if point is None else point.value
+
+    def turn_aside(self, rng: np.random.Generator) -> None:
+        """Move to another corner of the relaxation, worth about as much."""
+        worth = np.concatenate(self._model.program.worth)
+        self._engine.weigh(worth * (1.0 + _ASIDE * rng.random(len(worth))))
+        point = self._engine.corner()
+        self._point = None if point is None else point.columns
+        self._engine.weigh(worth)
+
+    @property
+    def _is_plain(self) -> bool:
+        """Whether tasks earn what their targets are worth, in a row for each target."""
+        return bool(np.any(self._model.program.worth[0] > 0.0))
+
+    def fix(self, contacts: tuple[int, ...]) -> None:
+        """Fix other contacts than so far, all known to the program."""
+        self._fixed = contacts
+        self._hold(self._engine)
+
+    def _hold(self, engine: _Engine) -> None:
+        at = np.flatnonzero(self._is_contact).astype(np.int32)
+        engine.hold(at, self._is_fixed(self._fixed)[at].astype(np.float64))
+
+    def _new_engine(self) -> _Engine:
+        return _Engine(self._model.program, self._budget, self._seed, is_chained=True)
+
+    @property
+    def _is_contact(self) -> Bools:
+        is_contact: Bools = self._problem.opportunities.kind[self._rows] == CONTACT
+        return is_contact
+
+    def _is_fixed(self, fixed: tuple[int, ...]) -> Bools:
+        """Return which of the program's tasks must be taken."""
+        must = self._is_contact & np.isin(self._rows, self._problem.kept_rows)
+        is_fixed: Bools = np.isin(self._rows, fixed) | must
+        return is_fixed
+
+    def _limit(self, is_fixed: Bools) -> None:
+        """Fix tasks, and let rows alone limit the collects, so that they get all prices."""
+        program, m = self._model.program, len(is_fixed)
+        lower, upper = np.concatenate(program.lower), np.concatenate(program.upper)
+        if self._is_plain:
+            upper[:m][upper[:m] > 0.0] = np.inf
+        upper[:m][self._is_contact] = 0.0
+        lower[:m][is_fixed] = upper[:m][is_fixed] = 1.0
+        program.lower, program.upper = [lower], [upper]
+
+    def _cut(self, rounds: int, solve: Callable[[], _Point | None]) -> _Point | None:
+        """Return the optimum of the relaxation with antichain cuts, if there is one."""
+        for left in range(rounds, -1, -1):
+            point = solve()
+            if point is None or left == 0 or not self._add_cuts(point.columns):
+                break
+        return point
+
+    def _add_cuts(self, taken: Floats) -> bool:
+        is_cut = False
+        satellites = zip(self._model.problem.satellites, self._model.orders, strict=True)
+        for satellite, order in satellites:
+            if len(satellite) == 0:
+                continue
+            own = self._model.taken[satellite.rows]
+            offsets, members = violated_antichains(order, taken[own])
+            cuts = Rows.of(offsets, own[members], upper=1.0)
+            self._engine.add_rows(cuts)
+            self._cuts.append(cuts)
+            is_cut = is_cut or len(offsets) > 1
+        return is_cut
+
+    def plan(self, at_least: float, *, is_rounded: bool = False) -> Plan | None:
+        """Return a plan worth ``at_least`` if one turns up soon, or else any, or None.
+
+        Parameters
+        ----------
+        is_rounded
+            Whether to look only near the last corner of the relaxation, and not for long.
+        """
+        engine = self._new_engine()
+        self._hold(engine)
+        for cuts in self._cuts:
+            engine.add_rows(cuts)
+        engine.require(at_least)
+        if is_rounded:
+            engine.look_no_further()
+        max_nodes = 0 if is_rounded else _MAX_NODES
+        outcome = engine.search(self._point, 0.0, _EFFORT, _unwatched, max_nodes)
+        if outcome.columns is None:
+            return None
+        return Plan.of(self._problem, self._rows[outcome.columns[: len(self._rows)] > 0.5])
+
+
+def _unwatched(_reward: float, _bound: float) -> None:
+    pass

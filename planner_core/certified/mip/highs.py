@@ -1,0 +1,210 @@
+"""HiGHS, asked to solve a program under a budget: quiet, single-threaded and repeatable."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import highspy
+import numpy as np
+
+from planner_core.budget import Budget
+from planner_core.certified.mip.program import Program, Rows
+from planner_core.problem import Floats
+
+# Sums of zeros and ones bear HiGHS's usual tolerance. In a long chain of levels each row may
+# be off by as much, so there it must be far below one task.
+_TOLERANCE: Final = 1e-6
+CHAIN_TOLERANCE: Final = 1e-9
+
+_POLL_S: Final = 0.02
+_PATIENCE_S: Final = 0.25
+"""How long HiGHS may take to stop by itself; between two of its interrupts lie seconds at times."""
+
+_MAX_LOG: Final = 6000  # characters
+
+Watch = Callable[[float, float], None]
+"""Called now and then with the best objective so far and the bound."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Outcome:
+    """What a run left.
+
+    Attributes
+    ----------
+    columns
+        The best integer point found, or None. Shape ``(num_columns,)``.
+    bound
+        No point is worth more; infinite where nothing is known yet.
+    is_infeasible
+        Whether it is proven that there is no point at all.
+    log
+        The end of what HiGHS had to say.
+    """
+
+    columns: Floats | None
+    bound: float
+    is_infeasible: bool
+    log: str
+
+
+class Engine:
+    """One program in HiGHS: relaxations first, then the integer search.
+
+    HiGHS runs in a thread of its own. A spent budget asks it to stop, and it does when it
+    comes to ask; who waits for an answer need not wait for that. What is then left behind is
+    never touched again, and the thread ends with its next question.
+    """
+
+    def __init__(self, program: Program, budget: Budget, seed: int, *, is_chained: bool) -> None:
+        tolerance = CHAIN_TOLERANCE if is_chained else _TOLERANCE
+        self._budget = budget
+        self._bound = float("inf")
+        self._incumbent: Floats | None = None
+        self._is_abandoned = False
+        self._messages: list[str] = []
+        self._highs = highs = highspy.Highs()  # type: ignore[no-untyped-call]  # it has no types
+        options: dict[str, bool | int | float | str] = {
+            "output_flag": True,
+            "log_to_console": False,
+            # More threads would outlive the solve, and workers fork.
+            "threads": 1,
+            "parallel": "off",
+            "random_seed": seed % 2**31,
+            "primal_feasibility_tolerance": tolerance,
+            "mip_feasibility_tolerance": tolerance,
+        }
+        for option, value in options.items():
+            highs.setOptionValue(option, value)
+        n = program.num_columns
+        self._is_integer = np.concatenate(program.is_integer)
+        highs.addVars(n, np.concatenate(program.lower), np.concatenate(program.upper))
+        highs.changeColsCost(n, np.arange(n, dtype=np.int32), np.concatenate(program.worth))
+        highs.changeObjectiveSense(highspy.ObjSense.kMaximize)
+        for rows in program.rows:
+            self.add_rows(rows)
+        highs.cbLogging += self._keep_message
+        highs.cbSimplexInterrupt += self._interrupt_if_spent
+        highs.cbIpmInterrupt += self._interrupt_if_spent
+
+    def add_rows(self, rows: Rows) -> None:
+        """Add constraints; the next run starts from the last one's basis."""
+        self._highs.addRows(
+            len(rows), rows.lower, rows.upper, len(rows.column), rows.first, rows.column, rows.value
+        )
+
+    def relaxed(self) -> Floats | None:
+        """Return the best fractional point, or None if the budget did not suffice."""
+        if not self._run():
+            return None
+        if self._highs.getModelStatus() != highspy.HighsModelStatus.kOptimal:
+            return None
+        info = self._highs.getInfo()
+        # The duals prove the value but for what HiGHS tolerates of them, on columns up to one.
+        doubt = float(info.sum_dual_infeasibilities) + _TOLERANCE
+        self._bound = min(self._bound, float(info.objective_function_value) + doubt)
+        return np.array(self._highs.getSolution().col_value)
+
+    @property
+    def bound(self) -> float:
+        """What no point exceeds, as far as the relaxations have shown."""
+        return self._bound
+
+    @property
+    def log(self) -> str:
+        """What HiGHS had to say: the end of it, which holds the result."""
+        return "".join(self._messages)[-_MAX_LOG:]
+
+    def search(
+        self,
+        start: Floats | None,
+        gap: float,
+        heuristic_effort: float,
+        watch: Watch,
+        max_nodes: int | None = None,
+    ) -> Outcome:
+        """Return the best integer point.
+
+        Parameters
+        ----------
+        start
+            Values of the first columns of a point that is known, all integer ones among them;
+            or a fractional one, near which HiGHS looks first; or None.
+        gap
+            Relative distance of objective and bound at which to stop.
+        heuristic_effort
+            Share of the work spent on looking for points rather than on the proof.
+        max_nodes
+            How many parts of the search to look at; unlike a limit in seconds, the same
+            everywhere.
+        """
+        if self._is_abandoned:
+            # HiGHS is still in its last relaxation, and must not be touched.
+            return self._so_far(None)
+        highs = self._highs
+        integer = np.flatnonzero(self._is_integer).astype(np.int32)
+        kinds = np.full(len(integer), int(highspy.HighsVarType.kInteger), dtype=np.uint8)
+        highs.changeColsIntegrality(len(integer), integer, kinds)
+        highs.setOptionValue("mip_rel_gap", gap)
+        highs.setOptionValue("mip_heuristic_effort", heuristic_effort)
+        if max_nodes is not None:
+            highs.setOptionValue("mip_max_nodes", max_nodes)
+        # Where it is not whole HiGHS begins with a program of its own over what is whole, which
+        # tells bounds too. They hold for nothing else.
+        is_whole = start is not None and bool(np.all(start[integer] == np.round(start[integer])))
+        if start is not None:
+            highs.setSolution(len(start), np.arange(len(start), dtype=np.int32), start)
+
+        def on_interrupt(event: highspy.highs.HighsCallbackEvent) -> None:
+            out = event.data_out
+            if not self._is_abandoned:
+                if is_whole:
+                    self._bound = min(self._bound, float(out.mip_dual_bound))
+                watch(float(out.mip_primal_bound), self._bound)
+            self._interrupt_if_spent(event)
+
+        def on_improved(event: highspy.highs.HighsCallbackEvent) -> None:
+            self._incumbent = np.array(event.data_out.mip_solution)
+
+        highs.cbMipInterrupt += on_interrupt
+        highs.cbMipImprovingSolution += on_improved
+        if not self._run():
+            return Outcome(
+                columns=self._incumbent, bound=self._bound, is_infeasible=False, log=self.log
+            )
+        info, status = highs.getInfo(), highs.getModelStatus()
+        has_point = info.primal_solution_status == highspy.SolutionStatus.kSolutionStatusFeasible
+        return Outcome(
+            columns=np.array(highs.getSolution().col_value) if has_point else None,
+            bound=min(self._bound, float(info.mip_dual_bound)),
+            is_infeasible=status == highspy.HighsModelStatus.kInfeasible,
+            log=self.log,
+        )
+
+    def _so_far(self, columns: Floats | None) -> Outcome:
+        return Outcome(columns=columns, bound=self._bound, is_infeasible=False, log=self.log)
+
+    def _run(self) -> bool:
+        """Run HiGHS; return whether it ended in time, and may be asked what it found."""
+        remaining_s = self._budget.remaining_s()
+        if remaining_s is not None:
+            # HiGHS counts from its first run on.
+            self._highs.setOptionValue("time_limit", self._highs.getRunTime() + remaining_s)
+        # Not a daemon: the interpreter must not end under a thread that will call into it.
+        thread = threading.Thread(target=self._highs.run, name="highs")
+        thread.start()
+        while thread.is_alive() and not self._budget.is_spent():
+            thread.join(_POLL_S)
+        thread.join(_PATIENCE_S)
+        self._is_abandoned = thread.is_alive()
+        return not self._is_abandoned
+
+    def _keep_message(self, event: highspy.highs.HighsCallbackEvent) -> None:
+        self._messages.append(event.message)
+
+    def _interrupt_if_spent(self, event: highspy.highs.HighsCallbackEvent) -> None:
+        if self._is_abandoned or self._budget.is_spent():
+            event.interrupt()

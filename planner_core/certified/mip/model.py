@@ -1,0 +1,181 @@
+"""The planning model as a mixed-integer program, over all satellites at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from planner_core.certified.mip.clique_cuts import antichain_cover, detours, excluding_pairs
+from planner_core.certified.mip.program import Program, Rows
+from planner_core.certified.mip.resources import ResourceTerms, add_resources, resource_terms
+from planner_core.precedence.relation import Order, order_of, transitive_closure
+from planner_core.problem import (
+    COLLECT,
+    CONTACT,
+    Floats,
+    Ints,
+    Problem,
+    SatelliteProblem,
+)
+from planner_core.problem.restrict import restricted
+from planner_core.problem.slew import TIME_TOLERANCE_S
+
+Formulation = Literal["antichain", "pairwise"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PlanProgram:
+    """A program whose first columns are x: one for each opportunity.
+
+    Attributes
+    ----------
+    problem
+        The opportunities that a plan may take.
+    orders
+        For each satellite, which of its tasks can stand in one plan.
+    """
+
+    problem: Problem
+    program: Program
+    taken: Ints
+    orders: tuple[Order, ...]
+
+
+def plan_program(
+    problem: Problem, formulation: Formulation, margin: float, rows: Ints | None = None
+) -> PlanProgram:
+    """Return the program of the plans that take some of the tasks.
+
+    Parameters
+    ----------
+    margin
+        How far inside battery and recorder limits to stay.
+    rows
+        The opportunities that a plan may take, ascending; all by default.
+    """
+    terms = [
+        resource_terms(problem, satellite) if problem.use_resources and len(satellite) else None
+        for satellite in problem.satellites
+    ]
+    if rows is not None:
+        # What a task costs depends on the tasks around it, taken or not.
+        is_kept = np.zeros(len(problem.opportunities), dtype=np.bool_)
+        is_kept[rows] = True
+        kept = [np.flatnonzero(is_kept[s.rows]).astype(np.int32) for s in problem.satellites]
+        terms = [own and own.of_part(part) for own, part in zip(terms, kept, strict=True)]
+        problem = restricted(problem, rows)
+    closures = [transitive_closure(problem, satellite) for satellite in problem.satellites]
+    is_transitive = all(
+        closed is satellite.transitions
+        for closed, satellite in zip(closures, problem.satellites, strict=True)
+    )
+    program = Program()
+    taken = _variables(program, problem, is_transitive)
+    orders = tuple(order_of(closed) for closed in closures)
+    _constraints(program, problem, taken, orders, terms, formulation, margin)
+    return PlanProgram(problem=problem, program=program, taken=taken, orders=orders)
+
+
+def _variables(program: Program, problem: Problem, is_transitive: bool) -> Ints:
+    """Add x, 1 for what must be taken, and the objective: each target's reward once."""
+    table = problem.opportunities
+    worth = _objective(problem)
+    kept = np.zeros(len(table), dtype=np.bool_)
+    kept[problem.kept_rows] = True
+    if is_transitive:
+        useful = (worth > 0.0) | ((table.kind == CONTACT) & problem.use_resources)
+        useful |= kept
+        taken = program.add_columns(
+            worth, lower=kept.astype(np.float64), upper=useful.astype(np.float64)
+        )
+        _once_per_target(program, problem, taken)
+        return taken
+    taken = program.add_columns(np.zeros(len(table)), lower=kept.astype(np.float64))
+    _paid_once_per_target(program, problem, taken)
+    return taken
+
+
+def _objective(problem: Problem) -> Floats:
+    """Return what each opportunity earns by itself."""
+    table = problem.opportunities
+    is_collect = table.kind == COLLECT
+    worth = np.zeros(len(table))
+    worth[is_collect] = problem.target_reward[table.place[is_collect]]
+    return worth
+
+
+def _once_per_target(program: Program, problem: Problem, taken: Ints) -> None:
+    """At most one collect of each target, over all satellites."""
+    rows, offsets = problem.target_opportunities
+    program.add_rows(Rows.of(offsets, taken[rows], upper=1.0))
+
+
+def _paid_once_per_target(program: Program, problem: Problem, taken: Ints) -> None:
+    """Pay for a target where any of its collects is taken.
+
+    A slow satellite may turn by way of a target that it has collected already.
+    """
+    rows, offsets = problem.target_opportunities
+    collected = program.add_columns(problem.target_reward.astype(np.float64), is_integer=False)
+    column = np.insert(taken[rows], offsets[1:], collected)
+    value = np.insert(np.full(len(rows), -1.0), offsets[1:], 1.0)
+    program.add_rows(Rows.of(offsets + np.arange(len(offsets)), column, value, upper=0.0))
+
+
+def _constraints(
+    program: Program,
+    problem: Problem,
+    taken: Ints,
+    orders: tuple[Order, ...],
+    terms: list[ResourceTerms | None],
+    formulation: Formulation,
+    margin: float,
+) -> None:
+    for satellite, order, own_terms in zip(problem.satellites, orders, terms, strict=True):
+        own = taken[satellite.rows]
+        if len(own) == 0:
+            continue
+        _agility(program, own, order, formulation)
+        _detours(program, satellite, own, order)
+        if own_terms is not None:
+            add_resources(program, satellite, own_terms, own, margin)
+    _stations(program, problem, taken)
+
+
+def _agility(program: Program, own: Ints, order: Order, formulation: Formulation) -> None:
+    """Tasks of one satellite that exclude each other: one of them at most."""
+    if formulation == "pairwise":
+        first, second = excluding_pairs(order)
+        program.add_rows(Rows.aligned((own[first], 1.0), (own[second], 1.0), upper=1.0))
+    else:
+        offsets, members = antichain_cover(order)
+        program.add_rows(Rows.of(offsets, own[members], upper=1.0))
+
+
+def _detours(program: Program, satellite: SatelliteProblem, own: Ints, order: Order) -> None:
+    """Two tasks that do not follow directly need another in between that makes up for it."""
+    direct = order_of(satellite.transitions)
+    if order.bits is direct.bits:
+        return
+    first, second, offsets, between = detours(direct, order)
+    ends = np.column_stack([own[first], own[second]]).ravel()
+    at = np.repeat(offsets[1:], 2)
+    column = np.insert(own[between], at, ends)
+    value = np.insert(np.full(len(between), -1.0), at, 1.0)
+    program.add_rows(Rows.of(offsets + 2 * np.arange(len(offsets)), column, value, upper=1.0))
+
+
+def _stations(program: Program, problem: Problem, taken: Ints) -> None:
+    """Let a station serve no more satellites at a time than it has antennas."""
+    table = problem.opportunities
+    groups, limits = [], []
+    for station, antennas in enumerate(problem.station_antennas):
+        rows = np.flatnonzero((table.kind == CONTACT) & (table.place == station))
+        for at, row in enumerate(rows):
+            running = rows[:at][table.end_s[rows[:at]] > table.start_s[row] + TIME_TOLERANCE_S]
+            if len(running) >= antennas:
+                groups.append(taken[np.append(running, row)])
+                limits.append(float(antennas))
+    program.add_rows(Rows.at_most(groups, limits))

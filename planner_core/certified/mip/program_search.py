@@ -1,0 +1,194 @@
+"""Plans of a fleet under battery and recorder by mixed-integer programs, with contacts drawn.
+
+Near the best prices the relaxed plans of all satellites hold a few thousand tasks between them,
+and the best plans are made of those. With its contacts fixed the program over them is nearly
+tight, and HiGHS finds in seconds what no search from plan to plan does. Which contacts: those of a
+satellite's own best plan at prices that are off by a little, less what it can do without, one
+satellite after another where they share antennas. The relaxation tells good sets from others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import chain
+from typing import Final
+
+import numpy as np
+
+from planner_core.budget import Budget
+from planner_core.certified.dp.resource_network import Network
+from planner_core.certified.mip.contact_sets import FixedContacts
+from planner_core.certified.mip.solution_pool import PlanPool, Rows, rows_of
+from planner_core.certified.multipliers.resources import PriceSearch
+from planner_core.certified.proofs.resource_bound import leaving_whole_units, whole_worth
+from planner_core.problem import (
+    CONTACT,
+    Bools,
+    Floats,
+    Ints,
+    Problem,
+)
+from planner_core.solvers.sequential import blocked_rows
+
+_BEST: Final = 2  # of those sets that are planned with
+_TRIES: Final = 2  # of a program without a better plan
+_DRAWS: Final = 3  # sets of contacts beside those of plans
+_OFF: Final = 0.2  # of a reward: what prices are off by at a draw
+_MOST_OFFERED: Final = 6000  # tasks of a program: of a larger fleet it takes some satellites
+# Steps of the other search that take about as long as
+_BESIDE_DRAWS: Final = 18
+_BESIDE_RELAXATIONS: Final = 24
+_BESIDE_PROGRAM: Final = 40
+
+
+class ProgramSearch:
+    """Turns that seek plans for a pool.
+
+    Parameters
+    ----------
+    pool
+        Where plans come from, and go.
+    prices
+        The satellites' programmes, and the best prices.
+    usage
+        How many plans that are relaxed at about these prices took each opportunity.
+        Shape ``(n,)``.
+
+    Attributes
+    ----------
+    steps_beside
+        How many steps of the other search take about as long as the next turn.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        pool: PlanPool,
+        prices: PriceSearch,
+        usage: Floats,
+        budget: Budget,
+        seed: int,
+    ) -> None:
+        self._problem, self._budget, self._seed = problem, budget, seed
+        self._pool = pool
+        self._prices, self._unit = prices.prices, prices.unit
+        self._satellites = prices.satellites
+        self._is_promising = usage > 0.0
+        self._rng = np.random.default_rng(seed)
+        self._work = self._steps()
+        self.steps_beside = next(self._work)
+
+    def turn(self) -> None:
+        """Draw sets of contacts, see what some are worth, or solve a program with one."""
+        self.steps_beside = next(self._work, 1)
+
+    def _steps(self) -> Iterator[int]:
+        """Yield how long each turn will take, before it."""
+        while not self._budget.is_spent():
+            yield _BESIDE_DRAWS
+            group = self._group()
+            # What satellites beside do stays the same, though the plan may change meanwhile.
+            beside = self._tasks_beside(group)
+            program = self._program(group, beside)
+            sets = [self._contacts(group, rows) for rows in self._known()]
+            sets += [self._draw(group, beside) for _ in range(_DRAWS)]
+            yield _BESIDE_RELAXATIONS
+            worth: dict[Rows, float] = {}
+            for contacts in dict.fromkeys(sets):
+                fixed = (*beside, *contacts)
+                program.fix(fixed)
+                worth[fixed] = program.relaxed()
+            for fixed in sorted(worth, key=lambda fixed: -worth[fixed])[:_BEST]:
+                yield from self._improve(program, fixed)
+
+    def _improve(self, program: FixedContacts, fixed: Rows) -> Iterator[int]:
+        """Better the plan with what is fixed, from one corner of the relaxation after another."""
+        program.fix(fixed)
+        value = program.relaxed()
+        num_tries = 0
+        while value >= self._pool.better and num_tries < _TRIES:
+            yield _BESIDE_PROGRAM
+            before = self._pool.reward
+            self._pool.add(program.plan(self._pool.better, is_rounded=True))
+            num_tries = 0 if self._pool.reward > before else num_tries + 1
+            program.turn_aside(self._rng)
+
+    def _group(self) -> Bools:
+        """Return which satellites the next program is for. Shape ``(num_satellites,)``."""
+        group = np.zeros(len(self._problem.satellites), dtype=np.bool_)
+        num_offered = 0
+        for relaxation in self._rng.permutation(np.array(self._satellites, dtype=object)):
+            rows = relaxation.satellite.rows
+            num_offered += int(self._is_promising[rows].sum())
+            if num_offered > _MOST_OFFERED and group.any():
+                break
+            group[self._problem.opportunities.satellite[rows[0]]] = True
+        return group
+
+    def _known(self) -> tuple[Rows, Rows]:
+        """Return the best plan, and the latest one of the other search."""
+        return rows_of(self._pool.plan), self._pool.latest
+
+    def _program(self, group: Bools, beside: Rows) -> FixedContacts:
+        """Return the program of some satellites, beside what the others do."""
+        offered = self._is_promising.copy()
+        offered[[*chain(*self._known())]] = True
+        offered &= group[self._problem.opportunities.satellite]
+        return FixedContacts(
+            self._problem, offered, beside, self._budget, self._seed, self._contacts(group)
+        )
+
+    def _tasks_beside(self, group: Bools) -> Rows:
+        """Return what the plan has the other satellites do."""
+        of = self._problem.opportunities.satellite
+        return tuple(row for row in rows_of(self._pool.plan) if not group[of[row]])
+
+    def _contacts(self, group: Bools, rows: Sequence[int] | None = None) -> Rows:
+        """Return the contacts of some satellites, of all or among some opportunities."""
+        table = self._problem.opportunities
+        is_one = (table.kind == CONTACT) & group[table.satellite]
+        if rows is not None:
+            is_one &= np.isin(np.arange(len(table)), rows)
+        return tuple(np.flatnonzero(is_one).tolist())
+
+    def _draw(self, group: Bools, beside: Rows) -> Rows:
+        """Return contacts that satellites would have in turn, at prices that are a little off."""
+        reward = self._problem.target_reward
+        off = _OFF * reward * self._rng.standard_normal(len(reward)) * (self._prices > 0.0)
+        prices = np.clip(self._prices + off, 0.0, reward)
+        prices = leaving_whole_units(self._problem, prices, self._unit)
+        worth = whole_worth(self._problem, prices, self._unit)
+        table = self._problem.opportunities
+        taken = [r for r in beside if table.kind[r] == CONTACT]
+        drawn: list[int] = []
+        for index in self._rng.permutation(len(self._satellites)):
+            relaxation = self._satellites[index]
+            satellite = relaxation.satellite
+            if not group[table.satellite[satellite.rows[0]]]:
+                continue
+            is_shut = blocked_rows(self._problem, satellite, taken + drawn) != 0
+            _, path = relaxation.without(is_shut).most(worth, 0, self._budget.stop, keeps_path=True)
+            if path is None:
+                return ()
+            drawn += satellite.rows[self._needed_contacts(relaxation.network, path)].tolist()
+        return tuple(drawn)
+
+    def _needed_contacts(self, network: Network, path: Ints) -> Ints:
+        """Return contacts of a path without which the recorder would hold more than with all."""
+        most = _overflow(network, path)
+        for contact in self._rng.permutation(path[network.is_contact[path] != 0]):
+            less = path[path != contact]
+            if _overflow(network, less) <= most:
+                path = less
+        needed: Ints = path[network.is_contact[path] != 0]
+        return needed
+
+
+def _overflow(network: Network, path: Sequence[int] | Ints) -> float:
+    """Return by how much the recorder passes its limits on a path, at most; 0 if it does not."""
+    data, most = network.data_start, 0.0
+    for k in path:
+        most = max(most, data - network.data_before[k])
+        data = max(network.data_floor[k], data + network.data_gain[k])
+        most = max(most, data - network.data_after[k])
+    return float(max(most, data - network.data_end))

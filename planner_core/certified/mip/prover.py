@@ -1,0 +1,49 @@
+"""HiGHS on what the prices leave: a plan worth some amount, or the proof that there is none."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planner_core.budget import Budget
+from planner_core.certified.mip.highs import Engine, Watch
+from planner_core.certified.mip.program import Program
+from planner_core.problem import Problem
+from planner_core.problem.plan import Plan
+
+
+class Prover(Engine):
+    """The program of the plans worth at least ``amount``; one worth ``enough`` ends the search.
+
+    ``program`` counts in the greatest reward of ``problem``, and its columns begin with x.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        program: Program,
+        amount: float,
+        enough: float,
+        budget: Budget,
+        seed: int,
+    ) -> None:
+        self._problem = problem
+        self._scale = float(problem.target_reward.max(initial=1e-300))
+        super().__init__(program, budget, seed, is_chained=False)
+        highs = self._highs
+        for option, limit in (("objective_bound", amount), ("objective_target", enough)):
+            highs.setOptionValue(option, (limit - 1e-6 * max(1.0, limit)) / self._scale)
+
+    def prove(
+        self, heuristic_effort: float, watch: Watch, max_nodes: int | None = None
+    ) -> tuple[Plan | None, float]:
+        """Return a plan worth the amount, if there is one, and what no plan exceeds.
+
+        The bound is infinite where the budget did not suffice for any.
+        """
+        outcome = self.search(None, 0.0, heuristic_effort, watch, max_nodes)
+        plan = None
+        if outcome.columns is not None:
+            taken = outcome.columns[: len(self._problem.opportunities)]
+            plan = Plan.of(self._problem, np.flatnonzero(taken > 0.5))
+        bound = -np.inf if outcome.is_infeasible else outcome.bound * self._scale
+        return plan, bound

@@ -1,0 +1,246 @@
+"""The relaxation of a problem without resources, in HiGHS, with its cutting planes."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from planner_core.budget import Budget
+from planner_core.certified.mip.clique_cuts import antichain_cover, violated_antichains
+from planner_core.certified.mip.highs import Engine
+from planner_core.certified.mip.program import Program, Rows
+from planner_core.certified.mip.zero_half_cuts import Sets, deepest, odd_sets
+from planner_core.certified.proofs.certificate import Cut, Multipliers
+from planner_core.draws import draws_of
+from planner_core.jit import kernel
+from planner_core.precedence.relation import (
+    Order,
+    are_comparable,
+    comes_before,
+    order_of,
+    transitive_closure,
+)
+from planner_core.problem import (
+    COLLECT,
+    Bools,
+    Bytes,
+    Floats,
+    Ints,
+    Problem,
+)
+
+_TRIALS: Final = 4  # orders of elimination that are tried for odd sets
+_MAX_CUTS: Final = 150  # in a round
+_MAX_SHARED: Final = 40  # new cuts that one fractional task may stand in
+_CANDIDATES: Final = 10  # for a branch
+_TRIAL_PIVOTS: Final = 60
+_PATIENCE: Final = 2  # rounds that a cut may lie idle
+
+
+class Master(Engine):
+    """Which tasks to take, fractionally: exclusion sets, odd sets, and their prices.
+
+    Paths are not in it: sets of tasks of one satellite that exclude each other say as much,
+    and those that matter are few.
+
+    Parameters
+    ----------
+    rows
+        For each opportunity of the problem its row in the problem that is to be proven.
+    """
+
+    def __init__(self, problem: Problem, rows: Ints, budget: Budget, seed: int) -> None:
+        self._rows = rows
+        self._problem = problem
+        table = problem.opportunities
+        self._scale = float(problem.target_reward.max(initial=1e-300))
+        self._worth = worth = np.zeros(len(table))
+        is_collect = table.kind == COLLECT
+        worth[is_collect] = problem.target_reward[table.place[is_collect]] / self._scale
+        self._orders = [
+            _exclusion_order(order_of(transitive_closure(problem, s)), s.place, s.kind)
+            for s in problem.satellites
+        ]
+        self._draws = draws_of(seed)
+        self._cuts: dict[tuple[int, ...], Cut] = {}
+        members, offsets = problem.target_opportunities
+        self._sets = Sets(offsets, members)
+        self._num_targets = len(offsets) - 1
+        for satellite, order in zip(problem.satellites, self._orders, strict=True):
+            cover, rows = antichain_cover(order)
+            self._keep_sets(cover, satellite.rows[rows])
+        program = Program()
+        self._useful = worth > 0.0
+        program.add_columns(worth, upper=self._useful.astype(np.float64))
+        program.add_rows(Rows.of(self._sets.offsets, self._sets.members, upper=1.0))
+        # For each row of the program the sets that it adds up, and how long it has lain idle.
+        self._row_sets: list[tuple[int, ...]] = [(i,) for i in range(len(self._sets.offsets) - 1)]
+        self._idle = [0] * len(self._row_sets)
+        super().__init__(program, budget, seed, is_chained=False)
+
+    @property
+    def value(self) -> float:
+        """Return what the last relaxation is worth."""
+        return float(self._highs.getInfo().objective_function_value) * self._scale
+
+    def multipliers(self) -> Multipliers:
+        """Return the prices that the last relaxation has put on targets and cuts."""
+        rows = self._rows
+        price = np.abs(np.array(self._highs.getSolution().row_dual)) * self._scale
+        prices = price[: self._num_targets].copy()
+        place = self._problem.opportunities.place
+        cuts, cut_prices = [], []
+        for row in np.flatnonzero(price > 1e-9 * self._scale):
+            picked = self._row_sets[row]
+            if row < self._num_targets:
+                continue
+            groups = [self._members(i) for i in picked]
+            is_on_path = len(groups) == 1 and len(np.unique(place[groups[0]])) == len(groups[0])
+            if not is_on_path:
+                if picked not in self._cuts:
+                    self._cuts[picked] = Cut(sets=tuple(rows[group] for group in groups))
+                cuts.append(self._cuts[picked])
+                cut_prices.append(float(price[row]))
+        return Multipliers(prices=prices, cuts=tuple(cuts), cut_prices=tuple(cut_prices))
+
+    def allow(self, is_open: Bools) -> None:
+        """Allow these tasks, and no others, from now on."""
+        n = len(self._useful)
+        upper = self._useful & is_open
+        columns = np.arange(n, dtype=np.int32)
+        self._highs.changeColsBounds(n, columns, np.zeros(n), upper.astype(np.float64))
+
+    def excluded_by(self, row: int) -> Bools:
+        """Return which tasks cannot stand in a plan with this one; not itself."""
+        table, local = self._problem.opportunities, self._problem.local_row
+        excluded: Bools = (table.place == table.place[row]) & (table.kind == COLLECT)
+        satellite = int(table.satellite[row])
+        own = self._problem.satellites[satellite].rows
+        order = self._orders[satellite]
+        excluded[own] |= [
+            not are_comparable(order, int(local[row]), int(other)) for other in local[own]
+        ]
+        excluded[row] = False
+        return excluded
+
+    def decisive(self, taken: Floats) -> int:
+        """Return the task of which taking and leaving it both cost the relaxation most."""
+        highs, value = self._highs, self.value / self._scale
+        basis = highs.getBasis()
+        _, patience = highs.getOptionValue("simplex_iteration_limit")
+        highs.setOptionValue("simplex_iteration_limit", _TRIAL_PIVOTS)
+        best, best_at = -1.0, int(np.argmax(np.minimum(taken, 1.0 - taken)))
+        for at in np.argsort(-np.minimum(taken, 1.0 - taken), kind="stable")[:_CANDIDATES]:
+            if min(taken[at], 1.0 - taken[at]) < 1e-3:
+                break
+            losses: list[float] = []
+            for fixed in (0.0, 1.0):
+                highs.changeColBounds(int(at), fixed, fixed)
+                highs.run()
+                losses.append(value - float(highs.getInfo().objective_function_value))
+                highs.changeColBounds(int(at), 0.0, 1.0)
+                highs.setBasis(basis)
+            score = max(losses[0], 1e-6) * max(losses[1], 1e-6)
+            if score > best:
+                best, best_at = score, int(at)
+        highs.setOptionValue("simplex_iteration_limit", patience)
+        return best_at
+
+    def cut(self, taken: Floats, *, with_odd_sets: bool) -> int:
+        """Add what the fractional plan breaks, drop what has long been idle; return what came."""
+        self._drop_idle()
+        num_before = len(self._row_sets)
+        picked = self._odd_sets(taken) if with_odd_sets else []
+        for satellite, order in zip(self._problem.satellites, self._orders, strict=True):
+            offsets, members = violated_antichains(order, taken[satellite.rows])
+            if len(offsets) > 1:
+                first = len(self._sets.offsets) - 1
+                self._keep_sets(offsets, satellite.rows[members])
+                self.add_rows(Rows.of(offsets, satellite.rows[members], upper=1.0))
+                self._row_sets += [(first + i,) for i in range(len(offsets) - 1)]
+        for group in picked:
+            cut = Cut(sets=tuple(self._members(i) for i in group))
+            members, weights = cut.weights()
+            offsets = np.array([0, len(members)], dtype=np.int64)
+            self.add_rows(
+                Rows.of(offsets, members, weights.astype(np.float64), upper=float(cut.limit))
+            )
+            self._row_sets.append(group)
+        self._idle += [0] * (len(self._row_sets) - num_before)
+        return len(self._row_sets) - num_before
+
+    def program(self, is_open: Bools) -> Program:
+        """Return all that the relaxation holds, for some of the tasks: exact if transitive."""
+        number = np.cumsum(is_open) - 1
+        program = Program()
+        program.add_columns(self._worth[is_open], upper=self._useful[is_open].astype(np.float64))
+        offsets, columns, values, limits = [0], [], [], []
+        for picked in self._row_sets:
+            cut = Cut(sets=tuple(self._members(i) for i in picked))
+            members, weights = cut.weights()
+            kept = is_open[members]
+            if kept.sum() < 2:
+                continue
+            offsets.append(offsets[-1] + int(kept.sum()))
+            columns.append(number[members[kept]])
+            values.append(weights[kept].astype(np.float64))
+            limits.append(float(cut.limit))
+        if columns:
+            program.add_rows(
+                Rows.of(
+                    np.array(offsets, dtype=np.int64), np.concatenate(columns),
+                    np.concatenate(values), upper=np.array(limits),
+                )
+            )  # fmt: skip
+        return program
+
+    def _members(self, i: int) -> Ints:
+        return self._sets.members[self._sets.offsets[i] : self._sets.offsets[i + 1]]
+
+    def _keep_sets(self, offsets: np.ndarray, members: Ints) -> None:
+        last = self._sets.offsets[-1]
+        self._sets = Sets(
+            np.concatenate([self._sets.offsets, last + offsets[1:]]),
+            np.concatenate([self._sets.members, members]),
+        )
+
+    def _odd_sets(self, taken: Floats) -> list[tuple[int, ...]]:
+        """Return the deepest cuts, not too many of them about the same tasks."""
+        depth_of: dict[tuple[int, ...], float] = {}
+        for _ in range(_TRIALS):
+            chosen = odd_sets(self._sets, taken, self._draws)
+            cuts, depth = deepest(self._sets, chosen, taken, _MAX_CUTS, _MAX_SHARED)
+            for cut, beyond in zip(cuts, depth, strict=True):
+                group = chosen.members[chosen.offsets[cut] : chosen.offsets[cut + 1]]
+                depth_of[tuple(np.sort(group).tolist())] = float(beyond)
+        return sorted(depth_of, key=lambda group: (-depth_of[group], group))[:_MAX_CUTS]
+
+    def _drop_idle(self) -> None:
+        solution = self._highs.getSolution()
+        dual = np.abs(np.array(solution.row_dual))
+        for row, picked in enumerate(self._row_sets):
+            if len(picked) > 1:
+                self._idle[row] = self._idle[row] + 1 if dual[row] < 1e-9 else 0
+        drop = [row for row, idle in enumerate(self._idle) if idle >= _PATIENCE]
+        if drop:
+            self._highs.deleteRows(len(drop), np.array(drop, dtype=np.int32))
+            gone = set(drop)
+            self._row_sets = [p for row, p in enumerate(self._row_sets) if row not in gone]
+            self._idle = [idle for idle in self._idle if idle < _PATIENCE]
+
+
+def _exclusion_order(order: Order, place: Ints, kind: np.ndarray) -> Order:
+    """Return an order without the pairs of tasks on one target: those exclude each other too."""
+    return order._replace(bits=_without_equals(order, np.where(kind == COLLECT, place, -1)))
+
+
+@kernel
+def _without_equals(order: Order, place: Ints) -> Bytes:
+    bits = order.bits.copy()
+    for a in range(len(place)):
+        for b in range(order.near_from[a], order.far_from[a]):
+            if place[a] >= 0 and place[a] == place[b] and comes_before(order, a, b):
+                bit = order.offset[a] + b - order.near_from[a]
+                bits[bit >> 3] ^= np.uint8(1 << (bit & 7))
+    return bits

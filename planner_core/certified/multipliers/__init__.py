@@ -1,0 +1,1 @@
+"""Lagrangian multipliers: ascents that bring the bound down."""

@@ -1,0 +1,64 @@
+"""A proven bound: its value, and what there is to check it with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+
+from planner_core.certified.proofs.certificate import Certificate
+from planner_core.problem import Floats, Problem
+
+Proof = Literal["lagrangian", "milp", "dp", "totals"]
+
+_ROUNDING: Final = 1e-6  # relative; far above the rounding of the sums, far below one reward
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Bound:
+    """A proven upper bound on what a valid plan can earn.
+
+    Attributes
+    ----------
+    prices
+        What proves a Lagrangian bound (``lagrangian_value`` checks them) or one by dynamic
+        programmes (``resource_bound.resource_value``), one per target; None for other proofs.
+        Shape ``(num_targets,)``.
+    is_elementary
+        Whether it is ``elementary_value`` that checks the prices.
+    unit
+        In what the dynamic programmes count worth.
+    certificate
+        What proves a Lagrangian bound that took cuts (``is_refuted`` checks it).
+    log
+        What the MILP solver reported, for a bound that it has proven.
+    """
+
+    value: float
+    proof: Proof
+    prices: Floats | None = None
+    is_elementary: bool = False
+    unit: float | None = None
+    certificate: Certificate | None = None
+    log: str | None = None
+
+
+def reward_unit(problem: Problem) -> float:
+    """Return an amount of which what any plan earns is a multiple; 0 where there is none."""
+    rewards = problem.target_reward
+    if len(rewards) == 0 or rewards.max() >= 2.0**50 or np.any(rewards != np.round(rewards)):
+        return 0.0
+    return float(np.gcd.reduce(rewards.astype(np.int64)))
+
+
+def rounded_bound(problem: Problem, value: float, reward: float) -> float:
+    """Return a bound rounded up for safety, then down to what whole rewards can add up to.
+
+    Never below ``reward``, which some plan has earned.
+    """
+    safe = value * (1.0 + 1e-12) + 1e-9
+    unit = reward_unit(problem)
+    if unit > 0.0:
+        safe = float(np.floor((safe + _ROUNDING) / unit) * unit)
+    return max(safe, reward)

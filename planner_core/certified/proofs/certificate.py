@@ -1,0 +1,209 @@
+r"""Proofs that no plan earns as much as some amount, checked without any search.
+
+Multipliers :math:`\lambda_i \ge 0` for the targets and :math:`\mu_c \ge 0` for cuts
+:math:`a_c x \le b_c` bound what a plan earns by :math:`\sum_i \lambda_i + \sum_c \mu_c b_c`
+and, for each satellite, its heaviest path where task k on target i is worth
+:math:`\max(0, r_i - \lambda_i - \sum_c \mu_c a_{ck})`. The same with the path led through a
+task bounds the plans that hold this task. A certificate is a sequence of multipliers: each
+strikes out the tasks that no plan worth the amount can hold, until no path is left that
+could be worth it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner_core.precedence.network import Network, heaviest_through, network_of
+from planner_core.precedence.relation import (
+    Order,
+    are_comparable,
+    order_of,
+    transitive_closure,
+)
+from planner_core.problem import (
+    COLLECT,
+    Bools,
+    Floats,
+    Ints,
+    Problem,
+)
+from planner_core.problem.restrict import restricted
+
+_ROUNDING = 1e-9  # relative; what sums of floats may be off by
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Cut:
+    """An inequality that all plans keep, from sets of which a plan takes one task at most.
+
+    Add up the sets, halve, and round down; a single set stands for itself.
+
+    Attributes
+    ----------
+    sets
+        Opportunities that exclude each other pairwise: of one target, or unrelated in the
+        order of one satellite. An odd number of sets.
+    """
+
+    sets: tuple[Ints, ...]
+
+    @property
+    def limit(self) -> int:
+        """What the weighted tasks of a plan do not exceed."""
+        return max(1, (len(self.sets) - 1) // 2)
+
+    def weights(self) -> tuple[Ints, Ints]:
+        """Return the opportunities of the cut and how much each counts."""
+        rows, counts = np.unique(np.concatenate(self.sets), return_counts=True)
+        if len(self.sets) > 1:
+            counts = counts // 2
+        return rows[counts > 0], counts[counts > 0].astype(np.int32)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Multipliers:
+    """Prices of targets and of cuts, none of them negative.
+
+    Attributes
+    ----------
+    prices
+        Shape ``(num_targets,)``.
+    cut_prices
+        One for each of ``cuts``.
+    """
+
+    prices: Floats
+    cuts: tuple[Cut, ...] = ()
+    cut_prices: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Refutation:
+    """Why no plan of the tasks at hand is worth so much.
+
+    Attributes
+    ----------
+    steps
+        Multipliers that strike out tasks one after another, down to none.
+    branch
+        Where some remain: an opportunity, what refutes the plans that take it, and what
+        refutes those that leave it.
+    """
+
+    steps: tuple[Multipliers, ...]
+    branch: tuple[int, Refutation, Refutation] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Certificate:
+    """The proof that no plan is worth ``amount`` or more."""
+
+    amount: float
+    refutation: Refutation
+
+
+def is_refuted(problem: Problem, certificate: Certificate) -> bool:
+    """Return whether the certificate proves what it claims. This is the whole proof."""
+    every = np.arange(len(problem.opportunities), dtype=np.int32)
+    orders = [order_of(transitive_closure(problem, s)) for s in problem.satellites]
+    checked = _Checked(problem, orders, certificate.amount)
+    return checked.is_refuted(certificate.refutation, every)
+
+
+class _Checked:
+    """A problem and an amount that its plans do not reach, as is to be proven."""
+
+    def __init__(self, problem: Problem, orders: list[Order], amount: float) -> None:
+        self._problem, self._orders, self._amount = problem, orders, amount
+
+    def is_refuted(self, refutation: Refutation, left: Ints) -> bool:
+        for step in refutation.steps:
+            if np.any(step.prices < 0.0) or any(price < 0.0 for price in step.cut_prices):
+                return False
+            if not all(self._is_sound(cut) for cut in step.cuts):
+                return False
+            network = network_of(restricted(self._problem, left))
+            total, through = values_through(self._problem, network, left, step)
+            if is_below(total, self._amount):
+                return True
+            is_left = np.empty(len(left), dtype=np.bool_)
+            is_left[network.row] = ~is_below(through, self._amount)
+            left = left[is_left]
+        if refutation.branch is None:
+            return False
+        row, taken, leaving = refutation.branch
+        # A slow satellite may pass by a target again, which is not to take it.
+        is_transitive = all(
+            order.bits is satellite.transitions.bits
+            for order, satellite in zip(self._orders, self._problem.satellites, strict=True)
+        )
+        beside = left[[a == row or not self._exclude(row, int(a)) for a in left]]
+        return (
+            is_transitive
+            and self.is_refuted(taken, beside)
+            and self.is_refuted(leaving, left[left != row])
+        )
+
+    def _exclude(self, a: int, b: int) -> bool:
+        """Return whether no plan without duplicates holds both collects."""
+        table, local = self._problem.opportunities, self._problem.local_row
+        if table.kind[a] != COLLECT or table.kind[b] != COLLECT:
+            return False
+        if table.place[a] == table.place[b]:
+            return True
+        satellite = int(table.satellite[a])
+        if table.satellite[b] != satellite:
+            return False
+        return not are_comparable(self._orders[satellite], int(local[a]), int(local[b]))
+
+    def _is_sound(self, cut: Cut) -> bool:
+        """Return whether the sets are an odd number and hold what excludes each other."""
+        return len(cut.sets) % 2 == 1 and all(
+            len(np.unique(group)) == len(group)
+            and all(self._exclude(int(a), int(b)) for i, a in enumerate(group) for b in group[:i])
+            for group in cut.sets
+        )
+
+
+def values_through(
+    problem: Problem, network: Network, rows: Ints, step: Multipliers, is_open: Bools | None = None
+) -> tuple[float, Floats]:
+    """Return what bounds all plans, and the plans that hold each node of the network.
+
+    Parameters
+    ----------
+    network
+        Of the problem restricted to ``rows``.
+    is_open
+        Which of the rows a plan may be paid for; all by default. Shape ``(len(rows),)``.
+    """
+    meant = rows if is_open is None else rows[is_open]
+    constant, paid = _priced(problem, meant, step)
+    worth = np.zeros(len(rows))
+    worth[slice(None) if is_open is None else is_open] = paid
+    total, through = heaviest_through(network, worth[network.row])
+    return constant + total, constant + through
+
+
+def is_below(value: Floats | float, amount: float) -> Bools:
+    """Return whether a bound is below an amount, whatever the rounding of its sum."""
+    return np.asarray(value) < amount - _ROUNDING * max(1.0, abs(amount))
+
+
+def _priced(problem: Problem, rows: Ints, step: Multipliers) -> tuple[float, Floats]:
+    """Return the constant of the bound, and what each opportunity is worth at the prices."""
+    table = problem.opportunities
+    is_collect = table.kind == COLLECT
+    place = table.place[is_collect]
+    worth = np.zeros(len(table))
+    worth[is_collect] = problem.target_reward[place] - step.prices[place]
+    constant = 0.0
+    for cut, price in zip(step.cuts, step.cut_prices, strict=True):
+        members, weights = cut.weights()
+        worth[members] -= price * weights
+        constant += price * cut.limit
+    offered = table.place[rows][table.kind[rows] == COLLECT]
+    constant += float(step.prices[np.unique(offered)].sum())
+    return constant, np.maximum(worth, 0.0)[rows]

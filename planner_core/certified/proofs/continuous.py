@@ -1,0 +1,261 @@
+r"""A bound on plans with continuous starts.
+
+Weak duality as in ``planner_core.certified.proofs.lagrangian``: prices of targets, and for each
+satellite the heaviest chain of its tasks, here with starts anywhere in the accesses and no access
+twice. ``planner_core.certified.dp.start_labels`` says why its labels never fall below the heaviest
+chain. It needs satellites that turn faster than lines of sight do: then the earliest start is the
+best one, and chains are sequences of accesses.
+
+Battery, recorder, stations and antennas are left out, which can only raise the bound.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from planner_core.certified.dp.start_labels import (
+    Cells,
+    Labels,
+    cells_of,
+    heaviest,
+    labels_of,
+)
+from planner_core.certified.proofs.bound import Bound, rounded_bound
+from planner_core.certified.proofs.totals import totals_bound
+from planner_core.precedence.time_windows import (
+    Spans,
+    part_of,
+    spans_of,
+    view_of,
+)
+from planner_core.problem import (
+    COLLECT,
+    Bools,
+    Bytes,
+    Floats,
+    Ints,
+    Problem,
+)
+
+LABELS: Final = 2
+_WIDTHS_S: Final = (2.5, 25.0)
+_ROUGH_S: Final = 10.0
+_ROUGH: Final = 50  # rounds of the price search over wide cells
+_FINE: Final = 70  # and over narrow ones
+_FOLLOWERS: Final = 8_000_000  # in the tables of all satellites, more or less
+_MOST_FOLLOWERS: Final = 30_000_000  # of 12 bytes each; with more there is no search for prices
+_STEPS: Final = (0.15, 0.08)  # of prices, at first, in rough and fine rounds
+_SHORTER: Final = 0.96
+_KEPT: Final = 0.85  # of the mean of prices, from round to round
+_CLEAR_S: Final = 60.0
+_LONGEST_S: Final = 15_000.0
+_TOLD: Final = 14
+
+
+def accessible(problem: Problem) -> Bound:
+    """Return the bound that every accessible target is imaged: prices of the whole reward."""
+    table = problem.opportunities
+    targets = np.unique(table.place[table.kind == COLLECT])
+    value = float(problem.target_reward[targets].sum())
+    prices = problem.target_reward.astype(np.float64)
+    return Bound(value=rounded_bound(problem, value, 0.0), proof="lagrangian", prices=prices)
+
+
+def quick_bound(problem: Problem) -> Bound:
+    """Return the better of the bounds that take no time."""
+    totals, every = totals_bound(problem), accessible(problem)
+    return every if totals is None or every.value <= totals.value else totals
+
+
+def continuous_value(problem: Problem, prices: Floats) -> float:
+    """Return the bound that ``prices`` prove. This is the whole proof: it needs no search."""
+    if np.any(prices < problem.target_reward):
+        dual = ContinuousDual.of(problem, width_for(problem))
+        if dual is not None:
+            value, _ = dual.at(prices)
+            return value
+    # Prices of the whole reward leave nothing to earn on any chain.
+    table = problem.opportunities
+    prices = np.maximum(prices, problem.target_reward)
+    return float(prices[np.unique(table.place[table.kind == COLLECT])].sum())
+
+
+def width_for(problem: Problem) -> float:
+    """Return how wide cells are, so that tables have a size that a machine can hold."""
+    width_s = _WIDTHS_S[0] * num_followers(problem, _WIDTHS_S[0]) / _FOLLOWERS
+    return float(np.clip(width_s, *_WIDTHS_S))
+
+
+def num_followers(problem: Problem, width_s: float) -> float:
+    """Return about how many followers the tables of all satellites have."""
+    count = 0.0
+    for index in range(len(problem.satellites)):
+        spans = spans_of(problem, index)
+        free_s = spans.close_s - spans.open_s
+        # Of what is open at a time, about four times as much comes next.
+        mean_open = float((free_s + spans.length_s).sum()) / problem.horizon_s
+        count += 4.0 * mean_open * float((free_s / width_s + 1.0).sum())
+    return count
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ContinuousDual:
+    """The function of prices whose every value is a bound.
+
+    Attributes
+    ----------
+    parts
+        Tasks of which one chain each is taken: pieces of the satellites' days. A chain of the
+        day is one of each piece, or none, so what they are worth together bounds it.
+    """
+
+    problem: Problem
+    parts: tuple[tuple[Cells, Labels], ...]
+    is_offered: Bools
+
+    @classmethod
+    def of(
+        cls, problem: Problem, width_s: float, stop: Bytes | None = None
+    ) -> ContinuousDual | None:
+        """Return it; None where a satellite turns more slowly than its lines of sight.
+
+        None as well once ``stop[0]`` is not zero.
+        """
+        parts = []
+        is_offered = np.zeros(len(problem.target_ids), dtype=np.bool_)
+        for index in range(len(problem.satellites)):
+            spans = spans_of(problem, index)
+            is_offered[spans.place] = True
+            for piece in pieces_of(spans):
+                if stop is not None and stop[0]:
+                    return None
+                if len(piece.row) == 0:
+                    continue
+                cells = cells_of(piece, view_of(problem, index), width_s)
+                if cells is None:
+                    return None
+                parts.append((cells, labels_of(cells, LABELS)))
+        return cls(problem=problem, parts=tuple(parts), is_offered=is_offered)
+
+    def clipped(self, prices: Floats) -> Floats:
+        """Return prices as they count."""
+        return np.where(self.is_offered, np.clip(prices, 0.0, self.problem.target_reward), 0.0)
+
+    def at(self, prices: Floats, *, is_exact: bool = True) -> tuple[float, Ints]:
+        """Return the value at prices, and how often the chains there take each target.
+
+        Only the exact value is a bound.
+        """
+        price = self.clipped(prices)
+        total = float(price.sum())
+        counts = np.zeros(len(price), dtype=np.int32)
+        for number in range(len(self.parts)):
+            value, taken = self.chain(number, price, is_exact=is_exact)
+            total += value
+            np.add.at(counts, taken, 1)
+        return total, counts
+
+    def chain(self, number: int, price: Floats, *, is_exact: bool) -> tuple[float, Ints]:
+        """Return the heaviest chain of one part: its worth, and the targets that it is paid for."""
+        cells, labels = self.parts[number]
+        weight = (self.problem.target_reward - price)[cells.spans.place]
+        value, slot = heaviest(cells, weight, labels, LABELS, is_exact)
+        taken = []
+        while slot >= 0:
+            if labels.is_paid[slot]:
+                taken.append(cells.spans.place[cells.task[slot // LABELS]])
+            slot = int(labels.parent[slot])
+        return value, np.array(taken, dtype=np.int32)
+
+
+def pieces_of(spans: Spans) -> list[Spans]:
+    """Return tasks in pieces of a day: cut where nothing is open, or little in a long while."""
+    ends_s = np.maximum.accumulate(spans.close_s + spans.length_s)
+    is_clear = spans.open_s[1:] >= ends_s[:-1] + _CLEAR_S
+    pieces: list[Spans] = []
+    left = [
+        part_of(spans, slice(a, b))
+        for a, b in itertools.pairwise([0, *(np.flatnonzero(is_clear) + 1), len(spans.row)])
+    ]
+    while left:
+        piece = left.pop()
+        if len(piece.row) < 2 or piece.open_s[-1] - piece.open_s[0] < _LONGEST_S:
+            pieces.append(piece)
+            continue
+        inner = np.flatnonzero(
+            (piece.open_s > piece.open_s[0] + _LONGEST_S / 3.0)
+            & (piece.open_s < piece.open_s[-1] - _LONGEST_S / 3.0)
+        )
+        if len(inner) == 0:
+            inner = np.array([len(piece.row) // 2])
+        still_open = [np.count_nonzero(piece.close_s[:at] >= piece.open_s[at]) for at in inner]
+        cut = int(inner[np.argmin(still_open)])
+        left += [part_of(piece, slice(0, cut)), part_of(piece, slice(cut, None))]
+    return pieces
+
+
+class ContinuousPrices:
+    """A search for good prices.
+
+    After each part's chain the prices of the targets that all chains of the moment take more
+    than once rise and the others fall, by steps that shrink from round to round (an incremental
+    subgradient method). The mean of the prices of late is what is good.
+    """
+
+    def __init__(self, dual: ContinuousDual, prices: Floats, step: float, seed: int = 0) -> None:
+        self.dual, self._step = dual, step
+        self._now = dual.clipped(prices)
+        self.prices = self._now
+        self._random = np.random.default_rng(seed)
+        self._taken = [
+            dual.chain(number, self._now, is_exact=False)[1] for number in range(len(dual.parts))
+        ]
+        self._counts = np.zeros(len(prices))
+        for taken in self._taken:
+            np.add.at(self._counts, taken, 1.0)
+
+    def round(self, budget_stop: Bytes) -> None:
+        """Go once over all parts."""
+        reward = self.dual.problem.target_reward
+        for number in self._random.permutation(len(self.dual.parts)).tolist():
+            if budget_stop[0]:
+                return
+            _, taken = self.dual.chain(number, self._now, is_exact=False)
+            np.add.at(self._counts, self._taken[number], -1.0)
+            np.add.at(self._counts, taken, 1.0)
+            self._taken[number] = taken
+            share = self._step / len(self.dual.parts)
+            self._now = self.dual.clipped(self._now + share * reward * (self._counts - 1.0))
+        self._step *= _SHORTER
+        self.prices = _KEPT * self.prices + (1.0 - _KEPT) * self._now
+
+
+def search_prices(problem: Problem, stop: Bytes) -> Iterator[tuple[float, Floats]]:
+    """Yield after each round of a search for prices the best bound so far and its prices."""
+    width_s = width_for(problem)
+    if num_followers(problem, width_s) > _MOST_FOLLOWERS:
+        return
+    rough_s = max(_ROUGH_S, width_s)
+    best, prices = np.inf, 0.9 * problem.target_reward
+    proving = prices
+    for cell_s, num_rounds, step in ((rough_s, _ROUGH, _STEPS[0]), (width_s, _FINE, _STEPS[1])):
+        dual = None if stop[0] else ContinuousDual.of(problem, cell_s, stop)
+        if dual is None:
+            return
+        search = ContinuousPrices(dual, prices, step)
+        for number in range(1, num_rounds + 1):
+            search.round(stop)
+            if cell_s == width_s and number % _TOLD == 0 and not stop[0]:
+                value, _ = dual.at(search.prices)
+                if value < best:
+                    best, proving = value, search.prices
+            yield best, proving
+            if stop[0]:
+                return
+        prices = search.prices
+        del dual, search

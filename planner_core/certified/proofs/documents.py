@@ -1,0 +1,135 @@
+"""Proven bounds as documents: written down with a plan, read back, and checked anew."""
+
+from __future__ import annotations
+
+import json
+from typing import Any, Final, cast
+
+import numpy as np
+
+from planner_core.certified.dp.elementary import elementary_value
+from planner_core.certified.proofs.bound import (
+    Bound,
+    Proof,
+    reward_unit,
+    rounded_bound,
+)
+from planner_core.certified.proofs.certificate import (
+    Certificate,
+    Cut,
+    Multipliers,
+    Refutation,
+    is_refuted,
+)
+from planner_core.certified.proofs.continuous import continuous_value
+from planner_core.certified.proofs.lagrangian import lagrangian_value
+from planner_core.certified.proofs.resource_bound import resource_value
+from planner_core.certified.proofs.totals import totals_bound
+from planner_core.problem import Problem
+
+VERSION: Final = 1
+_ROUNDING: Final = 1e-8  # relative
+
+
+def to_json(bound: Bound) -> str:
+    """Return a bound and what proves it as JSON text, exact to the last bit."""
+    document: dict[str, Any] = {"version": VERSION, "proof": bound.proof, "value": bound.value}
+    if bound.prices is not None:
+        document["prices"] = bound.prices.tolist()
+    if bound.is_elementary:
+        document["elementary"] = True
+    if bound.unit is not None:
+        document["unit"] = bound.unit
+    if bound.certificate is not None:
+        document["amount"] = bound.certificate.amount
+        document["refutation"] = _refutation_to_json(bound.certificate.refutation)
+    if bound.log is not None:
+        document["log"] = bound.log
+    return json.dumps(document)
+
+
+def from_json(text: str) -> Bound:
+    """Return the bound of ``to_json``."""
+    document = json.loads(text)
+    prices = document.get("prices")
+    return Bound(
+        value=float(document["value"]),
+        proof=cast(Proof, document["proof"]),
+        prices=None if prices is None else np.array(prices, dtype=np.float64),
+        is_elementary=bool(document.get("elementary", False)),
+        unit=document.get("unit"),
+        certificate=Certificate(
+            amount=float(document["amount"]),
+            refutation=_refutation_from_json(document["refutation"]),
+        )
+        if "refutation" in document
+        else None,
+        log=document.get("log"),
+    )
+
+
+def is_proven(problem: Problem, bound: Bound) -> bool | None:
+    """Return whether the stored multipliers prove the bound; None where there are none.
+
+    Nothing of the search that found them is used: they are put into the dual function of
+    ``problem``, whose value is a bound whatever they are. What HiGHS has proven has its log.
+    """
+    room = _ROUNDING * max(1.0, abs(bound.value))
+    if problem.continuous_starts and bound.certificate is not None:
+        # It strikes out tasks at the starts of opportunities, and others remain.
+        return False
+    if bound.certificate is not None:
+        is_enough = bound.certificate.amount <= bound.value + (reward_unit(problem) or room)
+        return is_enough and is_refuted(problem, bound.certificate)
+    if bound.proof == "totals":
+        totals = totals_bound(problem)
+        return totals is not None and totals.value <= bound.value + room
+    if bound.prices is None:
+        return None
+    if problem.continuous_starts:
+        value = continuous_value(problem, bound.prices)
+    elif bound.unit is not None:
+        value = resource_value(problem, bound.prices, bound.unit)
+    elif bound.is_elementary:
+        value, _ = elementary_value(problem, bound.prices)
+    else:
+        value, _ = lagrangian_value(problem, bound.prices)
+    return rounded_bound(problem, value, 0.0) <= bound.value + room
+
+
+def _refutation_to_json(refutation: Refutation) -> dict[str, Any]:
+    document: dict[str, Any] = {
+        "steps": [
+            {
+                "prices": step.prices.tolist(),
+                "cuts": [[group.tolist() for group in cut.sets] for cut in step.cuts],
+                "cut_prices": list(step.cut_prices),
+            }
+            for step in refutation.steps
+        ]
+    }
+    if refutation.branch is not None:
+        row, taken, left = refutation.branch
+        document["branch"] = [row, _refutation_to_json(taken), _refutation_to_json(left)]
+    return document
+
+
+def _refutation_from_json(document: dict[str, Any]) -> Refutation:
+    branch = None
+    if "branch" in document:
+        row, taken, left = document["branch"]
+        branch = (int(row), _refutation_from_json(taken), _refutation_from_json(left))
+    return Refutation(
+        steps=tuple(
+            Multipliers(
+                prices=np.array(step["prices"], dtype=np.float64),
+                cuts=tuple(
+                    Cut(sets=tuple(np.array(group, dtype=np.int32) for group in cut))
+                    for cut in step["cuts"]
+                ),
+                cut_prices=tuple(step["cut_prices"]),
+            )
+            for step in document["steps"]
+        ),
+        branch=branch,
+    )

@@ -1,0 +1,313 @@
+r"""An upper bound that battery and recorder tighten: prices, and exact dynamic programmes.
+
+As in ``planner_core.certified.proofs.lagrangian`` each target has a price :math:`\lambda_i`, and
+no plan earns more than :math:`\sum_i \lambda_i` plus what each satellite can gain where an image of
+:math:`i` is worth :math:`r_i - \lambda_i`. Here the satellite's gain is the most that its battery
+and its recorder allow, not only its agility. Worth is counted in whole units, rounded up, so the
+bound holds for any unit; prices chosen to leave whole units lose nothing by it. Stations are
+left out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from planner_core.certified.dp.completion_bounds import least_energy
+from planner_core.certified.dp.data_levels import DataLevels, data_levels
+from planner_core.certified.dp.forward_labels import (
+    STOPPED,
+    UNREACHED,
+    most_value,
+    path_of,
+)
+from planner_core.certified.dp.resource_network import Network, network_of
+from planner_core.certified.proofs.bound import Bound, rounded_bound
+from planner_core.certified.proofs.lagrangian import lagrangian_bound
+from planner_core.problem import (
+    COLLECT,
+    Bools,
+    Bytes,
+    Floats,
+    Ints,
+    Problem,
+    SatelliteProblem,
+    Singles,
+)
+
+_MAX_CELLS: Final = 30_000_000  # of one table of least energy
+_MAX_UNITS: Final = 2000
+_FIRST_STEP: Final = 0.01
+_SHARES: Final = (0.0, 0.25, 0.5, 0.75, 1.0)  # of prices that hold where agility alone counts
+_TRIED: Final = 2
+_FEW: Final = 1000  # opportunities whose programme takes no time
+_TRIAL_UNITS: Final = 24  # of an image, in the search for a price of data
+_ROUNDING: Final = 1e-9  # of a unit
+FINE: Final = 8
+"""Levels of the recorder that the smallest collect fills, where a proof counts."""
+COARSE: Final = 2
+"""The same where many prices are tried."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SatelliteRelaxation:
+    """One satellite's programme: its network, and its recorder in levels.
+
+    Attributes
+    ----------
+    data_price
+        What the data of a collect is worth, about, in typical collects.
+    """
+
+    satellite: SatelliteProblem
+    network: Network
+    levels: DataLevels
+    data_price: float = 0.0
+
+    @classmethod
+    def of(
+        cls, problem: Problem, satellite: SatelliteProblem, levels_per_collect: int
+    ) -> SatelliteRelaxation:
+        """Return the relaxation of a satellite that has opportunities."""
+        network = network_of(problem, satellite)
+        levels = data_levels(network, levels_per_collect, is_optimistic=True)
+        return cls(satellite=satellite, network=network, levels=levels)
+
+    def with_data_price(self, num_images: int) -> SatelliteRelaxation:
+        """Return the same with the price of data at which the battery alone allows least.
+
+        Parameters
+        ----------
+        num_images
+            How many are expected, about.
+        """
+        num_units = _TRIAL_UNITS
+        while num_units * num_images * len(self.satellite) > _MAX_CELLS:
+            num_units //= 2
+        weight = np.where(self.satellite.kind == COLLECT, num_units, 0).astype(np.int32)
+        best, least = self, np.inf
+        for units in range(num_units):
+            trial = replace(self, data_price=units / num_units)
+            price = trial._price_in(weight)
+            needs = _Needs.of(self.network, self.levels, weight, price, num_units * num_images)
+            if needs.top >= least:
+                break
+            best, least = trial, needs.top
+        return best
+
+    def without(self, is_shut: Bools) -> SatelliteRelaxation:
+        """Return the same where some tasks cannot be taken. Shape ``(m,)``."""
+        before = np.where(is_shut, -1, self.levels.before).astype(np.int32)
+        return replace(self, levels=self.levels._replace(before=before))
+
+    def weights(self, worth: Ints) -> Ints:
+        """Return the worth of each task, from that of each target."""
+        own = np.zeros(len(self.satellite), dtype=np.int32)
+        is_collect = self.satellite.kind == COLLECT
+        own[is_collect] = worth[self.satellite.place[is_collect]]
+        return own
+
+    def most(
+        self,
+        worth: Ints,
+        enough: int,
+        stop: Bytes,
+        *,
+        near: int | None = None,
+        keeps_path: bool = False,
+    ) -> tuple[int, Ints | None]:
+        """Return the most units that the satellite can gain, and the rows of a path that does.
+
+        Answers a cheaper bound on it, and no path, once ``stop`` is set or where the most is
+        known to be below ``enough`` (which it answers then).
+
+        Parameters
+        ----------
+        near
+            What is expected at least, if anything.
+        keeps_path
+            Whether to answer the path.
+        """
+        weight = self.weights(worth)
+        needs = _Needs.of(self.network, self.levels, weight, self._price_in(weight), near)
+        top = needs.top
+        step = max(1, int(_FIRST_STEP * top))
+        goal = top
+        if near is not None and near < top:
+            goal = min(top, near + step)
+        while goal >= enough:
+            # Labels that cannot reach the goal are dropped: the higher, the quicker.
+            goal, ceiling = max(enough, goal - step, 0), goal
+            most, labels = most_value(
+                self.network, self.levels, weight, needs.idle, needs.after, needs.credit,
+                top, goal, keeps_path, stop,
+            )  # fmt: skip
+            if most == STOPPED:
+                return min(ceiling, top), None
+            if most != UNREACHED:
+                if not keeps_path:
+                    return most, None
+                return most, path_of(self.network, self.levels, weight, labels, most)
+            goal, step = goal - 1, 2 * step
+        return max(enough, 0), None
+
+    def _price_in(self, weight: Ints) -> float:
+        """Return the price of a level in units, at which the least collect costs whole units."""
+        typical = float(weight[weight > 0].mean()) if np.any(weight > 0) else 0.0
+        filled = self.levels.gain[self.levels.gain > 0]
+        least = int(filled.min()) if len(filled) else 1
+        return float(np.round(self.data_price * typical)) / least
+
+
+class _Needs(NamedTuple):
+    """The least energy to gain so much from each task on, where data has a price.
+
+    At a price for each level of the recorder images are worth less, and contacts what they take
+    down at most. That leaves the limits of the recorder out, and yet not for nothing: what is
+    gained from a level on is no more than that worth, and the price of the levels that are free.
+
+    Attributes
+    ----------
+    idle, after
+        Tables of ``least_energy``.
+    credit
+        What levels that are free add, for each level. Shape ``(num_levels,)``.
+    top
+        No path gains more.
+    """
+
+    idle: Singles
+    after: Singles
+    credit: Ints
+    top: int
+
+    @classmethod
+    def of(
+        cls, network: Network, levels: DataLevels, weight: Ints, price: float, near: int | None
+    ) -> _Needs:
+        change = np.maximum(levels.gain, levels.floor - levels.before)
+        priced = np.ceil(weight - price * change - _ROUNDING)
+        priced = np.maximum(priced, 0.0).astype(np.int32)
+        free = np.maximum(levels.end - np.arange(levels.num_levels), 0)
+        credit = np.ceil(price * free - _ROUNDING).astype(np.int32)
+        at_start = int(credit[min(levels.start, levels.num_levels - 1)])
+        limit = int(1.07 * near) if near is not None else 0
+        limit += 128 + int(priced.max(initial=0))
+        while True:
+            idle, after = least_energy(network, priced, limit)
+            most = int(np.flatnonzero(idle[0] <= network.energy_start)[-1])
+            if most < limit:
+                break
+            limit = 4 * limit if near is None else int(1.1 * limit)
+        return cls(idle=idle, after=after, credit=credit, top=most + at_start)
+
+
+def relaxations(
+    problem: Problem, levels_per_collect: int = FINE
+) -> tuple[SatelliteRelaxation, ...]:
+    """Return the programmes of all satellites that have anything to do."""
+    return tuple(
+        SatelliteRelaxation.of(problem, satellite, levels_per_collect)
+        for satellite in problem.satellites
+        if len(satellite)
+    )
+
+
+def whole_worth(problem: Problem, prices: Floats, unit: float) -> Ints:
+    """Return what an image of each target is worth at these prices, in units, rounded up."""
+    worth = (problem.target_reward - np.maximum(prices, 0.0)) / unit
+    return np.maximum(np.ceil(worth - _ROUNDING), 0.0).astype(np.int32)
+
+
+def resource_value(problem: Problem, prices: Floats, unit: float) -> float:
+    """Return the bound that ``prices`` and ``unit`` prove.
+
+    This is the whole proof: it needs no search, only the problem. However finely the recorder is
+    counted the bound holds; as neither fineness is always better, the lower bound counts.
+    """
+    stop = np.zeros(1, dtype=np.uint8)
+    return min(
+        _value(problem, relaxations(problem, levels), prices, unit, 0.0, stop)
+        for levels in (FINE, COARSE)
+    )
+
+
+def _value(
+    problem: Problem,
+    satellites: tuple[SatelliteRelaxation, ...],
+    prices: Floats,
+    unit: float,
+    enough: float,
+    stop: Bytes,
+) -> float:
+    """Return the bound of these prices, or ``enough`` where that is more."""
+    reachable = problem.target_opportunities[1]
+    prices = np.where(np.diff(reachable) > 0, np.maximum(prices, 0.0), 0.0)
+    worth = whole_worth(problem, prices, unit)
+    paid = float(prices.sum())
+    # What the other satellites gain is known only afterwards: one alone may stop early.
+    units_enough = int(np.floor((enough - paid) / unit)) if len(satellites) == 1 else 0
+    units = sum(s.most(worth, max(units_enough, 0), stop)[0] for s in satellites)
+    rounded_away = _ROUNDING * len(problem.opportunities) * unit
+    return max(paid + units * unit + rounded_away, enough)
+
+
+def quick_bound(problem: Problem, reward: float) -> Bound:
+    """Return a cheap bound on any plan, by agility alone or by battery and recorder as well.
+
+    Parameters
+    ----------
+    reward
+        What a known plan earns: nothing below it needs proof.
+    """
+    best = lagrangian_bound(problem, reward)
+    # Where all targets are worth the same and energy is short, prices of zero are best.
+    is_plain = len(problem.satellites) == 1 and np.ptp(problem.target_reward) == 0.0
+    satellites: tuple[SatelliteRelaxation, ...] = ()
+    if problem.use_resources:
+        is_quick = is_plain or len(problem.opportunities) <= _FEW
+        satellites = relaxations(problem, FINE if is_quick else COARSE)
+    if not satellites or best.value <= reward:
+        return best
+    stop = np.zeros(1, dtype=np.uint8)
+    unit = _unit(problem, satellites, best.value)
+    start = np.zeros(1) if best.prices is None else best.prices
+    offered = [leaving_whole_units(problem, share * start, unit) for share in _SHARES]
+    if is_plain:
+        offered = offered[:1]
+    else:
+        # What the battery alone allows takes a fraction of the time, and tells which are best.
+        offered.sort(key=lambda prices: _battery_value(problem, satellites, prices, unit))
+    for prices in offered[:_TRIED]:
+        value = _value(problem, satellites, prices, unit, reward, stop)
+        if value < best.value:
+            rounded = rounded_bound(problem, value, reward)
+            best = Bound(value=rounded, proof="dp", prices=prices, unit=unit)
+    return best
+
+
+def _battery_value(
+    problem: Problem, satellites: tuple[SatelliteRelaxation, ...], prices: Floats, unit: float
+) -> float:
+    """Return what bounds all plans where recorders are left out."""
+    worth = whole_worth(problem, prices, unit)
+    needs = [_Needs.of(s.network, s.levels, s.weights(worth), 0.0, None) for s in satellites]
+    return float(prices.sum()) + unit * sum(n.top for n in needs)
+
+
+def _unit(problem: Problem, satellites: tuple[SatelliteRelaxation, ...], value: float) -> float:
+    """Return a unit: 1 where rewards are whole and few, or what can be counted in good time."""
+    reward = problem.target_reward
+    largest = max(len(s.satellite) for s in satellites)
+    most_units = min(_MAX_UNITS, _MAX_CELLS // largest)
+    if np.all(reward == np.round(reward)) and value <= most_units:
+        return 1.0
+    return max(value / most_units, 1e-12)
+
+
+def leaving_whole_units(problem: Problem, prices: Floats, unit: float) -> Floats:
+    """Return the nearest prices at which an image is worth a whole number of units."""
+    worth = np.round((problem.target_reward - prices) / unit)
+    return np.maximum(problem.target_reward - worth * unit, 0.0)

@@ -1,0 +1,1 @@
+"""The paper's semi-Markov decision process: states, actions, transitions."""

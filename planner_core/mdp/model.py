@@ -1,0 +1,187 @@
+"""The semi-Markov decision process of the paper (eqs. 2-7, Table 1), hard limits included."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from planner_core.jit import inlined
+from planner_core.mdp.actions import may_wait, next_action
+from planner_core.mdp.track import NO_TASK, Track, take
+from planner_core.problem import Bytes, Floats
+
+WAIT: Final = -1
+"""The sun-point action: wait for the first opportunity one could take, and let it pass."""
+
+
+class Guidance(NamedTuple):
+    """Table 2: what guides a search. It is never a plan's reward.
+
+    Per second of contact and of sun-pointing, and for each limit that is broken.
+    ``is_contact_by_wait`` counts a contact by the time until it starts, not by its own.
+    ``image_needs`` is what an image needs to count as made, one of ``IMAGE_NEEDS``.
+    """
+
+    gamma: float
+    contact_reward_per_s: float
+    sunpoint_reward_per_s: float
+    penalty: float
+    is_contact_by_wait: bool = False
+    image_needs: int = 0
+
+
+IMAGE_NEEDS: Final = ("nothing", "limits", "room")
+"""Nothing; battery and recorder within their limits (the text); room on board (the code)."""
+
+
+@inlined
+def counts_as_made(
+    track: Track, guidance: Guidance, battery_after: float, recorder_after: float
+) -> bool:
+    """Return whether an image that leaves these levels enters the images of eq. 2."""
+    if guidance.image_needs == 0 or not track.use_resources:
+        return True
+    if guidance.image_needs == 1:
+        return battery_after > track.battery_min and recorder_after < track.recorder_max
+    return recorder_after < 1.0
+
+
+@inlined
+def task_reward(
+    track: Track,
+    guidance: Guidance,
+    target_reward: Floats,
+    collected: Bytes,
+    waited_s: float,
+    discount: float,
+    row: int,
+    battery_after: float,
+    recorder_after: float,
+) -> float:
+    """Return R(s, a) of Table 2 for a collect or a contact.
+
+    ``waited_s`` is t_s - t, ``discount`` is gamma to it.
+    """
+    reward = 0.0
+    if track.is_contact[row]:
+        counted_s = track.end_s[row] - track.start_s[row]
+        if guidance.is_contact_by_wait:
+            counted_s = waited_s
+        reward += guidance.contact_reward_per_s * counted_s
+    elif not collected[track.place[row]]:
+        reward += discount * target_reward[track.place[row]]
+    if track.use_resources:
+        if battery_after <= track.battery_min:
+            reward -= guidance.penalty
+        if recorder_after >= track.recorder_max:
+            reward -= guidance.penalty
+    return reward
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class State:
+    """Eq. 2: time (start of row ``cursor``), last task, images, recorder and battery.
+
+    Battery and recorder are those right after the last task; idle time is added when the
+    next task is taken, which is exact because both are linear in between.
+    """
+
+    cursor: int
+    last: int
+    battery: float
+    recorder: float
+    collected: frozenset[int]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Step:
+    """What an action leads to: next state, R(s, a), and the sojourn time (t_s - t)."""
+
+    state: State
+    reward: float
+    sojourn_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Model:
+    """The readable semi-MDP of one satellite; compiled searches are compared with it."""
+
+    track: Track
+    target_reward: Floats
+    guidance: Guidance
+    is_hard: bool = True
+    unimaged_only: bool = True
+    contact_above: float = 0.0
+
+    def initial_state(self) -> State:
+        """Return the state at the start of the horizon."""
+        return State(
+            cursor=NO_TASK,
+            last=NO_TASK,
+            battery=self.track.battery_start,
+            recorder=self.track.recorder_start,
+            collected=frozenset(),
+        )
+
+    def now_s(self, state: State) -> float:
+        """Return the time of the most recent action."""
+        return float(self.track.start_s[state.cursor]) if state.cursor >= 0 else 0.0
+
+    def actions(self, state: State, breadth: int) -> Sequence[int]:
+        """Return the first ``breadth`` tasks of A(s) in time order, then ``WAIT`` if allowed.
+
+        Of the collects that one access offers only the first feasible one counts.
+        """
+        collected = self._mask(state)
+        rows: list[int] = []
+        row = state.cursor
+        while len(rows) < breadth:
+            row = next_action(
+                self.track, state.last, row + 1, state.battery, state.recorder,
+                self.is_hard, collected, self.unimaged_only, self.contact_above,
+            )  # fmt: skip
+            if row == len(self.track.start_s):
+                break
+            if all(self.track.first_offer[row] != self.track.first_offer[r] for r in rows):
+                rows.append(row)
+        if rows and self.track.use_resources and self._may_wait(state, rows[0]):
+            rows.append(WAIT)
+        return rows
+
+    def step(self, state: State, action: int, first_row: int) -> Step:
+        """Return where ``action`` leads; ``first_row`` is the first task of A(s)."""
+        now_s = self.now_s(state)
+        row = first_row if action == WAIT else action
+        sojourn_s = float(self.track.start_s[row]) - now_s
+        if action == WAIT:
+            waited = State(
+                cursor=row,
+                last=state.last,
+                battery=state.battery,
+                recorder=state.recorder,
+                collected=state.collected,
+            )
+            reward = self.guidance.sunpoint_reward_per_s * sojourn_s
+            return Step(state=waited, reward=reward, sojourn_s=sojourn_s)
+        battery, recorder, _ = take(self.track, state.last, row, state.battery, state.recorder)
+        reward = task_reward(
+            self.track, self.guidance, self.target_reward, self._mask(state),
+            sojourn_s, self.guidance.gamma**sojourn_s, row, battery, recorder,
+        )  # fmt: skip
+        images = state.collected
+        is_image = not self.track.is_contact[row]
+        if is_image and counts_as_made(self.track, self.guidance, battery, recorder):
+            images = images | {int(self.track.place[row])}
+        taken = State(cursor=row, last=row, battery=battery, recorder=recorder, collected=images)
+        return Step(state=taken, reward=float(reward), sojourn_s=sojourn_s)
+
+    def _may_wait(self, state: State, row: int) -> bool:
+        return may_wait(self.track, state.last, row, state.battery, state.recorder, self.is_hard)
+
+    def _mask(self, state: State) -> Bytes:
+        mask = np.zeros(len(self.target_reward), dtype=np.uint8)
+        mask[list(state.collected)] = 1
+        return mask

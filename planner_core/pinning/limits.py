@@ -1,0 +1,197 @@
+"""Whether battery and recorder can bear what pins ask for.
+
+Contacts alone decide it: an image takes energy and memory and gives none back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from planner_core.errors import InvalidScenario
+from planner_core.jit import kernel
+from planner_core.mdp.track import (
+    NO_TASK,
+    STRICT,
+    Track,
+    compile_track,
+    take,
+)
+from planner_core.precedence.relation import (
+    Order,
+    comes_before,
+    order_of,
+    transitive_closure,
+)
+from planner_core.problem import (
+    Bools,
+    Floats,
+    Kept,
+    Longs,
+    Pinned,
+    Problem,
+)
+from planner_core.problem.plan import Plan
+from planner_core.referee.replay import replay
+
+# After each task; of more, neighbours count as one that is as good as each.
+_MAX_STATES: Final = 200
+
+
+def check_limits(
+    problem: Problem,
+    ruled_out: Sequence[tuple[str, Longs]],
+    kept: Sequence[tuple[Kept, Bools]],
+) -> None:
+    """Raise where battery or recorder cannot bear what one satellite must or must not do.
+
+    Contacts may help; that satellites share antennas is left out, but for contacts that are kept.
+    Where no plan keeps the limits without pins either, these are not to blame.
+
+    Parameters
+    ----------
+    problem
+        With all its opportunities.
+    ruled_out
+        Pins, and the opportunities that each rules out.
+    kept
+        Actions to be kept, and what cannot stand beside each. Shape ``(n,)``.
+
+    Raises
+    ------
+    InvalidScenario
+        ``pin_breaks_limits``, with a pointer to the first pin that is one too many.
+    """
+    if not problem.use_resources:
+        return
+    kept = sorted(kept, key=lambda pair: pair[0].row)
+    for index, satellite in enumerate(problem.satellites):
+        own = set(satellite.rows.tolist())
+        must = [one for one, _ in kept if one.row in own]
+        missing = np.zeros(len(problem.opportunities), dtype=np.bool_)
+        for _, rows in ruled_out:
+            missing[rows] = True
+        for _, excluded in kept:
+            missing |= excluded
+        if can_keep(problem, index, must, missing):
+            continue
+        missing[:] = False
+        if not can_keep(problem, index, [], missing):
+            continue
+        for pointer, rows in ruled_out:
+            missing[rows] = True
+            if not can_keep(problem, index, [], missing):
+                raise InvalidScenario(
+                    "pin_breaks_limits",
+                    "Without the contacts that it and the pins before it rule out no plan keeps "
+                    f"the limits: {_what_breaks(problem, [])}",
+                    pointer=pointer,
+                )
+        must = []
+        for one, excluded in kept:
+            missing |= excluded
+            must += [one] if one.row in own else []
+            if not can_keep(problem, index, must, missing):
+                raise InvalidScenario(
+                    "pin_breaks_limits",
+                    "With it and the kept actions before it no plan keeps the limits: "
+                    + _what_breaks(problem, must),
+                    pointer=one.pointer,
+                )
+
+
+def _what_breaks(problem: Problem, kept: Sequence[Kept]) -> str:
+    alone = replace(problem, pinned=Pinned())
+    timeline = replay(alone, Plan.of(problem, [k.row for k in kept]))
+    broken = [v for v in timeline.violations if v.code in ("battery", "recorder")]
+    return broken[0].detail if broken else "Battery or recorder would reach its limit."
+
+
+def can_keep(problem: Problem, index: int, kept: Sequence[Kept], missing: Bools) -> bool:
+    """Return whether a satellite may keep the limits by these and contacts; False is proven.
+
+    Parameters
+    ----------
+    missing
+        Opportunities that are out of the question. Shape ``(n,)``.
+    """
+    satellite = problem.satellites[index]
+    trial = replace(problem, pinned=Pinned(kept=tuple(kept)))
+    track = compile_track(trial, satellite, missing[satellite.rows].astype(np.uint8))
+    if track.is_guarded:
+        return True
+    return _has_way(track, order_of(transitive_closure(problem, satellite)))
+
+
+@kernel
+def _has_way(track: Track, order: Order) -> bool:
+    """Return whether some of the fallbacks, with all that must be taken, keep the limits."""
+    num_rows = len(track.fallbacks)
+    battery = np.empty((num_rows, _MAX_STATES))
+    recorder = np.empty((num_rows, _MAX_STATES))
+    num_states = np.zeros(num_rows, dtype=np.int64)
+    if track.next_kept[0] == len(track.start_s) and _lasts(track, NO_TASK, track.recorder_start):
+        return True
+    for at in range(num_rows):
+        row = track.fallbacks[at]
+        found = np.empty((1 + at * _MAX_STATES, 2))
+        num_found = 0
+        if track.next_kept[0] >= row:
+            left, filled, is_within = take(
+                track, NO_TASK, row, track.battery_start, track.recorder_start
+            )
+            if is_within:
+                found[0] = (left, filled)
+                num_found = 1
+        for before in range(at - 1, -1, -1):
+            last = track.fallbacks[before]
+            if track.next_kept[last + 1] < row:
+                break
+            if not comes_before(order, last, row):
+                continue
+            for state in range(num_states[before]):
+                left, filled, is_within = take(
+                    track, last, row, battery[before, state], recorder[before, state]
+                )
+                if is_within:
+                    found[num_found] = (left, filled)
+                    num_found += 1
+        num_states[at] = _keep_best(found[:num_found], battery[at], recorder[at])
+        if track.next_kept[row + 1] < len(track.start_s):
+            continue
+        for state in range(num_states[at]):
+            if _lasts(track, row, recorder[at, state]):
+                return True
+    return False
+
+
+@kernel
+def _lasts(track: Track, last: int, recorder: float) -> bool:
+    """Return whether the recorder has room for the telemetry to the end."""
+    data_from_s = track.data_from_s[last] if last >= 0 else 0.0
+    idle_s = max(0.0, track.data_end_s - data_from_s)
+    return recorder + track.telemetry_per_s * idle_s < track.recorder_max - STRICT
+
+
+@kernel
+def _keep_best(found: Floats, battery: Floats, recorder: Floats) -> int:
+    """Fill in the states that no other one is as good as, the emptiest recorder first.
+
+    Where there are too many, some next to each other become one that has the best of them all.
+    """
+    num_best = 0
+    by_recorder = found[np.argsort(found[:, 1])]
+    for i in range(len(by_recorder)):
+        if num_best == 0 or by_recorder[i, 0] > by_recorder[num_best - 1, 0]:
+            by_recorder[num_best] = by_recorder[i]
+            num_best += 1
+    size = 1 + num_best // _MAX_STATES
+    num_states = 0
+    for first in range(0, num_best, size):
+        recorder[num_states] = by_recorder[first, 1]
+        battery[num_states] = by_recorder[min(first + size, num_best) - 1, 0]
+        num_states += 1
+    return num_states

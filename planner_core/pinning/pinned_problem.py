@@ -1,0 +1,336 @@
+"""Pins compiled into a problem, so that every solver honours them.
+
+What is ruled out leaves the table, and so does what could not stand beside a kept action:
+tasks of its satellite too close to turn, contacts of its antenna, other images of its target.
+What is left fits around all kept actions, and solvers need only take those (see
+``Track.next_kept`` and the programs' lower bounds).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from datetime import datetime
+from itertools import groupby
+
+import numpy as np
+
+from planner_core.domain import Scenario
+from planner_core.errors import InvalidScenario
+from planner_core.jit import kernel
+from planner_core.pinning.limits import check_limits
+from planner_core.pinning.pinned_starts import whole_accesses, with_pinned_starts
+from planner_core.pins import PinnedAction
+from planner_core.precedence.relation import (
+    Order,
+    are_comparable,
+    order_of,
+    transitive_closure,
+)
+from planner_core.problem import (
+    ACCESS_FOUND,
+    COLLECT,
+    CONTACT,
+    RULED_OUT,
+    Blocked,
+    Bools,
+    Kept,
+    Longs,
+    Opportunities,
+    Pinned,
+    Problem,
+    Struck,
+)
+from planner_core.problem.restrict import restricted
+from planner_core.problem.slew import TIME_TOLERANCE_S
+
+_NEARLY_S = 1.0  # bookings are made in whole seconds
+_KINDS = {"collect": COLLECT, "contact": CONTACT}
+
+
+def pinned_problem(scenario: Scenario, problem: Problem) -> Problem:
+    """Return the problem of a scenario with its pins compiled in.
+
+    Raises
+    ------
+    InvalidScenario
+        ``pin_without_opportunity``, ``pin_ambiguous``, ``pins_conflict`` or
+        ``pin_breaks_limits``, with a pointer into ``/pins``.
+    """
+    if not scenario.pins:
+        return problem
+    pins, table = scenario.pins, problem.opportunities
+    whole = table if problem.pointing is None else whole_accesses(problem)
+    kept, skipped = (
+        [row_of(scenario, whole, pin, f"/pins/{name}/{i}") for i, pin in enumerate(actions)]
+        for name, actions in (("keep", pins.keep), ("skip", pins.skip))
+    )
+    if problem.pointing is not None:
+        accesses = table.access[skipped]
+        problem, kept = with_pinned_starts(scenario, problem, kept)
+        skipped_rows = [
+            np.flatnonzero(problem.opportunities.access == own).tolist() for own in accesses
+        ]
+    else:
+        skipped_rows = [[row] for row in skipped]
+    return apply_pins(problem, resolve(scenario, kept, skipped_rows))
+
+
+def resolve(scenario: Scenario, kept: Sequence[int], skipped: Sequence[Sequence[int]]) -> Pinned:
+    """Return the scenario's pins in terms of its problem, where these rows are meant."""
+    pins = scenario.pins
+    satellites = {satellite.id: i for i, satellite in enumerate(scenario.satellites)}
+    targets = {target.id: i for i, target in enumerate(scenario.targets)}
+    offset_s = scenario.horizon.offset_s
+    return Pinned(
+        kept=tuple(Kept(row=row, pointer=f"/pins/keep/{i}") for i, row in enumerate(kept)),
+        skipped={row: f"/pins/skip/{i}" for i, rows in enumerate(skipped) for row in rows},
+        blocked=tuple(
+            Blocked(
+                satellite=satellites[pin.satellite_id],
+                start_s=offset_s(pin.start),
+                end_s=offset_s(pin.end),
+                kinds=frozenset(_KINDS[mode] for mode in pin.modes),
+                pointer=f"/pins/block/{i}",
+            )
+            for i, pin in enumerate(pins.block)
+        ),
+        forbidden=frozenset(targets[target_id] for target_id in pins.forbid),
+    )
+
+
+def row_of(scenario: Scenario, table: Opportunities, pin: PinnedAction, pointer: str) -> int:
+    """Return the opportunity that an operator's words mean."""
+    fits = np.ones(len(table), dtype=np.bool_)
+    if pin.satellite_id is not None:
+        ids = [satellite.id for satellite in scenario.satellites]
+        fits &= table.satellite == ids.index(pin.satellite_id)
+    if pin.target_id is not None:
+        ids = [target.id for target in scenario.targets]
+        fits &= (table.kind == COLLECT) & (table.place == ids.index(pin.target_id))
+    if pin.station_id is not None:
+        ids = [station.id for station in scenario.ground_stations]
+        fits &= (table.kind == CONTACT) & (table.place == ids.index(pin.station_id))
+    if pin.opportunity_id is not None:
+        fits &= np.arange(len(table)) == _number_of(pin.opportunity_id)
+    named = np.flatnonzero(fits)
+    start_s = 0.0
+    if pin.start is not None:
+        start_s = scenario.horizon.offset_s(pin.start)
+        end_s = start_s if pin.end is None else scenario.horizon.offset_s(pin.end)
+        fits &= (table.start_s <= end_s + _NEARLY_S) & (table.end_s >= start_s - _NEARLY_S)
+    rows = np.flatnonzero(fits)
+    if len(rows) == 0:
+        raise InvalidScenario(
+            "pin_without_opportunity", _why_none(scenario, table, named, pin), pointer=pointer
+        )
+    if pin.start is None and len(rows) > 1:
+        raise InvalidScenario(
+            "pin_ambiguous",
+            f"It names {len(rows)} opportunities; a start would tell which one is meant.",
+            pointer=pointer,
+        )
+    return int(rows[np.argmin(np.abs(table.start_s[rows] - start_s))])
+
+
+def _number_of(opportunity_id: str) -> int:
+    found = re.fullmatch(r"o(\d{1,9})", opportunity_id, re.ASCII)
+    return int(found[1]) if found else -1
+
+
+def _why_none(scenario: Scenario, table: Opportunities, named: Longs, pin: PinnedAction) -> str:
+    if len(named) == 0 or pin.start is None:
+        return "The scenario has no opportunity like this."
+    away_s = np.abs(table.start_s[named] - scenario.horizon.offset_s(pin.start))
+    nearest: datetime = scenario.horizon.instant(float(table.start_s[named[np.argmin(away_s)]]))
+    return f"No opportunity then; the nearest one starts at {nearest:%Y-%m-%dT%H:%M:%SZ}."
+
+
+def apply_pins(problem: Problem, pinned: Pinned) -> Problem:
+    """Return the problem without what the pins rule out.
+
+    Raises
+    ------
+    InvalidScenario
+        ``pins_conflict`` where two pins exclude each other, ``pin_breaks_limits`` where battery
+        or recorder cannot bear one.
+    """
+    pinned = replace(pinned, kept=_without_repeats(pinned.kept))
+    _check_conflicts(problem, pinned)
+    n = len(problem.opportunities)
+    beside = _kept_that_exclude(problem, pinned)
+    is_struck = _ruled_out(problem, pinned)
+    for _, excluded in beside:
+        is_struck |= excluded
+    whole = replace(problem, pinned=pinned)
+    left = np.flatnonzero(~is_struck).astype(np.int32)
+    part = restricted(whole, left)
+    place = np.full(n, -1)
+    place[left] = np.arange(len(left))
+    keepers = [(int(place[kept.row]), excluded) for kept, excluded in beside]
+    part = replace(
+        part,
+        pinned=replace(
+            part.pinned,
+            skipped={},
+            struck=_struck(problem, is_struck, keepers),
+        ),
+        target_access=_access_left(problem, part),
+    )
+    check_limits(problem, list(_pins_that_rule_out(problem, pinned)), beside)
+    return part
+
+
+def _without_repeats(kept: Iterable[Kept]) -> tuple[Kept, ...]:
+    first: dict[int, Kept] = {}
+    for one in kept:
+        first.setdefault(one.row, one)
+    return tuple(first.values())
+
+
+def _check_conflicts(problem: Problem, pinned: Pinned) -> None:
+    """Raise where a kept action is ruled out, or excludes another one."""
+    table = problem.opportunities
+    ruled_out = _ruled_out(problem, pinned)
+    ordered = sorted(pinned.kept, key=lambda kept: kept.row)
+    promised: dict[int, Kept] = {}
+    last: dict[int, Kept] = {}
+    for kept in ordered:
+        if ruled_out[kept.row]:
+            raise _conflict(kept, "another pin forbids what this one wants kept")
+        satellite = int(table.satellite[kept.row])
+        before = last.get(satellite)
+        local = problem.local_row
+        transitions = problem.satellites[satellite].transitions
+        if before is not None and not transitions.allows(local[before.row], local[kept.row]):
+            raise _conflict(
+                kept,
+                f"the satellite cannot turn to it in time from the action that {before.pointer} "
+                "keeps",
+            )
+        last[satellite] = kept
+        if table.kind[kept.row] == COLLECT:
+            other = promised.setdefault(int(table.place[kept.row]), kept)
+            if other is not kept:
+                raise _conflict(kept, f"{other.pointer} keeps another image of the same target")
+    contacts = [kept for kept in ordered if table.kind[kept.row] == CONTACT]
+    for kept in contacts:
+        earlier = [
+            other
+            for other in contacts
+            if other is not kept
+            and table.place[other.row] == table.place[kept.row]
+            and table.start_s[other.row] <= table.start_s[kept.row]
+            and table.end_s[other.row] > table.start_s[kept.row] + TIME_TOLERANCE_S
+        ]
+        if len(earlier) >= problem.station_antennas[table.place[kept.row]]:
+            raise _conflict(kept, f"the station then serves what {earlier[0].pointer} keeps")
+
+
+def _conflict(kept: Kept, why: str) -> InvalidScenario:
+    detail = f"It cannot be kept: {why}."
+    return InvalidScenario("pins_conflict", detail, pointer=kept.pointer)
+
+
+def _ruled_out(problem: Problem, pinned: Pinned) -> Bools:
+    """Return the opportunities that are forbidden or lie in a blocked interval."""
+    table = problem.opportunities
+    is_out: Bools = (table.kind == COLLECT) & np.isin(table.place, sorted(pinned.forbidden))
+    for _, rows in _pins_that_rule_out(problem, pinned):
+        is_out[rows] = True
+    return is_out
+
+
+def _pins_that_rule_out(problem: Problem, pinned: Pinned) -> Iterator[tuple[str, Longs]]:
+    """Yield pins that skip or block, and the opportunities that each is about."""
+    table = problem.opportunities
+    for pointer, skipped in groupby(pinned.skipped, key=lambda row: pinned.skipped[row]):
+        yield pointer, np.array(list(skipped))
+    for blocked in pinned.blocked:
+        is_out = (
+            (table.satellite == blocked.satellite)
+            & np.isin(table.kind, sorted(blocked.kinds))
+            & (table.start_s < blocked.end_s - TIME_TOLERANCE_S)
+            & (table.end_s > blocked.start_s + TIME_TOLERANCE_S)
+        )
+        yield blocked.pointer, np.flatnonzero(is_out)
+
+
+def _kept_that_exclude(problem: Problem, pinned: Pinned) -> list[tuple[Kept, Bools]]:
+    """Return for each kept action the opportunities that cannot stand beside it."""
+    table = problem.opportunities
+    orders = {
+        index: order_of(transitive_closure(problem, problem.satellites[index]))
+        for index in {int(table.satellite[kept.row]) for kept in pinned.kept}
+    }
+    contacts = np.array(
+        [kept.row for kept in pinned.kept if table.kind[kept.row] == CONTACT], dtype=np.int64
+    )
+    is_kept = np.zeros(len(table), dtype=np.bool_)
+    is_kept[[kept.row for kept in pinned.kept]] = True
+    found = []
+    for kept in pinned.kept:
+        satellite = int(table.satellite[kept.row])
+        excluded = np.zeros(len(table), dtype=np.bool_)
+        own = problem.satellites[satellite].rows
+        excluded[own] = _excluded(orders[satellite], int(problem.local_row[kept.row]), len(own))
+        if table.kind[kept.row] == COLLECT:
+            excluded |= (table.kind == COLLECT) & (table.place == table.place[kept.row])
+        else:
+            excluded |= _without_antenna(problem, kept.row, contacts)
+        found.append((kept, excluded & ~is_kept))
+    return found
+
+
+@kernel
+def _excluded(order: Order, row: int, num_rows: int) -> Bools:
+    """Return the tasks of a satellite that cannot stand in one plan with ``row``."""
+    excluded = np.zeros(num_rows, dtype=np.bool_)
+    for other in range(num_rows):
+        excluded[other] = other != row and not are_comparable(order, row, other)
+    return excluded
+
+
+def _without_antenna(problem: Problem, row: int, kept: Longs) -> Bools:
+    """Return the contacts that find no antenna where ``row`` and other ``kept`` ones run."""
+    table = problem.opportunities
+    station = table.place[row]
+    there = kept[table.place[kept] == station]
+    others = np.flatnonzero((table.kind == CONTACT) & (table.place == station))
+    excluded = np.zeros(len(table), dtype=np.bool_)
+    for other in others:
+        from_s = max(table.start_s[other], table.start_s[row])
+        to_s = min(table.end_s[other], table.end_s[row])
+        if to_s <= from_s + TIME_TOLERANCE_S:
+            continue
+        is_running = (table.start_s[there] <= from_s) & (
+            table.end_s[there] > from_s + TIME_TOLERANCE_S
+        )
+        excluded[other] = is_running.sum() >= problem.station_antennas[station]
+    return excluded
+
+
+def _struck(
+    problem: Problem, is_struck: Bools, keepers: list[tuple[int, Bools]]
+) -> dict[int, tuple[Struck, ...]]:
+    """Return the collects that the pins rule out, by target."""
+    table = problem.opportunities
+    found: dict[int, tuple[Struck, ...]] = {}
+    for row in np.flatnonzero(is_struck & (table.kind == COLLECT)):
+        struck = Struck(
+            row=problem.scenario_row(int(row)),
+            satellite=int(table.satellite[row]),
+            start_s=float(table.start_s[row]),
+            end_s=float(table.end_s[row]),
+            kept=tuple(kept for kept, excluded in keepers if excluded[row]),
+        )
+        target = int(table.place[row])
+        found[target] = (*found.get(target, ()), struck)
+    return found
+
+
+def _access_left(problem: Problem, part: Problem) -> np.ndarray:
+    """Return why targets have no collect, pins included."""
+    is_lost = (problem.target_access == ACCESS_FOUND) & (np.diff(part.target_opportunities[1]) == 0)
+    return np.where(is_lost, RULED_OUT, problem.target_access).astype(np.int8)

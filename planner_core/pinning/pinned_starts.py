@@ -1,0 +1,177 @@
+"""Pins on a problem with continuous starts: kept actions at the starts that they were given.
+
+A kept collect becomes an opportunity at its own start. So do the starts right before and after
+it, and around blocked intervals, of the accesses there: what only overlaps at the opportunities'
+own starts may still be imaged beside it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from planner_core.domain import Scenario
+from planner_core.jit import kernel
+from planner_core.problem import (
+    COLLECT,
+    Floats,
+    Ints,
+    Opportunities,
+    Problem,
+    line_of_sight,
+)
+from planner_core.problem.plan import Action, Plan
+from planner_core.problem.pointing import (
+    Agile,
+    Path,
+    Vector,
+    agile_of,
+    earliest_start_s,
+    latest_start_s,
+)
+from planner_core.problem.retimed import offered, with_starts
+
+
+def whole_accesses(problem: Problem) -> Opportunities:
+    """Return the table with each collect as long as its access, as pins see it here."""
+    table = problem.opportunities
+    is_collect = table.kind == COLLECT
+    return replace(
+        table,
+        start_s=np.where(is_collect, table.access_start_s, table.start_s),
+        end_s=np.where(is_collect, table.access_end_s, table.end_s),
+    )
+
+
+def with_pinned_starts(
+    scenario: Scenario, problem: Problem, kept: list[int]
+) -> tuple[Problem, list[int]]:
+    """Return the problem with the starts that pins ask for, and its rows of what is kept.
+
+    Parameters
+    ----------
+    kept
+        For each action to be kept an opportunity of its access.
+    """
+    table = problem.opportunities
+    rows: list[int] = []
+    starts: list[float] = []
+    for pin, row in zip(scenario.pins.keep, kept, strict=True):
+        start_s = float(table.start_s[row])
+        if pin.start is not None and table.kind[row] == COLLECT:
+            open_s, close_s = starts_of(problem, row)
+            start_s = min(max(round(scenario.horizon.offset_s(pin.start), 3), open_s), close_s)
+        rows.append(row)
+        starts.append(start_s)
+    own = Plan(
+        tuple(
+            Action(start_s, start_s + float(table.end_s[row] - table.start_s[row]), row)
+            for row, start_s in zip(kept, starts, strict=True)
+        )
+    )
+    for action in own.actions:
+        _add_beside(problem, action, rows, starts)
+    ids = [satellite.id for satellite in scenario.satellites]
+    for block in scenario.pins.block:
+        if "collect" in block.modes:
+            from_s, to_s = (scenario.horizon.offset_s(t) for t in (block.start, block.end))
+            _add_around(problem, ids.index(block.satellite_id), from_s, to_s, rows, starts)
+    made = with_starts(problem, np.array(rows, dtype=np.int32), np.array(starts))
+    return made.problem, [action.opportunity for action in offered(made, problem, own).actions]
+
+
+def starts_of(problem: Problem, row: int) -> tuple[float, float]:
+    """Return the first and the last start that an opportunity's access allows."""
+    table = problem.opportunities
+    length_s = float(table.end_s[row] - table.start_s[row])
+    open_s = max(0.0, float(table.access_start_s[row]))
+    close_s = min(problem.horizon_s, float(table.access_end_s[row])) - length_s
+    return open_s, round(close_s, 3)
+
+
+def _first_rows(problem: Problem, satellite: int) -> Ints:
+    """Return one collect of each access of a satellite."""
+    table = problem.opportunities
+    rows = np.flatnonzero((table.satellite == satellite) & (table.kind == COLLECT))
+    _, first = np.unique(table.access[rows], return_index=True)
+    return rows[first].astype(np.int32)
+
+
+def _add_beside(problem: Problem, action: Action, rows: list[int], starts: list[float]) -> None:
+    table, pointing = problem.opportunities, problem.pointing
+    if pointing is None:
+        return
+    row, satellite = action.opportunity, int(table.satellite[action.opportunity])
+    others = _first_rows(problem, satellite)
+    agility = problem.satellites[satellite].agility
+    length_s = table.end_s[others] - table.start_s[others]
+    before, after = _beside(
+        pointing.paths[satellite],
+        pointing.targets_m,
+        agile_of(agility.slew_rate_deg_s, agility.acceleration_deg_s2, agility.settle_s),
+        action.start_s,
+        action.end_s,
+        line_of_sight(problem, row, action.start_s),
+        line_of_sight(problem, row, action.end_s),
+        table.place[others],
+        length_s,
+        np.maximum(table.access_start_s[others], 0.0),
+        np.minimum(table.access_end_s[others], problem.horizon_s) - length_s,
+    )
+    for found in (before, after):
+        for c in np.flatnonzero(np.isfinite(found)):
+            rows.append(int(others[c]))
+            starts.append(float(found[c]))
+
+
+@kernel
+def _beside(
+    path: Path,
+    targets_m: Floats,
+    agile: Agile,
+    start_s: float,
+    end_s: float,
+    looks: Vector,
+    looked: Vector,
+    target: Ints,
+    length_s: Floats,
+    open_s: Floats,
+    close_s: Floats,
+) -> tuple[Floats, Floats]:
+    """Return the latest start of each access before a task, and the earliest after it.
+
+    Not finite where the task is not in the way of some start of the access.
+    """
+    before, after = np.full(len(target), -np.inf), np.full(len(target), np.inf)
+    around_s = 360.0 / agile.rate_deg_s + agile.settle_s
+    for c in range(len(target)):
+        if open_s[c] > end_s + around_s or close_s[c] + length_s[c] < start_s - around_s:
+            continue
+        before[c] = latest_start_s(
+            agile, start_s, looks, path, targets_m, target[c], length_s[c], open_s[c], close_s[c]
+        )
+        after[c] = earliest_start_s(
+            agile, end_s, looked, path, targets_m, target[c], open_s[c], close_s[c]
+        )
+    return before, after
+
+
+def _add_around(
+    problem: Problem,
+    satellite: int,
+    from_s: float,
+    to_s: float,
+    rows: list[int],
+    starts: list[float],
+) -> None:
+    for row in _first_rows(problem, satellite).tolist():
+        table = problem.opportunities
+        length_s = float(table.end_s[row] - table.start_s[row])
+        open_s, close_s = starts_of(problem, row)
+        before_s = np.floor((from_s - length_s) * 1000.0 + 1e-4) / 1000.0
+        after_s = np.ceil(to_s * 1000.0 - 1e-4) / 1000.0
+        for start_s in (before_s, after_s):
+            if open_s <= start_s <= close_s:
+                rows.append(row)
+                starts.append(float(start_s))

@@ -1,0 +1,214 @@
+"""Lists of what may follow what among the tasks of one satellite."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from planner_core.jit import borrowing, kernel
+from planner_core.precedence.relation import Order, comes_before
+from planner_core.problem import Ints, Longs
+
+Words = npt.NDArray[np.uint64]
+
+_WORD: Final = 64
+
+
+class Arcs(NamedTuple):
+    """Arcs from each task: ``to[first[a] : first[a + 1]]``.
+
+    Attributes
+    ----------
+    first
+        Shape ``(m + 1,)``.
+    to
+        Rows in ascending order for each task. Shape ``(num_arcs,)``.
+    """
+
+    first: Longs
+    to: Ints
+
+
+def covering_arcs(order: Order, later: Ints | None = None) -> Arcs:
+    """Return the pairs of tasks that may follow each other with none in between.
+
+    Where "may follow" is transitive, as ``order`` must be, a chain of these leads from each
+    task to every task that may follow it. There are about ten for each task, far fewer than
+    pairs; some fifty where an access offers a collect every 15 s.
+
+    Parameters
+    ----------
+    later
+        For each task another one whose followers all may follow it too, or -1 (see
+        ``waiting``): arcs to what follows that one are left out. Shape ``(m,)``.
+    """
+    m = len(order.near_from)
+    return _covering(order, np.full(m, -1, dtype=np.int32) if later is None else later)
+
+
+@borrowing
+def _bits_at(words: Words, bit: int) -> np.uint64:
+    """Return the 64 bits that begin with a given one."""
+    at, into = bit >> 6, np.uint64(bit & 63)
+    found: np.uint64 = words[at] >> into
+    if into > 0:
+        found |= words[at + 1] << (np.uint64(_WORD) - into)
+    return found
+
+
+@borrowing
+def _add_followers(
+    near_from: Ints, offset: Longs, words: Words, c: int, begin: int, end: int, covered: Words
+) -> None:
+    """Mark in ``covered``, whose first bit stands for row ``begin``, the near followers of c.
+
+    Only rows below ``end`` count, which is at most where the far followers begin.
+    """
+    low = near_from[c] - begin
+    for k in range(max(low, 0) >> 6, (end - begin + _WORD - 1) >> 6):
+        shift = low - _WORD * k
+        if shift > 0:
+            covered[k] |= _bits_at(words, offset[c]) << np.uint64(shift)
+        else:
+            covered[k] |= _bits_at(words, offset[c] - shift)
+
+
+@kernel
+def _covering(order: Order, later: Ints) -> Arcs:
+    near_from, far_from, offset, bits = order
+    words = bits.view(np.uint64)
+    m = len(near_from)
+    first = np.zeros(m + 1, dtype=np.int64)
+    to = np.empty(16 * m + 16, dtype=np.int32)
+    covered = np.zeros(64, dtype=np.uint64)
+    count = 0
+    for a in range(m):
+        begin = near_from[a]
+        # Whatever the longest slew from one of the arcs' ends reaches is covered by it.
+        end = m
+        marked = 0  # words of ``covered`` that are in use
+        if later[a] >= 0:
+            end = far_from[later[a]]
+            marked = ((end - begin) >> 6) + 1
+            if marked > len(covered):
+                covered = np.zeros(2 * marked, dtype=np.uint64)
+            covered[:marked] = 0
+            _add_followers(near_from, offset, words, later[a], begin, end, covered)
+        b = begin
+        while b < end:
+            if b < far_from[a]:
+                left = _bits_at(words, offset[a] + b - begin)
+                if b + _WORD > far_from[a]:
+                    left &= (np.uint64(1) << np.uint64(far_from[a] - b)) - np.uint64(1)
+                    left |= ~np.uint64(0) << np.uint64(far_from[a] - b)
+            else:
+                left = ~np.uint64(0)
+            if marked:
+                left &= ~covered[(b - begin) >> 6]
+            while left:
+                lowest = left & (~left + np.uint64(1))
+                left ^= lowest
+                c = b + _trailing_zeros(lowest)
+                if c >= end:
+                    break
+                if count == len(to):
+                    to = np.concatenate((to, np.empty_like(to)))
+                to[count] = c
+                count += 1
+                if marked == 0:
+                    marked = ((far_from[c] - begin) >> 6) + 1
+                    if marked > len(covered):
+                        covered = np.zeros(2 * marked, dtype=np.uint64)
+                    covered[:marked] = 0
+                end = min(end, far_from[c])
+                _add_followers(near_from, offset, words, c, begin, end, covered)
+                left &= ~covered[(b - begin) >> 6]
+            b += _WORD
+        first[a + 1] = count
+    return Arcs(first, to[:count].copy())
+
+
+@borrowing
+def _trailing_zeros(lowest: np.uint64) -> int:
+    """Return which bit is set, of a word in which one is."""
+    at = 0
+    for step in (32, 16, 8, 4, 2, 1):
+        if lowest >> np.uint64(step + at):
+            at += step
+    return at
+
+
+@kernel
+def waiting(order: Order, access: Ints) -> Ints:
+    """Return for each task the next collect of its access, where it may as well be over by then.
+
+    That is where whatever may follow the later collect may follow the earlier one too; -1
+    elsewhere. A longest path then reaches what follows the later one by waiting.
+
+    Parameters
+    ----------
+    access
+        Number of the access that each task lies in. Shape ``(m,)``.
+    """
+    near_from, far_from, offset, bits = order
+    words = bits.view(np.uint64)
+    m = len(access)
+    later = np.full(m, -1, dtype=np.int32)
+    last = np.full(access.max() + 1 if m else 0, -1, dtype=np.int32)
+    for b in range(m):
+        a = last[access[b]]
+        last[access[b]] = b
+        if a < 0 or near_from[a] > near_from[b] or far_from[a] > far_from[b]:
+            continue
+        is_subset = True
+        row = near_from[b]
+        while is_subset and row < far_from[a]:
+            needed = _bits_at(words, offset[b] + row - near_from[b])
+            given = _bits_at(words, offset[a] + row - near_from[a])
+            if row + _WORD > far_from[a]:
+                needed &= (np.uint64(1) << np.uint64(far_from[a] - row)) - np.uint64(1)
+            is_subset = not needed & ~given
+            row += _WORD
+        if is_subset:
+            later[a] = b
+    return later
+
+
+@kernel
+def near_arcs(order: Order) -> Arcs:
+    """Return all pairs that the table of near tasks allows."""
+    m = len(order.near_from)
+    first = np.zeros(m + 1, dtype=np.int64)
+    for a in range(m):
+        first[a + 1] = first[a]
+        for b in range(order.near_from[a], order.far_from[a]):
+            first[a + 1] += comes_before(order, a, b)
+    to = np.empty(first[m], dtype=np.int32)
+    count = 0
+    for a in range(m):
+        for b in range(order.near_from[a], order.far_from[a]):
+            if comes_before(order, a, b):
+                to[count] = b
+                count += 1
+    return Arcs(first, to)
+
+
+@kernel
+def reversed_arcs(arcs: Arcs) -> Arcs:
+    """Return the same arcs from their ends to where they come from."""
+    m = len(arcs.first) - 1
+    first = np.zeros(m + 1, dtype=np.int64)
+    for b in arcs.to:
+        first[b + 1] += 1
+    for b in range(m):
+        first[b + 1] += first[b]
+    filled = first[:m].copy()
+    come_from = np.empty(len(arcs.to), dtype=np.int32)
+    for a in range(m):
+        for at in range(arcs.first[a], arcs.first[a + 1]):
+            b = arcs.to[at]
+            come_from[filled[b]] = a
+            filled[b] += 1
+    return Arcs(first, come_from)

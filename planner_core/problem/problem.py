@@ -1,0 +1,466 @@
+"""The frozen problem: all that a solver and the referee ever see.
+
+Geometry has been turned into numbers here. Opportunities lie in one table of columns,
+ordered by (start, end, satellite, kind, place); each satellite has a view of its own rows
+with a sparse table of which of them may follow each other.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from planner_core.domain import Agility, Dynamics, Resources
+from planner_core.jit import inlined, kernel
+from planner_core.problem.pointing import Pointing, Vector, sight
+from planner_core.problem.slew import (
+    INSTANT,
+    TIME_TOLERANCE_S,
+    angle_between_deg,
+    reach_deg,
+    slew_s,
+)
+
+Floats = npt.NDArray[np.float64]
+Singles = npt.NDArray[np.float32]
+Ints = npt.NDArray[np.int32]
+Longs = npt.NDArray[np.int64]
+Bytes = npt.NDArray[np.uint8]
+Bools = npt.NDArray[np.bool_]
+
+_CLEARLY: Final = 1e-7  # in the cosine of an angle; rounding is far smaller
+
+COLLECT: Final = 0
+CONTACT: Final = 1
+
+ACCESS_FOUND: Final = 0
+NEVER_VISIBLE: Final = 1
+OUTSIDE_LIMITS: Final = 2
+ACCESS_TOO_SHORT: Final = 3
+RULED_OUT: Final = 4
+"""Geometry would allow it; what the scenario pins leaves no opportunity."""
+WRONG_SENSOR_TYPE: Final = 5
+OUTSIDE_TIMES: Final = 6
+"""An access is long enough, but not between the target's release and due times."""
+BETWEEN_STARTS: Final = 7
+"""There is room for a collect, but not at a start of the horizon's grid."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Opportunities:
+    """All collects and contacts of a scenario, one row each, in the order of the plan model.
+
+    Instants are seconds from the start of the horizon, rounded inward to the millisecond.
+    Angles and distances hold at the middle of the opportunity, in single precision (1e-5 deg,
+    a quarter of a metre): they are for people, plans do not hang on them. Lines of sight are unit
+    vectors from the satellite in the inertial (TEME) frame. Shape ``(n,)`` or ``(n, 3)``.
+
+    Attributes
+    ----------
+    satellite
+        Index of the satellite in the scenario.
+    kind
+        ``COLLECT`` or ``CONTACT``.
+    place
+        Index of the target (collect) or of the ground station (contact).
+    access
+        Number of the access it lies in, unique in the scenario.
+    start_s, end_s
+        Span of the task itself.
+    access_start_s, access_end_s
+        Span of its access, as far as it lies between its target's release and due times.
+    los_start, los_end
+        Line of sight at ``start_s`` and at ``end_s``.
+    off_nadir_deg, elevation_deg, azimuth_deg, range_m
+        At the satellite; at the ground; at the ground from north over east; between both.
+    sun_elevation_deg, in_eclipse
+        Of the sun at the target or station; whether the satellite is in the Earth's shadow.
+    """
+
+    satellite: Ints
+    kind: npt.NDArray[np.int8]
+    place: Ints
+    access: Ints
+    start_s: Floats
+    end_s: Floats
+    access_start_s: Floats
+    access_end_s: Floats
+    los_start: Floats
+    los_end: Floats
+    off_nadir_deg: Singles
+    elevation_deg: Singles
+    azimuth_deg: Singles
+    range_m: Singles
+    sun_elevation_deg: Singles
+    in_eclipse: Bools
+
+    def __len__(self) -> int:
+        return len(self.start_s)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Sunlight:
+    """When one satellite is in sunlight: ``enter_s[i] <= t < exit_s[i]``, ascending."""
+
+    enter_s: Floats
+    exit_s: Floats
+
+    def gaps(self, horizon_s: float) -> list[tuple[float, float]]:
+        """Return the times in shadow, from 0 to the end of the horizon.
+
+        >>> Sunlight(enter_s=np.array([0.0, 50.0]), exit_s=np.array([10.0, 60.0])).gaps(80.0)
+        [(10.0, 50.0), (60.0, 80.0)]
+        """
+        starts = [0.0, *self.exit_s.tolist()]
+        ends = [*self.enter_s.tolist(), horizon_s]
+        return [(start, end) for start, end in zip(starts, ends, strict=True) if start < end]
+
+    def seconds_until(self, t_s: Floats) -> Floats:
+        """Return the sunlit seconds between 0 and each instant.
+
+        >>> Sunlight(enter_s=np.array([0.0, 50.0]), exit_s=np.array([10.0, 60.0])).seconds_until(
+        ...     np.array([5.0, 20.0, 55.0]))
+        array([ 5., 10., 15.])
+        """
+        lengths = self.exit_s - self.enter_s
+        before = np.concatenate([[0.0], np.cumsum(lengths)])
+        i = np.searchsorted(self.enter_s, t_s, side="right")
+        last = np.maximum(i - 1, 0)
+        if len(lengths) == 0:
+            return np.zeros_like(t_s)
+        into = np.clip(t_s - self.enter_s[last], 0.0, lengths[last])
+        return np.where(i == 0, 0.0, before[last] + into)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Transitions:
+    """Which opportunity of one satellite may follow which: C(a, b) of eq. 4, sparse.
+
+    Local row ``b`` may follow ``a`` when ``b >= far_from[a]`` (even the longest slew fits), or
+    ``near_from[a] <= b < far_from[a]`` and bit ``offset[a] + b - near_from[a]`` is set.
+
+    Attributes
+    ----------
+    near_from, far_from
+        Shape ``(m,)``; the near rows of ``a`` are ``near_from[a]`` up to ``far_from[a]``.
+    offset
+        First bit of each row's near part. Shape ``(m + 1,)``.
+    bits
+        Packed, least significant bit first.
+    """
+
+    near_from: Ints
+    far_from: Ints
+    offset: Longs
+    bits: Bytes
+
+    def allows(self, a: int, b: int) -> bool:
+        """Return whether local row ``b`` may follow local row ``a`` directly."""
+        return bool(may_follow(a, b, self.near_from, self.far_from, self.offset, self.bits))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SatelliteProblem:
+    """One satellite's part: its rows of the opportunity table, and what may follow what.
+
+    Attributes
+    ----------
+    rows
+        Rows of the scenario's table that belong to this satellite, ascending. Shape ``(m,)``.
+    sunlight
+        Only what ``eclipse_aware`` needs; the whole horizon otherwise.
+    event_s
+        Starts of all opportunities of the satellite in the scenario, those that pins or a
+        search leave out included: the events of ``dynamics: paper``. Ascending.
+    event
+        For each row its place in ``event_s``. Shape ``(m,)``.
+    """
+
+    id: str
+    name: str
+    agility: Agility
+    resources: Resources
+    rows: Ints
+    kind: npt.NDArray[np.int8]
+    place: Ints
+    start_s: Floats
+    end_s: Floats
+    transitions: Transitions
+    sunlight: Sunlight
+    event_s: Floats
+    event: Ints
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    @property
+    def previous_event_s(self) -> Floats:
+        """When the event before each row was; 0 before the first. Shape ``(m,)``."""
+        return np.concatenate([[0.0], self.event_s])[self.event]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Kept:
+    """A row that every plan must take, and the pin (JSON pointer) that says so."""
+
+    row: int
+    pointer: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Blocked:
+    """A span in which a satellite may not do tasks of some kinds."""
+
+    satellite: int
+    start_s: float
+    end_s: float
+    kinds: frozenset[int]
+    pointer: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Struck:
+    """A collect that pins rule out.
+
+    Attributes
+    ----------
+    row
+        Of the scenario's table, which the problem no longer has.
+    kept
+        Rows of the problem that it cannot stand beside; none where it is ruled out itself.
+    """
+
+    row: int
+    satellite: int
+    start_s: float
+    end_s: float
+    kept: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pinned:
+    """What the scenario pins, in terms of the problem.
+
+    Attributes
+    ----------
+    skipped
+        Rows that no plan may take, as long as they are in the table, and the pin that says so.
+    forbidden
+        Targets that no plan may collect.
+    struck
+        By target, the collects that were ruled out.
+    """
+
+    kept: tuple[Kept, ...] = ()
+    skipped: Mapping[int, str] = field(default_factory=dict)
+    blocked: tuple[Blocked, ...] = ()
+    forbidden: frozenset[int] = frozenset()
+    struck: Mapping[int, tuple[Struck, ...]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Problem:
+    """A compiled scenario.
+
+    Attributes
+    ----------
+    target_reward
+        Shape ``(num_targets,)``.
+    target_access
+        Why a target has no opportunity, or ``ACCESS_FOUND``. Shape ``(num_targets,)``.
+    station_antennas
+        How many satellites each station serves at a time. Shape ``(num_stations,)``.
+    continuous_starts
+        Whether a collect may start anywhere in its access, at a whole millisecond.
+    pointing
+        Lines of sight at any instant, where continuous starts need them.
+    pinned
+        Opportunities that pins rule out are not in the table; those to be kept are named here.
+    origin
+        Row of each opportunity in the scenario's table, where that is another one. Shape ``(n,)``.
+    """
+
+    horizon_s: float
+    use_resources: bool
+    dynamics: Dynamics
+    continuous_starts: bool
+    target_ids: tuple[str, ...]
+    target_reward: Floats
+    target_access: npt.NDArray[np.int8]
+    station_ids: tuple[str, ...]
+    station_antennas: Ints
+    opportunities: Opportunities
+    satellites: tuple[SatelliteProblem, ...]
+    pointing: Pointing | None = None
+    pinned: Pinned = Pinned()
+    origin: Ints | None = None
+
+    @cached_property
+    def kept_rows(self) -> Ints:
+        """Return the rows that every plan must take, ascending."""
+        return np.array(sorted(kept.row for kept in self.pinned.kept), dtype=np.int32)
+
+    def kept_local(self, satellite: SatelliteProblem) -> Ints:
+        """Return the local rows that a satellite must take, ascending."""
+        return np.flatnonzero(np.isin(satellite.rows, self.kept_rows)).astype(np.int32)
+
+    def scenario_row(self, row: int) -> int:
+        """Return the row of an opportunity in the scenario's table, which names it to users."""
+        return row if self.origin is None else int(self.origin[row])
+
+    @cached_property
+    def local_row(self) -> Ints:
+        """Return, for each opportunity, its row in its own satellite's view. Shape ``(n,)``."""
+        local = np.empty(len(self.opportunities), dtype=np.int32)
+        for satellite in self.satellites:
+            local[satellite.rows] = np.arange(len(satellite), dtype=np.int32)
+        return local
+
+    @cached_property
+    def offers_choice(self) -> bool:
+        """Return whether some access offers several collects."""
+        return len(np.unique(self.opportunities.access)) < len(self.opportunities)
+
+    @cached_property
+    def target_opportunities(self) -> tuple[Ints, Longs]:
+        """Return collects grouped by target: rows, and offsets of shape ``(num_targets + 1,)``."""
+        collects = np.flatnonzero(self.opportunities.kind == COLLECT).astype(np.int32)
+        order = np.argsort(self.opportunities.place[collects], kind="stable")
+        counts = np.bincount(self.opportunities.place[collects], minlength=len(self.target_ids))
+        offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+        return collects[order], offsets
+
+    def collects_of(self, target: int) -> Ints:
+        """Return the rows of a target's collects, in order."""
+        rows, offsets = self.target_opportunities
+        return rows[offsets[target] : offsets[target + 1]]
+
+
+def line_of_sight(problem: Problem, row: int, t_s: float) -> Vector:
+    """Return where the satellite looks when it does an opportunity's task at an instant.
+
+    Without ``pointing`` the problem knows that at the opportunity's own start and end only.
+    """
+    table, pointing = problem.opportunities, problem.pointing
+    if pointing is None:
+        own = table.los_start if t_s <= table.start_s[row] else table.los_end
+        x, y, z = own[row].tolist()
+        return x, y, z
+    is_collect = table.kind[row] == COLLECT
+    places = pointing.targets_m if is_collect else pointing.stations_m
+    path = pointing.paths[int(table.satellite[row])]
+    return sight(path, places, int(table.place[row]), float(t_s))
+
+
+def build_satellite_problem(
+    index: int,
+    opportunities: Opportunities,
+    *,
+    id: str,  # noqa: A002 - the field's own name
+    name: str,
+    agility: Agility,
+    resources: Resources,
+    sunlight: Sunlight,
+    events: tuple[Floats, Ints] | None = None,
+) -> SatelliteProblem:
+    """Return one satellite's view of the table, with its transitions worked out.
+
+    Parameters
+    ----------
+    events
+        ``event_s`` and ``event``, where there are more of them than opportunities.
+    """
+    rows = np.flatnonzero(opportunities.satellite == index).astype(np.int32)
+    start_s, end_s = opportunities.start_s[rows], opportunities.end_s[rows]
+    return SatelliteProblem(
+        id=id,
+        name=name,
+        agility=agility,
+        resources=resources,
+        rows=rows,
+        kind=opportunities.kind[rows],
+        place=opportunities.place[rows],
+        start_s=start_s,
+        end_s=end_s,
+        transitions=_transitions(
+            start_s, end_s, opportunities.los_start[rows], opportunities.los_end[rows], agility
+        ),
+        sunlight=sunlight,
+        event_s=start_s if events is None else events[0],
+        event=np.arange(len(rows), dtype=np.int32) if events is None else events[1],
+    )
+
+
+def _transitions(
+    start_s: Floats, end_s: Floats, los_start: Floats, los_end: Floats, agility: Agility
+) -> Transitions:
+    acceleration = agility.acceleration_deg_s2 or INSTANT
+    longest_s = slew_s(180.0, agility.slew_rate_deg_s, acceleration) + agility.settle_s
+    near_from = np.searchsorted(start_s, end_s - TIME_TOLERANCE_S).astype(np.int32)
+    # A task of no length would come before its own end: it never follows itself.
+    near_from = np.maximum(near_from, np.arange(1, len(start_s) + 1, dtype=np.int32))
+    far_from = np.searchsorted(start_s, end_s + longest_s).astype(np.int32)
+    far_from = np.maximum(far_from, near_from)
+    offset = np.concatenate([[0], np.cumsum((far_from - near_from).astype(np.int64))])
+    # Whole words and two to spare, so that kernels may read any 64 bits at once.
+    bits = np.zeros(8 * (int(offset[-1]) // 64 + 3), dtype=np.uint8)
+    _fill_near_bits(
+        start_s, end_s, np.ascontiguousarray(los_start), np.ascontiguousarray(los_end),
+        agility.slew_rate_deg_s, acceleration, agility.settle_s,
+        near_from, far_from, offset, bits,
+    )  # fmt: skip
+    return Transitions(near_from=near_from, far_from=far_from, offset=offset, bits=bits)
+
+
+@kernel
+def _fill_near_bits(
+    start_s: Floats,
+    end_s: Floats,
+    los_start: Floats,
+    los_end: Floats,
+    rate_deg_s: float,
+    acceleration_deg_s2: float,
+    settle_s: float,
+    near_from: Ints,
+    far_from: Ints,
+    offset: Longs,
+    bits: Bytes,
+) -> None:
+    for a in range(len(start_s)):
+        for b in range(near_from[a], far_from[a]):
+            room_s = start_s[b] - end_s[a] - settle_s + TIME_TOLERANCE_S
+            if room_s < 0.0:
+                continue
+            # Most pairs are far from the limit, and cosines are cheaper than angles.
+            least = math.cos(math.radians(reach_deg(room_s, rate_deg_s, acceleration_deg_s2)))
+            dot = (
+                los_end[a, 0] * los_start[b, 0]
+                + los_end[a, 1] * los_start[b, 1]
+                + los_end[a, 2] * los_start[b, 2]
+            )
+            if dot < least - _CLEARLY:
+                continue
+            if dot < least + _CLEARLY:
+                angle_deg = angle_between_deg(los_end[a], los_start[b])
+                needed_s = slew_s(angle_deg, rate_deg_s, acceleration_deg_s2) + settle_s
+                if start_s[b] - end_s[a] < needed_s - TIME_TOLERANCE_S:
+                    continue
+            bit = offset[a] + b - near_from[a]
+            bits[bit >> 3] |= np.uint8(1 << (bit & 7))
+
+
+@inlined
+def may_follow(a: int, b: int, near_from: Ints, far_from: Ints, offset: Longs, bits: Bytes) -> bool:
+    """Return whether local row ``b`` may follow ``a``; ``a`` of -1 is "no task yet"."""
+    if a < 0 or b >= far_from[a]:
+        return True
+    if b < near_from[a]:
+        return False
+    bit = offset[a] + b - near_from[a]
+    return bool((bits[bit >> 3] >> (bit & 7)) & 1)

@@ -1,0 +1,1 @@
+"""The referee: replays a plan, says what it earns and which rules it breaks."""

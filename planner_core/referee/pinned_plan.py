@@ -1,0 +1,65 @@
+"""Whether a plan honours what the scenario pins; the referee asks."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from planner_core.problem import COLLECT, Problem
+from planner_core.problem.plan import Plan
+from planner_core.problem.slew import TIME_TOLERANCE_S
+
+
+class Breach(NamedTuple):
+    """A pin that a plan breaks, and the positions in ``plan.actions`` that break it."""
+
+    satellite: int
+    at_s: float
+    needed: float
+    available: float
+    detail: str
+    blamed: tuple[int, ...]
+
+
+def breaches(problem: Problem, plan: Plan) -> list[Breach]:
+    """Return every kept action that is missing and every action that is ruled out."""
+    pinned, table = problem.pinned, problem.opportunities
+    starts = {action.opportunity: action.start_s for action in plan.actions}
+    found = [
+        Breach(
+            satellite=int(table.satellite[kept.row]),
+            at_s=float(table.start_s[kept.row]),
+            needed=1.0,
+            available=0.0,
+            detail=f"The action that {kept.pointer} keeps is missing.",
+            blamed=(),
+        )
+        for kept in pinned.kept
+        if kept.row not in starts
+        or (
+            problem.continuous_starts
+            and abs(starts[kept.row] - table.start_s[kept.row]) > TIME_TOLERANCE_S
+        )
+    ]
+    for position, action in enumerate(plan.actions):
+        row = action.opportunity
+        satellite, kind = int(table.satellite[row]), int(table.kind[row])
+        why = [
+            f"It lies in the interval that {blocked.pointer} blocks."
+            for blocked in pinned.blocked
+            if blocked.satellite == satellite
+            and kind in blocked.kinds
+            and action.start_s < blocked.end_s - TIME_TOLERANCE_S
+            and action.end_s > blocked.start_s + TIME_TOLERANCE_S
+        ]
+        if kind == COLLECT and int(table.place[row]) in pinned.forbidden:
+            why.append("Its target is forbidden.")
+        if row in pinned.skipped:
+            why.append(f"It is what {pinned.skipped[row]} skips.")
+        found += [
+            Breach(
+                satellite=satellite, at_s=action.start_s, needed=0.0, available=1.0,
+                detail=detail, blamed=(position,),
+            )
+            for detail in why
+        ]  # fmt: skip
+    return found

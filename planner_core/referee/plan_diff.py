@@ -1,0 +1,162 @@
+"""What changed from one plan to another: actions, and what they add up to."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from typing import Final
+
+from planner_core.domain import Scenario
+from planner_core.problem import COLLECT, Problem
+from planner_core.referee.replay import Mode, Timeline
+
+_SAME_TIME: Final = timedelta(milliseconds=1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, order=True)
+class PlannedAction:
+    """A collect or a contact in terms that every plan of these satellites shares."""
+
+    start: datetime
+    end: datetime
+    satellite_id: str
+    mode: Mode
+    place_id: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlanView:
+    """What two plans are compared by; ``totals`` are numbers, or None where unknown."""
+
+    actions: tuple[PlannedAction, ...]
+    totals: Mapping[str, float | None]
+
+    @classmethod
+    def of(cls, scenario: Scenario, problem: Problem, timeline: Timeline) -> PlanView:
+        """Return the view of a judged plan."""
+        actions = []
+        for satellite, line in zip(problem.satellites, timeline.satellites, strict=True):
+            for action in line.actions:
+                if action.opportunity is None:
+                    continue
+                place = int(problem.opportunities.place[action.opportunity])
+                is_collect = problem.opportunities.kind[action.opportunity] == COLLECT
+                actions.append(
+                    PlannedAction(
+                        start=scenario.horizon.instant(action.start_s),
+                        end=scenario.horizon.instant(action.end_s),
+                        satellite_id=satellite.id,
+                        mode=action.mode,
+                        place_id=(problem.target_ids if is_collect else problem.station_ids)[place],
+                    )
+                )
+        modes = [action.mode for action in actions]
+        return cls(
+            actions=tuple(sorted(actions)),
+            totals={
+                "reward": timeline.reward,
+                "collects": float(modes.count("collect")),
+                "contacts": float(modes.count("contact")),
+                "targets": float(len(timeline.collected)),
+                "downlinked_fraction": sum(timeline.downlinked) if problem.use_resources else None,
+                "battery_min_fraction": timeline.battery_min,
+                "recorder_max_fraction": timeline.recorder_max,
+            },
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlanDiff:
+    """What the second plan has that the first has not, and the other way round.
+
+    Attributes
+    ----------
+    moved
+        The same target, or the same satellite's contact of the same station, at another time
+        (or the target by another satellite): before and after.
+    totals
+        Second minus first, only what differs; None where one of them does not know.
+    """
+
+    added: tuple[PlannedAction, ...]
+    removed: tuple[PlannedAction, ...]
+    moved: tuple[tuple[PlannedAction, PlannedAction], ...]
+    totals: Mapping[str, float | None]
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether the plans are the same."""
+        return not (self.added or self.removed or self.moved or self.totals)
+
+
+def plan_diff(first: PlanView, second: PlanView) -> PlanDiff:
+    """Return the difference of two plans; that of a plan and itself is empty."""
+    before, after = _without_common(first.actions, second.actions)
+    there = _grouped(after, _place)
+    pairs = sorted((abs(a.start - b.start), a, b) for a in before for b in there.get(_place(a), ()))
+    moved = []
+    gone, new = Counter(before), Counter(after)
+    for _, a, b in pairs:
+        if gone[a] and new[b]:
+            moved.append((a, b))
+            gone[a] -= 1
+            new[b] -= 1
+    return PlanDiff(
+        added=tuple(sorted(new.elements())),
+        removed=tuple(sorted(gone.elements())),
+        moved=tuple(sorted(moved)),
+        totals=_differences(first.totals, second.totals),
+    )
+
+
+def _without_common(
+    first: tuple[PlannedAction, ...], second: tuple[PlannedAction, ...]
+) -> tuple[list[PlannedAction], list[PlannedAction]]:
+    """Return what either has and the other has not, up to the millisecond of rounding."""
+    left = _grouped(second, _task)
+    before = []
+    for action in first:
+        there = left.get(_task(action), [])
+        same = next((other for other in there if _is_at_same_time(action, other)), None)
+        if same is None:
+            before.append(action)
+        else:
+            there.remove(same)
+    return before, [action for there in left.values() for action in there]
+
+
+def _grouped(
+    actions: Iterable[PlannedAction], key: Callable[[PlannedAction], tuple[str, ...]]
+) -> dict[tuple[str, ...], list[PlannedAction]]:
+    groups: dict[tuple[str, ...], list[PlannedAction]] = {}
+    for action in actions:
+        groups.setdefault(key(action), []).append(action)
+    return groups
+
+
+def _is_at_same_time(a: PlannedAction, b: PlannedAction) -> bool:
+    return abs(a.start - b.start) <= _SAME_TIME and abs(a.end - b.end) <= _SAME_TIME
+
+
+def _task(action: PlannedAction) -> tuple[str, ...]:
+    return action.satellite_id, action.mode, action.place_id
+
+
+def _place(action: PlannedAction) -> tuple[str, ...]:
+    """Return what an action is still known by when it moves."""
+    if action.mode == "collect":
+        return action.mode, action.place_id
+    return action.mode, action.place_id, action.satellite_id
+
+
+def _differences(
+    first: Mapping[str, float | None], second: Mapping[str, float | None]
+) -> dict[str, float | None]:
+    found: dict[str, float | None] = {}
+    for name in first.keys() | second.keys():
+        a, b = first.get(name), second.get(name)
+        if a != b:
+            found[name] = None if a is None or b is None else b - a
+    return dict(sorted(found.items()))

@@ -1,0 +1,489 @@
+"""The referee: replay a plan, say what it earns and every rule that it breaks.
+
+Only this module awards reward. It does not know which solver made a plan, and believes none.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import heapq
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from planner_core.problem import (
+    COLLECT,
+    CONTACT,
+    Floats,
+    Problem,
+    line_of_sight,
+)
+from planner_core.problem.plan import Action, Plan
+from planner_core.problem.slew import (
+    INSTANT,
+    TIME_TOLERANCE_S,
+    Vector,
+    angle_between_deg,
+    slew_s,
+)
+from planner_core.referee.pinned_plan import breaches
+from planner_core.referee.resource_profile import (
+    Point,
+    Profile,
+    integrate,
+    thin,
+)
+
+Mode = Literal["collect", "contact", "sunpoint"]
+ViolationCode = Literal[
+    "window", "overlap", "slew", "station", "duplicate", "battery", "recorder", "pin"
+]
+_AMOUNT_TOLERANCE = 1e-9  # of a recorder's capacity, in comparing sums of many pieces
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Violation:
+    """A rule that the plan breaks.
+
+    Attributes
+    ----------
+    at_s
+        When, in seconds from the start of the horizon.
+    needed, available
+        What the rule asks for and what the plan leaves: seconds, or fractions of capacity.
+    blamed
+        Positions in ``plan.actions`` of the actions that break it; those earn nothing.
+    """
+
+    code: ViolationCode
+    satellite: int
+    at_s: float
+    needed: float
+    available: float
+    detail: str
+    blamed: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Slew:
+    """The turn before an action; ``needed_s`` includes settling."""
+
+    angle_deg: float
+    needed_s: float
+    available_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JudgedAction:
+    """One action of the timeline. ``opportunity`` and ``position`` are None for sun-pointing."""
+
+    mode: Mode
+    start_s: float
+    end_s: float
+    opportunity: int | None
+    position: int | None
+    slew: Slew | None
+    reward: float
+    battery_end: float | None
+    recorder_end: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Resourceline:
+    """Battery and recorder fractions over time; shape ``(k,)`` each."""
+
+    time_s: Floats
+    battery: Floats
+    recorder: Floats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SatelliteTimeline:
+    """What one satellite does, and its resources (None where they do not count)."""
+
+    actions: tuple[JudgedAction, ...]
+    resources: Resourceline | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Collected:
+    """How a target was collected: by which plan action, and whether its image is down."""
+
+    position: int
+    satellite: int
+    is_downlinked: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Timeline:
+    """A plan, judged.
+
+    Attributes
+    ----------
+    reward
+        Sum over the distinct targets collected by actions that break nothing.
+    collected
+        By target index.
+    downlinked
+        What contacts took down, by satellite, in recorder capacities.
+    battery_min, recorder_max
+        The lowest battery and the highest recorder of any satellite at any instant.
+    """
+
+    satellites: tuple[SatelliteTimeline, ...]
+    violations: tuple[Violation, ...]
+    reward: float
+    collected: Mapping[int, Collected]
+    downlinked: tuple[float, ...]
+    battery_min: float | None
+    recorder_max: float | None
+
+    @property
+    def is_valid(self) -> bool:
+        """Whether nothing is broken; imaging a target twice is allowed, it earns nothing."""
+        return all(v.code == "duplicate" for v in self.violations)
+
+
+def plan_sha256(problem: Problem, plan: Plan) -> str:
+    """Return a hash of what the plan does, the same wherever and whenever it was made."""
+    table = problem.opportunities
+    content = []
+    for action in plan.actions:
+        i = action.opportunity
+        place = int(table.place[i])
+        is_collect = table.kind[i] == COLLECT
+        content.append(
+            [
+                int(table.satellite[i]),
+                "collect" if is_collect else "contact",
+                problem.target_ids[place] if is_collect else place,
+                round(action.start_s * 1000),
+                round(action.end_s * 1000),
+            ]
+        )
+    content.sort(key=lambda row: (row[0], row[3], row[4], str(row[1]), str(row[2])))
+    return hashlib.sha256(json.dumps(content, separators=(",", ":")).encode()).hexdigest()
+
+
+def replay(problem: Problem, plan: Plan) -> Timeline:
+    """Return the timeline of a plan: its reward, resources and every violation."""
+    by_satellite: list[list[int]] = [[] for _ in problem.satellites]
+    for position, action in enumerate(plan.actions):
+        by_satellite[problem.opportunities.satellite[action.opportunity]].append(position)
+    for positions in by_satellite:
+        positions.sort(key=lambda p: plan.actions[p])
+
+    violations: list[Violation] = _windows(problem, plan)
+    slews: dict[int, Slew | None] = {}
+    for index, positions in enumerate(by_satellite):
+        found, turns = _turns(problem, plan, index, positions)
+        violations += found
+        slews |= turns
+    violations += _stations(problem, plan)
+    violations += [Violation(code="pin", **b._asdict()) for b in breaches(problem, plan)]
+
+    profiles: list[Profile | None] = [None] * len(problem.satellites)
+    if problem.use_resources:
+        for index, positions in enumerate(by_satellite):
+            profile = integrate(
+                problem, problem.satellites[index], [plan.actions[p] for p in positions]
+            )
+            profiles[index] = profile
+            violations += _limits(problem, index, positions, profile)
+
+    blamed = {p for v in violations for p in v.blamed}
+    collected, duplicates = _collected(problem, plan, blamed, by_satellite, profiles)
+    violations += duplicates
+    earned = {c.position: float(problem.target_reward[target]) for target, c in collected.items()}
+    points = [point for profile in profiles if profile for point in profile.points]
+    return Timeline(
+        satellites=tuple(
+            _satellite_timeline(problem, plan, positions, slews, earned, profile)
+            for positions, profile in zip(by_satellite, profiles, strict=True)
+        ),
+        violations=tuple(sorted(violations, key=lambda v: (v.at_s, v.satellite, v.code))),
+        reward=float(sum(earned.values())),
+        collected=collected,
+        downlinked=tuple(profile.points[-1].removed if profile else 0.0 for profile in profiles),
+        battery_min=min((p.battery for p in points), default=None),
+        recorder_max=max((p.recorder for p in points), default=None),
+    )
+
+
+def _windows(problem: Problem, plan: Plan) -> list[Violation]:
+    """Each action lies in its access and in the horizon, and has its opportunity's length."""
+    table = problem.opportunities
+    found = []
+    for position, action in enumerate(plan.actions):
+        i = action.opportunity
+        first_s = max(0.0, float(table.access_start_s[i]))
+        last_s = min(problem.horizon_s, float(table.access_end_s[i]))
+        early_s, late_s = first_s - action.start_s, action.end_s - last_s
+        length_s = float(table.end_s[i] - table.start_s[i])
+        is_own_start = problem.continuous_starts and table.kind[i] == COLLECT
+        shift_s = abs(action.start_s - float(table.start_s[i]))
+        if early_s > TIME_TOLERANCE_S:
+            at_s, needed, available = action.start_s, first_s, action.start_s
+            detail = f"It starts {early_s:.3f} s before its access."
+        elif late_s > TIME_TOLERANCE_S:
+            at_s, needed, available = action.end_s, last_s, action.end_s
+            detail = f"It ends {late_s:.3f} s after its access."
+        elif abs(action.end_s - action.start_s - length_s) > TIME_TOLERANCE_S:
+            at_s, needed, available = action.start_s, length_s, action.end_s - action.start_s
+            detail = f"It lasts {available:.3f} s instead of {length_s:.3f} s."
+        elif shift_s > TIME_TOLERANCE_S and not is_own_start:
+            at_s, needed, available = action.start_s, float(table.start_s[i]), action.start_s
+            detail = "It is not one of the scenario's opportunities."
+        else:
+            continue
+        found.append(
+            Violation(code="window", satellite=int(table.satellite[i]), at_s=at_s, needed=needed,
+                      available=available, detail=detail, blamed=(position,))
+        )  # fmt: skip
+    return found
+
+
+def _turns(
+    problem: Problem, plan: Plan, index: int, positions: Sequence[int]
+) -> tuple[list[Violation], dict[int, Slew | None]]:
+    """Tasks of one satellite neither overlap nor follow faster than it turns: C(a, b)."""
+    agility = problem.satellites[index].agility
+    acceleration = agility.acceleration_deg_s2 or INSTANT
+    found: list[Violation] = []
+    slews: dict[int, Slew | None] = {}
+    previous: Action | None = None
+    busy_until: Action | None = None
+    for position in positions:
+        action = plan.actions[position]
+        slews[position] = None
+        if previous is not None and busy_until is not None:
+            angle_deg = angle_between_deg(_looked(problem, previous), _looks(problem, action))
+            needed_s = slew_s(angle_deg, agility.slew_rate_deg_s, acceleration) + agility.settle_s
+            available_s = action.start_s - previous.end_s
+            slews[position] = Slew(angle_deg=angle_deg, needed_s=needed_s, available_s=available_s)
+            gap_s = action.start_s - busy_until.end_s
+            code: ViolationCode | None = None
+            if gap_s < -TIME_TOLERANCE_S:
+                code, needed, available = "overlap", 0.0, gap_s
+                detail = f"It starts {-gap_s:.3f} s before the task ahead of it ends."
+            elif available_s < needed_s - TIME_TOLERANCE_S:
+                code, needed, available = "slew", needed_s, available_s
+                detail = f"The turn of {angle_deg:.2f} deg takes {needed_s:.3f} s."
+            if code is not None:
+                found.append(
+                    Violation(code=code, satellite=index, at_s=action.start_s, needed=needed,
+                              available=available, detail=detail, blamed=(position,))
+                )  # fmt: skip
+        previous = action
+        if busy_until is None or action.end_s > busy_until.end_s:
+            busy_until = action
+    return found, slews
+
+
+def _looks(problem: Problem, action: Action) -> Vector:
+    """Return the line of sight at an action's start."""
+    table, i = problem.opportunities, action.opportunity
+    if abs(action.start_s - table.start_s[i]) <= TIME_TOLERANCE_S:
+        return np.asarray(table.los_start[i])
+    return line_of_sight(problem, i, action.start_s)
+
+
+def _looked(problem: Problem, action: Action) -> Vector:
+    """Return the line of sight at an action's end."""
+    table, i = problem.opportunities, action.opportunity
+    if abs(action.end_s - table.end_s[i]) <= TIME_TOLERANCE_S:
+        return np.asarray(table.los_end[i])
+    return line_of_sight(problem, i, action.end_s)
+
+
+def _stations(problem: Problem, plan: Plan) -> list[Violation]:
+    """Check that no station serves more satellites at a time than it has antennas."""
+    table = problem.opportunities
+    found = []
+    busy: dict[int, list[float]] = {}
+    contacts = [p for p, a in enumerate(plan.actions) if table.kind[a.opportunity] == CONTACT]
+    for position in sorted(contacts, key=lambda p: plan.actions[p]):
+        action = plan.actions[position]
+        station = int(table.place[action.opportunity])
+        ends = busy.setdefault(station, [])
+        while ends and ends[0] <= action.start_s + TIME_TOLERANCE_S:
+            heapq.heappop(ends)
+        antennas = int(problem.station_antennas[station])
+        if len(ends) < antennas:
+            heapq.heappush(ends, action.end_s)
+            continue
+        found.append(
+            Violation(
+                code="station",
+                satellite=int(table.satellite[action.opportunity]),
+                at_s=action.start_s,
+                needed=float(len(ends) + 1),
+                available=float(antennas),
+                detail=f"Station {problem.station_ids[station]} serves another satellite "
+                f"until {ends[0]:.3f} s.",
+                blamed=(position,),
+            )
+        )
+    return found
+
+
+def _limits(
+    problem: Problem, index: int, positions: Sequence[int], profile: Profile
+) -> list[Violation]:
+    """Battery stays strictly above its minimum, recorder strictly below its maximum."""
+    r = problem.satellites[index].resources
+
+    def is_low(point: Point) -> bool:
+        return point.battery <= r.battery_min_fraction
+
+    def is_full(point: Point) -> bool:
+        return point.recorder >= r.recorder_max_fraction
+
+    found = []
+    for code, is_broken, limit in (
+        ("battery", is_low, r.battery_min_fraction),
+        ("recorder", is_full, r.recorder_max_fraction),
+    ):
+        blamed = [
+            (before.time_s, after.time_s, position)
+            for position, before, after in zip(
+                positions, profile.before, profile.after, strict=True
+            )
+            if is_broken(after) or (problem.dynamics == "physical" and is_broken(before))
+        ]
+        for start_s, end_s, worst in _excursions(problem, profile.points, code, limit):
+            found.append(
+                Violation(
+                    code="battery" if code == "battery" else "recorder",
+                    satellite=index,
+                    at_s=start_s,
+                    needed=limit,
+                    available=worst,
+                    detail=f"The {code} reaches {worst:.4f} of its capacity; "
+                    f"the limit is {limit:.4f}.",
+                    blamed=tuple(p for b, a, p in blamed if b <= end_s and a >= start_s),
+                )
+            )
+    return found
+
+
+def _excursions(
+    problem: Problem, points: Sequence[Point], code: str, limit: float
+) -> list[tuple[float, float, float]]:
+    """Return (start, end, worst value) of each stay at or beyond a limit."""
+    values = [p.battery if code == "battery" else p.recorder for p in points]
+    sign = -1.0 if code == "battery" else 1.0
+    found: list[tuple[float, float, float]] = []
+    start_s: float | None = None
+    worst = limit
+    for i, value in enumerate(values):
+        is_broken = sign * (value - limit) >= 0.0
+        if is_broken and start_s is None:
+            start_s, worst = points[i].time_s, value
+            step = value - values[i - 1] if i else 0.0
+            if problem.dynamics == "physical" and step != 0.0:
+                share = (limit - values[i - 1]) / step
+                start_s = points[i - 1].time_s + share * (points[i].time_s - points[i - 1].time_s)
+        elif is_broken:
+            worst = max(worst, value) if sign > 0 else min(worst, value)
+        elif start_s is not None:
+            found.append((start_s, points[i].time_s, worst))
+            start_s = None
+    if start_s is not None:
+        found.append((start_s, points[-1].time_s, worst))
+    return found
+
+
+def _collected(
+    problem: Problem,
+    plan: Plan,
+    blamed: set[int],
+    by_satellite: Sequence[Sequence[int]],
+    profiles: Sequence[Profile | None],
+) -> tuple[dict[int, Collected], list[Violation]]:
+    """Return the first unbroken collect of each target, and a warning for each further one."""
+    table = problem.opportunities
+    is_down = _downlinked(by_satellite, profiles)
+    collected: dict[int, Collected] = {}
+    duplicates = []
+    for position in sorted(range(len(plan.actions)), key=lambda p: plan.actions[p]):
+        action = plan.actions[position]
+        i = action.opportunity
+        if table.kind[i] != COLLECT or position in blamed:
+            continue
+        target, satellite = int(table.place[i]), int(table.satellite[i])
+        if target in collected:
+            duplicates.append(
+                Violation(code="duplicate", satellite=satellite, at_s=action.start_s, needed=1.0,
+                          available=2.0, blamed=(),
+                          detail=f"Target {problem.target_ids[target]} is collected already.")
+            )  # fmt: skip
+            continue
+        collected[target] = Collected(
+            position=position, satellite=satellite, is_downlinked=is_down.get(position, False)
+        )
+    return collected, duplicates
+
+
+def _downlinked(
+    by_satellite: Sequence[Sequence[int]], profiles: Sequence[Profile | None]
+) -> dict[int, bool]:
+    """First in, first out: an image is down once all that was recorded by its end is down."""
+    return {
+        position: after.recorded <= profile.points[-1].removed + _AMOUNT_TOLERANCE
+        for positions, profile in zip(by_satellite, profiles, strict=True)
+        if profile
+        for position, after in zip(positions, profile.after, strict=True)
+    }
+
+
+def _satellite_timeline(
+    problem: Problem,
+    plan: Plan,
+    positions: Sequence[int],
+    slews: Mapping[int, Slew | None],
+    earned: Mapping[int, float],
+    profile: Profile | None,
+) -> SatelliteTimeline:
+    table = problem.opportunities
+    actions: list[JudgedAction] = []
+    free_from_s = 0.0
+    level: Point | None = profile.points[0] if profile else None
+
+    def sun_point(until_s: float, end: Point | None) -> None:
+        if end is not None and until_s > free_from_s + TIME_TOLERANCE_S:
+            actions.append(
+                JudgedAction(mode="sunpoint", start_s=free_from_s, end_s=until_s, opportunity=None,
+                             position=None, slew=None, reward=0.0, battery_end=end.battery,
+                             recorder_end=end.recorder)
+            )  # fmt: skip
+
+    for order, position in enumerate(positions):
+        action = plan.actions[position]
+        level = profile.after[order] if profile else None
+        sun_point(action.start_s, profile.before[order] if profile else None)
+        actions.append(
+            JudgedAction(
+                mode="contact" if table.kind[action.opportunity] == CONTACT else "collect",
+                start_s=action.start_s,
+                end_s=action.end_s,
+                opportunity=action.opportunity,
+                position=position,
+                slew=slews[position],
+                reward=earned.get(position, 0.0),
+                battery_end=level.battery if level else None,
+                recorder_end=level.recorder if level else None,
+            )
+        )
+        free_from_s = max(free_from_s, action.end_s)
+    sun_point(problem.horizon_s, profile.points[-1] if profile else None)
+    if profile is None:
+        return SatelliteTimeline(actions=tuple(actions), resources=None)
+    time_s, battery, recorder = thin(profile.points)
+    return SatelliteTimeline(
+        actions=tuple(actions),
+        resources=Resourceline(time_s=time_s, battery=battery, recorder=recorder),
+    )

@@ -1,0 +1,216 @@
+"""Battery and recorder of one satellite over a plan, integrated for the referee.
+
+Solvers step from task to task with the lumps of ``planner_core.mdp.track``. The referee does not
+trust them: it integrates every second here, piece by piece, in its own way.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from planner_core.problem import (
+    CONTACT,
+    Floats,
+    Problem,
+    SatelliteProblem,
+)
+from planner_core.problem.plan import Action
+
+
+class Point(NamedTuple):
+    """The state at an instant. ``recorded`` and ``removed`` count from the start."""
+
+    time_s: float
+    battery: float
+    recorder: float
+    recorded: float
+    removed: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Profile:
+    """Battery and recorder over the horizon, linear (``physical``) or stepped (``paper``).
+
+    Attributes
+    ----------
+    points
+        In order of time; limits need to be tested at these only.
+    before, after
+        The state in which each action starts, and the one that it leaves.
+    """
+
+    points: tuple[Point, ...]
+    before: tuple[Point, ...]
+    after: tuple[Point, ...]
+
+
+def integrate(problem: Problem, satellite: SatelliteProblem, actions: Sequence[Action]) -> Profile:
+    """Return the resources of ``satellite`` under its own ``actions``, in order of start."""
+    if problem.dynamics == "physical":
+        return _integrate_physical(problem, satellite, actions)
+    return _integrate_events(problem, satellite, actions)
+
+
+def _integrate_physical(
+    problem: Problem, satellite: SatelliteProblem, actions: Sequence[Action]
+) -> Profile:
+    """Integrate over all time: each mode at its power and rate, sun-pointing in between."""
+    r = satellite.resources
+    horizon_s = problem.horizon_s
+    kind = problem.opportunities.kind
+
+    def clip(t_s: float) -> float:
+        return min(max(t_s, 0.0), horizon_s)
+
+    change: dict[float, list[int]] = {0.0: [0, 0, 0], horizon_s: [0, 0, 0]}
+    for action in actions:
+        column = 1 if kind[action.opportunity] == CONTACT else 0
+        change.setdefault(clip(action.start_s), [0, 0, 0])[column] += 1
+        change.setdefault(clip(action.end_s), [0, 0, 0])[column] -= 1
+    for enter_s, exit_s in zip(satellite.sunlight.enter_s, satellite.sunlight.exit_s, strict=True):
+        change.setdefault(clip(float(enter_s)), [0, 0, 0])[2] += 1
+        change.setdefault(clip(float(exit_s)), [0, 0, 0])[2] -= 1
+
+    point = Point(0.0, r.initial_battery_fraction, r.initial_recorder_fraction,
+                  r.initial_recorder_fraction, 0.0)  # fmt: skip
+    points = [point]
+    at = {0.0: point}
+    collects = contacts = sunlit = 0
+    times = sorted(change)
+    for t_s, until_s in itertools.pairwise(times):
+        collects += change[t_s][0]
+        contacts += change[t_s][1]
+        sunlit += change[t_s][2]
+        if collects or contacts:
+            power = -collects * r.collect_drain_per_s - contacts * r.contact_drain_per_s
+        else:
+            power = r.sunpoint_charge_per_s if sunlit else 0.0
+        fill = r.telemetry_per_s + collects * r.collect_fill_per_s
+        drain = contacts * r.downlink_per_s
+        while point.time_s < until_s:
+            point = _advance(point, until_s, power, fill, drain)
+            points.append(point)
+        at[until_s] = point
+    return Profile(
+        points=tuple(points),
+        before=tuple(at[clip(a.start_s)] for a in actions),
+        after=tuple(at[clip(a.end_s)] for a in actions),
+    )
+
+
+def _advance(point: Point, until_s: float, power: float, fill: float, drain: float) -> Point:
+    """Return the state at ``until_s``, or earlier where battery or recorder reach an end stop."""
+    if (power > 0 and point.battery >= 1.0) or (power < 0 and point.battery <= 0.0):
+        power = 0.0
+    net = fill - drain
+    if (net > 0 and point.recorder >= 1.0) or (net < 0 and point.recorder <= 0.0):
+        net = 0.0
+    dt = until_s - point.time_s
+    stop_s = until_s
+    for value, rate in ((point.battery, power), (point.recorder, net)):
+        if rate != 0.0:
+            to_stop_s = ((1.0 if rate > 0 else 0.0) - value) / rate
+            # The last bit of rounding must not leave an endless row of tiny pieces.
+            if to_stop_s < dt - 1e-9:
+                dt = max(to_stop_s, 1e-9)
+                stop_s = point.time_s + dt
+    battery = min(max(point.battery + power * dt, 0.0), 1.0)
+    recorder = min(max(point.recorder + net * dt, 0.0), 1.0)
+    # What did not stay in the recorder was taken down (or, when it is full, lost).
+    removed = fill * dt - (recorder - point.recorder) if drain > 0 else 0.0
+    return Point(
+        stop_s, battery, recorder, point.recorded + fill * dt, point.removed + max(removed, 0.0)
+    )
+
+
+def _integrate_events(
+    problem: Problem, satellite: SatelliteProblem, actions: Sequence[Action]
+) -> Profile:
+    """Walk the authors' events: every opportunity's start, taken or sun-pointed towards."""
+    r = satellite.resources
+    taken: dict[int, list[int]] = {}
+    for position, action in enumerate(actions):
+        event = int(satellite.event[problem.local_row[action.opportunity]])
+        taken.setdefault(event, []).append(position)
+    sunlit_s: Floats = satellite.sunlight.seconds_until(satellite.event_s)
+    point = Point(0.0, r.initial_battery_fraction, r.initial_recorder_fraction,
+                  r.initial_recorder_fraction, 0.0)  # fmt: skip
+    points = [point]
+    before = [point] * len(actions)
+    after = [point] * len(actions)
+    previous_sunlit_s = 0.0
+    for event in range(len(satellite.event_s)):
+        t_s = float(satellite.event_s[event])
+        telemetry = r.telemetry_per_s * (t_s - point.time_s)
+        if event not in taken:
+            charge = r.sunpoint_charge_per_s * (float(sunlit_s[event]) - previous_sunlit_s)
+            point = Point(
+                t_s,
+                min(1.0, point.battery + charge),
+                min(1.0, point.recorder + telemetry),
+                point.recorded + telemetry,
+                point.removed,
+            )
+        for position in taken.get(event, ()):
+            before[position] = point
+            point = _book(point, problem, satellite, actions[position], t_s, telemetry)
+            after[position] = point
+            telemetry = 0.0
+        previous_sunlit_s = float(sunlit_s[event])
+        points.append(point)
+    return Profile(points=tuple(points), before=tuple(before), after=tuple(after))
+
+
+def _book(
+    point: Point,
+    problem: Problem,
+    satellite: SatelliteProblem,
+    action: Action,
+    t_s: float,
+    telemetry: float,
+) -> Point:
+    """Book a whole task at its start, with the telemetry since the event before."""
+    r = satellite.resources
+    duration_s = action.end_s - action.start_s
+    if problem.opportunities.kind[action.opportunity] == CONTACT:
+        held = point.recorder + telemetry
+        removed = min(held, r.downlink_per_s * duration_s)
+        return Point(
+            t_s,
+            max(0.0, point.battery - r.contact_drain_per_s * duration_s),
+            min(1.0, held - removed),
+            point.recorded + telemetry,
+            point.removed + removed,
+        )
+    filled = telemetry + r.collect_fill_per_s * duration_s
+    return Point(
+        t_s,
+        max(0.0, point.battery - r.collect_drain_per_s * duration_s),
+        min(1.0, point.recorder + filled),
+        point.recorded + filled,
+        point.removed,
+    )
+
+
+def thin(points: Sequence[Point]) -> tuple[Floats, Floats, Floats]:
+    """Return time, battery and recorder without points that lie on a line or repeat."""
+    table = np.array([(p.time_s, p.battery, p.recorder) for p in points])
+    keep = np.ones(len(table), dtype=np.bool_)
+    last = 0
+    for i in range(1, len(table) - 1):
+        span = table[i + 1, 0] - table[last, 0]
+        if span <= 0.0:
+            last = i
+            continue
+        share = (table[i, 0] - table[last, 0]) / span
+        line = table[last, 1:] + share * (table[i + 1, 1:] - table[last, 1:])
+        if np.all(np.abs(line - table[i, 1:]) < 1e-9):
+            keep[i] = False
+        else:
+            last = i
+    return table[keep, 0], table[keep, 1], table[keep, 2]

@@ -1,1 +1,0 @@
-"""Plans whose collects start when it suits: insertion, and a search over windows of the plan."""

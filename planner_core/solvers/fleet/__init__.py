@@ -1,1 +1,0 @@
-"""Planning many satellites together: prices that they share, and a search that heeds them."""

@@ -1,1 +1,0 @@
-"""Planning without resources: prices, window search, cutting planes and the proof."""

@@ -1,0 +1,271 @@
+"""Monte Carlo tree search (Alg. 2): sample futures, and go where they turn out well."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import ClassVar, Final, Literal
+
+import numpy as np
+
+from planner_core.budget import Budget
+from planner_core.certified.lns.search import polished
+from planner_core.draws import draws_of
+from planner_core.mdp.model import (
+    IMAGE_NEEDS,
+    WAIT,
+    Guidance,
+    counts_as_made,
+)
+from planner_core.mdp.track import NO_TASK
+from planner_core.problem import Floats, Problem
+from planner_core.solvers.base import (
+    BreadthCounts,
+    Constraint,
+    ContactCounts,
+    Feasibility,
+    ImageNeeds,
+    Solution,
+)
+from planner_core.solvers.mcts_choices import Rules
+from planner_core.solvers.mcts_simulate import Path, search, sunpoint_instead
+from planner_core.solvers.mcts_successors import no_successors
+from planner_core.solvers.mcts_tree import (
+    UNSEEN,
+    Tree,
+    copy_branch,
+    empty_tree,
+    new_node,
+)
+from planner_core.solvers.sequential import Turn, plan_in_turn
+from planner_core.solvers.walk import contact_above_metadata
+
+MAX_ACTIONS: Final = 10_000_000
+"""Actions in a tree: 20 bytes each, and two trees."""
+
+
+def _described(text: str, **limits: float) -> dict[str, object]:
+    return {**limits, "description": text}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mcts:
+    """Sample sequences of actions from each state, steered by upper confidence bounds."""
+
+    name: ClassVar[str] = "mcts"
+    title: ClassVar[str] = "SMDP Monte Carlo tree search"
+    paper: ClassVar[str] = "Algorithm 2, section Solution Methods"
+    exact: ClassVar[bool] = False
+    honours: ClassVar[frozenset[Constraint]] = frozenset(Constraint) - {Constraint.DUPLICATE}
+
+    num_simulations: int = field(
+        default=500,
+        metadata=_described("Simulations per step (N_sim max).", minimum=1, maximum=1_000_000),
+    )
+    depth: int = field(
+        default=100,
+        metadata=_described("Actions of a simulation (d_solve).", minimum=1, maximum=1000),
+    )
+    exploration: float = field(
+        default=30.0, metadata=_described("Weight c of the upper confidence bound.", minimum=0)
+    )
+    breadth: int = field(
+        default=8,
+        metadata=_described("Tasks in A(s), the first in time (N_a max).", minimum=1, maximum=1000),
+    )
+    breadth_counts: BreadthCounts = field(
+        default="tasks",
+        metadata=_described(
+            "tasks: A(s) has breadth tasks (the paper); one_more: one more than that "
+            "(the authors' code, which stops after the limit)."
+        ),
+    )
+    gamma: float = field(
+        default=0.9999,
+        metadata=_described("Discount, see discount.", exclusiveMinimum=0, maximum=1),
+    )
+    discount: Literal["per_second", "per_decision"] = field(
+        default="per_second",
+        metadata=_described(
+            "per_second: gamma to the elapsed time (the paper); "
+            "per_decision: gamma at each action (the authors' code)."
+        ),
+    )
+    returns: Literal["with_reward", "literal"] = field(
+        default="with_reward",
+        metadata=_described(
+            "with_reward: an action's own reward is part of its value; "
+            "literal: line 14 of the listing, which leaves it out."
+        ),
+    )
+    backup: Literal["mean", "max"] = field(
+        default="max",
+        metadata=_described("Value of an action: the mean of its samples (the paper) or the best."),
+    )
+    rollout: Literal["random", "greedy"] = field(
+        default="greedy",
+        metadata=_described("random: any of A(s) (the paper); greedy: what the rule would take."),
+    )
+    keep_incumbent: bool = field(
+        default=True,
+        metadata=_described("Follow the best sequence sampled so far; the paper does not."),
+    )
+    unimaged_only: bool = field(
+        default=True,
+        metadata=_described(
+            "Leave targets that are already imaged out of A(s); the paper keeps them in."
+        ),
+    )
+    feasibility: Feasibility = field(
+        default="hard",
+        metadata=_described(
+            "hard: only actions that keep every limit; "
+            "penalty: the paper's soft form, where a broken limit costs reward (Table 2)."
+        ),
+    )
+    worthless: Literal["take", "sunpoint"] = field(
+        default="take",
+        metadata=_described(
+            "What to do when the chosen action's own reward is not positive. take: that action "
+            "(the paper); sunpoint: let it pass (the authors' code)."
+        ),
+    )
+    contact_counts: ContactCounts = field(
+        default="duration",
+        metadata=_described(
+            "What a second of contact_reward_per_s is. duration: of the contact "
+            "(the authors' code); wait: of the time until it starts (the paper's equation)."
+        ),
+    )
+    image_needs: ImageNeeds = field(
+        default="nothing",
+        metadata=_described(
+            "What an image needs to count as made. limits: battery and recorder "
+            "within theirs (the paper); room: room on board (the authors' code); nothing. "
+            "Matters where feasibility is penalty."
+        ),
+    )
+    contact_reward_per_s: float = field(
+        default=1e-3,
+        metadata=_described("Guidance per second of contact (Table 2: 0.1).", minimum=0),
+    )
+    sunpoint_reward_per_s: float = field(
+        default=1e-4,
+        metadata=_described("Guidance per second of sun-pointing (Table 2).", minimum=0),
+    )
+    penalty: float = field(
+        default=1e4,
+        metadata=_described("Guidance lost for each broken limit (Table 2).", minimum=0),
+    )
+    contact_above_fraction: float = field(
+        default=0.0,
+        metadata=contact_above_metadata(
+            "0, the paper's, has every contact in A(s); rollouts heed 0.45 in any case."
+        ),
+    )
+
+    window_moves_per_task: float = field(
+        default=0.5,
+        metadata=_described(
+            "Moves of a window search on the finished plan, for each access; without "
+            "resources only. The paper has none.",
+            minimum=0,
+            maximum=1000,
+        ),
+    )
+
+    def solve(self, problem: Problem, budget: Budget, seed: int) -> Solution:
+        """Return the plan; the same one for the same seed."""
+
+        def plan_turn(turn: Turn) -> list[int]:
+            return self._plan_turn(turn, problem.target_reward, budget, seed)
+
+        solution = plan_in_turn(problem, budget, plan_turn)
+        return polished(problem, solution, self.window_moves_per_task, budget)
+
+    def _plan_turn(self, turn: Turn, target_reward: Floats, budget: Budget, seed: int) -> list[int]:
+        track, collected = turn.track, turn.collected
+        guidance = Guidance(
+            gamma=self.gamma,
+            contact_reward_per_s=self.contact_reward_per_s,
+            sunpoint_reward_per_s=self.sunpoint_reward_per_s,
+            penalty=self.penalty,
+            is_contact_by_wait=self.contact_counts == "wait",
+            image_needs=IMAGE_NEEDS.index(self.image_needs),
+        )
+        rules = Rules(
+            depth=self.depth,
+            breadth=self.breadth + (self.breadth_counts == "one_more"),
+            exploration=self.exploration,
+            is_hard=self.feasibility == "hard",
+            unimaged_only=self.unimaged_only,
+            is_per_decision=self.discount == "per_decision",
+            is_literal=self.returns == "literal",
+            is_greedy=self.rollout == "greedy",
+            is_max_backup=self.backup == "max",
+            contact_above=self.contact_above_fraction,
+        )
+        # A state stays in the tree for at most ``depth`` steps, so no more ever hang together.
+        # Where that is more than memory should hold, the rest is sampled by rollouts alone.
+        num_nodes = min(
+            self.num_simulations * (self.depth + 1) + 2, MAX_ACTIONS // (rules.breadth + 1)
+        )
+        num_nodes += rules.breadth + 3
+        num_edges = (num_nodes + 2) * (rules.breadth + 1) + 2
+        trees = [empty_tree(num_nodes, num_edges) for _ in range(2)]
+        tree, spare = trees
+        new_node(tree, NO_TASK, NO_TASK, track.battery_start, track.recorder_start)
+        # Without resources alone A(s) hangs on the last task only.
+        successors = no_successors(
+            0 if track.use_resources else len(track.start_s), collected.copy()
+        )
+        random = draws_of(seed)
+        path = Path(
+            edge=np.empty(self.depth, dtype=np.int32),
+            action=np.empty(self.depth, dtype=np.int32),
+            image=np.empty(self.depth, dtype=np.int32),
+            reward=np.empty(self.depth),
+            discount=np.empty(self.depth),
+            options=np.empty(rules.breadth + 1, dtype=np.int32),
+        )
+        best, best_actions = np.full(1, -np.inf), np.full(self.depth, NO_TASK, dtype=np.int32)
+        taken: list[int] = []
+        reward = 0.0
+        while not budget.is_spent():
+            edge = search(
+                tree, track, rules, guidance, successors, target_reward, collected, random,
+                path, self.num_simulations, budget.stop, best, best_actions,
+            )  # fmt: skip
+            if edge == UNSEEN or budget.is_spent():
+                break
+            if self.keep_incumbent:
+                edge = _edge_of(tree, int(best_actions[0]), edge)
+            if self.worthless == "sunpoint":
+                edge = sunpoint_instead(
+                    tree, track, rules, guidance, target_reward, collected, edge
+                )
+            action = int(tree.action[edge])
+            child = int(tree.child[edge])
+            if action != WAIT:
+                taken.append(action)
+                place = track.place[action]
+                levels = float(tree.battery[child]), float(tree.recorder[child])
+                if (
+                    not track.is_contact[action]
+                    and not collected[place]
+                    and (self.image_needs == "nothing" or counts_as_made(track, guidance, *levels))
+                ):
+                    collected[place] = successors.imaged[place] = 1
+                    reward += float(target_reward[place])
+            best[0] = -np.inf
+            copy_branch(tree, spare, child)
+            tree, spare = spare, tree
+            turn.report((int(tree.cursor[0]) + 1) / len(track.start_s), reward)
+        return taken
+
+
+def _edge_of(tree: Tree, action: int, otherwise: int) -> int:
+    first = int(tree.first_edge[0])
+    for edge in range(first, first + int(tree.num_edges[0])):
+        if tree.action[edge] == action and tree.visits[edge] > 0:
+            return edge
+    return otherwise

@@ -1,1 +1,0 @@
-"""The planning problem as a mixed-integer linear program, and HiGHS to solve it."""

@@ -1,0 +1,37 @@
+"""The solvers, one module each. A new solver joins the tuple below."""
+
+from __future__ import annotations
+
+from planner_core.certified.solver import Certified
+from planner_core.errors import UnknownSolver
+from planner_core.solvers.base import Solver
+from planner_core.solvers.forward_search import ForwardSearch
+from planner_core.solvers.graph import Graph
+from planner_core.solvers.mcts import Mcts
+from planner_core.solvers.milp import Milp
+from planner_core.solvers.rule import Rule
+
+__all__ = ["SOLVERS", "Certified", "ForwardSearch", "Graph", "Mcts", "Milp", "Rule", "solver_class"]
+
+SOLVERS: dict[str, type[Solver]] = {
+    solver.name: solver for solver in (Rule, Graph, ForwardSearch, Mcts, Milp, Certified)
+}
+"""Every solver by its name in the API."""
+
+
+def solver_class(name: str) -> type[Solver]:
+    """Return the solver of that name.
+
+    Raises
+    ------
+    UnknownSolver
+        Where there is none.
+    """
+    if name not in SOLVERS:
+        known = ", ".join(sorted(SOLVERS))
+        raise UnknownSolver(
+            "unknown_solver",
+            f"No solver is called {name!r}; there are: {known}.",
+            pointer="/solver",
+        )
+    return SOLVERS[name]
