@@ -72,7 +72,15 @@ def compare(
     return comparison
 
 
-@pytest.mark.parametrize(("nadir", "num_targets"), [("geocentric", 3600), ("geodetic", 800)])
+@pytest.mark.parametrize(
+    ("nadir", "num_targets"),
+    [
+        ("geocentric", 400),
+        ("geodetic", 400),
+        pytest.param("geocentric", 3600, marks=pytest.mark.full_size),
+        pytest.param("geodetic", 800, marks=pytest.mark.full_size),
+    ],
+)
 def test_the_paper_orbit_over_real_targets(
     shared_data: Path, nadir: Nadir, num_targets: int
 ) -> None:

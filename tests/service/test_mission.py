@@ -27,6 +27,7 @@ from tests.missions import (
     landsat_targets,
     paper_mission,
 )
+from tests.patience import PATIENCE_S, wait_until
 
 FINAL = ("succeeded", "failed", "cancelled", "expired")
 LONG = {"depth": 9, "breadth": 5}
@@ -56,8 +57,9 @@ class Service:
             self.post("/v1/jobs", {"scenario_id": scenario_id, "solver": solver, **more})["id"]
         )
 
-    def until(self, job_id: str, *states: str, within_s: float = 60.0) -> Document:
-        deadline_s = time.monotonic() + within_s
+    def until(self, job_id: str, *states: str) -> Document:
+        """Return the job as soon as it is in one of these states."""
+        deadline_s = time.monotonic() + PATIENCE_S
         while True:
             job: Document = self.get(f"/v1/jobs/{job_id}")
             if job["state"] in states:
@@ -80,15 +82,9 @@ class Service:
         children = psutil.Process(self.process.pid).children()
         return [c for c in children if "service.jobs" in c.cmdline()]
 
-    def busy_worker(self, within_s: float = 60.0) -> psutil.Process:
-        """Return the worker that has a job's process, a child of its fork server."""
-        deadline_s = time.monotonic() + within_s
-        while True:
-            for worker in self.workers():
-                if any(child.children() for child in worker.children()):
-                    return worker
-            assert time.monotonic() < deadline_s, "no worker has a job's process"
-            time.sleep(0.05)
+    def busy_workers(self) -> list[psutil.Process]:
+        """Return the workers that have a job's process, a child of their fork server."""
+        return [w for w in self.workers() if any(child.children() for child in w.children())]
 
 
 @pytest.fixture(scope="module")
@@ -105,7 +101,7 @@ def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
     yield running
     running.http.close()
     process.terminate()
-    assert process.wait(30) == 0
+    assert process.wait(PATIENCE_S) == 0
     process.stdout.close()
 
 
@@ -167,7 +163,9 @@ def test_a_job_whose_worker_is_killed_finishes_once_within_a_minute(service: Ser
         scenario["id"], "forward_search", params=LONG, limits={"time_s": 8, "memory_mb": 2048}
     )
     service.until(job_id, "running")
-    service.busy_worker().send_signal(signal.SIGKILL)
+    wait_until(service.busy_workers)
+    (worker,) = service.busy_workers()
+    worker.send_signal(signal.SIGKILL)
     job = service.until(job_id, *FINAL)
     assert (job["state"], job["attempt"]) == ("succeeded", 2), job
     assert job["termination"] == "time_limit"
@@ -177,10 +175,7 @@ def test_a_job_whose_worker_is_killed_finishes_once_within_a_minute(service: Ser
 def test_cancelling_a_running_job_takes_two_seconds_and_keeps_the_plan(service: Service) -> None:
     scenario = post_mission(service, drawn_targets(300, seed=2))
     job_id = service.submit(scenario["id"], "forward_search", params={"depth": 8, "breadth": 4})
-    deadline_s = time.monotonic() + 60
-    while not (service.get(f"/v1/jobs/{job_id}")["progress"] or {}).get("reward"):
-        assert time.monotonic() < deadline_s
-        time.sleep(0.05)
+    wait_until(lambda: (service.get(f"/v1/jobs/{job_id}")["progress"] or {}).get("reward"))
     began_s = time.monotonic()
     assert service.http.post(f"/v1/jobs/{job_id}/cancel").status_code == 202
     job = service.until(job_id, "cancelled")

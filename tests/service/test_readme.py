@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 
+from tests.patience import PATIENCE_S
 from tests.service.factories import tle
 from tests.service.serving import serving
 
 ROOT = Path(__file__).resolve().parents[2]
-WITHIN_S = 120.0
 OWN_FILES = {
     "satellites.tle": ["EYE", *tle(90100)],
     "targets.csv": ["id,lat_deg,lon_deg", "bern,46.948,7.447", "quito,-0.22,-78.51"],
@@ -50,7 +50,7 @@ def _output(page: str, tmp_path: Path) -> str:
             env=os.environ | {"PYTHONPATH": str(ROOT)},
             capture_output=True,
             text=True,
-            timeout=WITHIN_S,
+            timeout=PATIENCE_S,
             check=False,
         )
     assert ran.returncode == 0, ran.stderr
