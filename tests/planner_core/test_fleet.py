@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget, Termination
@@ -20,6 +20,7 @@ from planner_core.problem import Problem
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
 from planner_core.solvers.registry import Certified, Milp
+from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import random_problem
 
@@ -44,7 +45,7 @@ def searched(problem: Problem, budget: Budget, seed: int) -> FleetSearch:
     return search
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(
     seed=SEEDS, num_satellites=st.integers(2, 4), has_rewards=st.booleans(),
     num_offers=st.integers(1, 2), slew_rate_deg_s=st.sampled_from([1.0, 0.3]),
@@ -71,7 +72,7 @@ def test_small_fleets_are_planned_as_brute_force_does(
         assert replay(problem, solution.plan).reward == pytest.approx(best)
 
 
-@settings(max_examples=15, deadline=None)
+@examples(15)
 @given(seed=SEEDS, slew_rate_deg_s=st.sampled_from([1.0, 0.3]))
 def test_the_plan_is_the_same_however_many_threads_work(seed: int, slew_rate_deg_s: float) -> None:
     problem = fleet(seed, slew_rate_deg_s)
