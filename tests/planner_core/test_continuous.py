@@ -6,14 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget, Termination
 from planner_core.certified.drivers.continuous import solve_continuous, with_own_starts
 from planner_core.certified.lns.continuous_search import ContinuousSearch
 from planner_core.certified.proofs import documents as proofs
-from planner_core.certified.proofs.continuous import ContinuousDual, accessible, continuous_value
+from planner_core.certified.proofs.bound import accessible
+from planner_core.certified.proofs.continuous import ContinuousDual, continuous_value
 from planner_core.domain import Agility
 from planner_core.precedence.earliest_starts import follows_at_s
 from planner_core.precedence.time_windows import spans_of, view_of
@@ -27,6 +28,7 @@ from planner_core.problem import (
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
 from planner_core.solvers.registry import SOLVERS, Certified, Rule
+from tests.examples import examples
 from tests.planner_core.flat_earth import flat_problem
 
 SEEDS = st.integers(0, 10**6)
@@ -62,7 +64,7 @@ def best_reward(problem: Problem) -> float:
     return best
 
 
-@settings(max_examples=25, deadline=None)
+@examples(25)
 @given(seed=SEEDS, agility=AGILITIES, num_satellites=st.integers(1, 3), has_rewards=st.booleans(),
        spacing_s=st.sampled_from([None, 40.0]))  # fmt: skip
 def test_plans_are_valid_no_worse_than_they_began_and_below_the_bound(
@@ -85,7 +87,7 @@ def test_plans_are_valid_no_worse_than_they_began_and_below_the_bound(
     assert replay(problem, filled.plan).reward >= replay(problem, rule.plan).reward
 
 
-@settings(max_examples=40, deadline=None)
+@examples(40)
 @given(
     seed=SEEDS, rate=st.sampled_from([1.0, 2.0]), settle_s=st.sampled_from([0.0, 6.0]),
     has_rewards=st.booleans(), width_s=st.sampled_from([2.5, 7.0, 25.0]),
@@ -124,7 +126,7 @@ def test_small_problems_end_at_the_optimum_and_most_are_proven() -> None:
     assert proven >= 15
 
 
-@settings(max_examples=15, deadline=None)
+@examples(15)
 @given(seed=SEEDS, num_satellites=st.integers(1, 2))
 def test_the_best_plan_on_a_grid_stays_below_the_bound(seed: int, num_satellites: int) -> None:
     problem = flat_problem(
@@ -192,7 +194,7 @@ def test_a_satellite_slower_than_its_lines_of_sight_has_the_bound_of_all_targets
     assert continuous_value(slow, np.zeros(10)) == accessible(slow).value
 
 
-@settings(max_examples=30, deadline=None)
+@examples(30)
 @given(seed=SEEDS)
 def test_pins_hold_and_blocked_intervals_stay_empty(seed: int) -> None:
     """Accesses around a blocked interval may be used on either side of it."""

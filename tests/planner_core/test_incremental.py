@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.certified.multipliers.incremental import incremental_prices
@@ -17,6 +17,7 @@ from planner_core.certified.proofs.lagrangian import lagrangian_bound, lagrangia
 from planner_core.domain import Agility
 from planner_core.precedence.network import network_of
 from planner_core.problem import Floats, Problem
+from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import random_problem
 
@@ -44,7 +45,7 @@ def best_known(problem: Problem) -> float:
     return improve_prices(network, worth, most, 0.5 * most, 0.0, 3000, GO_ON)
 
 
-@settings(max_examples=80, deadline=None)
+@examples(80)
 @given(
     seed=SEEDS, num_satellites=st.integers(2, 3), has_rewards=st.booleans(),
     slew_rate_deg_s=st.sampled_from([1.0, 0.3]), num_epochs=st.sampled_from([0, 1, 7, 60]),

@@ -76,7 +76,7 @@ class ProgramSearch:
         self._is_promising = usage > 0.0
         self._rng = np.random.default_rng(seed)
         self._work = self._steps()
-        self.steps_beside = next(self._work)
+        self.steps_beside = next(self._work, 1)
 
     def turn(self) -> None:
         """Draw sets of contacts, see what some are worth, or solve a program with one."""

@@ -59,3 +59,10 @@ def rounded_bound(problem: Problem, value: float, reward: float) -> float:
     if unit > 0.0:
         safe = float(np.floor((safe + _ROUNDING) / unit) * unit)
     return max(safe, reward)
+
+
+def accessible(problem: Problem) -> Bound:
+    """Return the bound that every accessible target is imaged: prices of its best worth."""
+    prices = problem.best_worth
+    value = rounded_bound(problem, float(prices.sum()), 0.0)
+    return Bound(value=value, proof="lagrangian", prices=prices)

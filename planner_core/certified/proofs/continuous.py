@@ -25,7 +25,7 @@ from planner_core.certified.dp.start_labels import (
     heaviest,
     labels_of,
 )
-from planner_core.certified.proofs.bound import Bound, rounded_bound
+from planner_core.certified.proofs.bound import Bound, accessible
 from planner_core.certified.proofs.totals import totals_bound
 from planner_core.precedence.time_windows import (
     Spans,
@@ -55,13 +55,6 @@ _KEPT: Final = 0.85  # of the mean of prices, from round to round
 _CLEAR_S: Final = 60.0
 _LONGEST_S: Final = 15_000.0
 _TOLD: Final = 14
-
-
-def accessible(problem: Problem) -> Bound:
-    """Return the bound that every accessible target is imaged: prices of its best worth."""
-    prices = problem.best_worth
-    value = rounded_bound(problem, float(prices.sum()), 0.0)
-    return Bound(value=value, proof="lagrangian", prices=prices)
 
 
 def quick_bound(problem: Problem) -> Bound:
