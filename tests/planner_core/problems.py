@@ -106,8 +106,7 @@ def make_problem(
     whole = Sunlight(enter_s=np.array([0.0]), exit_s=np.array([horizon_s]))
     reward = column(rewards if rewards is not None else [1.0] * num_targets, num_targets)
     quality = column([t.quality for t in ordered])
-    is_collect = table.kind == COLLECT
-    worth = np.where(is_collect, reward[np.where(is_collect, table.place, 0)] * quality, 0.0)
+    worth = _worth(table, reward, quality)
     seen = set(table.place[table.kind == COLLECT].tolist())
     return Problem(
         horizon_s=horizon_s,
@@ -140,11 +139,15 @@ def make_problem(
 
 def with_rewards(problem: Problem, rewards: Sequence[float] | npt.NDArray[np.number]) -> Problem:
     """Return the problem with other rewards of its targets, which all their collects earn."""
-    table = problem.opportunities
-    is_collect = table.kind == COLLECT
-    reward = np.array(rewards, dtype=np.float64)
-    worth = np.where(is_collect, reward[np.where(is_collect, table.place, 0)], 0.0)
-    return replace(problem, worth=worth)
+    reward, n = np.array(rewards, dtype=np.float64), len(problem.opportunities)
+    return replace(problem, worth=_worth(problem.opportunities, reward, np.ones(n)))
+
+
+def _worth(table: Opportunities, reward: Floats, quality: Floats) -> Floats:
+    worth = np.zeros(len(table))
+    collects = table.kind == COLLECT
+    worth[collects] = reward[table.place[collects]] * quality[collects]
+    return worth
 
 
 def random_problem(
