@@ -89,9 +89,7 @@ class Milp:
     def solve(self, problem: Problem, budget: Budget, seed: int) -> Solution:
         """Return the best plan; the same one for the same seed where the budget suffices."""
         if self.formulation == "antichain" and is_free(problem):
-            effort = Effort(
-                moves_per_task=self.moves_per_task, max_rounds=self.cut_rounds, max_parts=0
-            )
+            effort = Effort(moves_per_task=self.moves_per_task, max_rounds=self.cut_rounds)
             return solve_without_resources(problem, budget, seed, self.gap, effort)
         best = Incumbent(problem, budget, self.gap, bound=Bound(value=np.inf, proof="milp"))
         for plan in _starts(problem, budget):

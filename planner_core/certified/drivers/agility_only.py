@@ -8,21 +8,21 @@ smaller, for the search as well as for the proof.
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from planner_core.budget import Budget
 from planner_core.certified.dp.elementary import memory_of
-from planner_core.certified.incumbent import Incumbent
+from planner_core.certified.incumbent import Incumbent, is_optimal
 from planner_core.certified.lns.search import WindowSearch
 from planner_core.certified.mip.model import plan_program
 from planner_core.certified.mip.program import Program
 from planner_core.certified.mip.prover import Prover
 from planner_core.certified.mip.restricted_master import Master
 from planner_core.certified.multipliers.elementary import ElementaryPrices
-from planner_core.certified.proofs.bound import Bound
+from planner_core.certified.proofs.bound import Bound, accessible, rounded_bound
 from planner_core.certified.proofs.certificate import (
     Certificate,
     Multipliers,
@@ -42,7 +42,6 @@ from planner_core.problem import (
 from planner_core.problem.plan import Plan
 from planner_core.problem.restrict import restricted
 from planner_core.solvers.base import Solution
-from planner_core.solvers.graph import Graph
 from planner_core.solvers.rule import Rule
 
 MOST_PAIRS: Final = 8_000_000
@@ -51,10 +50,7 @@ MOST_PAIRS: Final = 8_000_000
 _STALLED: Final = 0.02  # of the gap, in _PATIENCE rounds of cuts
 _PATIENCE: Final = 12
 _WANTED: Final = 1e-3
-_NODE_ROUNDS: Final = 12
 _MAX_NODES: Final = 50  # of HiGHS, among the tasks that a relaxation takes
-_POLISH: Final = 50.0
-_POLISHED: Final = (1, 4)  # rounds
 _ROUNDED_OFF: Final = 8  # this round, and when cutting planes lead no further
 _REPORT_EVERY_S: Final = 0.25
 _SHARE: Final = 0.1  # moves for each task, where prices of passes take turns with them
@@ -73,13 +69,10 @@ class Effort:
         Moves of the window search for each opportunity.
     max_rounds
         Rounds of cutting planes.
-    max_parts
-        Parts into which the plans are split for the proof; beyond ten HiGHS is faster.
     """
 
     moves_per_task: float = 30.0
     max_rounds: int = 200
-    max_parts: int = 10
 
 
 class FreeSearch:
@@ -89,8 +82,6 @@ class FreeSearch:
         self.best, self.problem, self.budget = best, best.problem, best.budget
         self.seed = seed
         self.steps = [Multipliers(prices=self.problem.best_worth)]
-        self.tree: Refutation | None = None
-        self.num_parts = 0
         self.is_transitive = is_transitive(self.problem)
         self._rows = np.arange(len(self.problem.opportunities), dtype=np.int32)
         self._rest = self.problem
@@ -100,7 +91,8 @@ class FreeSearch:
         self._window_rows: Ints = self._rows[:0]
         self._network = network_of(self.problem)
         self._prices: ElementaryPrices | None = None
-        self.through: Floats = np.full(len(self._rows), best.bound.value)
+        self._certified = accessible(self.problem).value
+        self.through: Floats = np.full(len(self._rows), self._certified)
 
     @property
     def refuted(self) -> float:
@@ -109,6 +101,8 @@ class FreeSearch:
 
     def lower(self, value: float) -> None:
         """Note that no plan is worth more, by the steps and what they refute."""
+        known = rounded_bound(self.problem, value, self.best.reward)
+        self._certified = min(self._certified, known)
         self.best.lower(Bound(value=value, proof="lagrangian"))
 
     def step(self, step: Multipliers) -> None:
@@ -116,16 +110,14 @@ class FreeSearch:
         total, through = values_through(
             self.problem, self._network, self._rows, step, ~self.is_struck
         )
-        before = self.best.bound.value
+        before = self._certified
         # Plans that hold what is struck out are worth less than a better one.
         self.lower(max(total, self.refuted))
         by_row = np.empty(len(self._rows))
         by_row[self._network.row] = through
         lower = np.minimum(self.through, by_row)
         # What is not kept must not be built upon.
-        if self.best.bound.value < before or np.any(
-            is_below(lower, self.best.better) > self.is_struck
-        ):
+        if self._certified < before or np.any(is_below(lower, self.best.better) > self.is_struck):
             self.steps.append(step)
             self.through = lower
 
@@ -202,12 +194,6 @@ class FreeSearch:
         """Return the tasks that a plan worth this much can hold."""
         return self._rows[~is_below(self.through, amount)]
 
-    def polish(self, taken: Floats) -> None:
-        """Search windows among the tasks that a relaxation takes, in part."""
-        rows = self._rows[taken > _WANTED]
-        while self.search(_POLISH, rows) and not self.best.is_done:
-            pass
-
     def cut(self, max_rounds: int) -> Master:
         """Price with cutting planes until that leads no further; return the relaxation."""
         self.shrink()
@@ -221,9 +207,6 @@ class FreeSearch:
             self.step(master.multipliers())
             self.best.report("cutting planes")
             bounds.append(master.value)
-            if number in _POLISHED and not self.best.is_done:
-                self.polish(taken)
-                self.best.report("window search")
             if number == _ROUNDED_OFF and not self.best.is_done:
                 self.round_off(master, taken)
             if self.best.is_done:
@@ -287,75 +270,23 @@ class FreeSearch:
             self._reported_s = now_s
             self.best.report("HiGHS searches")
 
-    def refutation(self) -> Refutation:
-        """Return why no plan is worth more than the bound."""
-        if self.tree is None:
-            return Refutation(steps=tuple(self.steps))
-        return Refutation(steps=(*self.steps, *self.tree.steps), branch=self.tree.branch)
-
-    def branch(self, master: Master, max_parts: int) -> None:
-        """Split the plans by what they take until all parts are refuted."""
-        tree = self._part(master, ~self.is_struck, max_parts)
-        if tree is not None:
-            self.tree = tree
-            self.lower(self.refuted)
-
-    def _part(self, master: Master, is_open: Bools, max_parts: int) -> Refutation | None:
-        """Return why no plan of the open tasks is better; None where that takes too long."""
-        steps, values = [], []
-        while True:
-            master.allow(is_open)
-            taken = master.relaxed()
-            if taken is None:
-                return None
-            steps.append(master.multipliers())
-            total, through = values_through(
-                self.problem, self._network, self._rows, steps[-1], is_open
-            )
-            if is_below(total, self.best.better):
-                return Refutation(steps=tuple(steps))
-            values.append(total)
-            by_row = np.empty(len(is_open))
-            by_row[self._network.row] = through
-            is_open = is_open & ~is_below(by_row, self.best.better)
-            loss = np.minimum(taken, 1.0 - taken)
-            if loss.max() < _WANTED and self.best.offer(
-                Plan.of(self.problem, self._rows[taken > 0.5])
-            ):
-                continue
-            is_slow = len(values) > 1 and values[-2] - total < 0.1 * (total - self.best.better)
-            if is_slow or len(values) == _NODE_ROUNDS or not master.cut(taken, with_odd_sets=True):
-                break
-        at = master.decisive(taken)
-        self.num_parts += 1
-        if self.best.is_done or self.num_parts == max_parts:
-            return None
-        self.best.report(f"{self.num_parts} parts")
-        first = self._part(master, is_open & ~master.excluded_by(at), max_parts)
-        if first is None or self.best.is_done:
-            return None
-        others = is_open.copy()
-        others[at] = False
-        second = self._part(master, others, max_parts)
-        if second is None:
-            return None
-        return Refutation(steps=tuple(steps), branch=(int(self._rows[at]), first, second))
-
     def solution(self) -> Solution:
         """Return the plan with what is known of it."""
         bound = self.best.bound
-        if bound.proof == "lagrangian" and bound.prices is None:
-            above = bound.value + (self.best.unit or 4e-9 * max(1.0, bound.value))
-            certificate = Certificate(amount=above, refutation=self.refutation())
-            bound = replace(bound, certificate=certificate)
+        # What multipliers prove elsewhere the steps prove too, to the tolerance of "better".
+        is_certified = is_optimal(bound.value, self._certified, 0.0)
+        if bound.proof == "lagrangian" and is_certified and not bound.is_elementary:
+            value = max(bound.value, self._certified)
+            above = value + (self.best.unit or 4e-9 * max(1.0, value))
+            certificate = Certificate(amount=above, refutation=Refutation(steps=tuple(self.steps)))
+            bound = Bound(value=value, proof="lagrangian", certificate=certificate)
         return self.best.solution(bound)
 
 
 def solve_free(problem: Problem, budget: Budget, seed: int, gap: float, effort: Effort) -> Solution:
     """Return the best plan of a problem without resources, and its proof."""
     best = Incumbent(problem, budget, gap)
-    for solver in (Rule(), Graph()):
-        best.offer(solver.solve(problem, Budget(), seed).plan)
+    best.offer(Rule().solve(problem, Budget(), seed).plan)
     search = FreeSearch(best, seed)
     if not best.is_done and not problem.offers_choice:
         search.price()
@@ -388,11 +319,9 @@ def _approach(search: FreeSearch, effort: Effort) -> None:
 
 
 def close_in(search: FreeSearch, effort: Effort) -> None:
-    """Cut, search and branch until plan and bound meet or the budget is spent."""
+    """Cut and search until plan and bound meet or the budget is spent."""
     search.price()
     master = search.cut(effort.max_rounds)
-    if search.is_transitive and effort.max_parts and not search.best.is_done:
-        search.branch(master, effort.max_parts)
     while not search.best.is_done:
         before = (search.best.bound, search.best.reward)
         search.prove(master, search.best.better)

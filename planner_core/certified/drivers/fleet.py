@@ -151,7 +151,7 @@ def solve_without_resources(
     if not budget.is_spent():
         fleet.search(effort.moves_per_task)
     is_small = effort.max_rounds > 0 and len(problem.opportunities) <= _SMALL
-    if not is_small or best.is_done:
+    if not is_small or budget.is_spent():
         return best.solution()
     search = FreeSearch(best, seed)
     search.step(Multipliers(prices=fleet.prices))
