@@ -30,7 +30,7 @@ def main() -> None:
     changes = {**STRATEGIES, **(constants() if options.constants else {})}
     chosen = [name for name in changes if any(word in name for word in options.only)]
     run({name: changes[name] for name in chosen}, options.into)
-    text = page(rows.read(options.into, Trial), STRATEGIES)
+    text = page(rows.read(options.into, Trial))
     options.into.with_suffix(".md").write_text(text, encoding="utf-8")
 
 

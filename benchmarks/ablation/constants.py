@@ -20,7 +20,7 @@ from benchmarks.ablation.strategies import Change, Patch
 
 _ENGINE: Final = "planner_core.certified"
 _CAPITALS: Final = re.compile(r"_?[A-Z][A-Z_]*")
-_FACTORS: Final = {"half": 0.5, "double": 2.0}
+FACTORS: Final = {"half": 0.5, "double": 2.0}
 _LEFT_OUT: Final = frozenset({
     "TOLERANCE", "_TOLERANCE", "CHAIN_TOLERANCE", "_ROUNDING", "_CLEAR", "_INTEGER", "_SLACK",
     "_MAX_CELLS", "_MAX_LOG", "_MOST_KEPT", "_NUM_BITS", "_LONGEST_S", "_REPORT_EVERY_S", "_POLL_S",
@@ -67,7 +67,7 @@ def constants() -> dict[str, Change]:
             is_constant = _CAPITALS.fullmatch(name) and _is_number(value) and name not in _LEFT_OUT
             if not is_constant or name in frozen or not _is_own(module, name) or not families:
                 continue
-            for label, factor in _FACTORS.items():
+            for label, factor in FACTORS.items():
                 changed = scaled(value, factor)
                 if changed != value:
                     patch = Patch(module=module.__name__, name=name, value=changed)

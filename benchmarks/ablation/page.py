@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from benchmarks.ablation.constants import FACTORS
 from benchmarks.ablation.strategies import NOTHING
 from benchmarks.ablation.trials import Trial
 from benchmarks.suite.compare import Line, line_of
@@ -14,6 +15,8 @@ from benchmarks.suite.engine import LEVELS
 
 POINTS: Final = 0.2  # of gap
 RATIO: Final = 1.1  # of time
+LABELS: Final = tuple(f" {label}" for label in FACTORS)
+"""How changes of constants end."""
 
 _HEAD: Final = """\
 # What the engine's parts are worth
@@ -26,7 +29,8 @@ the solver as it is, beside which each change stands.
 A strategy earns its place where, without it, the gap grows by more than 0.2 percentage points on
 some family, or the time to some gap by more than 10 %. One image is 0.1 to 0.3 points, and the
 last image a matter of luck: the time to 0 % differs by a factor of two from seed to seed, so a
-verdict on that column alone takes more than two draws.
+verdict on that column alone takes more than two draws. What was not missed is gone from the
+engine since; its rows stay, with the revision that still had it.
 """
 
 
@@ -65,12 +69,11 @@ def findings(trials: Iterable[Trial]) -> list[Finding]:
     return found
 
 
-def page(trials: Sequence[Trial], strategies: Iterable[str]) -> str:
+def page(trials: Sequence[Trial]) -> str:
     """Return the page as Markdown."""
     found = findings(trials)
-    names = set(strategies)
-    about_strategies = [finding for finding in found if finding.change in names]
-    about_constants = [finding for finding in found if finding.change not in names]
+    about_constants = [finding for finding in found if finding.change.endswith(LABELS)]
+    about_strategies = [finding for finding in found if finding not in about_constants]
     revisions = ", ".join(dict.fromkeys(trial.revision for trial in trials))
     parts = [
         _HEAD,

@@ -106,16 +106,6 @@ def _in_turns(search: Any, choices: Any, num_moves: int) -> None:
     search.report("plans")
 
 
-class _RuleAgain:
-    """A solver for a first plan that finds the one that is there already."""
-
-    def solve(self, problem: Any, budget: Any, seed: int) -> Any:
-        """Return the plan of the rule."""
-        from planner_core.solvers.rule import Rule
-
-        return Rule().solve(problem, budget, seed)
-
-
 def _off(module: str, name: str, value: Callable[..., Any] = _nothing) -> tuple[Patch, ...]:
     return (Patch(module=module, name=name, value=value),)
 
@@ -128,7 +118,6 @@ _RESOURCES: Final = {
     "paper-200": 10.0, "paper-500": 15.0, "weights-1000": 15.0, "paper-1000": 12.0,
 }  # fmt: skip
 _FLEET: Final = {"fleet-4x2000": 12.0, "fleet-2x500": 10.0}
-_AGILITY: Final = {"agility-500": 10.0, "agility-1000": 16.0}
 _STATIONS: Final = {"fleet-stations-4x2000": 60.0}
 
 STRATEGIES: Final[Mapping[str, Change]] = {
@@ -149,15 +138,6 @@ STRATEGIES: Final[Mapping[str, Change]] = {
     "choice moves alone, not in turns with windows": Change(
         patches=_off(f"{DRIVERS}.resources", "ResourceSearch.search", _in_turns),
         families=_RESOURCES,
-    ),
-    "polishing of relaxations": Change(
-        patches=_off(f"{DRIVERS}.agility_only", "FreeSearch.polish"), families=_AGILITY
-    ),
-    "branching": Change(
-        patches=_off(f"{DRIVERS}.agility_only", "FreeSearch.branch"), families=_AGILITY
-    ),
-    "graph as a start": Change(
-        patches=_off(f"{DRIVERS}.agility_only", "Graph", _RuleAgain), families=_AGILITY
     ),
     "program search": Change(
         patches=_off(f"{DRIVERS}.resources", "ProgramSearch", _Idle), families=_STATIONS

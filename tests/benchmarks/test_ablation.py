@@ -119,6 +119,6 @@ def test_what_is_missed_is_found_and_written() -> None:
     assert missed == {
         "kept": True, "slow": True, "idle": False, "dead": True, "lns _MOVES half": True,
     }  # fmt: skip
-    text = page(all_rows, ["kept", "slow", "idle", "dead"])
+    text = page(all_rows)
     assert "| kept | paper-200 | 1 | 1.00 | 1.50 | +0.50 |" in text
     assert "| `lns _MOVES` | paper-200 | +0.40 | x 1.00 |  |  | **yes** |" in text
