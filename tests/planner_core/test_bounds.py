@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
@@ -15,7 +13,7 @@ from planner_core.referee.replay import replay
 from planner_core.solvers.registry import ForwardSearch
 from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
-from tests.planner_core.problems import random_problem
+from tests.planner_core.problems import random_problem, with_rewards
 
 SEEDS = st.integers(0, 10**6)
 
@@ -49,7 +47,7 @@ def test_a_slow_satellite_may_turn_by_way_of_tasks_that_are_worth_nothing(seed: 
         max_turn_deg=25.0, agility=Agility(slew_rate_deg_s=0.3),
     )  # fmt: skip
     rng = np.random.default_rng(seed)
-    problem = replace(problem, target_reward=rng.integers(0, 2, 4).astype(np.float64))
+    problem = with_rewards(problem, rng.integers(0, 2, 4))
     best = best_reward(problem)
     assert lagrangian_bound(problem, reward=0.0).value >= best - 1e-9
     for prices in (np.zeros(4), np.ones(4), rng.uniform(0.0, 1.0, 4)):

@@ -66,7 +66,7 @@ def test_prices_from_amid_prove_what_a_corner_is_worth(seed: int, dynamics: Dyna
     relaxation = FixedContacts(problem, every, (), Budget(), 0).relaxation()
     corner = FixedContacts(problem, every, (), Budget(), 0).relaxed()
     assert relaxation.value == pytest.approx(corner, rel=0.02)
-    assert np.all((relaxation.prices >= 0.0) & (relaxation.prices <= problem.target_reward))
+    assert np.all((relaxation.prices >= 0.0) & (relaxation.prices <= problem.best_worth))
     # Without contacts the programme over paths is no weaker than the linear one.
     proven = resource_value(problem, relaxation.prices, 1e-3)
     assert proven <= relaxation.value + 0.05

@@ -13,7 +13,8 @@ from planner_core.budget import Budget, Termination
 from planner_core.certified.drivers.continuous import solve_continuous, with_own_starts
 from planner_core.certified.lns.continuous_search import ContinuousSearch
 from planner_core.certified.proofs import documents as proofs
-from planner_core.certified.proofs.continuous import ContinuousDual, accessible, continuous_value
+from planner_core.certified.proofs.bound import accessible
+from planner_core.certified.proofs.continuous import ContinuousDual, continuous_value
 from planner_core.domain import Agility
 from planner_core.precedence.earliest_starts import follows_at_s
 from planner_core.precedence.time_windows import spans_of, view_of
@@ -43,7 +44,7 @@ def best_reward(problem: Problem) -> float:
     It turns faster than its lines of sight, so each task is best begun as early as it can be.
     """
     spans, view = spans_of(problem, 0), view_of(problem, 0)
-    reward = problem.target_reward
+    reward = problem.best_worth
     best = 0.0
 
     def go_on(last: int, start_s: float, taken: frozenset[int]) -> None:
@@ -103,7 +104,7 @@ def test_whatever_the_prices_the_bound_is_not_below_the_best_plan(
     assert dual is not None
     rng = np.random.default_rng(seed)
     for share in (0.0, 0.3, 1.0):
-        prices = problem.target_reward * np.clip(rng.normal(share, 0.3, 6), 0.0, 1.0)
+        prices = problem.best_worth * np.clip(rng.normal(share, 0.3, 6), 0.0, 1.0)
         assert dual.at(prices)[0] >= best - 1e-9
     solution = solve_continuous(problem, Budget(), 0, 0.0, 20.0)
     reward = replay(problem, solution.plan).reward

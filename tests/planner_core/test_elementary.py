@@ -56,7 +56,7 @@ def spaced_problem(
 
 
 def random_prices(problem: Problem, rng: np.random.Generator) -> Floats:
-    prices: Floats = rng.uniform(-0.3, 1.2, len(problem.target_ids)) * problem.target_reward
+    prices: Floats = rng.uniform(-0.3, 1.2, len(problem.target_ids)) * problem.best_worth
     return prices
 
 

@@ -75,7 +75,7 @@ def test_no_plan_beats_the_prices(dynamics: Dynamics, seed: int, num_satellites:
     search.improve(30, Budget().stop)
     assert search.is_settled
     assert search.value >= best_reward(problem) - 1e-6
-    assert np.all((search.prices >= 0.0) & (search.prices <= problem.target_reward))
+    assert np.all((search.prices >= 0.0) & (search.prices <= problem.best_worth))
 
 
 def test_collects_that_cost_next_to_nothing_need_no_endless_table() -> None:

@@ -40,8 +40,9 @@ def settled(problem: Problem, num_epochs: int) -> tuple[float, Floats]:
 
 def best_known(problem: Problem) -> float:
     """Return what many subgradient steps prove."""
-    reward = np.append(problem.target_reward, 0.0)
-    return improve_prices(network_of(problem), reward, 0.5 * reward, 0.0, 3000, GO_ON)
+    network, most = network_of(problem), np.append(problem.best_worth, 0.0)
+    worth = problem.worth[network.row]
+    return improve_prices(network, worth, most, 0.5 * most, 0.0, 3000, GO_ON)
 
 
 @examples(80)
@@ -83,8 +84,7 @@ def test_the_same_prices_come_out_again() -> None:
 
 def test_targets_without_access_cost_nothing() -> None:
     problem = crowded(2, 3)
-    rewards: Floats = np.append(problem.target_reward, 50.0)
-    wider = replace(problem, target_ids=(*problem.target_ids, "far"), target_reward=rewards)
+    wider = replace(problem, target_ids=(*problem.target_ids, "far"))
     value, prices = settled(wider, 40)
     assert value == settled(problem, 40)[0]
     assert prices[-1] == 0.0

@@ -56,7 +56,7 @@ def test_the_actions_of_a_state_are_of_different_accesses_in_model_and_tree(
     problem = random_problem(seed, dynamics=dynamics, use_resources=use_resources, num_offers=4)
     track = track_of(problem)
     model = Model(
-        track=track, target_reward=problem.target_reward, guidance=ForwardSearch().guidance,
+        track=track, worth=problem.worth, guidance=ForwardSearch().guidance,
         is_hard=is_hard, unimaged_only=unimaged_only, contact_above=contact_above,
     )  # fmt: skip
     state = model.initial_state()

@@ -93,7 +93,7 @@ def test_hard_plans_look_ahead_so_that_telemetry_never_fills_the_recorder(
         seed, dynamics, True, num_collects=25, num_targets=20, num_contacts=8, resources=resources
     )
     contacts_only = Rule(unimaged_only=True)
-    no_images = replace(problem, target_reward=problem.target_reward * 0)
+    no_images = replace(problem, worth=problem.worth * 0)
     for satellite in no_images.satellites:
         track = compile_track(no_images, satellite, (satellite.kind == 0).astype("uint8"))
         if not track.is_guarded:
@@ -170,7 +170,7 @@ def test_the_compiled_forward_search_plans_what_the_listing_plans(
     satellite = problem.satellites[0]
     model = Model(
         track=compile_track(problem, satellite, (satellite.rows * 0).astype("uint8")),
-        target_reward=problem.target_reward,
+        worth=problem.worth,
         guidance=solver.guidance,
         is_hard=feasibility == "hard",
         unimaged_only=unimaged_only,
