@@ -57,7 +57,7 @@ serve: setup
 	@$(BIN)/slewline demo --serve
 
 # A process for each core, each with a module at a time; see docs/testing.md.
-ALL_TESTS := $(BIN)/python -m pytest -n logical --dist loadgroup --no-loadscope-reorder
+ALL_TESTS := $(BIN)/python -m pytest -n logical
 
 test: check
 	$(ALL_TESTS)
