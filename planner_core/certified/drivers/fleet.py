@@ -68,7 +68,7 @@ class FleetSearch:
         self._seed = seed
         self._network = network_of(problem)
         self._worth = np.append(problem.target_reward, 0.0)
-        num_epochs = int(np.clip(default_steps(self._network), *_EPOCHS))
+        num_epochs = int(np.clip(default_steps(len(self._network.row)), *_EPOCHS))
         self._dual = IncrementalPrices(self._network, self._worth, num_epochs, seed)
 
     @property
