@@ -19,6 +19,7 @@ from planner_core.precedence.network import (
     network_of,
     part_ends,
 )
+from planner_core.precedence.readable import heaviest_to_each
 from planner_core.precedence.relation import direct_precedence, is_transitive
 from planner_core.problem import Floats, Problem
 from tests.planner_core.problems import random_problem
@@ -40,8 +41,9 @@ def weights(seed: int, kind: str, number: int) -> Floats:
     worth = rng.uniform(0.0, 5.0, number)
     if kind == "mostly nothing":
         worth *= rng.integers(0, 2, number)
-    # Prices leave many targets next to no worth.
-    return np.where(rng.random(number) < 0.7, 1e-3 * worth, worth) if kind[0] == "h" else worth
+    if kind == "hardly anything":  # as prices leave it
+        worth = np.where(rng.random(number) < 0.7, 1e-3 * worth, worth)
+    return worth
 
 
 def readable(problem: Problem, worth: Floats) -> tuple[float, Floats]:
@@ -111,6 +113,8 @@ def test_paths_and_detours_are_the_heaviest(
     total, through = heaviest_through(network, worth[network.row])
     assert total == pytest.approx(expected_total)
     np.testing.assert_allclose(through, expected[network.row], atol=1e-9)
+    in_python = [heaviest_to_each(s.transitions, worth[s.rows]) for s in problem.satellites]
+    assert sum(value.max(initial=0.0) for value in in_python) == pytest.approx(expected_total)
     total, paths = longest(problem, worth)
     assert total == pytest.approx(expected_total)
     assert sum(worth[path].sum() for path in paths) == pytest.approx(expected_total)
