@@ -62,7 +62,7 @@ class Graph:
         def plan_turn(turn: Turn) -> list[int]:
             track = turn.track
             is_wanted = (track.is_contact == 0) & (turn.collected[track.place] == 0)
-            weight = np.where(is_wanted, problem.target_reward[track.place], 0.0)
+            weight = np.where(is_wanted, problem.worth[turn.satellite.rows], 0.0)
             if self.path == "longest":
                 path = longest_chain(problem, turn.satellite, weight)
             else:

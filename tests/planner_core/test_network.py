@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.certified.dp.elementary import elementary_paths, labels_for, memory_of
@@ -22,6 +22,7 @@ from planner_core.precedence.network import (
 from planner_core.precedence.readable import heaviest_to_each
 from planner_core.precedence.relation import direct_precedence, is_transitive
 from planner_core.problem import Floats, Problem
+from tests.examples import examples
 from tests.planner_core.problems import random_problem
 
 AGILITIES: Final = st.builds(
@@ -82,7 +83,7 @@ def longest(problem: Problem, worth: Floats) -> tuple[float, list[list[int]]]:
     return total, paths
 
 
-@settings(max_examples=150, deadline=None)
+@examples(150)
 @given(
     seed=st.integers(0, 10**6), num_satellites=st.integers(1, 4), size=st.integers(0, 40),
     num_offers=st.sampled_from([1, 1, 6]), num_contacts=st.sampled_from([0, 12]),
@@ -144,7 +145,7 @@ def test_stored_arcs_say_the_same_of_crowds(kind: str, slew_rate_deg_s: float) -
         assert longest(problem, worth)[0] == pytest.approx(expected, rel=1e-12)
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(seed=st.integers(0, 10**6), agility=AGILITIES, span_s=st.sampled_from([900.0, 9000.0]))
 def test_the_table_of_pairs_says_what_geometry_says(
     seed: int, agility: Agility, span_s: float

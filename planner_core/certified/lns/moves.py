@@ -67,7 +67,7 @@ class Ground(NamedTuple):
     is_transitive
         Whether the tasks around one can do without it in any case. Shape ``(num_parts,)``.
     worth
-        Of each target, and 0 for contacts. Shape ``(num_targets + 1,)``.
+        Of each node.
     preference
         By how much the search prefers a target to others of its worth, as a factor.
         Shape ``(num_targets + 1,)``.
@@ -116,9 +116,11 @@ class Room(NamedTuple):
         Nodes whose labels have not been entered yet, in order of end.
     on_chain
         Sets of targets, a label's after another's. Shape ``(MAX_NODES * MAX_WORDS,)``.
-    number, marked_at, weight
-        A target's place in those sets (-1 for none) and its weight, as of which move.
-        Shape ``(num_targets + 1,)``.
+    number, marked_at, tie
+        A target's place in those sets (-1 for none) and by how much it is favoured, as of which
+        move. Shape ``(num_targets + 1,)``.
+    weight
+        Of each node of the window.
     path, old, dropped
         Nodes that a move takes, lets go in the window, and lets go elsewhere.
     move
@@ -133,6 +135,7 @@ class Room(NamedTuple):
     number: Ints
     marked_at: Longs
     weight: Floats
+    tie: Floats
     path: Ints
     old: Ints
     dropped: Ints
@@ -150,7 +153,8 @@ def room_for(num_targets: int) -> Room:
         on_chain=np.zeros(nodes * MAX_WORDS, dtype=np.uint64),
         number=np.zeros(num_targets + 1, dtype=np.int32),
         marked_at=np.zeros(num_targets + 1, dtype=np.int64),
-        weight=np.zeros(num_targets + 1),
+        weight=np.zeros(nodes),
+        tie=np.zeros(num_targets + 1),
         path=np.zeros(nodes, dtype=np.int32),
         old=np.zeros(nodes, dtype=np.int32),
         dropped=np.zeros(nodes, dtype=np.int32),
@@ -195,7 +199,7 @@ def make_moves(
         if num_words > MAX_WORDS:
             continue
         ends = (left if left >= begin else NO_TASK, right if right < end else NO_TASK)
-        last = _heaviest(ground, taken, offered, room, num_words, part, ends, low, high)
+        last = _heaviest(ground, room, num_words, part, ends, low, high)
         if last != _NOWHERE:
             _replace(ground, taken, room, low, high, last)
 
@@ -225,7 +229,7 @@ def _pivot(ground: Ground, taken: Taken, offered: Bools, draws: Uint64s) -> int:
     for _ in range(num_trials):
         pivot = int(next_draw(draws) * n)
         target = ground.network.place[pivot]
-        if offered[pivot] and taken.holder[target] == FREE and ground.worth[target] > 0.0:
+        if offered[pivot] and taken.holder[target] == FREE and ground.worth[pivot] > 0.0:
             urgency = ground.urgency[target]
             if urgency >= 1.0 or next_draw(draws) < urgency:
                 break
@@ -272,9 +276,9 @@ def _window(taken: Taken, pivot: int, begin: int, end: int, draws: Uint64s) -> t
 def _weigh(
     ground: Ground, taken: Taken, offered: Bools, room: Room, low: int, high: int, draws: Uint64s
 ) -> int:
-    """Give a window's targets weights; return how many words a set of them takes.
+    """Give a window's nodes weights; return how many words a set of its targets takes.
 
-    Only those have a place in such sets that are in the window more than once.
+    Only those targets have a place in such sets that are in the window more than once.
 
     Ties are broken at random, so that the search wanders over plans of equal worth.
     """
@@ -283,42 +287,38 @@ def _weigh(
     tie = _TIE if ground.is_alike or move & 1 else _SMALL_TIE
     count = 0
     for node in range(low, high):
-        target = ground.network.place[node]
-        if ground.worth[target] <= 0.0 or not (offered[node] or taken.is_taken[node]):
+        room.weight[node - low] = 0.0
+        target, worth = ground.network.place[node], ground.worth[node]
+        if worth <= 0.0 or not (offered[node] or taken.is_taken[node]):
             continue
-        if room.marked_at[target] == move:
-            if room.number[target] < 0:
-                room.number[target] = count
-                count += 1
-            continue
-        room.marked_at[target] = move
-        room.number[target] = -1
         held = taken.holder[target]
-        weight = ground.worth[target] * ground.preference[target]
-        if held == FREE or low <= held < high:
-            room.weight[target] = weight * (1.0 + tie * next_draw(draws))
-        elif ground.is_locked[target]:
-            room.weight[target] = -1.0
-        else:
-            room.weight[target] = weight * tie * (2.0 * next_draw(draws) - 1.0)
+        is_held_elsewhere = held != FREE and not low <= held < high
+        if room.marked_at[target] != move:
+            room.marked_at[target] = move
+            room.number[target] = -1
+            if not is_held_elsewhere:
+                room.tie[target] = 1.0 + tie * next_draw(draws)
+            elif not ground.is_locked[target]:
+                room.tie[target] = 2.0 * next_draw(draws) - 1.0
+        elif room.number[target] < 0:
+            room.number[target] = count
+            count += 1
+        weight = worth * ground.preference[target]
+        if ground.is_locked[target] and not ground.is_kept[node]:
+            continue
+        if not is_held_elsewhere:
+            room.weight[node - low] = weight * room.tie[target]
+        elif not ground.is_locked[target]:
+            better = (worth - ground.worth[held]) * ground.preference[target]
+            room.weight[node - low] = better + weight * tie * room.tie[target]
+        if ground.is_kept[node]:
+            room.weight[node - low] += ground.kept_worth
     return (count + 63) >> 6
 
 
 @borrowing
-def _weight_of(
-    ground: Ground, taken: Taken, offered: Bools, room: Room, node: int, target: int
-) -> float:
-    """Return what a chain gains by a node of the window; nothing or less where it may not."""
-    if not (offered[node] or taken.is_taken[node]) or room.marked_at[target] != room.move[0]:
-        return 0.0
-    if ground.is_kept[node]:
-        return float(room.weight[target]) + ground.kept_worth
-    return -1.0 if ground.is_locked[target] else float(room.weight[target])
-
-
-@borrowing
 def _heaviest(
-    ground: Ground, taken: Taken, offered: Bools, room: Room, num_words: int,
+    ground: Ground, room: Room, num_words: int,
     part: int, ends: tuple[int, int], low: int, high: int,
 ) -> int:  # fmt: skip
     """Find the heaviest chain between two tasks, or none; return its last label.
@@ -334,7 +334,7 @@ def _heaviest(
     count, num_waiting, entered = 0, 0, 0
     for node in range(low, high):
         target = network.place[node]
-        weight = _weight_of(ground, taken, offered, room, node, target)
+        weight = room.weight[node - low]
         if weight <= 0.0 or network.end_s[node] > until_s:
             continue
         start_s = network.start_s[node]
@@ -431,8 +431,9 @@ def _replace(ground: Ground, taken: Taken, room: Room, low: int, high: int, last
         room.path[num_new] = node
         num_new += 1
         held = taken.holder[ground.network.place[node]]
-        if held == FREE or low <= held < high:
-            worth += ground.worth[ground.network.place[node]]
+        worth += ground.worth[node]
+        if held != FREE and not low <= held < high:
+            worth -= ground.worth[held]
         if ground.is_kept[node]:
             worth += ground.kept_worth
         at = room.source[k]
@@ -442,7 +443,7 @@ def _replace(ground: Ground, taken: Taken, room: Room, low: int, high: int, last
             room.old[num_old] = node
             num_old += 1
             if taken.holder[ground.network.place[node]] == node:
-                worth -= ground.worth[ground.network.place[node]]
+                worth -= ground.worth[node]
             if ground.is_kept[node]:
                 worth -= ground.kept_worth
     if worth < -1e-9:

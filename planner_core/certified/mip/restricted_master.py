@@ -52,11 +52,8 @@ class Master(Engine):
     def __init__(self, problem: Problem, rows: Ints, budget: Budget, seed: int) -> None:
         self._rows = rows
         self._problem = problem
-        table = problem.opportunities
-        self._scale = float(problem.target_reward.max(initial=1e-300))
-        self._worth = worth = np.zeros(len(table))
-        is_collect = table.kind == COLLECT
-        worth[is_collect] = problem.target_reward[table.place[is_collect]] / self._scale
+        self._scale = float(problem.worth.max(initial=1e-300))
+        self._worth = worth = problem.worth / self._scale
         self._precedences = [
             _exclusion(transitive_closure(s), s.place, s.kind) for s in problem.satellites
         ]
