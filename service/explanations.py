@@ -9,9 +9,9 @@ from planner_core.budget import Budget
 from planner_core.reasons.access_changes import OF_TARGETS, AccessChange, access_changes
 from planner_core.reasons.at_length import Attempt, explain_target
 from service.background import Background
-from service.instants import instant_text
 from service.opportunities import Described
 from service.rebuilt import Rebuilt, rebuild
+from service.wire.instants import instant_text
 from service.wording import Document, Wording
 
 _KEPT = 200

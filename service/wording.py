@@ -9,7 +9,7 @@ from planner_core.domain import Scenario
 from planner_core.problem import Problem
 from planner_core.reasons.reason import Change, TargetOutcome
 from planner_core.referee.replay import Timeline, Violation
-from service.instants import instant_text
+from service.wire.instants import instant_text
 
 Document = dict[str, Any]
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Final, Literal, cast
+from typing import cast
 
 import sqlalchemy as sa
 from fastapi import APIRouter, Request, Response
-from pydantic import BaseModel, Field
 from sqlalchemy.orm import Session
 
 from service.api import ask_again
@@ -16,74 +15,26 @@ from service.api.conditional import NOT_MODIFIED, created, unless_known
 from service.api.deps import AuditDep, CallerDep, DatabaseDep, SettingsDep
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
-from service.api.job_shapes import ErrorOut, ProgressOut, QuestionIn, ScenarioRef, SolverIn
-from service.api.paging import Listed, PagingDep, newest_first
+from service.api.paging import PagingDep, newest_first
 from service.api.problems import ServiceError
-from service.api.shapes import Instant
 from service.db.rows import ComparisonRow
-from service.jobs import lease
-from service.jobs.lease import JobState
 from service.scenarios.translate import inside
 from service.stores import comparison_store as store
 from service.stores import job_store
 from service.stores.comparison_store import Run
+from service.wire.base import Listed
+from service.wire.jobs import (
+    ACTIVE,
+    ComparedRun,
+    ComparisonIn,
+    ComparisonOut,
+    ErrorOut,
+    JobState,
+    ProgressOut,
+    ScenarioRef,
+)
 
 router = APIRouter(prefix="/v1/comparisons", tags=["comparisons"])
-
-MAX_RUNS: Final = 32
-
-
-class ComparisonIn(QuestionIn):
-    """A scenario and the solvers that are to plan it; limits, priority, label are of each job."""
-
-    runs: list[SolverIn] = Field(min_length=1, max_length=MAX_RUNS)
-
-
-class FiguresOut(BaseModel):
-    """Numbers of a run's timeline; all null as long as it has none."""
-
-    reward: float | None = Field(None, description="As the referee awarded it.")
-    bound: float | None = Field(None, description="No plan of the scenario can exceed it.")
-    gap: float | None = Field(None, description="`(bound - reward) / bound`.")
-    bound_proof: str | None = None
-    collects: int | None = None
-    contacts: int | None = None
-    downlinked_mbit: float | None = Field(
-        None, description="Null too where a recorder has no capacity in megabits."
-    )
-    downlinked_fraction: float | None = Field(None, description="In recorder capacities.")
-    solve_s: float | None = Field(None, description="Of the search alone.")
-    runtime_s: float | None = Field(None, description="Of the whole job's work.")
-    validity: str | None = None
-    plan_sha256: str | None = None
-
-
-class ComparedRun(FiguresOut):
-    """One line of the table."""
-
-    job_id: str
-    state: JobState
-    solver: str
-    params: dict[str, Any]
-    seed: int
-    progress: ProgressOut | None
-    termination: str | None
-    error: ErrorOut | None
-    links: dict[str, str]
-
-
-class ComparisonOut(BaseModel):
-    """Several solvers on one scenario, side by side."""
-
-    id: str
-    state: Literal["running", "finished"] = Field(
-        description="`finished` when every job is final, whether it succeeded or not."
-    )
-    scenario: ScenarioRef
-    label: str | None
-    created_at: Instant
-    runs: list[ComparedRun] = Field(description="In the order of the request.")
-    links: dict[str, str]
 
 
 @router.post("", status_code=202, responses=problem_responses(503))
@@ -178,7 +129,7 @@ def _shown(session: Session, rows: Sequence[ComparisonRow]) -> list[ComparisonOu
 
 
 def _table(row: ComparisonRow, runs: list[Run], sha256: str) -> ComparisonOut:
-    is_active = any(run.job.state in lease.ACTIVE for run in runs)
+    is_active = any(run.job.state in ACTIVE for run in runs)
     return ComparisonOut(
         id=row.id,
         state="running" if is_active else "finished",

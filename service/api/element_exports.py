@@ -14,13 +14,13 @@ from planner_core.orbits.omm_writing import Outgoing
 from service.api.conditional import NOT_MODIFIED
 from service.api.deps import DatabaseDep
 from service.api.errors import problem_responses
+from service.api.etags import etag_of, matches
 from service.api.problems import ServiceError
 from service.api.satellites import find_satellite
-from service.api.shapes import etag_of, matches
 from service.db.rows import SatelliteRow
-from service.scenarios.inputs import OrbitIn
 from service.scenarios.translate import orbit_from
 from service.stores import satellite_store as store
+from service.wire.satellites import OrbitIn
 
 router = APIRouter(prefix="/v1/satellites", tags=["satellites"])
 

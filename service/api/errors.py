@@ -10,7 +10,7 @@ from typing import Any
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import ValidationError
 from sqlalchemy.exc import SQLAlchemyError
 from starlette.exceptions import HTTPException
 
@@ -19,34 +19,13 @@ from service.access.tokens import masked
 from service.api.problems import ServiceError, kind_of
 from service.api.security_headers import SECURITY_HEADERS
 from service.db.failures import why_unavailable
+from service.wire.operations import FaultOut, ProblemOut
 
 PROBLEM_JSON = "application/problem+json"
 MAX_FAULTS = 100
 DATABASE_RETRY_S = 5
 
 logger = logging.getLogger(__name__)
-
-
-class FaultOut(BaseModel):
-    """One thing that is wrong, and where."""
-
-    pointer: str | None = Field(description="JSON pointer into the body, where it was JSON.")
-    code: str
-    row: int | None = Field(description="Line of the file, from 1; a header is line 1.")
-    detail: str
-
-
-class ProblemOut(BaseModel):
-    """A problem document (RFC 9457)."""
-
-    type: str = Field(description="Address of the explanation of this code.")
-    title: str
-    status: int
-    code: str = Field(description="Stable name of the problem. More codes may be added.")
-    detail: str
-    instance: str = Field(description="Path of the request.")
-    request_id: str
-    errors: list[FaultOut] = Field(description="At most 100; the detail says how many more.")
 
 
 def install_error_handlers(app: FastAPI) -> None:

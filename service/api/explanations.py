@@ -2,55 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, cast
+from typing import Annotated, cast
 
 from fastapi import APIRouter, Depends, Path, Request, Response
-from pydantic import BaseModel, Field
 
 from service.api import job_intake as intake
 from service.api.conditional import NOT_MODIFIED
 from service.api.deps import DatabaseDep, own_job_only
 from service.api.errors import problem_responses
-from service.api.job_shapes import TargetItem
+from service.api.etags import etag_of, matches
 from service.api.problems import ServiceError
-from service.api.shapes import Instant, etag_of, matches
-from service.api.timeline_shapes import ViolationOut
 from service.explanations import Explainer, version_of
 from service.opportunities import OpportunityReader
 from service.stores.job_store import hashes_of
+from service.wire.timelines import ExplanationOut
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[Depends(own_job_only)])
-
-
-class AttemptOut(BaseModel):
-    """One opportunity of the target, tried in the plan by the referee."""
-
-    opportunity_id: str
-    satellite_id: str
-    start: Instant
-    end: Instant
-    violations: list[ViolationOut] = Field(
-        description="What the plan with it breaks, and did not break before."
-    )
-    displaces: list[str] = Field(
-        description="Ids of the actions that have to go for it; of a pinned opportunity's rivals "
-        "where `ruled_out`."
-    )
-    fits_instead: bool = Field(description="The plan with it and without those is valid.")
-    reward_delta: float | None = Field(description="What that plan earns more.")
-    ruled_out: bool = Field(description="A pin rules it out.")
-
-
-class ExplanationOut(TargetItem):
-    """What became of a target, and what of each of its opportunities."""
-
-    opportunities: list[AttemptOut] = Field(
-        description="In order of time; none of a target that is collected."
-    )
-    access_changes: list[dict[str, Any]] = Field(
-        description="For a target without access: changes that would give it one, each by itself "
-        "and in the form that `relax` of a what-if takes."
-    )
 
 
 @router.get(

@@ -7,7 +7,6 @@ from typing import Literal
 
 import sqlalchemy as sa
 from fastapi import APIRouter, Request, Response
-from pydantic import BaseModel, Field
 from sqlalchemy.orm import Session
 
 from planner_core.errors import Fault
@@ -15,22 +14,16 @@ from service.api.conditional import NOT_MODIFIED, created, require_match, unless
 from service.api.deps import AuditDep, DatabaseDep, RawBodyDep, require_media_type
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
-from service.api.imports import (
-    Imported,
-    OnError,
-    OnErrorQuery,
-    body_schemas,
-    imported,
-    refuse_if_asked,
-)
-from service.api.paging import Listed, PagingDep, newest_first
+from service.api.imports import OnError, OnErrorQuery, body_schemas, imported, refuse_if_asked
+from service.api.paging import PagingDep, newest_first
 from service.api.problems import ServiceError
-from service.api.shapes import Instant
 from service.db.rows import GroundStationRow
 from service.ids import new_id
-from service.scenarios.inputs import GroundStationIn
 from service.scenarios.records import Checked, check, read_csv, read_geojson
 from service.scenarios.translate import ground_station_from
+from service.wire.base import Listed
+from service.wire.imports import Imported
+from service.wire.places import GroundStationIn, GroundStationOut, ImportedStation
 
 router = APIRouter(prefix="/v1/ground-stations", tags=["ground stations"])
 
@@ -38,24 +31,6 @@ _CSV_COLUMNS = tuple(n for n in GroundStationIn.model_fields if n != "elevation_
 _REQUIRED = ("name", "lat_deg", "lon_deg")
 _MOST_STATIONS = 10_000
 _IMPORT_TYPES = ("application/geo+json", "application/json", "text/csv")
-
-
-class GroundStationOut(GroundStationIn):
-    """A ground station."""
-
-    id: str
-    created_at: Instant
-
-
-class ImportedStation(BaseModel):
-    """The station that a record belongs to."""
-
-    id: str
-    name: str
-    row: int | None = Field(description="Line of the file, for CSV.")
-    status: Literal["created", "unchanged"] = Field(
-        description="`unchanged`: the same station is stored already."
-    )
 
 
 @router.post("", status_code=201)

@@ -3,69 +3,22 @@
 from __future__ import annotations
 
 import json
-from typing import Any, Literal
+from typing import Any
 
 from fastapi import APIRouter, Depends, Request, Response
-from pydantic import BaseModel, Field
 
 from planner_core.referee.plan_diff import PlannedAction, plan_diff
 from service.api import job_intake as intake
 from service.api.conditional import NOT_MODIFIED
 from service.api.deps import CallerDep, DatabaseDep, own_job_only
 from service.api.errors import problem_responses
+from service.api.etags import etag_of, matches
 from service.api.problems import ServiceError
-from service.api.shapes import Instant, etag_of, matches
 from service.plan_views import view_of
 from service.stores import job_store as store
+from service.wire.timelines import Difference, DiffOut, MovedOut, PlannedOut, TotalDiff
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[Depends(own_job_only)])
-
-Difference = Literal["scenario", "horizon", "satellites", "use_resources", "dynamics"]
-
-
-class PlannedOut(BaseModel):
-    """A collect or a contact."""
-
-    satellite_id: str
-    mode: Literal["collect", "contact"]
-    target_id: str | None
-    station_id: str | None
-    start: Instant
-    end: Instant
-
-
-class MovedOut(BaseModel):
-    """The same target, or the same satellite's contact of a station, at another time."""
-
-    before: PlannedOut
-    after: PlannedOut
-
-
-class TotalDiff(BaseModel):
-    """A figure of both plans, which differs; null where there is none."""
-
-    before: float | None
-    after: float | None
-    delta: float | None = Field(description="After less before; null where one is missing.")
-
-
-class DiffOut(BaseModel):
-    """From the first job's plan to the second's; nothing of it for the same plan."""
-
-    before: str = Field(description="The first job.")
-    after: str = Field(description="The second one.")
-    is_empty: bool = Field(description="Whether actions and totals are the same.")
-    questions_differ_in: list[Difference] = Field(
-        description="Where the jobs did not plan the same: `scenario` with anything else that is "
-        "listed, or alone where pins, settings or targets differ."
-    )
-    added: list[PlannedOut]
-    removed: list[PlannedOut]
-    moved: list[MovedOut]
-    totals: dict[str, TotalDiff] = Field(
-        description="`reward`, `collects`, `contacts`, `targets` (imaged and counted), what is "
-        "downlinked, the lowest battery and the fullest recorder; only those that differ."
-    )
 
 
 @router.get(

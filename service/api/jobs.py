@@ -12,17 +12,18 @@ from service.api import job_intake as intake
 from service.api.conditional import NOT_MODIFIED
 from service.api.deps import AuditDep, CallerDep, DatabaseDep, SettingsDep, own_job_only
 from service.api.errors import problem_responses
+from service.api.etags import matches
 from service.api.idempotency import OnceDep
-from service.api.job_shapes import JobIn, JobOut, etag_of_job, shown
+from service.api.job_shapes import etag_of_job, shown
 from service.api.job_wait import wait_for_change
-from service.api.paging import Listed, PagingDep, newest_first
+from service.api.paging import PagingDep, newest_first
 from service.api.problems import ServiceError
-from service.api.shapes import matches
 from service.db.rows import JobRow
 from service.jobs import lease
-from service.jobs.lease import JobState
 from service.jobs.queue import JobQueue
 from service.stores import job_store as store
+from service.wire.base import Listed
+from service.wire.jobs import JobIn, JobOut, JobState
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[Depends(own_job_only)])
 log = logging.getLogger(__name__)

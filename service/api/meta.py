@@ -7,52 +7,19 @@ from typing import Annotated
 
 import sqlalchemy as sa
 from fastapi import APIRouter, Path, Request
-from pydantic import BaseModel, Field
 
 import planner_core
 from service.api.deps import DatabaseDep
 from service.api.errors import problem_responses
 from service.api.problems import KINDS, ServiceError, kind_of
-from service.api.shapes import Instant
 from service.db.rows import WorkerRow
 from service.db.session import Database
 from service.jobs.queue import JobQueue
+from service.wire.operations import Live, ProblemExplained, Ready, Version
 
 router = APIRouter(tags=["operations"])
 
 WORKER_SILENCE = timedelta(seconds=30)
-
-
-class Live(BaseModel):
-    """The process answers."""
-
-    status: str = "live"
-
-
-class Ready(BaseModel):
-    """Jobs can be taken and run."""
-
-    status: str = "ready"
-    database: str = "ok"
-    queue: str = "ok"
-    workers: int = Field(description="Workers heard of in the last 30 seconds.")
-    last_heartbeat: Instant
-
-
-class Version(BaseModel):
-    """What runs here."""
-
-    name: str = "slewline"
-    version: str
-
-
-class ProblemExplained(BaseModel):
-    """What a problem code means, and what to do about it."""
-
-    code: str
-    title: str
-    status: int
-    explanation: str
 
 
 @router.get("/health/live")

@@ -12,12 +12,13 @@ from fastapi.openapi.utils import get_openapi
 from fastapi.responses import HTMLResponse
 from pydantic import BaseModel
 
-from service.api.errors import ProblemOut, problem_responses
+from service.api.errors import problem_responses
 from service.api.examples import add_examples
 from service.api.guard import is_limited, is_open
 from service.api.links import add_links
-from service.api.target_catalogs import TargetCatalogIn
-from service.api.timeline_shapes import ProofOut, TimelineOut
+from service.wire.operations import ProblemOut
+from service.wire.places import TargetCatalogIn
+from service.wire.timelines import ProofOut, TimelineOut
 
 router = APIRouter(include_in_schema=False)
 

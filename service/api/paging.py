@@ -10,7 +10,6 @@ from typing import Annotated, Generic, TypeVar
 
 import sqlalchemy as sa
 from fastapi import Depends, Query, Request, Response
-from pydantic import BaseModel, Field
 from sqlalchemy.orm import InstrumentedAttribute, Session
 
 from service.api.problems import ServiceError
@@ -18,13 +17,6 @@ from service.api.problems import ServiceError
 T = TypeVar("T")
 R = TypeVar("R")
 K = TypeVar("K", str, int)
-
-
-class Listed(BaseModel, Generic[T]):
-    """One page of a list."""
-
-    items: list[T]
-    next: str | None = Field(description="Cursor of the next page; null on the last one.")
 
 
 @dataclass(frozen=True, slots=True)

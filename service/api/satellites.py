@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from datetime import UTC, datetime
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
 import sqlalchemy as sa
 from fastapi import APIRouter, Query, Request, Response
-from pydantic import BaseModel, Field
 from sqlalchemy.orm import Session
 
 from planner_core.errors import Fault
@@ -17,76 +16,30 @@ from service.api.conditional import NOT_MODIFIED, created, require_match, unless
 from service.api.deps import AuditDep, DatabaseDep, RawBodyDep, require_media_type
 from service.api.errors import problem_responses, refuse
 from service.api.idempotency import OnceDep
-from service.api.imports import (
-    Imported,
-    OnError,
-    OnErrorQuery,
-    body_schemas,
-    imported,
-    refuse_if_asked,
-)
-from service.api.paging import Listed, PagingDep, newest_first
+from service.api.imports import OnError, OnErrorQuery, body_schemas, imported, refuse_if_asked
+from service.api.paging import PagingDep, newest_first
 from service.api.problems import ServiceError
-from service.api.shapes import Instant
 from service.db.rows import ElementSetRow, SatelliteRow
-from service.scenarios.inputs import AgilityIn, OrbitIn, ResourcesField, SatelliteIn, SensorIn
 from service.scenarios.translate import orbit_from, satellite_from
 from service.stores import satellite_store as store
+from service.wire.base import Listed
+from service.wire.imports import Imported
+from service.wire.satellites import (
+    AgilityIn,
+    ElementsOut,
+    ImportedSatellite,
+    OrbitIn,
+    RecordWarning,
+    SatelliteIn,
+    SatelliteOut,
+    SensorIn,
+)
 
 router = APIRouter(prefix="/v1/satellites", tags=["satellites"])
 
 _ADD_ELEMENTS: Final = "add_elements"
 _ACTIONS: Final[dict[store.Status, str]] = {"created": "create", "elements_added": _ADD_ELEMENTS}
 _IMPORT_TYPES = ("text/plain", "application/json", "text/csv", "application/xml", "text/xml")
-
-
-class ElementsOut(BaseModel):
-    """One element set of a satellite."""
-
-    id: str
-    epoch: Instant
-    tle: list[str] | None
-    omm: dict[str, Any] | None
-    created_at: Instant
-
-
-class SatelliteOut(BaseModel):
-    """A satellite with the element set in force, the one of the newest epoch."""
-
-    id: str
-    name: str
-    norad_cat_id: int
-    epoch: Instant
-    tle: list[str] | None
-    omm: dict[str, Any] | None
-    agility: AgilityIn
-    sensor: SensorIn
-    resources: ResourcesField
-    created_at: Instant
-    links: dict[str, str]
-
-
-class RecordWarning(BaseModel):
-    """What was put right while reading a record."""
-
-    row: int | None
-    code: str
-    detail: str
-
-
-class ImportedSatellite(BaseModel):
-    """The satellite that a record belongs to."""
-
-    id: str
-    name: str
-    norad_cat_id: int
-    epoch: Instant
-    row: int | None = Field(description="Line of the file where the record starts.")
-    status: store.Status = Field(
-        description="`elements_added`: the catalogue number was known, the epoch was not; "
-        "`unchanged`: both were."
-    )
-    warnings: list[RecordWarning]
 
 
 @router.post("", status_code=201)

@@ -4,109 +4,39 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from typing import Annotated, Any, Literal, cast
+from typing import Annotated, Any, cast
 
 import numpy as np
 import sqlalchemy as sa
 from fastapi import APIRouter, Query, Request, Response
-from pydantic import BaseModel, Field
 from sqlalchemy.orm import Session
 
 from planner_core.build import view_at
-from planner_core.domain import CollectAlignment, Dynamics, Nadir
 from planner_core.orbits.places import View
 from planner_core.problem import COLLECT, CONTACT
 from service.api.conditional import NOT_MODIFIED, created, unless_known
 from service.api.deps import AuditDep, DatabaseDep, SettingsDep
 from service.api.errors import problem_responses
+from service.api.etags import etag_of, matches
 from service.api.idempotency import OnceDep
-from service.api.paging import Listed, PagingDep, newest_first
+from service.api.paging import PagingDep, newest_first
 from service.api.problems import ServiceError
-from service.api.shapes import Instant, etag_of, matches
 from service.db.rows import ScenarioRow
 from service.opportunities import Described, OpportunityReader
-from service.scenarios.inputs import ScenarioFile, ScenarioIn
-from service.scenarios.pin_inputs import PinsIn
 from service.stores import scenario_store as store
+from service.wire.base import Listed
+from service.wire.scenarios import (
+    Kind,
+    OpportunityOut,
+    ScenarioFile,
+    ScenarioIn,
+    ScenarioOut,
+    ViewOut,
+)
 
 router = APIRouter(prefix="/v1/scenarios", tags=["scenarios"])
 
-Kind = Literal["collect", "contact"]
 _KINDS: dict[str, int] = {"collect": COLLECT, "contact": CONTACT}
-
-
-class HorizonOut(BaseModel):
-    """The span to plan."""
-
-    start: Instant
-    end: Instant
-
-
-class Counts(BaseModel):
-    """How much the scenario holds."""
-
-    satellites: int
-    targets: int
-    ground_stations: int
-
-
-class ScenarioOut(BaseModel):
-    """A frozen question. Later edits of what it names change nothing in it."""
-
-    id: str
-    sha256: str = Field(description="Of the canonical content, the name left out.")
-    name: str | None
-    horizon: HorizonOut
-    satellite_ids: list[str]
-    target_catalog_ids: list[str]
-    ground_station_ids: list[str]
-    use_resources: bool
-    dynamics: Dynamics
-    collect_spacing_s: float | None
-    collect_alignment: CollectAlignment = "access"
-    continuous_starts: bool
-    allow_old_elements: bool
-    pins: PinsIn = PinsIn()
-    counts: Counts
-    warnings: list[str] = Field(description="About the age of orbits, for people.")
-    created_at: Instant
-    links: dict[str, str]
-
-
-class ViewOut(BaseModel):
-    """What satellite and place see of each other at one instant."""
-
-    off_nadir_deg: float
-    elevation_deg: float
-    azimuth_deg: float
-    range_km: float
-    sun_elevation_deg: float
-    eclipse: bool
-
-
-class OpportunityOut(BaseModel):
-    """A collect or a contact that a plan may take. Angles and range hold at its middle."""
-
-    id: str
-    satellite_id: str
-    kind: Kind
-    target_id: str | None = Field(description="Of a collect.")
-    station_id: str | None = Field(description="Of a contact.")
-    start: Instant
-    end: Instant
-    access_start: Instant = Field(
-        description="The opportunity lies within its access, cut to the release and due times."
-    )
-    access_end: Instant
-    off_nadir_deg: float = Field(description="At the satellite, from the nadir named below.")
-    elevation_deg: float = Field(description="At the target or station.")
-    azimuth_deg: float = Field(description="Of the satellite, from north over east.")
-    sun_elevation_deg: float = Field(description="At the target or station.")
-    range_km: float = Field(description="From the satellite to the target or station.")
-    eclipse: bool = Field(description="The satellite is in the Earth's shadow.")
-    nadir: Nadir = Field(description="What off-nadir angles are measured from.")
-    at_start: ViewOut | None = Field(None, description="With `edges=true`.")
-    at_end: ViewOut | None = Field(None, description="With `edges=true`.")
 
 
 @router.post(
@@ -198,19 +128,18 @@ def list_opportunities(
     rows = _matching(described, target_id, satellite_id, kind)
     first = int(np.searchsorted(rows, paging.after_number(), side="right"))
     page = paging.answer(rows[first : first + paging.limit + 1].tolist(), lambda row: row)
-    items = [_opportunity(described, row) for row in page.rows]
-    if edges:
-        _add_edges(described, page.rows, items)
+    seen = _edges(described, page.rows) if edges else [{} for _ in page.rows]
+    items = [_opportunity(described, row, **at) for row, at in zip(page.rows, seen, strict=True)]
     return Listed(items=items, next=page.next)
 
 
-def _add_edges(described: Described, rows: Sequence[int], items: Sequence[OpportunityOut]) -> None:
+def _edges(described: Described, rows: Sequence[int]) -> list[dict[str, ViewOut]]:
+    """Return what holds at start and end of each of these opportunities."""
     scenario, table = described.scenario, described.computed.opportunities
     chosen = np.array(rows, dtype=np.int64)
     first = view_at(scenario, table, chosen, table.start_s[chosen])
     last = view_at(scenario, table, chosen, table.end_s[chosen])
-    for position, item in enumerate(items):
-        item.at_start, item.at_end = _view(first, position), _view(last, position)
+    return [{"at_start": _view(first, i), "at_end": _view(last, i)} for i in range(len(rows))]
 
 
 def _view(seen: View, position: int) -> ViewOut:
@@ -240,7 +169,7 @@ def _matching(
     return np.flatnonzero(wanted)
 
 
-def _opportunity(described: Described, row: int) -> OpportunityOut:
+def _opportunity(described: Described, row: int, **edges: ViewOut) -> OpportunityOut:
     scenario, table = described.scenario, described.computed.opportunities
     is_collect = int(table.kind[row]) == COLLECT
     place = int(table.place[row])
@@ -262,6 +191,7 @@ def _opportunity(described: Described, row: int) -> OpportunityOut:
         range_km=_rounded(table.range_m[row] / 1000.0),
         eclipse=bool(table.in_eclipse[row]),
         nadir=scenario.satellites[int(table.satellite[row])].sensor.nadir,
+        **edges,
     )
 
 

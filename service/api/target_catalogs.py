@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import sqlalchemy as sa
 from fastapi import APIRouter, Query, Request, Response
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import Field, ValidationError
 from sqlalchemy.orm import Session
 
 from planner_core.errors import Fault
@@ -17,18 +17,17 @@ from service.api.conditional import NOT_MODIFIED, created, require_match, unless
 from service.api.deps import AuditDep, DatabaseDep, RawBodyDep, require_media_type
 from service.api.errors import faults_of_validation, problem_responses, refuse
 from service.api.idempotency import OnceDep
-from service.api.paging import Listed, PagingDep, newest_first
+from service.api.paging import PagingDep, newest_first
 from service.api.problems import ServiceError
-from service.api.shapes import Body, Instant, Name
 from service.db.rows import TargetCatalogRow, TargetRow
 from service.ids import new_id
-from service.scenarios.inputs import TargetIn
 from service.scenarios.records import Record, Records, check, first_of_each, read_csv, read_geojson
 from service.scenarios.translate import target_from
+from service.wire.base import Body, Listed, Name
+from service.wire.places import MAX_TARGETS, CreatedCatalog, TargetCatalogOut, TargetIn
 
 router = APIRouter(prefix="/v1/target-catalogs", tags=["target catalogues"])
 
-MAX_TARGETS = 100_000
 _TYPES = ("application/json", "application/geo+json", "text/csv")
 _REQUIRED = ("id", "lat_deg", "lon_deg")
 _COLUMNS = tuple(TargetIn.model_fields)
@@ -36,34 +35,11 @@ _OPTIONAL = tuple(column for column in _COLUMNS if column not in _REQUIRED)
 _UNNAMED = "Targets"
 
 
-class TargetCatalogIn(Body):
-    """A catalogue of targets."""
-
-    name: Name
-    targets: list[TargetIn] = Field(min_length=1, max_length=MAX_TARGETS)
-
-
 class _Listed(Body):
     """The same, with targets that are still to be looked at one by one."""
 
     name: Name
     targets: list[dict[str, Any]] = Field(min_length=1, max_length=MAX_TARGETS)
-
-
-class TargetCatalogOut(BaseModel):
-    """A catalogue; its targets have their own address."""
-
-    id: str
-    name: str
-    num_targets: int
-    created_at: Instant
-    links: dict[str, str]
-
-
-class CreatedCatalog(TargetCatalogOut):
-    """A new catalogue."""
-
-    ignored_columns: list[str] = Field(description="Columns of a CSV file that mean nothing here.")
 
 
 _REQUEST_BODY: dict[str, Any] = {

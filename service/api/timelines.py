@@ -16,11 +16,10 @@ from service.api.accept import preferred
 from service.api.conditional import NOT_MODIFIED
 from service.api.deps import DatabaseDep, own_job_only
 from service.api.errors import problem_responses
-from service.api.job_shapes import Outcome, TargetItem, etag_of_timeline
-from service.api.paging import Listed, PagingDep
+from service.api.etags import matches
+from service.api.job_shapes import etag_of_timeline
+from service.api.paging import PagingDep
 from service.api.problems import ServiceError
-from service.api.shapes import matches
-from service.api.timeline_shapes import JSON_PROOF, JSON_TIMELINE
 from service.blocks import TIMELINE, Entry, holds, items_in
 from service.db.rows import JobRow
 from service.db.session import Database
@@ -28,10 +27,14 @@ from service.exports.answered import Answered, in_chunks
 from service.exports.forms import FORMS, Form
 from service.stores import answer_store
 from service.stores import job_store as store
+from service.wire.base import Listed
+from service.wire.timelines import Outcome, TargetItem
 
 router = APIRouter(prefix="/v1/jobs", tags=["timelines"], dependencies=[Depends(own_job_only)])
 
 _JSON: Final = "application/json"
+_TIMELINE: Final = {"$ref": "#/components/schemas/Timeline"}
+_PROOF: Final = {"anyOf": [{"$ref": "#/components/schemas/Proof"}, {"type": "null"}]}
 _BY_SUFFIX: Final = {form.suffix: form for form in FORMS}
 _BY_TYPE: Final = {form.media_type: form for form in FORMS if form.has_own_type}
 _SUFFIXES: Final = ["json", *_BY_SUFFIX]
@@ -46,12 +49,11 @@ Suffix = Annotated[
 def _responses(forms: Sequence[Form]) -> dict[int | str, dict[str, Any]]:
     """Return the entries of the OpenAPI document for a route that offers these forms and JSON."""
     # JSON stands first: generated clients read the first form they know.
-    content: dict[str, Any] = JSON_TIMELINE | {
-        form.media_type: {} for form in forms if form.media_type != _JSON
-    }
+    content: dict[str, Any] = {_JSON: {"schema": _TIMELINE}}
+    content |= {form.media_type: {} for form in forms if form.media_type != _JSON}
     if _JSON in (form.media_type for form in forms):
         other = [{"type": "array"}, {"type": "object"}]
-        content[_JSON] = {"schema": {"anyOf": [JSON_TIMELINE[_JSON]["schema"], *other]}}
+        content[_JSON] = {"schema": {"anyOf": [_TIMELINE, *other]}}
     headers = {
         "Content-Disposition": {
             "description": "A name to save it under.",
@@ -99,7 +101,7 @@ def get_timeline_as(
 @router.get(
     "/{job_id}/proof",
     responses={
-        200: {"content": JSON_PROOF, "description": "The proof document."},
+        200: {"content": {_JSON: {"schema": _PROOF}}, "description": "The proof document."},
         **NOT_MODIFIED,
         **problem_responses(404, 409),
     },

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import base64
 import secrets
-from typing import Annotated, Any, Final, Literal, cast
+from typing import Any, Final
 
 import sqlalchemy as sa
 from fastapi import APIRouter, Request, Response
-from pydantic import BaseModel, Field, StringConstraints
 from sqlalchemy.orm import Session
 
 from planner_core.errors import Fault
@@ -17,74 +16,26 @@ from service.api.conditional import NOT_MODIFIED, created, require_match, unless
 from service.api.deps import AuditDep, CallerDep, DatabaseDep, SettingsDep
 from service.api.errors import problem_responses, refuse
 from service.api.idempotency import OnceDep
-from service.api.paging import Listed, PagingDep, newest_first
+from service.api.paging import PagingDep, newest_first
 from service.api.problems import ServiceError
-from service.api.shapes import Body, Instant, Name
 from service.db.clock import utc_now
 from service.db.rows import WebhookDeliveryRow, WebhookRow
 from service.ids import new_id
 from service.webhooks import outbox
-from service.webhooks.addresses import LONGEST_URL, AddressRefused, require_good_url
-from service.webhooks.events import JOB_EVENTS, Event
-from service.webhooks.outbox import DeliveryState
+from service.webhooks.addresses import AddressRefused, require_good_url
+from service.wire.base import Listed
+from service.wire.webhooks import (
+    JOB_EVENTS,
+    CreatedWebhook,
+    DeliveryOut,
+    WebhookIn,
+    WebhookOut,
+)
 
 router = APIRouter(prefix="/v1/webhooks", tags=["webhooks"])
 
 MOST_OF_AN_OWNER: Final = 20
 _SECRET_BYTES: Final = 32
-JobEvent = Literal["job.succeeded", "job.failed", "job.cancelled", "job.expired"]
-
-
-class WebhookIn(Body):
-    """Where to send, and what."""
-
-    url: Annotated[str, StringConstraints(min_length=1, max_length=LONGEST_URL)] = Field(
-        description="Gets each event as a POST. `https` only, unless the server allows more."
-    )
-    events: list[JobEvent] = Field(
-        default_factory=lambda: cast("list[JobEvent]", list(JOB_EVENTS)),
-        min_length=1,
-        max_length=len(JOB_EVENTS),
-        description="Ends of jobs that are told.",
-    )
-    name: Name | None = None
-
-
-class WebhookOut(BaseModel):
-    """A webhook, without the secret that signs what it sends."""
-
-    id: str
-    url: str
-    events: list[JobEvent]
-    name: str | None
-    owner: str = Field(description="Whose jobs it tells of.")
-    created_at: Instant
-    disabled_at: Instant | None = Field(
-        description="Since when nothing is sent any more: the receiver answered 410."
-    )
-    disabled_because: str | None
-    links: dict[str, str]
-
-
-class CreatedWebhook(WebhookOut):
-    """The same with its secret, which is shown this once."""
-
-    secret: str = Field(description="For the receiver: verify `webhook-signature` with it.")
-
-
-class DeliveryOut(BaseModel):
-    """One message and how it fared."""
-
-    id: str = Field(description="The `webhook-id` of each of its attempts.")
-    event: Event
-    job_id: str | None
-    state: DeliveryState
-    attempts: int
-    due_at: Instant | None = Field(description="When it is tried next.")
-    last_status: int | None = Field(description="What the receiver answered last.")
-    last_error: str | None
-    created_at: Instant
-    ended_at: Instant | None
 
 
 @router.post("", status_code=201)

@@ -5,38 +5,23 @@ from __future__ import annotations
 from typing import Any, Final, cast
 
 from fastapi import APIRouter, Depends, Request, Response
-from pydantic import Field
 
 from service.api import job_intake as intake
 from service.api.deps import AuditDep, CallerDep, DatabaseDep, SettingsDep, own_job_only
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
-from service.api.job_shapes import JobOut, LimitsIn
-from service.api.shapes import Name
 from service.db.rows import JobRow, ScenarioRow
 from service.opportunities import OpportunityReader
-from service.scenarios.change_inputs import ChangeIn
 from service.scenarios.variations import Asked, Variations
 from service.settings import Settings
 from service.stores import answer_store, opportunity_store, scenario_store
 from service.stores import job_store as store
+from service.wire.changes import ChangeIn
+from service.wire.jobs import JobOut, LimitsIn, WhatIfIn
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[Depends(own_job_only)])
 
 _CHANGE: Final = set(ChangeIn.model_fields)
-
-
-class WhatIfIn(ChangeIn):
-    """A change to the question of a job. What is left out is as in that job."""
-
-    solver: str | None = Field(None, description="A name of `GET /v1/solvers`.")
-    params: dict[str, Any] | None = Field(
-        None, description="The solver's own; the others are its defaults."
-    )
-    seed: int | None = Field(None, ge=0, lt=2**63)
-    limits: LimitsIn = LimitsIn()
-    priority: int | None = Field(None, ge=0, le=9)
-    label: Name | None = None
 
 
 @router.post("/{job_id}/what-if", status_code=202, responses=problem_responses(404, 409, 503))

@@ -22,7 +22,7 @@ from planner_core.domain import (
 )
 from planner_core.orbits.ephemeris import propagate
 from service.exports.answered import Answered, Document, compact, in_chunks, listed
-from service.instants import instant_text
+from service.wire.instants import instant_text
 
 _DEGREE: Final = 5
 _SPEED: Final = 60

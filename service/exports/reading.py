@@ -23,10 +23,9 @@ from planner_core.problem import (
     Problem,
 )
 from planner_core.problem.plan import Action, Plan
-from service.api.shapes import Body, Instant
 from service.exports.table import unguarded
-from service.scenarios.pin_inputs import Id
 from service.scenarios.records import Checked, Record, Records, check, read_csv
+from service.wire.base import Body, Id, Instant
 
 _MOST_ACTIONS: Final = 1_000_000
 _REQUIRED: Final = ("satellite_id", "mode", "start", "end", "target_id", "station_id")

@@ -13,8 +13,8 @@ from sqlalchemy.orm import Session, aliased
 from planner_core.orbits.ingest import Entry
 from service.db.rows import ElementSetRow, SatelliteRow
 from service.ids import new_id
-from service.scenarios.inputs import AgilityIn, SatelliteIn, SensorIn
 from service.scenarios.translate import Orbit
+from service.wire.satellites import AgilityIn, SatelliteIn, SensorIn
 
 _LONGEST_NAME = 200
 

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any, Final, Literal, get_args
+from typing import Any
 
 from service.db.rows import JobRow
-
-Event = Literal["job.succeeded", "job.failed", "job.cancelled", "job.expired", "test"]
-JOB_EVENTS: Final = tuple(event for event in get_args(Event) if event != "test")
 
 
 def event_of(state: str) -> str:

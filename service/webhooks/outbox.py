@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
@@ -18,10 +18,8 @@ from sqlalchemy.orm import Session
 from service.db.clock import utc_now
 from service.db.rows import JobRow, WebhookDeliveryRow, WebhookRow
 from service.ids import new_id
-from service.instants import instant_text
 from service.webhooks import events
-
-DeliveryState = Literal["pending", "delivered", "failed"]
+from service.wire.instants import instant_text
 
 TAKEN_S: Final = 60.0
 KEEP_S: Final = 30 * 86400.0
