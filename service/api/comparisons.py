@@ -16,8 +16,9 @@ from service.api.deps import AuditDep, CallerDep, DatabaseDep, SettingsDep
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
 from service.api.paging import PagingDep, newest_first
-from service.api.problems import ServiceError
 from service.db.rows import ComparisonRow
+from service.jobs import submission
+from service.problems.kinds import ServiceError
 from service.scenarios.translate import inside
 from service.stores import comparison_store as store
 from service.stores import job_store
@@ -60,7 +61,7 @@ def create_comparison(
         intake.require_room(session, settings, len(body.runs))
         scenario_id = intake.stored_scenario(session, audit, body, inline)
         specs = [
-            job_store.JobSpec(
+            submission.JobSpec(
                 scenario_id=scenario_id,
                 solver=run.solver,
                 params=of_run,
@@ -73,7 +74,7 @@ def create_comparison(
             )
             for run, of_run in zip(body.runs, params, strict=True)
         ]
-        row = store.submit(session, queue, specs, label=body.label)
+        row = submission.submit_comparison(session, queue, specs, label=body.label)
         shown = _shown(session, [row])[0]
         audit.record(session, "create", "job", *(run.job_id for run in shown.runs))
         audit.record(session, "create", "comparison", row.id)

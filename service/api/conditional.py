@@ -9,7 +9,7 @@ from fastapi import Request, Response
 from pydantic import BaseModel
 
 from service.api.etags import etagged, matches, matches_strongly
-from service.api.problems import ServiceError
+from service.problems.kinds import ServiceError
 
 M = TypeVar("M", bound=BaseModel)
 

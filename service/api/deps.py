@@ -14,10 +14,10 @@ from starlette.concurrency import run_in_threadpool
 from planner_core.errors import Fault
 from service.access.audit import Audit
 from service.access.callers import Caller, Scope
-from service.api.errors import refuse
 from service.api.guard import require_scope
-from service.api.problems import ServiceError
 from service.db.session import Database
+from service.problems.faults import refuse
+from service.problems.kinds import ServiceError
 from service.settings import Settings
 from service.stores import job_store
 

@@ -15,9 +15,9 @@ from service.api.conditional import NOT_MODIFIED
 from service.api.deps import DatabaseDep
 from service.api.errors import problem_responses
 from service.api.etags import etag_of, matches
-from service.api.problems import ServiceError
 from service.api.satellites import find_satellite
 from service.db.rows import SatelliteRow
+from service.problems.kinds import ServiceError
 from service.scenarios.translate import orbit_from
 from service.stores import satellite_store as store
 from service.wire.satellites import OrbitIn

@@ -6,14 +6,14 @@ from typing import Annotated, cast
 
 from fastapi import APIRouter, Depends, Path, Request, Response
 
+from service.answers.explanations import Explainer, version_of
 from service.api import job_intake as intake
 from service.api.conditional import NOT_MODIFIED
 from service.api.deps import DatabaseDep, own_job_only
 from service.api.errors import problem_responses
 from service.api.etags import etag_of, matches
-from service.api.problems import ServiceError
-from service.explanations import Explainer, version_of
-from service.opportunities import OpportunityReader
+from service.problems.kinds import ServiceError
+from service.scenarios.opportunities import OpportunityReader
 from service.stores.job_store import hashes_of
 from service.wire.timelines import ExplanationOut
 

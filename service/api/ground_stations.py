@@ -16,9 +16,9 @@ from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
 from service.api.imports import OnError, OnErrorQuery, body_schemas, imported, refuse_if_asked
 from service.api.paging import PagingDep, newest_first
-from service.api.problems import ServiceError
+from service.db.ids import new_id
 from service.db.rows import GroundStationRow
-from service.ids import new_id
+from service.problems.kinds import ServiceError
 from service.scenarios.records import Checked, check, read_csv, read_geojson
 from service.scenarios.translate import ground_station_from
 from service.wire.base import Listed

@@ -9,7 +9,7 @@ from typing import Annotated, Any, TypeVar
 from fastapi import Query
 
 from planner_core.errors import Fault
-from service.api.errors import refuse
+from service.problems.faults import refuse
 from service.wire.imports import Imported, RejectedRow
 
 T = TypeVar("T")

@@ -8,13 +8,13 @@ from typing import Any
 from fastapi import APIRouter, Depends, Request, Response
 
 from planner_core.referee.plan_diff import PlannedAction, plan_diff
+from service.answers.views import view_of
 from service.api import job_intake as intake
 from service.api.conditional import NOT_MODIFIED
 from service.api.deps import CallerDep, DatabaseDep, own_job_only
 from service.api.errors import problem_responses
 from service.api.etags import etag_of, matches
-from service.api.problems import ServiceError
-from service.plan_views import view_of
+from service.problems.kinds import ServiceError
 from service.stores import job_store as store
 from service.wire.timelines import Difference, DiffOut, MovedOut, PlannedOut, TotalDiff
 

@@ -12,19 +12,20 @@ from sqlalchemy.orm import Session
 from planner_core.errors import Fault
 from planner_core.solvers.registry import solver_class
 from service.access.audit import Audit
+from service.answers import store as answer_store
 from service.api import ask_again
-from service.api.errors import refuse
 from service.api.job_shapes import headers_of, shown
-from service.api.problems import ServiceError
 from service.db.rows import JobRow
 from service.db.session import Database
 from service.jobs.queue import JobQueue
+from service.jobs.solver_params import params_of, parse_params
+from service.problems.faults import refuse
+from service.problems.kinds import ServiceError
+from service.scenarios import freezing as scenario_store
+from service.scenarios.freezing import FrozenScenario
 from service.scenarios.translate import inside, read_file
 from service.settings import Settings
-from service.solver_params import params_of, parse_params
-from service.stores import answer_store, scenario_store
 from service.stores import job_store as store
-from service.stores.scenario_store import FrozenScenario
 from service.wire.jobs import ACTIVE, JobOut, LimitsIn, QuestionIn
 from service.wire.scenarios import ScenarioFile, ScenarioIn
 

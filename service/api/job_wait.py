@@ -10,9 +10,9 @@ from starlette.concurrency import run_in_threadpool
 
 from service.api.etags import matches
 from service.api.job_shapes import etag_of_job
-from service.api.problems import ServiceError
 from service.db.rows import JobRow
 from service.db.session import Database
+from service.problems.kinds import ServiceError
 from service.stores import job_store as store
 from service.wire.jobs import ACTIVE
 

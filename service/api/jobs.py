@@ -17,10 +17,10 @@ from service.api.idempotency import OnceDep
 from service.api.job_shapes import etag_of_job, shown
 from service.api.job_wait import wait_for_change
 from service.api.paging import PagingDep, newest_first
-from service.api.problems import ServiceError
 from service.db.rows import JobRow
-from service.jobs import lease
+from service.jobs import lease, submission
 from service.jobs.queue import JobQueue
+from service.problems.kinds import ServiceError
 from service.stores import job_store as store
 from service.wire.base import Listed
 from service.wire.jobs import JobIn, JobOut, JobState
@@ -52,7 +52,7 @@ def create_job(
     inline = intake.frozen(database, settings, body)
     with once.transaction() as session:
         intake.require_room(session, settings)
-        spec = store.JobSpec(
+        spec = submission.JobSpec(
             scenario_id=intake.stored_scenario(session, audit, body, inline),
             solver=body.solver,
             params=params,
@@ -63,7 +63,7 @@ def create_job(
             label=body.label,
             owner=caller.owner,
         )
-        job = store.submit(session, queue, spec)
+        job = submission.submit(session, queue, spec)
         audit.record(session, "create", "job", job.id)
         return once.keep(session, intake.accepted(session, response, job))
 
@@ -160,9 +160,9 @@ def rerun_job(
     """
     queue = intake.queue_of(request)
     with once.transaction() as session:
-        spec = store.spec_again(intake.find_job(session, job_id), caller.owner)
+        spec = submission.spec_again(intake.find_job(session, job_id), caller.owner)
         intake.require_room(session, settings)
-        job = store.submit(session, queue, spec)
+        job = submission.submit(session, queue, spec)
         audit.record(session, "create", "job", job.id)
         return once.keep(session, intake.accepted(session, response, job))
 

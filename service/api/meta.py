@@ -11,10 +11,10 @@ from fastapi import APIRouter, Path, Request
 import planner_core
 from service.api.deps import DatabaseDep
 from service.api.errors import problem_responses
-from service.api.problems import KINDS, ServiceError, kind_of
 from service.db.rows import WorkerRow
 from service.db.session import Database
 from service.jobs.queue import JobQueue
+from service.problems.kinds import KINDS, ServiceError, kind_of
 from service.wire.operations import Live, ProblemExplained, Ready, Version
 
 router = APIRouter(tags=["operations"])

@@ -12,7 +12,7 @@ import sqlalchemy as sa
 from fastapi import Depends, Query, Request, Response
 from sqlalchemy.orm import InstrumentedAttribute, Session
 
-from service.api.problems import ServiceError
+from service.problems.kinds import ServiceError
 
 T = TypeVar("T")
 R = TypeVar("R")

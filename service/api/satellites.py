@@ -14,12 +14,13 @@ from planner_core.errors import Fault
 from planner_core.orbits.ingest import read_elements
 from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
 from service.api.deps import AuditDep, DatabaseDep, RawBodyDep, require_media_type
-from service.api.errors import problem_responses, refuse
+from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
 from service.api.imports import OnError, OnErrorQuery, body_schemas, imported, refuse_if_asked
 from service.api.paging import PagingDep, newest_first
-from service.api.problems import ServiceError
 from service.db.rows import ElementSetRow, SatelliteRow
+from service.problems.faults import refuse
+from service.problems.kinds import ServiceError
 from service.scenarios.translate import orbit_from, satellite_from
 from service.stores import satellite_store as store
 from service.wire.base import Listed
@@ -50,7 +51,7 @@ def create_satellite(
     satellite_from(body, "new")
     orbit = orbit_from(body)
     with once.transaction() as session:
-        row = store.add_satellite(session, body, orbit)
+        row = store.add_satellite(session, body, orbit.elements, orbit.stored)
         audit.record(session, "create", "satellite", row.id)
         shown = created(response, _shown(session, [row])[0], f"/v1/satellites/{row.id}")
         return once.keep(session, shown)

@@ -20,10 +20,10 @@ from service.api.errors import problem_responses
 from service.api.etags import etag_of, matches
 from service.api.idempotency import OnceDep
 from service.api.paging import PagingDep, newest_first
-from service.api.problems import ServiceError
 from service.db.rows import ScenarioRow
-from service.opportunities import Described, OpportunityReader
-from service.stores import scenario_store as store
+from service.problems.kinds import ServiceError
+from service.scenarios import freezing as store
+from service.scenarios.opportunities import Described, OpportunityReader
 from service.wire.base import Listed
 from service.wire.scenarios import (
     Kind,

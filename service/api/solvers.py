@@ -7,8 +7,8 @@ from fastapi import APIRouter
 from planner_core.solvers.base import Solver
 from planner_core.solvers.registry import SOLVERS
 from service.api.errors import problem_responses
-from service.api.problems import ServiceError
-from service.solver_params import params_schema
+from service.jobs.solver_params import params_schema
+from service.problems.kinds import ServiceError
 from service.wire.base import Listed
 from service.wire.operations import SolverOut
 

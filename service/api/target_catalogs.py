@@ -15,12 +15,13 @@ from sqlalchemy.orm import Session
 from planner_core.errors import Fault
 from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
 from service.api.deps import AuditDep, DatabaseDep, RawBodyDep, require_media_type
-from service.api.errors import faults_of_validation, problem_responses, refuse
+from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
 from service.api.paging import PagingDep, newest_first
-from service.api.problems import ServiceError
+from service.db.ids import new_id
 from service.db.rows import TargetCatalogRow, TargetRow
-from service.ids import new_id
+from service.problems.faults import faults_of_validation, refuse
+from service.problems.kinds import ServiceError
 from service.scenarios.records import Record, Records, check, first_of_each, read_csv, read_geojson
 from service.scenarios.translate import target_from
 from service.wire.base import Body, Listed, Name

@@ -11,6 +11,9 @@ from fastapi import APIRouter, Depends, Path, Query, Request, Response
 from fastapi.responses import StreamingResponse
 
 import planner_core
+from service.answers import store as answer_store
+from service.answers.answered import Answered, in_chunks
+from service.answers.blocks import TIMELINE, Entry, holds, items_in
 from service.api import job_intake as intake
 from service.api.accept import preferred
 from service.api.conditional import NOT_MODIFIED
@@ -19,13 +22,10 @@ from service.api.errors import problem_responses
 from service.api.etags import matches
 from service.api.job_shapes import etag_of_timeline
 from service.api.paging import PagingDep
-from service.api.problems import ServiceError
-from service.blocks import TIMELINE, Entry, holds, items_in
 from service.db.rows import JobRow
 from service.db.session import Database
-from service.exports.answered import Answered, in_chunks
 from service.exports.forms import FORMS, Form
-from service.stores import answer_store
+from service.problems.kinds import ServiceError
 from service.stores import job_store as store
 from service.wire.base import Listed
 from service.wire.timelines import Outcome, TargetItem

@@ -14,13 +14,14 @@ from planner_core.errors import Fault
 from service.access.callers import Caller
 from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
 from service.api.deps import AuditDep, CallerDep, DatabaseDep, SettingsDep
-from service.api.errors import problem_responses, refuse
+from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
 from service.api.paging import PagingDep, newest_first
-from service.api.problems import ServiceError
 from service.db.clock import utc_now
+from service.db.ids import new_id
 from service.db.rows import WebhookDeliveryRow, WebhookRow
-from service.ids import new_id
+from service.problems.faults import refuse
+from service.problems.kinds import ServiceError
 from service.webhooks import outbox
 from service.webhooks.addresses import AddressRefused, require_good_url
 from service.wire.base import Listed

@@ -6,16 +6,18 @@ from typing import Any, Final, cast
 
 from fastapi import APIRouter, Depends, Request, Response
 
+from service.answers import store as answer_store
+from service.answers.variations import Asked, Variations
 from service.api import job_intake as intake
 from service.api.deps import AuditDep, CallerDep, DatabaseDep, SettingsDep, own_job_only
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
 from service.db.rows import JobRow, ScenarioRow
-from service.opportunities import OpportunityReader
-from service.scenarios.variations import Asked, Variations
+from service.jobs import submission
+from service.scenarios import freezing as scenario_store
+from service.scenarios.opportunities import OpportunityReader
 from service.settings import Settings
-from service.stores import answer_store, opportunity_store, scenario_store
-from service.stores import job_store as store
+from service.stores import opportunity_store
 from service.wire.changes import ChangeIn
 from service.wire.jobs import JobOut, LimitsIn, WhatIfIn
 
@@ -69,7 +71,7 @@ def create_what_if(
         if is_new:
             audit.record(session, "create", "scenario", row.id)
             opportunity_store.save(session, row.sha256, varied.opportunity_block)
-        spec = store.JobSpec(
+        spec = submission.JobSpec(
             scenario_id=row.id,
             solver=solver,
             params=params,
@@ -82,7 +84,7 @@ def create_what_if(
             what_if_of=job_id,
             change=body.model_dump(mode="json", include=_CHANGE, exclude_unset=True),
         )
-        made = store.submit(session, queue, spec)
+        made = submission.submit(session, queue, spec)
         audit.record(session, "create", "job", made.id)
         return once.keep(session, intake.accepted(session, response, made))
 

@@ -21,7 +21,7 @@ from planner_core.domain import (
     Target,
 )
 from planner_core.orbits.ephemeris import propagate
-from service.exports.answered import Answered, Document, compact, in_chunks, listed
+from service.answers.answered import Answered, Document, compact, in_chunks, listed
 from service.wire.instants import instant_text
 
 _DEGREE: Final = 5

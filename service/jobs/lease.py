@@ -14,11 +14,11 @@ from typing import Any, cast
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
 
-from service.blocks import Block
+from service.answers import store as answer_store
+from service.answers.blocks import Block
 from service.db.clock import utc_now
 from service.db.rows import JobRow
 from service.jobs.queue import JobQueue
-from service.stores import answer_store
 from service.webhooks import outbox
 from service.wire.jobs import JobState
 

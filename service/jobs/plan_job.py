@@ -13,8 +13,14 @@ from planner_core.certified.proofs import documents as proofs
 from planner_core.run import plan_scenario
 from planner_core.solvers.base import Solver
 from planner_core.solvers.registry import solver_class
-from service.blocks import Block, target_blocks, targets_text, timeline_blocks, timeline_text
-from service.documents import Documents, figures_of
+from service.answers.blocks import (
+    Block,
+    target_blocks,
+    targets_text,
+    timeline_blocks,
+    timeline_text,
+)
+from service.answers.rendering import Documents, figures_of
 from service.scenarios.translate import scenario_from_content
 
 

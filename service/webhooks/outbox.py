@@ -16,8 +16,8 @@ import sqlalchemy as sa
 from sqlalchemy.orm import Session
 
 from service.db.clock import utc_now
+from service.db.ids import new_id
 from service.db.rows import JobRow, WebhookDeliveryRow, WebhookRow
-from service.ids import new_id
 from service.webhooks import events
 from service.wire.instants import instant_text
 

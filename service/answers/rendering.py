@@ -15,8 +15,8 @@ from planner_core.orbits.sgp4_record import GRAVITY
 from planner_core.problem.slew import TIME_TOLERANCE_S
 from planner_core.referee.replay import JudgedAction, Resourceline, plan_sha256
 from planner_core.run import Judged
+from service.answers.wording import Document, Wording
 from service.wire.instants import instant_text
-from service.wording import Document, Wording
 
 SCHEMA_VERSION = "1.0"
 _COMPARED = (

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, Final
 
 from planner_core.referee.plan_diff import PlannedAction, PlanView
-from service.exports.reading import ActionIn, records_of_json
+from service.answers.reading import ActionIn, records_of_json
 from service.scenarios.records import check
 
 _FIGURES: Final = (

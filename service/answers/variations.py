@@ -14,15 +14,15 @@ from planner_core.errors import InvalidScenario
 from planner_core.pins import PinnedAction, Pins
 from planner_core.problem.plan import Plan
 from planner_core.reasons.what_if import Change, what_if
-from service.background import Background
-from service.opportunities import Described
-from service.rebuilt import stored_plan
+from service.answers.rebuilt import stored_plan
+from service.scenarios.background import Background
 from service.scenarios.change_pointers import Places, pointing_into, pointing_into_relax
+from service.scenarios.freezing import FrozenScenario, freeze_file
+from service.scenarios.opportunities import Described
 from service.scenarios.pin_inputs import pinned_action, pins_in
 from service.scenarios.relaxing import relaxed_file
 from service.scenarios.scenario_limits import ScenarioLimits
 from service.scenarios.translate import read_file, scenario_from_file, sha256_of
-from service.stores.scenario_store import FrozenScenario, freeze_file
 from service.wire.base import parse_instant
 from service.wire.changes import ChangeIn
 from service.wire.scenarios import ScenarioFile

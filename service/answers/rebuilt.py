@@ -13,8 +13,8 @@ from planner_core.problem import Problem
 from planner_core.problem.plan import Plan
 from planner_core.reasons.reason import Search
 from planner_core.referee.replay import Timeline, replay
-from service.exports.reading import plan_in, records_of_json
-from service.opportunities import Described
+from service.answers.reading import plan_in, records_of_json
+from service.scenarios.opportunities import Described
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -8,11 +8,11 @@ import planner_core
 from planner_core.budget import Budget
 from planner_core.reasons.access_changes import OF_TARGETS, AccessChange, access_changes
 from planner_core.reasons.at_length import Attempt, explain_target
-from service.background import Background
-from service.opportunities import Described
-from service.rebuilt import Rebuilt, rebuild
+from service.answers.rebuilt import Rebuilt, rebuild
+from service.answers.wording import Document, Wording
+from service.scenarios.background import Background
+from service.scenarios.opportunities import Described
 from service.wire.instants import instant_text
-from service.wording import Document, Wording
 
 _KEPT = 200
 _KEPT_JOBS = 2

@@ -23,8 +23,7 @@ from planner_core.problem import (
     Problem,
 )
 from planner_core.problem.plan import Action, Plan
-from service.exports.table import unguarded
-from service.scenarios.records import Checked, Record, Records, check, read_csv
+from service.scenarios.records import Checked, Record, Records, check, read_csv, unguarded
 from service.wire.base import Body, Id, Instant
 
 _MOST_ACTIONS: Final = 1_000_000

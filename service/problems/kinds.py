@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from planner_core.errors import Fault
-from service.api.element_problems import ELEMENT_PROBLEMS
+from service.problems.elements import ELEMENT_PROBLEMS
 
 
 @dataclass(frozen=True, slots=True)
