@@ -51,6 +51,5 @@ def get_explanation(
     if matches(request.headers.get("if-none-match"), etag):
         return Response(status_code=304, headers={"ETag": etag})
     explainer = cast(Explainer, request.app.state.explainer)
-    found = explainer.get(job_id, described, timeline, ids.index(target_id))
     response.headers["ETag"] = etag
-    return ExplanationOut.model_validate(found)
+    return explainer.get(job_id, described, timeline, ids.index(target_id))

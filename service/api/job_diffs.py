@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
-from typing import Any
+from collections.abc import Iterator
 
 from fastapi import APIRouter, Depends, Request, Response
 
 from planner_core.referee.plan_diff import PlannedAction, plan_diff
-from service.answers.views import view_of
+from service.answers.rebuilt import view_of
 from service.api import job_intake as intake
 from service.api.conditional import NOT_MODIFIED
 from service.api.deps import CallerDep, DatabaseDep, own_job_only
@@ -16,7 +15,8 @@ from service.api.errors import problem_responses
 from service.api.etags import etag_of, matches
 from service.problems.kinds import ServiceError
 from service.stores import job_store as store
-from service.wire.timelines import Difference, DiffOut, MovedOut, PlannedOut, TotalDiff
+from service.wire.base import read
+from service.wire.timelines import Difference, DiffOut, MovedOut, PlannedOut, TimelineOut, TotalDiff
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[Depends(own_job_only)])
 
@@ -52,14 +52,14 @@ def get_diff(
 
 
 def _diff(job_id: str, other_id: str, before: str, after: str) -> DiffOut:
-    first, second = json.loads(before), json.loads(after)
-    one, other = view_of(before, first), view_of(after, second)
+    first, second = read(TimelineOut, before), read(TimelineOut, after)
+    one, other = view_of(first), view_of(second)
     found = plan_diff(one, other)
     return DiffOut(
         before=job_id,
         after=other_id,
         is_empty=found.is_empty,
-        questions_differ_in=_differences(first, second),
+        questions_differ_in=tuple(_differences(first, second)),
         added=[_shown(action) for action in found.added],
         removed=[_shown(action) for action in found.removed],
         moved=[MovedOut(before=_shown(a), after=_shown(b)) for a, b in found.moved],
@@ -70,19 +70,17 @@ def _diff(job_id: str, other_id: str, before: str, after: str) -> DiffOut:
     )
 
 
-def _differences(first: dict[str, Any], second: dict[str, Any]) -> list[Difference]:
-    found: list[Difference] = []
-    if first["scenario_sha256"] != second["scenario_sha256"]:
-        found.append("scenario")
-    if first["horizon"] != second["horizon"]:
-        found.append("horizon")
-    if {s["id"] for s in first["satellites"]} != {s["id"] for s in second["satellites"]}:
-        found.append("satellites")
-    if first["use_resources"] != second["use_resources"]:
-        found.append("use_resources")
-    if first["dynamics"] != second["dynamics"]:
-        found.append("dynamics")
-    return found
+def _differences(first: TimelineOut, second: TimelineOut) -> Iterator[Difference]:
+    if first.scenario_sha256 != second.scenario_sha256:
+        yield "scenario"
+    if first.horizon != second.horizon:
+        yield "horizon"
+    if {s.id for s in first.satellites} != {s.id for s in second.satellites}:
+        yield "satellites"
+    if first.use_resources != second.use_resources:
+        yield "use_resources"
+    if first.dynamics != second.dynamics:
+        yield "dynamics"
 
 
 def _shown(action: PlannedAction) -> PlannedOut:

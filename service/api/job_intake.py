@@ -127,7 +127,7 @@ def require_answer(session: Session, job: JobRow) -> datetime:
 
 
 def find_timeline(session: Session, job: JobRow) -> str:
-    """Return a job's timeline document; 409 where there is none."""
+    """Return a job's timeline as JSON text; 409 where there is none."""
     timeline = answer_store.timeline_of(session, job.id)
     if timeline is None:
         raise not_ready(job)

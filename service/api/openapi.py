@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import re
 from html import escape
 from typing import Any
 
@@ -30,6 +31,7 @@ _FURTHER_SCHEMAS: dict[str, type[BaseModel]] = {
     "Proof": ProofOut,
 }
 
+_SENTENCE = re.compile(r"(.+?)\.(?:\s+|$)(.*)", re.DOTALL)
 _ALWAYS = (422, 500, 503)
 _WITH_BODY = (413, 415)
 # What each of these answers says about itself, and which request header brings it about.
@@ -93,6 +95,7 @@ def _with_problems(document: dict[str, Any]) -> dict[str, Any]:
     document["components"]["securitySchemes"] = _KEYS
     for path, operations in document["paths"].items():
         for operation in operations.values():
+            _summarise(operation)
             statuses = _ALWAYS + (_WITH_BODY if "requestBody" in operation else ())
             statuses += _LIMITED if is_limited(path) else ()
             if not is_open(path):
@@ -114,6 +117,15 @@ def _with_problems(document: dict[str, Any]) -> dict[str, Any]:
     add_examples(document)
     add_links(document)
     return document
+
+
+def _summarise(operation: dict[str, Any]) -> None:
+    """Take the first sentence of the description as the summary, which was a function's name."""
+    found = _SENTENCE.match(operation["description"])
+    assert found is not None, operation["operationId"]
+    first, rest = found.groups()
+    operation["summary"] = " ".join(first.split())
+    operation["description"] = rest or f"{first}."
 
 
 def _header_parameter(name: str, description: str) -> dict[str, Any]:

@@ -6,7 +6,6 @@ from typing import Any, Final, cast
 
 from fastapi import APIRouter, Depends, Request, Response
 
-from service.answers import store as answer_store
 from service.answers.variations import Asked, Variations
 from service.api import job_intake as intake
 from service.api.deps import AuditDep, CallerDep, DatabaseDep, SettingsDep, own_job_only
@@ -49,14 +48,12 @@ def create_what_if(
     queue = intake.queue_of(request)
     with database.reading() as session:
         job = intake.find_job(session, job_id)
-        timeline = answer_store.timeline_of(session, job_id)
+        timeline = intake.find_timeline(session, job) if body.needs_plan else None
         scenario = session.get_one(ScenarioRow, job.scenario_id)
         content, sha256 = scenario.content, scenario.sha256
-    if timeline is None and body.needs_plan:
-        raise intake.not_ready(job)
     asked = Asked(
         content=content,
-        timeline=timeline if body.needs_plan else None,
+        timeline=timeline,
         change=body,
         limits=settings.scenario_limits,
     )

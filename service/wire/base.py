@@ -123,6 +123,11 @@ class Listed(Wire, Generic[T]):
     next: str | None = Field(description="Cursor of the next page; null on the last one.")
 
 
+def dumped(model: BaseModel, include: set[str] | None = None) -> Json:
+    """Return a model as JSON has it, or some of its fields."""
+    return model.model_dump(mode="json", include=include)
+
+
 def read(model: type[M], text: str | bytes) -> M:
     """Return what an answer says: fields and words that are not known here do no harm."""
     return model.model_validate_json(text, extra="ignore", context=_READING)
