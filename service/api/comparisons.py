@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from typing import cast
 
 import sqlalchemy as sa
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Response
 from sqlalchemy.orm import Session
 
 from service.api import ask_again
 from service.api import job_intake as intake
 from service.api.conditional import NOT_MODIFIED, created, unless_known
-from service.api.deps import AuditDep, CallerDep, DatabaseDep, SettingsDep
+from service.api.deps import CallDep
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
 from service.api.paging import PagingDep, newest_first
@@ -39,27 +39,18 @@ router = APIRouter(prefix="/v1/comparisons", tags=["comparisons"])
 
 
 @router.post("", status_code=202, responses=problem_responses(503))
-def create_comparison(
-    body: ComparisonIn,
-    database: DatabaseDep,
-    settings: SettingsDep,
-    once: OnceDep,
-    caller: CallerDep,
-    audit: AuditDep,
-    request: Request,
-    response: Response,
-) -> ComparisonOut:
+def create_comparison(body: ComparisonIn, call: CallDep, once: OnceDep) -> ComparisonOut:
     """Queue a job for each run, all or none; the answer tells where the table grows."""
-    queue = intake.queue_of(request)
+    queue = intake.queue_of(call.request)
     params = []
     for position, run in enumerate(body.runs):
         with inside(f"/runs/{position}"):
             params.append(intake.all_params(run.solver, run.params))
-    time_s, memory_mb = intake.limits_of(body.limits, settings)
-    inline = intake.frozen(database, settings, body)
+    time_s, memory_mb = intake.limits_of(body.limits, call.settings)
+    inline = intake.frozen(call.database, call.settings, body)
     with once.transaction() as session:
-        intake.require_room(session, settings, len(body.runs))
-        scenario_id = intake.stored_scenario(session, audit, body, inline)
+        intake.require_room(session, call.settings, len(body.runs))
+        scenario_id = intake.stored_scenario(session, call.audit, body, inline)
         specs = [
             submission.JobSpec(
                 scenario_id=scenario_id,
@@ -70,28 +61,26 @@ def create_comparison(
                 memory_mb=memory_mb,
                 priority=body.priority,
                 label=body.label,
-                owner=caller.owner,
+                owner=call.caller.owner,
             )
             for run, of_run in zip(body.runs, params, strict=True)
         ]
         row = submission.submit_comparison(session, queue, specs, label=body.label)
         shown = _shown(session, [row])[0]
-        audit.record(session, "create", "job", *(run.job_id for run in shown.runs))
-        audit.record(session, "create", "comparison", row.id)
-        shown = created(response, shown, f"/v1/comparisons/{row.id}")
-        _describe(response, shown)
+        call.audit.record(session, "create", "job", *(run.job_id for run in shown.runs))
+        call.audit.record(session, "create", "comparison", row.id)
+        shown = created(call.response, shown, f"/v1/comparisons/{row.id}")
+        _describe(call.response, shown)
         return once.keep(session, shown)
 
 
 @router.get("")
-def list_comparisons(
-    database: DatabaseDep, caller: CallerDep, paging: PagingDep
-) -> Listed[ComparisonOut]:
+def list_comparisons(call: CallDep, paging: PagingDep) -> Listed[ComparisonOut]:
     """List the comparisons of the key's owner, newest first; all for the scope `admin`."""
     query = sa.select(ComparisonRow)
-    if caller.visible_owner is not None:
-        query = query.where(ComparisonRow.tenant == caller.visible_owner)
-    with database.reading() as session:
+    if call.caller.visible_owner is not None:
+        query = query.where(ComparisonRow.tenant == call.caller.visible_owner)
+    with call.database.reading() as session:
         page = newest_first(session, query, ComparisonRow.id, paging)
         return Listed(items=_shown(session, page.rows), next=page.next)
 
@@ -101,21 +90,15 @@ def list_comparisons(
     response_model=ComparisonOut,
     responses={**NOT_MODIFIED, **problem_responses(404)},
 )
-def get_comparison(
-    comparison_id: str,
-    database: DatabaseDep,
-    caller: CallerDep,
-    request: Request,
-    response: Response,
-) -> ComparisonOut | Response:
+def get_comparison(comparison_id: str, call: CallDep) -> ComparisonOut | Response:
     """Return the table as it stands: a line fills when its job has an answer."""
-    with database.reading() as session:
+    with call.database.reading() as session:
         row = session.get(ComparisonRow, comparison_id)
-        if row is None or caller.visible_owner not in (None, row.tenant):
+        if row is None or call.caller.visible_owner not in (None, row.tenant):
             raise ServiceError("not_found", f"There is no comparison {comparison_id!r}.")
         shown = _shown(session, [row])[0]
-    _describe(response, shown)
-    return unless_known(request, response, shown)
+    _describe(call.response, shown)
+    return unless_known(call.request, call.response, shown)
 
 
 def _describe(response: Response, shown: ComparisonOut) -> None:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, cast
 
-from fastapi import APIRouter, Depends, Path, Request, Response
+from fastapi import APIRouter, Depends, Path, Response
 
 from service.answers.explanations import Explainer, version_of
 from service.api import job_intake as intake
 from service.api.conditional import NOT_MODIFIED
-from service.api.deps import DatabaseDep, own_job_only
+from service.api.deps import CallDep, own_job_only
 from service.api.errors import problem_responses
 from service.api.etags import etag_of, matches
 from service.problems.kinds import ServiceError
@@ -29,27 +29,25 @@ router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[Depends(own_j
 def get_explanation(
     job_id: str,
     target_id: Annotated[str, Path(description="Percent-encoded, slashes too.")],
-    database: DatabaseDep,
-    request: Request,
-    response: Response,
+    call: CallDep,
 ) -> ExplanationOut | Response:
     """Explain one target, opportunity by opportunity: what it breaks, displaces and earns.
 
     It is worked out when it is asked for, which may take a while: 503 with `Retry-After` asks
     to come back.
     """
-    with database.reading() as session:
+    with call.database.reading() as session:
         job = intake.find_job(session, job_id)
         timeline = intake.find_timeline(session, job)
         sha256 = hashes_of(session, [job.scenario_id])[job.scenario_id]
-    reader = cast(OpportunityReader, request.app.state.opportunities)
-    described = reader.get(database, job.scenario_id, sha256)
+    reader = cast(OpportunityReader, call.request.app.state.opportunities)
+    described = reader.get(call.database, job.scenario_id, sha256)
     ids = [target.id for target in described.scenario.targets]
     if target_id not in ids:
         raise ServiceError("not_found", f"The job has no target {target_id!r}.")
     etag = etag_of(version_of(job_id, target_id))
-    if matches(request.headers.get("if-none-match"), etag):
+    if matches(call.request.headers.get("if-none-match"), etag):
         return Response(status_code=304, headers={"ETag": etag})
-    explainer = cast(Explainer, request.app.state.explainer)
-    response.headers["ETag"] = etag
+    explainer = cast(Explainer, call.request.app.state.explainer)
+    call.response.headers["ETag"] = etag
     return explainer.get(job_id, described, timeline, ids.index(target_id))

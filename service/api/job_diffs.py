@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from fastapi import APIRouter, Depends, Request, Response
+from fastapi import APIRouter, Depends, Response
 
 from planner_core.referee.plan_diff import PlannedAction, plan_diff
 from service.answers.rebuilt import view_of
 from service.api import job_intake as intake
 from service.api.conditional import NOT_MODIFIED
-from service.api.deps import CallerDep, DatabaseDep, own_job_only
+from service.api.deps import CallDep, own_job_only
 from service.api.errors import problem_responses
 from service.api.etags import etag_of, matches
 from service.problems.kinds import ServiceError
@@ -26,28 +26,21 @@ router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[Depends(own_j
     response_model=DiffOut,
     responses={**NOT_MODIFIED, **problem_responses(404, 409)},
 )
-def get_diff(
-    job_id: str,
-    other_id: str,
-    database: DatabaseDep,
-    caller: CallerDep,
-    request: Request,
-    response: Response,
-) -> DiffOut | Response:
+def get_diff(job_id: str, other_id: str, call: CallDep) -> DiffOut | Response:
     """Compare the plans of two jobs: actions added, removed and moved, and the totals.
 
     Plans of different questions are compared as well, by the ids of satellites, targets and
     stations; `questions_differ_in` says so.
     """
-    with database.reading() as session:
-        if caller.visible_owner not in (None, store.owner_of(session, other_id)):
+    with call.database.reading() as session:
+        if call.caller.visible_owner not in (None, store.owner_of(session, other_id)):
             raise ServiceError("not_found", f"There is no job {other_id!r}.")
         jobs = [intake.find_job(session, own_id) for own_id in (job_id, other_id)]
         before, after = (intake.find_timeline(session, job) for job in jobs)
     etag = etag_of(f"{job_id}/{other_id}")  # timelines never change
-    if matches(request.headers.get("if-none-match"), etag):
+    if matches(call.request.headers.get("if-none-match"), etag):
         return Response(status_code=304, headers={"ETag": etag})
-    response.headers["ETag"] = etag
+    call.response.headers["ETag"] = etag
     return _diff(job_id, other_id, before, after)
 
 

@@ -6,10 +6,10 @@ from datetime import UTC, datetime, timedelta
 from typing import Annotated
 
 import sqlalchemy as sa
-from fastapi import APIRouter, Path, Request
+from fastapi import APIRouter, Path
 
 import planner_core
-from service.api.deps import DatabaseDep
+from service.api.deps import CallDep
 from service.api.errors import problem_responses
 from service.db.rows import WorkerRow
 from service.db.session import Database
@@ -30,10 +30,10 @@ async def live() -> Live:
 
 
 @router.get("/health/ready", responses=problem_responses(503))
-def ready(database: DatabaseDep, request: Request) -> Ready:
+def ready(call: CallDep) -> Ready:
     """Say whether database and queue answer, and a worker was heard of in the last 30 seconds."""
-    workers = _recent_workers(database)
-    _ask_queue(request.app.state.queue)
+    workers = _recent_workers(call.database)
+    _ask_queue(call.request.app.state.queue)
     if not workers:
         raise ServiceError("not_live", "No worker has been heard of in the last 30 seconds.")
     return Ready(workers=len(workers), last_heartbeat=max(workers))

@@ -15,7 +15,7 @@ from planner_core.build import view_at
 from planner_core.orbits.places import View
 from planner_core.problem import COLLECT, CONTACT
 from service.api.conditional import NOT_MODIFIED, created, unless_known
-from service.api.deps import AuditDep, DatabaseDep, SettingsDep
+from service.api.deps import CallDep, DatabaseDep
 from service.api.errors import problem_responses
 from service.api.etags import etag_of, matches
 from service.api.idempotency import OnceDep
@@ -44,25 +44,18 @@ _KINDS: dict[str, int] = {"collect": COLLECT, "contact": CONTACT}
     status_code=201,
     responses={200: {"model": ScenarioOut, "description": "The same question is stored already."}},
 )
-def create_scenario(
-    body: ScenarioIn,
-    database: DatabaseDep,
-    settings: SettingsDep,
-    once: OnceDep,
-    audit: AuditDep,
-    response: Response,
-) -> ScenarioOut:
+def create_scenario(body: ScenarioIn, call: CallDep, once: OnceDep) -> ScenarioOut:
     """Freeze a question: everything it names is copied into it.
 
     The same content again, under whatever name, answers 200 with the scenario that is there.
     """
-    frozen = store.freeze(database, body, settings.scenario_limits)
+    frozen = store.freeze(call.database, body, call.settings.scenario_limits)
     with once.transaction() as session:
         row, is_new = store.save(session, frozen)
         if is_new:
-            audit.record(session, "create", "scenario", row.id)
-        response.status_code = 201 if is_new else 200
-        return once.keep(session, created(response, _shown(row), f"/v1/scenarios/{row.id}"))
+            call.audit.record(session, "create", "scenario", row.id)
+        call.response.status_code = 201 if is_new else 200
+        return once.keep(session, created(call.response, _shown(row), f"/v1/scenarios/{row.id}"))
 
 
 @router.get("")
@@ -80,19 +73,17 @@ def list_scenarios(database: DatabaseDep, paging: PagingDep) -> Listed[ScenarioO
 )
 def get_scenario(
     scenario_id: str,
-    database: DatabaseDep,
-    request: Request,
-    response: Response,
+    call: CallDep,
     expand: Annotated[
         bool, Query(description="Answer the self-contained scenario file instead.")
     ] = False,
 ) -> ScenarioOut | Response:
     """Return one scenario; with `expand`, as the file that `slewline solve` takes."""
-    with database.reading() as session:
+    with call.database.reading() as session:
         row = _find(session, scenario_id)
         if expand:
-            return _file(request, row)
-    return unless_known(request, response, _shown(row))
+            return _file(call.request, row)
+    return unless_known(call.request, call.response, _shown(row))
 
 
 def _file(request: Request, row: ScenarioRow) -> Response:
@@ -108,8 +99,7 @@ def _file(request: Request, row: ScenarioRow) -> Response:
 @router.get("/{scenario_id}/opportunities", responses=problem_responses(404, 503))
 def list_opportunities(
     scenario_id: str,
-    database: DatabaseDep,
-    request: Request,
+    call: CallDep,
     paging: PagingDep,
     target_id: Annotated[str | None, Query(description="Only collects of this target.")] = None,
     satellite_id: Annotated[str | None, Query(description="Only of this satellite.")] = None,
@@ -121,10 +111,10 @@ def list_opportunities(
     The first call computes the opportunities, which may take a while: 503 with `Retry-After`
     asks to come back.
     """
-    with database.reading() as session:
+    with call.database.reading() as session:
         sha256 = _find(session, scenario_id).sha256
-    reader = cast(OpportunityReader, request.app.state.opportunities)
-    described = reader.get(database, scenario_id, sha256)
+    reader = cast(OpportunityReader, call.request.app.state.opportunities)
+    described = reader.get(call.database, scenario_id, sha256)
     rows = _matching(described, target_id, satellite_id, kind)
     first = int(np.searchsorted(rows, paging.after_number(), side="right"))
     page = paging.answer(rows[first : first + paging.limit + 1].tolist(), lambda row: row)

@@ -17,7 +17,7 @@ from service.answers.blocks import TIMELINE, Entry, holds, items_in
 from service.api import job_intake as intake
 from service.api.accept import preferred
 from service.api.conditional import NOT_MODIFIED
-from service.api.deps import DatabaseDep, own_job_only
+from service.api.deps import CallDep, DatabaseDep, own_job_only
 from service.api.errors import problem_responses
 from service.api.etags import matches
 from service.api.job_shapes import etag_of_timeline
@@ -70,32 +70,30 @@ def _responses(forms: Sequence[Form]) -> dict[int | str, dict[str, Any]]:
 @router.get(
     "/{job_id}/timeline", response_class=Response, responses=_responses(list(_BY_TYPE.values()))
 )
-def get_timeline(job_id: str, database: DatabaseDep, request: Request) -> Response:
+def get_timeline(job_id: str, call: CallDep) -> Response:
     """Return the plan, judged: actions, resources, totals, violations.
 
     `Accept` chooses the form. The suffixes of the next call do too, and offer some more.
     """
-    media_type = preferred(request.headers.get("accept"), [_JSON, *_BY_TYPE])
-    with database.reading() as session:
+    media_type = preferred(call.request.headers.get("accept"), [_JSON, *_BY_TYPE])
+    with call.database.reading() as session:
         job = intake.find_job(session, job_id)
     if media_type is None:
         raise ServiceError(
             "not_acceptable", f"The timeline is offered as {', '.join([_JSON, *_BY_TYPE])}."
         )
-    return _answer(database, request, job, _BY_TYPE.get(media_type))
+    return _answer(call.database, call.request, job, _BY_TYPE.get(media_type))
 
 
 @router.get("/{job_id}/timeline.{suffix}", response_class=Response, responses=_responses(FORMS))
-def get_timeline_as(
-    job_id: str, suffix: Suffix, database: DatabaseDep, request: Request
-) -> Response:
+def get_timeline_as(job_id: str, suffix: Suffix, call: CallDep) -> Response:
     """Return the plan in the form that the suffix names, whatever `Accept` says."""
-    with database.reading() as session:
+    with call.database.reading() as session:
         job = intake.find_job(session, job_id)
     if suffix not in _SUFFIXES:
         offered = ", ".join(f".{known}" for known in _SUFFIXES)
         raise ServiceError("not_acceptable", f"The timeline is offered as {offered}.")
-    return _answer(database, request, job, _BY_SUFFIX.get(suffix))
+    return _answer(call.database, call.request, job, _BY_SUFFIX.get(suffix))
 
 
 @router.get(
@@ -106,18 +104,18 @@ def get_timeline_as(
         **problem_responses(404, 409),
     },
 )
-def get_proof(job_id: str, database: DatabaseDep, request: Request) -> Response:
+def get_proof(job_id: str, call: CallDep) -> Response:
     """Return what proves the bound of the timeline, or `null` where it has none.
 
     `proof` names the argument and `value` the bound. `prices` holds a multiplier for each
     target, in the order of the scenario: the dual function at these prices is the bound.
     """
     etag = f'"{job_id}"'
-    with database.reading() as session:
+    with call.database.reading() as session:
         job = intake.find_job(session, job_id)
         intake.require_answer(session, job)
         proof = answer_store.proof_of(session, job_id)
-    if matches(request.headers.get("if-none-match"), etag):
+    if matches(call.request.headers.get("if-none-match"), etag):
         return Response(status_code=304, headers={"ETag": etag})
     return Response(proof or "null", media_type=_JSON, headers={"ETag": etag})
 
