@@ -155,9 +155,7 @@ class Documents(Wording):
             totals=self._totals(),
             warnings=judged.opportunities.warnings,
             models=ModelsOut(
-                propagation="SGP4",
                 gravity=GRAVITY,
-                earth_orientation="IERS daily dUT1 and polar motion",
                 nadir={s.id: s.sensor.nadir for s in self.scenario.satellites},
             ),
         )

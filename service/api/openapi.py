@@ -121,11 +121,10 @@ def _with_problems(document: dict[str, Any]) -> dict[str, Any]:
 
 def _summarise(operation: dict[str, Any]) -> None:
     """Take the first sentence of the description as the summary, which was a function's name."""
-    found = _SENTENCE.match(operation["description"])
-    assert found is not None, operation["operationId"]
-    first, rest = found.groups()
-    operation["summary"] = " ".join(first.split())
-    operation["description"] = rest or f"{first}."
+    if found := _SENTENCE.match(operation.get("description", "")):
+        first, rest = found.groups()
+        operation["summary"] = " ".join(first.split())
+        operation["description"] = rest or f"{first}."
 
 
 def _header_parameter(name: str, description: str) -> dict[str, Any]:

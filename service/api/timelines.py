@@ -120,7 +120,9 @@ def get_proof(job_id: str, call: CallDep) -> Response:
     return Response(proof or "null", media_type=_JSON, headers={"ETag": etag})
 
 
-@router.get("/{job_id}/targets", responses=problem_responses(404, 409))
+@router.get(
+    "/{job_id}/targets", responses=problem_responses(404, 409), response_model_exclude_unset=True
+)
 def list_outcomes(
     job_id: str,
     database: DatabaseDep,

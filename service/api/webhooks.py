@@ -29,6 +29,7 @@ from service.wire.webhooks import (
     JOB_EVENTS,
     CreatedWebhook,
     DeliveryOut,
+    TestData,
     WebhookIn,
     WebhookOut,
 )
@@ -106,7 +107,7 @@ def test_webhook(webhook_id: str, once: OnceDep, call: CallDep) -> DeliveryOut:
     with once.transaction() as session:
         row = _find(session, webhook_id, call.caller)
         _require_enabled(row)
-        data = {"message": "This is a test of the webhook.", "webhook_id": row.id}
+        data = TestData(message="This is a test of the webhook.", webhook_id=row.id)
         delivery_id = outbox.queue(session, row, "test", data, job_id=None)
         call.audit.record(session, "test", "webhook", row.id)
         return once.keep(session, _accepted(session, call.response, row, delivery_id))

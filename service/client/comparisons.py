@@ -63,6 +63,6 @@ class Comparisons:
             Where one has not after ``timeout_s``.
         """
         path = path_of("comparisons", comparison_id)
-        read = partial(parsed, Comparison)
+        read = partial(parsed, Comparison, what="a comparison")
         tables = polled(self._transport, path, read, timeout_s=timeout_s, can_hold=False)
         return deque(tables, maxlen=1).pop()

@@ -228,7 +228,7 @@ class Jobs:
         return self._transport.get(path_of("jobs", first, "diff", second), PlanDiff)
 
     def _read(self, text: str, etag: str | None = None) -> Job:
-        return self._own(parsed(Job, text).with_etag(etag))
+        return self._own(parsed(Job, text, "a job").with_etag(etag))
 
     def _own(self, job: Job) -> Job:
         job._jobs = self

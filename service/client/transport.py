@@ -127,7 +127,7 @@ class Transport:
         cursor: str | None = None
         while True:
             answer = self.request("GET", path, params={**(params or {}), "cursor": cursor})
-            page = parsed(Listed[shape], answer.content)  # type: ignore[valid-type]
+            page = held(Listed[shape], answer)  # type: ignore[valid-type]
             yield from page.items
             cursor = page.next
             if cursor is None:
@@ -202,16 +202,17 @@ def checked(answer: httpx.Response) -> httpx.Response:
 
 def held(shape: type[M], answer: httpx.Response) -> M:
     """Return what an answer holds, with its ETag where the shape has one."""
-    found = parsed(shape, answer.content)
+    request = answer.request
+    found = parsed(shape, answer.content, f"{request.method} {request.url.path}")
     return found.with_etag(answer.headers.get("etag")) if isinstance(found, Stored) else found
 
 
-def parsed(shape: type[M], text: str | bytes) -> M:
-    """Return what a text holds; ``UnexpectedAnswer`` where it is something else."""
+def parsed(shape: type[M], text: str | bytes, what: str) -> M:
+    """Return what a text holds; ``UnexpectedAnswer`` where it is something else than ``what``."""
     try:
         return read(shape, text)
     except ValidationError as error:
-        raise UnexpectedAnswer(f"the answer is not as the API says: {error}") from error
+        raise UnexpectedAnswer(f"{what}: not as the API says: {error}") from error
 
 
 @contextmanager

@@ -89,10 +89,15 @@ Open = Annotated[T, WrapValidator(_open)]
 """One of some words. Readers take any: a newer service may have more of them."""
 
 
+def _for_readers(schema: Json) -> None:
+    """Let the OpenAPI document say what readers may count on: more fields may come."""
+    schema.pop("additionalProperties", None)
+
+
 class Wire(BaseModel):
     """Base of all that is sent."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, json_schema_extra=_for_readers)
 
     def __getitem__(self, name: str) -> Any:
         """Return a field by its name in JSON."""
@@ -136,7 +141,9 @@ def read(model: type[M], text: str | bytes) -> M:
 class Body(Wire):
     """Base of everything a client sends: unknown fields, "5" for 5, and NaN are refused."""
 
-    model_config = ConfigDict(strict=True, allow_inf_nan=False, validate_default=False)
+    model_config = ConfigDict(
+        strict=True, allow_inf_nan=False, validate_default=False, json_schema_extra=None
+    )
 
     @model_validator(mode="before")
     @classmethod

@@ -118,10 +118,10 @@ class SatelliteTimelineOut(Wire):
 class ModelsOut(Wire):
     """The physics behind the accesses."""
 
-    propagation: str
-    gravity: str
-    earth_orientation: str
-    nadir: dict[str, Open[Nadir]] = Field(description="By satellite.")
+    propagation: str = "SGP4"
+    gravity: str = Field("WGS72", description="Of the element sets.")
+    earth_orientation: str = "IERS daily dUT1 and polar motion"
+    nadir: dict[str, Open[Nadir]] = Field({}, description="By satellite.")
 
 
 class TimelineHead(Wire):

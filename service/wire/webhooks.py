@@ -7,6 +7,7 @@ from typing import Annotated, Final, Literal, cast
 from pydantic import Field, StringConstraints
 
 from service.wire.base import Body, Instant, Name, Open, Stored, Wire
+from service.wire.jobs import ErrorOut, JobState
 
 LONGEST_URL: Final = 2000
 JobEvent = Literal["job.succeeded", "job.failed", "job.cancelled", "job.expired"]
@@ -67,3 +68,31 @@ class DeliveryOut(Wire):
     last_error: str | None
     created_at: Instant
     ended_at: Instant | None
+
+
+class JobEnd(Wire):
+    """What an event tells of a job."""
+
+    job_id: str
+    state: Open[JobState]
+    termination: str | None
+    error: ErrorOut | None
+    solver: str
+    label: str | None
+    scenario_id: str
+    links: dict[str, str]
+
+
+class TestData(Wire):
+    """What an event of type `test` tells."""
+
+    message: str
+    webhook_id: str
+
+
+class EventOut(Wire):
+    """What is sent to a webhook."""
+
+    type: Open[Event]
+    timestamp: Instant
+    data: JobEnd | TestData

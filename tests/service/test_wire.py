@@ -12,11 +12,16 @@ from fastapi.routing import APIRoute
 from pydantic import BaseModel, ValidationError, create_model
 
 from planner_core import domain, pins
+from planner_core.budget import Budget
 from planner_core.reasons import reason
 from planner_core.solvers.base import Constraint
+from planner_core.solvers.registry import solver_class
 from service import client
 from service.access.callers import Scope
+from service.jobs.plan_job import PlanRequest, run_plan_job
+from service.jobs.solver_params import params_of, parse_params
 from service.main import ROUTERS, create_app
+from service.scenarios.translate import canonical, sha256_of
 from service.settings import Settings
 from service.wire import (
     base,
@@ -34,6 +39,7 @@ from service.wire import (
     pins as wire_pins,
 )
 from service.wire.base import Wire, dumped, read
+from tests.service.jobs.mission import small_mission
 
 MODULES = (
     base, changes, imports, jobs, operations, wire_pins, places, satellites, scenarios, timelines,
@@ -149,6 +155,29 @@ def test_a_shape_without_one_of_its_fields_can_no_longer_be_written(
         narrower = create_model("Narrower", __base__=Wire, **others)  # type: ignore[call-overload]
         with pytest.raises(ValidationError, match="Extra inputs are not permitted"):
             narrower(**document)
+
+
+@pytest.mark.parametrize("solver", ["rule", "milp"])
+def test_real_answers_hold_nothing_that_is_not_declared(solver: str) -> None:
+    content = canonical(small_mission())
+    request = PlanRequest(
+        job_id="j1",
+        scenario_sha256=sha256_of(content),
+        content=content,
+        solver=solver,
+        params=params_of(parse_params(solver_class(solver), {})),
+        seed=0,
+        limits={},
+    )
+    answer = run_plan_job(request, Budget())
+    timeline = json.loads(answer.timeline)
+    assert timeline["satellites"][0]["eclipses"]
+    assert dumped(timelines.TimelineOut(**timeline)) == timeline
+    targets = json.loads(answer.targets)
+    assert [dumped(timelines.TargetItem(**target)) for target in targets] == targets
+    assert any(target["reason"] for target in targets)
+    proof = json.loads(answer.proof or "null")
+    assert dumped(timelines.ProofOut(**proof)).items() >= proof.items()
 
 
 def test_readers_take_fields_and_words_that_are_not_known_yet() -> None:
