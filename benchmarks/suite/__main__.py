@@ -45,7 +45,7 @@ def main() -> None:
 
 
 def _read(path: Path) -> list[rows.Row]:
-    found = rows.read(path)
+    found = rows.read(path, rows.Row)
     if not found:
         sys.exit(f"{path} holds no rows.")
     return found
@@ -66,11 +66,11 @@ def cases(families: list[str], *, is_quick: bool) -> list[Case]:
 
 def run(wanted: list[Case], path: Path) -> None:
     """Run what is missing and write it down, row by row."""
-    known = {row.case for row in rows.read(path)}
+    known = {row.case for row in rows.read(path, rows.Row)}
     for case in wanted:
         if case in known:
             continue
-        row = rows.row_of(case, apart(case))
+        row = rows.row_of(case, apart(case), rows.Row)
         rows.append(path, row)
         gap = row.failure or (f"{row.gap_percent:.2f} %" if row.gap_percent is not None else "-")
         print(f"{case.family:>22} draw {case.draw}: {gap} ({row.used_s} s)", flush=True)

@@ -72,13 +72,12 @@ class Curve:
 
     def __call__(self, progress: Progress) -> None:
         """Take the best reward and the best bound so far."""
-        self.note(progress.reward, progress.bound)
+        self.note(progress.reward, progress.bound, time.process_time() - self._began_s)
 
-    def note(self, reward: float | None, bound: float | None) -> None:
+    def note(self, reward: float | None, bound: float | None, used_s: float) -> None:
         """Take a reward and a bound; None for what is not known."""
         self._reward = max(self._reward, 0.0 if reward is None else reward)
         self._bound = min(self._bound, math.inf if bound is None else bound)
-        used_s = time.process_time() - self._began_s
         for i, level in enumerate(LEVELS):
             is_reached = self._bound - self._reward <= (level + _ROUNDING) * self._bound
             if self.to_level_s[i] is None and math.isfinite(self._bound) and is_reached:
@@ -93,12 +92,27 @@ def run_case(case: Case) -> Result:
     AssertionError
         Where the referee finds a violation.
     """
-    family = FAMILIES[case.family]
-    _solve(problem_of(warm_up_of(family)), 0, _WARM_UP_S)
-    problem = problem_of(scenario_of(family, case.draw))
+    warm_up(case.family)
+    problem = problem_of(scenario_of(FAMILIES[case.family], case.draw))
+    return solve(problem, case.seed, case.budget_s)
+
+
+def warm_up(family: str) -> None:
+    """Load what a family needs of kernels."""
+    solve(problem_of(warm_up_of(FAMILIES[family])), 0, _WARM_UP_S)
+
+
+def solve(problem: Problem, seed: int, budget_s: float) -> Result:
+    """Plan a problem that is built, in so many CPU seconds of this process.
+
+    Raises
+    ------
+    AssertionError
+        Where the referee finds a violation.
+    """
     compiled_s: list[float] = []
     with event.install_timer("numba:compile", compiled_s.append):
-        result = _solve(problem, case.seed, case.budget_s)
+        result = _solve(problem, seed, budget_s)
     return Result(**result, compiled_s=sum(compiled_s))
 
 
@@ -110,7 +124,7 @@ def _solve(problem: Problem, seed: int, budget_s: float) -> dict[str, Any]:
     used_s = time.process_time() - began_s
     timeline = replay(problem, solution.plan)
     assert timeline.is_valid, timeline.violations[:3]
-    curve.note(timeline.reward, solution.bound)
+    curve.note(timeline.reward, solution.bound, used_s)
     return {
         "reward": timeline.reward,
         "bound": math.inf if solution.bound is None else solution.bound,

@@ -85,12 +85,13 @@ FAMILIES: Final[Mapping[str, Family]] = {
     "continuous-1000": Family(
         num_targets=1000, budget_s=30.0, quick_budget_s=12.0, continuous_starts=True
     ),
+    "fleet-2x500": Family(num_satellites=2, num_targets=500, budget_s=10.0, quick_budget_s=5.0),
     "fleet-4x2000": Family(num_satellites=4, num_targets=2000, budget_s=12.0, quick_budget_s=8.0),
     "fleet-24x10000": Family(
         num_satellites=24, num_targets=10_000, budget_s=60.0, quick_budget_s=None, num_draws=1
     ),
     "fleet-stations-4x2000": Family(
-        num_satellites=4, num_targets=2000, budget_s=40.0, quick_budget_s=20.0, dynamics="paper"
+        num_satellites=4, num_targets=2000, budget_s=40.0, quick_budget_s=30.0, dynamics="paper"
     ),
     "weights-agility-1000": Family(
         num_targets=1000, budget_s=20.0, quick_budget_s=10.0, has_random_rewards=True
@@ -99,9 +100,13 @@ FAMILIES: Final[Mapping[str, Family]] = {
         num_targets=1000, budget_s=20.0, quick_budget_s=12.0, dynamics="physical",
         has_random_rewards=True,
     ),
-    "tight-1000": Family(
-        num_targets=1000, budget_s=20.0, quick_budget_s=10.0, dynamics="physical",
+    "tight-150": Family(
+        num_targets=150, budget_s=10.0, quick_budget_s=5.0, dynamics="physical",
         has_tight_battery=True,
+    ),
+    "tight-weights-300": Family(
+        num_targets=300, budget_s=10.0, quick_budget_s=5.0, dynamics="physical",
+        has_random_rewards=True, has_tight_battery=True,
     ),
 }  # fmt: skip
 

@@ -8,7 +8,7 @@ import subprocess
 from dataclasses import asdict, dataclass, fields
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from benchmarks.suite.engine import Case, Result
 
@@ -56,15 +56,18 @@ class Row:
         return self.to_2_s, self.to_1_s, self.to_half_s, self.to_0_s
 
 
-def row_of(case: Case, result: Result | str) -> Row:
-    """Return the line of a case: its result, or how it failed."""
-    told: dict[str, Any] = {"revision": revision(), "date": f"{datetime.now(UTC):%Y-%m-%d}"}
+R = TypeVar("R", bound=Row)
+
+
+def row_of(case: Case, result: Result | str, kind: type[R], **more: str) -> R:
+    """Return the line of a case: its result, or how it failed, and what else its kind tells."""
+    told: dict[str, Any] = {**more, "revision": revision(), "date": f"{datetime.now(UTC):%Y-%m-%d}"}
     if isinstance(result, str):
-        return Row(**asdict(case), **told, failure=result)
+        return kind(**asdict(case), **told, failure=result)
     is_proven = math.isfinite(result.bound)
     gap = 0.0 if result.bound <= 0.0 else 1.0 - result.reward / result.bound
     to_2_s, to_1_s, to_half_s, to_0_s = (_rounded(s, 2) for s in result.to_level_s)
-    return Row(
+    return kind(
         **asdict(case),
         reward=_rounded(result.reward, 3),
         bound=_rounded(result.bound, 3) if is_proven else None,
@@ -90,25 +93,25 @@ def revision() -> str:
     return done.stdout.strip()
 
 
-def read(path: Path) -> list[Row]:
+def read(path: Path, kind: type[R]) -> list[R]:
     """Return the rows of a file; none where there is no file."""
     if not path.exists():
         return []
     with path.open(encoding="utf-8", newline="") as lines:
-        return [_parsed(record) for record in csv.DictReader(lines)]
+        return [_parsed(record, kind) for record in csv.DictReader(lines)]
 
 
-def _parsed(record: dict[str, str]) -> Row:
+def _parsed(record: dict[str, str], kind: type[R]) -> R:
     values: dict[str, Any] = {}
-    for field in fields(Row):
+    for field in fields(kind):
         text = record[field.name]
-        if field.name in ("family", "revision", "date", "failure"):
+        if field.type == "str":
             values[field.name] = text
-        elif field.name in ("draw", "seed"):
+        elif field.type == "int":
             values[field.name] = int(text)
         else:
             values[field.name] = float(text) if text else None
-    return Row(**values)
+    return kind(**values)
 
 
 def append(path: Path, row: Row) -> None:
@@ -116,7 +119,7 @@ def append(path: Path, row: Row) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     is_new = not path.exists()
     with path.open("a", encoding="utf-8", newline="") as lines:
-        writer = csv.DictWriter(lines, [field.name for field in fields(Row)], lineterminator="\n")
+        writer = csv.DictWriter(lines, [field.name for field in fields(row)], lineterminator="\n")
         if is_new:
             writer.writeheader()
         writer.writerow(asdict(row))

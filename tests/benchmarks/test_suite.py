@@ -53,7 +53,7 @@ def test_what_is_in_the_file_is_not_run_again(
     suite.run([CASE, replace(CASE, draw=1), replace(CASE, budget_s=9.0)], path)
     suite.run([CASE, replace(CASE, draw=1)], path)
     assert asked == [CASE, replace(CASE, draw=1), replace(CASE, budget_s=9.0)]
-    kept = rows.read(path)
+    kept = rows.read(path, rows.Row)
     assert [row.case for row in kept] == asked
     assert kept[0].gap_percent == 2.0
     assert kept[0].to_level_s == RESULT.to_level_s
@@ -62,9 +62,9 @@ def test_what_is_in_the_file_is_not_run_again(
 
 
 def test_a_run_without_a_bound_has_no_gap(tmp_path: Path) -> None:
-    row = rows.row_of(CASE, replace(RESULT, bound=float("inf")))
+    row = rows.row_of(CASE, replace(RESULT, bound=float("inf")), rows.Row)
     rows.append(tmp_path / "suite.csv", row)
-    assert rows.read(tmp_path / "suite.csv") == [row]
+    assert rows.read(tmp_path / "suite.csv", rows.Row) == [row]
     assert row.gap_percent is None
     assert row.reward == 98.0
 
@@ -95,12 +95,12 @@ def test_a_case_that_fails_is_worse_and_not_averaged() -> None:
 
 
 def test_the_table_names_families_revisions_and_what_is_alone() -> None:
-    other = replace(ROW, family="tight-1000")
+    other = replace(ROW, family="tight-150")
     text = markdown([ROW, other], [replace(ROW, gap_percent=3.0, revision="second")])
     assert "| paper-200 | 1 | 2.00 | 3.00 | +1.00 |" in text
     assert "**gap**" in text
     assert "first before, second after; 1 of 1 families worse." in text
-    assert "In one file only: tight-1000 draw 0 seed 0 in 5 s." in text
+    assert "In one file only: tight-150 draw 0 seed 0 in 5 s." in text
 
 
 def test_the_curve_notes_when_a_gap_is_first_reached() -> None:
