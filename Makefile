@@ -3,7 +3,8 @@
 PYTHON ?= python3
 UV ?= uv
 BIN := .venv/bin
-STAMP := .venv/.installed
+PRODUCT := .venv/.product
+TOOLS := .venv/.tools
 WARM := .venv/.warm
 KERNELS := $(shell grep -rlE '^@(kernel|borrowing|inlined)' planner_core --include=*.py)
 LOCK := $(UV) pip compile --universal --python-version 3.11 --generate-hashes \
@@ -11,7 +12,7 @@ LOCK := $(UV) pip compile --universal --python-version 3.11 --generate-hashes \
 PIP := $(BIN)/python -m pip -qq --disable-pip-version-check
 
 .PHONY: help setup demo serve test test-full chaos fuzz browser screenshots check check-types \
-	check-rest format lock paper paper-quick clean
+	check-rest format lock dist paper paper-quick clean
 
 help:
 	@echo "make demo     plan a real-size mission through the service's own API, and end"
@@ -25,39 +26,46 @@ help:
 	@echo "make check    lint, format, types, import contracts, examples in docstrings"
 	@echo "make setup    the environment in .venv (the others call it)"
 	@echo "make format   rewrite the sources in the one layout"
+	@echo "make dist     an sdist and a wheel, in dist"
 	@echo "make lock     resolve the dependencies again into the lock files (needs uv)"
 	@echo "make paper    the paper's study again, within two hours; writes docs/paper-reproduction.md"
 	@echo "make paper-quick  the same in five minutes, into build/paper-quick"
 	@echo "make clean    remove all that these commands made"
 
-setup: $(WARM)
+setup: $(TOOLS) $(WARM)
 	@:
 
 # Everything pip fetches is checked against a hash; the build of the project itself fetches nothing.
-$(STAMP): pyproject.toml requirements.lock
+$(PRODUCT): pyproject.toml requirements.lock
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
 		echo "Slewline needs Python 3.11 or later, and '$(PYTHON)' is not. Try: make PYTHON=python3.12" >&2; \
 		exit 1; }
-	@echo "Setting up .venv (once; about a minute) ..."
+	@echo "Setting up .venv (once; about half a minute) ..."
 	@$(PYTHON) -m venv .venv
-	@$(PIP) install --require-hashes -r requirements.lock
+	@$(PIP) install --no-compile --require-hashes -r requirements.lock
 	@$(PIP) install --no-deps --no-build-isolation --editable .
 	@touch $@
 
+# What only developers need, on top of the product.
+$(TOOLS): $(PRODUCT) requirements-dev.lock
+	@echo "Adding the developers' tools (once) ..."
+	@$(PIP) install --no-compile --require-hashes -r requirements-dev.lock
+	@touch $@
+
 # An edited kernel is compiled here, once, and not by each worker on its own.
-$(WARM): $(STAMP) $(KERNELS)
+$(WARM): $(PRODUCT) $(KERNELS)
 	@echo "Compiling the planning kernels (once) ..."
 	@$(BIN)/python -m service.jobs.warm
 	@touch $@
 
-demo: setup
+demo: $(WARM)
 	@$(BIN)/slewline demo
 
-serve: setup
+serve: $(WARM)
 	@$(BIN)/slewline demo --serve
 
 # A process for each core, each with a module at a time; see docs/testing.md.
-ALL_TESTS := $(BIN)/python -m pytest -n logical --dist loadgroup --no-loadscope-reorder
+ALL_TESTS := $(BIN)/python -m pytest -n logical
 
 test: check
 	$(ALL_TESTS)
@@ -101,9 +109,13 @@ format: setup
 	$(BIN)/ruff format .
 
 lock:
-	$(LOCK) pyproject.toml --extra dev --extra study --extra otel -o requirements.lock
-	$(LOCK) pyproject.toml --extra otel --extra build -c requirements.lock -o docker/requirements.lock
+	$(LOCK) pyproject.toml --extra otel --extra build -o requirements.lock
+	$(LOCK) pyproject.toml --extra otel --extra build --extra dev --extra study -c requirements.lock \
+		-o requirements-dev.lock
 	$(LOCK) tests/fuzz/requirements.in -o tests/fuzz/requirements.lock
+
+dist: $(TOOLS)
+	@$(BIN)/python -m build --no-isolation
 
 # Both go on where they were stopped.
 paper: setup
@@ -114,5 +126,5 @@ paper-quick: setup
 
 clean:
 	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
-	rm -rf build demo-output *.egg-info
-	find planner_core service tests migrations benchmarks -name __pycache__ -prune -exec rm -rf {} +
+	rm -rf build dist demo-output *.egg-info
+	find slewline planner_core service tests migrations benchmarks -name __pycache__ -prune -exec rm -rf {} +

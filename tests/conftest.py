@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
 
 import pytest
+from xdist.scheduler import LoadScopeScheduling
 
 from tests.examples import load_profile
 
@@ -16,7 +18,7 @@ load_profile()
 
 
 # What shares a service is done by one process.
-_SHARED = {
+_TOGETHER = {
     "tests/service/jobs/test_diff.py": "mission",
     "tests/service/jobs/test_explanation.py": "mission",
     "tests/service/jobs/test_fleet.py": "mission",
@@ -35,20 +37,23 @@ _LONG = (
 )
 
 
+class _ByModule(LoadScopeScheduling):  # type: ignore[misc]  # it has no types
+    """A module's tests share servers and problems: one process has them all."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        module = nodeid.partition("::")[0]
+        return _TOGETHER.get(module, module)
+
+
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> _ByModule:
+    """Hand modules out in the order in which they were found."""
+    config.option.loadscopereorder = False
+    return _ByModule(config, log)
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Keep each module together, as its tests share servers and problems, the long ones first.
-
-    Where tests run in several processes (``--dist loadgroup``), one takes each of these groups,
-    in this order.
-    """
-    for item in items:
-        module = _module(item)
-        item.add_marker(pytest.mark.xdist_group(_SHARED.get(module, module)))
-    items.sort(key=lambda item: _module(item) not in _LONG)
-
-
-def _module(item: pytest.Item) -> str:
-    return item.path.relative_to(_ROOT).as_posix()
+    """Put the long modules first."""
+    items.sort(key=lambda item: item.nodeid.partition("::")[0] not in _LONG)
 
 
 @pytest.fixture(scope="session")

@@ -167,9 +167,9 @@ def _cut(engine: Engine, problem: Problem, model: PlanProgram, rounds: int, watc
         if len(bounds) > _PATIENCE and bounds[-1 - _PATIENCE] - bounds[-1] < _STALLED * bounds[-1]:
             return
         num_added = 0
-        for satellite, order in zip(problem.satellites, model.orders, strict=True):
+        for satellite, precedence in zip(problem.satellites, model.precedences, strict=True):
             own = model.taken[satellite.rows]
-            offsets, members = violated_antichains(order, taken[own])
+            offsets, members = violated_antichains(precedence, taken[own])
             engine.add_rows(Rows.of(offsets, own[members], upper=1.0))
             num_added += len(offsets) - 1
         if num_added == 0:

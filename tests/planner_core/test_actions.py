@@ -46,7 +46,7 @@ GUIDANCE = ForwardSearch().guidance
 
 
 def follows(track: Track, a: int, b: int) -> bool:
-    return may_follow(a, b, track.near_from, track.far_from, track.offset, track.bits)
+    return may_follow(track.transitions, a, b)
 
 
 def may_pass(problem: Problem, track: Track, row: int, recorder: float) -> bool:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from planner_core.budget import Budget
 from planner_core.domain import Agility
-from planner_core.precedence.relation import transitive_closure
+from planner_core.precedence.relation import comes_before, excluded_by, transitive_closure
 from planner_core.problem.slew import INSTANT, slew_s
 from planner_core.referee.replay import replay
 from planner_core.solvers.registry import SOLVERS
@@ -76,9 +76,12 @@ def test_the_closure_is_what_single_steps_reach(
     reaches = np.array([[satellite.transitions.allows(a, b) for b in range(n)] for a in range(n)])
     for via in range(n):
         reaches |= np.outer(reaches[:, via], reaches[via])
-    closure = transitive_closure(problem, satellite)
-    found = [[closure.allows(a, b) for b in range(n)] for a in range(n)]
+    closure = transitive_closure(satellite)
+    found = [[a < b and comes_before(closure, a, b) for b in range(n)] for a in range(n)]
     assert found == reaches.tolist()
+    beside = reaches | reaches.T | np.eye(n, dtype=np.bool_)
+    for row in range(n):
+        np.testing.assert_array_equal(excluded_by(satellite, row), ~beside[row])
 
 
 @examples(40)

@@ -22,7 +22,7 @@ from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.proofs.documents import from_json, is_proven, to_json
 from planner_core.certified.proofs.lagrangian import lagrangian_bound, lagrangian_value
 from planner_core.domain import Agility
-from planner_core.precedence.network import network_of
+from planner_core.precedence.arcs import arc_network_of
 from planner_core.problem import COLLECT, Floats, Problem
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
@@ -93,7 +93,7 @@ def test_crowded_problems_never_hold_a_better_plan(seed: int) -> None:
 def test_it_holds_for_weights_that_differ_from_collect_to_collect(seed: int) -> None:
     """Against the heaviest path without repetition, found by trying all."""
     problem = spaced_problem(seed, num_accesses=2, num_offers=4)
-    network = network_of(problem)
+    network = arc_network_of(problem)
     memory = memory_of(problem, network)
     rng = np.random.default_rng(seed)
     weight = rng.uniform(0.0, 3.0, len(network.row)) * rng.integers(0, 2, len(network.row))
@@ -137,7 +137,7 @@ def test_a_target_in_view_for_long_is_paid_once() -> None:
 
 def test_prices_get_better_and_their_proof_survives_being_written_down() -> None:
     problem = spaced_problem(5, num_accesses=60, num_offers=8, span_s=3000.0)
-    network = network_of(problem)
+    network = arc_network_of(problem)
     memory = memory_of(problem, network)
     first, again = (ElementaryPrices(problem, network, memory, 0) for _ in range(2))
     first.improve(1, NEVER)

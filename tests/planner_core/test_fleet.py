@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget, Termination
-from planner_core.certified.drivers.fleet import FleetSearch
+from planner_core.certified.drivers.agility_only import Effort
+from planner_core.certified.drivers.fleet import FleetSearch, solve_without_resources
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.fleet_start import priced_start
 from planner_core.certified.mip.solution_pool import PlanPool
@@ -16,6 +17,7 @@ from planner_core.certified.multipliers.incremental import IncrementalPrices
 from planner_core.certified.proofs.documents import from_json, is_proven, to_json
 from planner_core.domain import Agility
 from planner_core.precedence.network import network_of
+from planner_core.precedence.relation import direct_precedence
 from planner_core.problem import Problem
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
@@ -145,3 +147,22 @@ def test_who_cancels_gets_the_plan_so_far_and_its_bound() -> None:
     assert timeline.reward > 0.0
     assert solution.bound is not None
     assert timeline.reward <= solution.bound <= problem.best_worth.sum()
+
+
+def test_paths_of_a_fleet_need_no_table_of_pairs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Plan, bound and window search of a large fleet; the table grows with density squared."""
+
+    def refuse(*_: object) -> None:
+        raise AssertionError
+
+    monkeypatch.setattr("planner_core.precedence.relation._fill_bits", refuse)
+    monkeypatch.setattr("planner_core.certified.drivers.fleet._SMALL", 0)
+    problem = random_problem(
+        5, use_resources=False, num_collects=240, num_targets=90, num_satellites=8
+    )
+    effort = Effort(moves_per_task=5.0, max_rounds=0)
+    solution = solve_without_resources(problem, Budget(), 0, 0.0, effort)
+    assert solution.proven is not None
+    assert 0.0 < replay(problem, solution.plan).reward <= solution.proven.value
+    with pytest.raises(AssertionError):
+        direct_precedence(problem.satellites[0])

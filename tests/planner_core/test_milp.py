@@ -19,7 +19,7 @@ from planner_core.certified.mip.model import plan_program
 from planner_core.certified.mip.program import Program, Rows
 from planner_core.certified.proofs.documents import is_proven
 from planner_core.domain import Agility, Dynamics
-from planner_core.precedence.relation import transitive_closure
+from planner_core.precedence.relation import is_transitive
 from planner_core.problem import (
     COLLECT,
     CONTACT,
@@ -127,8 +127,7 @@ def test_a_target_already_collected_may_be_the_way_to_another() -> None:
         Task(kind=COLLECT, place=2, start_s=0.5, end_s=31.0, angle_deg=3.0),
     ]
     problem = make_problem(tasks, num_targets=3, use_resources=False, agility=SLOW)
-    satellite = problem.satellites[0]
-    assert transitive_closure(problem, satellite) is not satellite.transitions
+    assert not is_transitive(problem)
     solution = Milp().solve(problem, Budget(), 0)
     assert replay(problem, solution.plan).reward == best_reward(problem) == 2.0
 

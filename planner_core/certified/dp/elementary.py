@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from planner_core.jit import borrowing, kernel
-from planner_core.precedence.network import Network, network_of
+from planner_core.precedence.arcs import ArcNetwork, arc_network_of
 from planner_core.problem import (
     COLLECT,
     Bools,
@@ -68,7 +68,7 @@ class Memory(NamedTuple):
     num_started: Ints
 
 
-def memory_of(problem: Problem, network: Network) -> Memory:
+def memory_of(problem: Problem, network: ArcNetwork) -> Memory:
     """Return what paths through a network are to remember."""
     table, rows = problem.opportunities, network.row
     nodes = np.arange(len(rows))
@@ -150,7 +150,7 @@ class Labels(NamedTuple):
     bit_weight: Floats
 
 
-def labels_for(network: Network, memory: Memory) -> Labels:
+def labels_for(network: ArcNetwork, memory: Memory) -> Labels:
     """Return room for the labels of a network."""
     n = len(network.row)
     return Labels(
@@ -170,7 +170,7 @@ def labels_for(network: Network, memory: Memory) -> Labels:
 
 @borrowing
 def label_part(
-    network: Network, memory: Memory, weight: Floats, labels: Labels, part: int
+    network: ArcNetwork, memory: Memory, weight: Floats, labels: Labels, part: int
 ) -> tuple[float, int]:
     """Label the nodes of one part; return what its paths are worth at most, and the best's end.
 
@@ -349,7 +349,7 @@ def _weight_of(low: np.uint64, high: np.uint64, bit_weight: Floats) -> float:
 
 @borrowing
 def elementary_paths(
-    network: Network, memory: Memory, weight: Floats, labels: Labels, counts: Ints
+    network: ArcNetwork, memory: Memory, weight: Floats, labels: Labels, counts: Ints
 ) -> float:
     """Return what the paths of all parts are worth at most.
 
@@ -377,7 +377,7 @@ def elementary_value(problem: Problem, prices: Floats) -> tuple[float, Ints]:
 
     This is the whole proof, as ``lagrangian_value`` is that of the plain bound.
     """
-    network = network_of(problem)
+    network = arc_network_of(problem)
     memory = memory_of(problem, network)
     price = np.append(surplus(prices, problem.best_worth), 0.0)
     weight = weights(problem.worth[network.row], price[network.place])

@@ -31,6 +31,7 @@ from planner_core.certified.proofs.certificate import (
     values_through,
 )
 from planner_core.certified.proofs.lagrangian import default_steps, priced_bound
+from planner_core.precedence.arcs import arc_network_of
 from planner_core.precedence.network import network_of
 from planner_core.precedence.relation import is_transitive, num_near_pairs
 from planner_core.problem import (
@@ -139,7 +140,7 @@ class FreeSearch:
             self._rest,
             self._network,
             self.best.reward,
-            default_steps(self._network),
+            default_steps(len(self._rows)),
             self.budget.stop,
         )
         self.step(Multipliers(prices=prices))
@@ -147,8 +148,9 @@ class FreeSearch:
     def price_passes(self, num_rounds: int) -> None:
         """Search for prices by which no target is paid twice in one pass over it."""
         if self._prices is None:
-            memory = memory_of(self.problem, self._network)
-            self._prices = ElementaryPrices(self.problem, self._network, memory, self.seed)
+            arcs = arc_network_of(self.problem)
+            memory = memory_of(self.problem, arcs)
+            self._prices = ElementaryPrices(self.problem, arcs, memory, self.seed)
         for _ in range(num_rounds):
             if not self.best.is_done:
                 self._prices.improve(1, self.budget.stop)

@@ -57,7 +57,7 @@ class FleetSearch:
         self._network = network_of(self.problem)
         self._worth = self.problem.worth[self._network.row]
         most = np.append(self.problem.best_worth, 0.0)
-        num_epochs = int(np.clip(default_steps(self._network), *_EPOCHS))
+        num_epochs = int(np.clip(default_steps(len(self._network.row)), *_EPOCHS))
         self._dual = IncrementalPrices(self._network, self._worth, most, num_epochs, seed)
 
     @property

@@ -12,7 +12,7 @@ from planner_core.certified.lns.moves import FREE, Taken
 from planner_core.certified.lns.resource_labels import Ground, room_for
 from planner_core.certified.lns.resource_moves import make_moves
 from planner_core.draws import draws_of
-from planner_core.precedence.relation import transitive_closure
+from planner_core.precedence.relation import is_transitive
 from planner_core.problem import (
     COLLECT,
     CONTACT,
@@ -104,7 +104,7 @@ def _locked_targets(problem: Problem) -> Bools:
     locked = np.zeros(len(problem.target_ids) + 1, dtype=np.bool_)
     table, kept = problem.opportunities, problem.kept_rows
     locked[table.place[kept[table.kind[kept] == COLLECT]]] = True
-    if any(transitive_closure(problem, s) is not s.transitions for s in problem.satellites):
+    if not is_transitive(problem):
         # The tasks around one that is dropped could not do without it.
         locked[:] = True
     return locked

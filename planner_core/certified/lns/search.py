@@ -17,7 +17,7 @@ from planner_core.certified.lns.moves import (
 )
 from planner_core.draws import draws_of
 from planner_core.precedence.network import Network, network_of
-from planner_core.precedence.relation import transitive_closure
+from planner_core.precedence.relation import is_transitive_on
 from planner_core.problem import (
     COLLECT,
     CONTACT,
@@ -79,10 +79,10 @@ class WindowSearch:
         # The best image of a target counts, and the first of those.
         own = np.flatnonzero(is_taken)[::-1]
         own = own[np.argsort(self._ground.worth[own], kind="stable")]
-        holder[self._ground.place[own]] = own
+        holder[self._ground.network.place[own]] = own
         # Where it need not stand, a second image of a target only takes up room.
-        part = np.searchsorted(self._ground.first, own, side="right") - 1
-        is_spare = holder[self._ground.place[own]] != own
+        part = np.searchsorted(self._ground.network.first, own, side="right") - 1
+        is_spare = holder[self._ground.network.place[own]] != own
         is_spare &= self._ground.is_transitive[part] & ~self._ground.is_kept[own]
         is_taken[own[is_spare]] = False
         self._taken = Taken(is_taken=is_taken, holder=holder)
@@ -152,37 +152,15 @@ def polished(
 def _ground_of(
     problem: Problem, network: Network, preference: Floats | None, urgency: Floats | None
 ) -> Ground:
-    satellites = problem.satellites
-    tables = [satellite.transitions for satellite in satellites]
-    # Bits of the next satellite begin with a whole byte.
-    starts = np.cumsum([0, *(8 * len(table.bits) for table in tables)])
-    bases = np.cumsum([0, *(len(satellite) for satellite in satellites)]).astype(np.int32)
-    pairs = list(zip(tables, bases[:-1], starts[:-1], strict=True))
-    nothing = np.empty(0, dtype=np.int32)
-    is_transitive = np.array(
-        [transitive_closure(problem, s) is s.transitions for s in satellites], dtype=np.bool_
-    )
+    is_transitive = np.array([is_transitive_on(s) for s in problem.satellites], dtype=np.bool_)
     num_targets = len(problem.target_ids)
     worth = problem.worth[network.row]
     is_kept = np.isin(network.row, problem.kept_rows)
     is_locked = np.zeros(num_targets + 1, dtype=np.bool_)
     is_locked[network.place[is_kept]] = True
     return Ground(
-        place=network.place,
-        first=network.first,
-        arc_from=network.arc_from,
-        before=network.before,
-        far_from=network.far_from,
-        earlier=network.earlier,
-        order_near=np.concatenate([nothing, *(t.near_from + base for t, base, _ in pairs)]),
-        order_far=network.far_from,
-        order_offset=np.concatenate([t.offset[:-1] + start for t, _, start in pairs]),
-        order_bits=tables[0].bits
-        if len(tables) == 1
-        else np.concatenate([table.bits for table in tables]),
-        is_transitive=is_transitive[
-            problem.opportunities.satellite[network.row[network.first[:-1]]]
-        ],
+        network=network,
+        is_transitive=is_transitive[network.satellite],
         worth=worth,
         preference=np.ones(num_targets + 1) if preference is None else np.append(preference, 1.0),
         urgency=np.ones(num_targets + 1) if urgency is None else np.append(urgency, 0.0),

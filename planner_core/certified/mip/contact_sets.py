@@ -235,12 +235,12 @@ class FixedContacts:
 
     def _add_cuts(self, taken: Floats) -> bool:
         is_cut = False
-        satellites = zip(self._model.problem.satellites, self._model.orders, strict=True)
-        for satellite, order in satellites:
+        satellites = zip(self._model.problem.satellites, self._model.precedences, strict=True)
+        for satellite, precedence in satellites:
             if len(satellite) == 0:
                 continue
             own = self._model.taken[satellite.rows]
-            offsets, members = violated_antichains(order, taken[own])
+            offsets, members = violated_antichains(precedence, taken[own])
             cuts = Rows.of(offsets, own[members], upper=1.0)
             self._engine.add_rows(cuts)
             self._cuts.append(cuts)

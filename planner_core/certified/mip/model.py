@@ -11,7 +11,12 @@ import numpy as np
 from planner_core.certified.mip.clique_cuts import antichain_cover, detours, excluding_pairs
 from planner_core.certified.mip.program import Program, Rows
 from planner_core.certified.mip.resources import ResourceTerms, add_resources, resource_terms
-from planner_core.precedence.relation import Order, order_of, transitive_closure
+from planner_core.precedence.relation import (
+    Precedence,
+    direct_precedence,
+    is_transitive,
+    transitive_closure,
+)
 from planner_core.problem import (
     CONTACT,
     Floats,
@@ -43,7 +48,7 @@ class PlanProgram:
     problem: Problem
     program: Program
     taken: Ints
-    orders: tuple[Order, ...]
+    precedences: tuple[Precedence, ...]
     paid: Paid | None
 
     def target_prices(self, row_prices: Floats) -> Floats:
@@ -119,24 +124,21 @@ def plan_program(
         kept = [np.flatnonzero(is_kept[s.rows]).astype(np.int32) for s in problem.satellites]
         terms = [own and own.of_part(part) for own, part in zip(terms, kept, strict=True)]
         problem = restricted(problem, rows)
-    closures = [transitive_closure(problem, satellite) for satellite in problem.satellites]
-    is_transitive = all(
-        closed is satellite.transitions
-        for closed, satellite in zip(closures, problem.satellites, strict=True)
-    )
+    precedences = tuple(transitive_closure(satellite) for satellite in problem.satellites)
     program = Program()
-    taken, paid = _variables(program, problem, is_transitive)
-    orders = tuple(order_of(closed) for closed in closures)
-    _constraints(program, problem, taken, orders, terms, formulation, margin)
-    return PlanProgram(problem=problem, program=program, taken=taken, orders=orders, paid=paid)
+    taken, paid = _variables(program, problem, is_transitive(problem))
+    _constraints(program, problem, taken, precedences, terms, formulation, margin)
+    return PlanProgram(
+        problem=problem, program=program, taken=taken, precedences=precedences, paid=paid
+    )
 
 
-def _variables(program: Program, problem: Problem, is_transitive: bool) -> tuple[Ints, Paid | None]:
+def _variables(program: Program, problem: Problem, is_direct: bool) -> tuple[Ints, Paid | None]:
     """Add x, 1 for what must be taken, and the objective: what the images are worth."""
     table, worth = problem.opportunities, problem.worth
     kept = np.zeros(len(table), dtype=np.bool_)
     kept[problem.kept_rows] = True
-    if is_transitive:
+    if is_direct:
         useful = (worth > 0.0) | ((table.kind == CONTACT) & problem.use_resources)
         useful |= kept
         taken = program.add_columns(
@@ -175,38 +177,42 @@ def _constraints(
     program: Program,
     problem: Problem,
     taken: Ints,
-    orders: tuple[Order, ...],
+    precedences: tuple[Precedence, ...],
     terms: list[ResourceTerms | None],
     formulation: Formulation,
     margin: float,
 ) -> None:
-    for satellite, order, own_terms in zip(problem.satellites, orders, terms, strict=True):
+    for satellite, precedence, own_terms in zip(
+        problem.satellites, precedences, terms, strict=True
+    ):
         own = taken[satellite.rows]
         if len(own) == 0:
             continue
-        _agility(program, own, order, formulation)
-        _detours(program, satellite, own, order)
+        _agility(program, own, precedence, formulation)
+        _detours(program, satellite, own, precedence)
         if own_terms is not None:
             add_resources(program, satellite, own_terms, own, margin)
     _stations(program, problem, taken)
 
 
-def _agility(program: Program, own: Ints, order: Order, formulation: Formulation) -> None:
+def _agility(program: Program, own: Ints, precedence: Precedence, formulation: Formulation) -> None:
     """Tasks of one satellite that exclude each other: one of them at most."""
     if formulation == "pairwise":
-        first, second = excluding_pairs(order)
+        first, second = excluding_pairs(precedence)
         program.add_rows(Rows.aligned((own[first], 1.0), (own[second], 1.0), upper=1.0))
     else:
-        offsets, members = antichain_cover(order)
+        offsets, members = antichain_cover(precedence)
         program.add_rows(Rows.of(offsets, own[members], upper=1.0))
 
 
-def _detours(program: Program, satellite: SatelliteProblem, own: Ints, order: Order) -> None:
+def _detours(
+    program: Program, satellite: SatelliteProblem, own: Ints, precedence: Precedence
+) -> None:
     """Two tasks that do not follow directly need another in between that makes up for it."""
-    direct = order_of(satellite.transitions)
-    if order.bits is direct.bits:
+    direct = direct_precedence(satellite)
+    if precedence.bits is direct.bits:
         return
-    first, second, offsets, between = detours(direct, order)
+    first, second, offsets, between = detours(direct, precedence)
     ends = np.column_stack([own[first], own[second]]).ravel()
     at = np.repeat(offsets[1:], 2)
     column = np.insert(own[between], at, ends)

@@ -15,9 +15,8 @@ from planner_core.certified.proofs.certificate import Cut, Multipliers
 from planner_core.draws import draws_of
 from planner_core.jit import kernel
 from planner_core.precedence.relation import (
-    Order,
+    Precedence,
     comes_before,
-    order_of,
     transitive_closure,
 )
 from planner_core.problem import (
@@ -52,17 +51,16 @@ class Master(Engine):
         self._problem = problem
         self._scale = float(problem.worth.max(initial=1e-300))
         self._worth = worth = problem.worth / self._scale
-        self._orders = [
-            _exclusion_order(order_of(transitive_closure(problem, s)), s.place, s.kind)
-            for s in problem.satellites
+        self._precedences = [
+            _exclusion(transitive_closure(s), s.place, s.kind) for s in problem.satellites
         ]
         self._draws = draws_of(seed)
         self._cuts: dict[tuple[int, ...], Cut] = {}
         members, offsets = problem.target_opportunities
         self._sets = Sets(offsets, members)
         self._num_targets = len(offsets) - 1
-        for satellite, order in zip(problem.satellites, self._orders, strict=True):
-            cover, rows = antichain_cover(order)
+        for satellite, precedence in zip(problem.satellites, self._precedences, strict=True):
+            cover, rows = antichain_cover(precedence)
             self._keep_sets(cover, satellite.rows[rows])
         program = Program()
         self._useful = worth > 0.0
@@ -110,8 +108,8 @@ class Master(Engine):
         self._drop_idle()
         num_before = len(self._row_sets)
         picked = self._odd_sets(taken) if with_odd_sets else []
-        for satellite, order in zip(self._problem.satellites, self._orders, strict=True):
-            offsets, members = violated_antichains(order, taken[satellite.rows])
+        for satellite, precedence in zip(self._problem.satellites, self._precedences, strict=True):
+            offsets, members = violated_antichains(precedence, taken[satellite.rows])
             if len(offsets) > 1:
                 first = len(self._sets.offsets) - 1
                 self._keep_sets(offsets, satellite.rows[members])
@@ -188,17 +186,19 @@ class Master(Engine):
             self._idle = [idle for idle in self._idle if idle < _PATIENCE]
 
 
-def _exclusion_order(order: Order, place: Ints, kind: np.ndarray) -> Order:
+def _exclusion(precedence: Precedence, place: Ints, kind: np.ndarray) -> Precedence:
     """Return an order without the pairs of tasks on one target: those exclude each other too."""
-    return order._replace(bits=_without_equals(order, np.where(kind == COLLECT, place, -1)))
+    return precedence._replace(
+        bits=_without_equals(precedence, np.where(kind == COLLECT, place, -1))
+    )
 
 
 @kernel
-def _without_equals(order: Order, place: Ints) -> Bytes:
-    bits = order.bits.copy()
+def _without_equals(precedence: Precedence, place: Ints) -> Bytes:
+    bits = precedence.bits.copy()
     for a in range(len(place)):
-        for b in range(order.near_from[a], order.far_from[a]):
-            if place[a] >= 0 and place[a] == place[b] and comes_before(order, a, b):
-                bit = order.offset[a] + b - order.near_from[a]
+        for b in range(precedence.near_from[a], precedence.far_from[a]):
+            if place[a] >= 0 and place[a] == place[b] and comes_before(precedence, a, b):
+                bit = precedence.offset[a] + b - precedence.near_from[a]
                 bits[bit >> 3] ^= np.uint8(1 << (bit & 7))
     return bits

@@ -20,7 +20,7 @@ from planner_core.certified.dp.elementary import (
 )
 from planner_core.draws import Uint64s, draws_of, next_draw
 from planner_core.jit import borrowing
-from planner_core.precedence.network import Network
+from planner_core.precedence.arcs import ArcNetwork
 from planner_core.problem import (
     Bools,
     Bytes,
@@ -60,7 +60,7 @@ class ElementaryPrices:
     def __init__(
         self,
         problem: Problem,
-        network: Network,
+        network: ArcNetwork,
         memory: Memory,
         seed: int,
         num_rounds: int | None = None,
@@ -114,7 +114,7 @@ class ElementaryPrices:
 
 @borrowing
 def _epoch(
-    network: Network,
+    network: ArcNetwork,
     memory: Memory,
     labels: Labels,
     worth: Floats,

@@ -17,6 +17,7 @@ from planner_core.certified.multipliers.elementary import ROUND, ElementaryPrice
 from planner_core.certified.multipliers.incremental import incremental_prices
 from planner_core.certified.multipliers.subgradient import improve_prices
 from planner_core.certified.proofs.bound import Bound, rounded_bound
+from planner_core.precedence.arcs import arc_network_of
 from planner_core.precedence.network import Network, heaviest_paths, network_of
 from planner_core.problem import (
     Bytes,
@@ -26,7 +27,7 @@ from planner_core.problem import (
 )
 from planner_core.worth import surplus, weights
 
-_ARCS_TO_SPEND = 150_000_000
+_NODES_TO_SPEND = 6_000_000
 
 
 def lagrangian_value(problem: Problem, prices: Floats) -> tuple[float, Ints]:
@@ -62,23 +63,23 @@ def lagrangian_bound(problem: Problem, reward: float, iterations: int | None = N
         How many steps; by default as many as a fraction of a second allows, counted from
         the size of the problem so that the same problem always gets the same bound.
     """
-    network = network_of(problem)
     if iterations is None:
-        iterations = default_steps(network)
+        iterations = default_steps(len(problem.opportunities))
     if problem.offers_choice and iterations > 0:
-        memory = memory_of(problem, network)
-        passes = ElementaryPrices(problem, network, memory, 0, num_rounds=iterations // ROUND + 1)
+        arcs = arc_network_of(problem)
+        memory = memory_of(problem, arcs)
+        passes = ElementaryPrices(problem, arcs, memory, 0, num_rounds=iterations // ROUND + 1)
         passes.improve(iterations // ROUND + 1, np.zeros(1, dtype=np.uint8))
         value = rounded_bound(problem, passes.bound, reward)
         return Bound(value=value, proof="lagrangian", prices=passes.prices, is_elementary=True)
+    network = network_of(problem)
     value, prices = priced_bound(problem, network, reward, iterations, np.zeros(1, dtype=np.uint8))
     return Bound(value=rounded_bound(problem, value, reward), proof="lagrangian", prices=prices)
 
 
-def default_steps(network: Network) -> int:
+def default_steps(num_nodes: int) -> int:
     """Return how many subgradient steps a network is worth."""
-    size = len(network.before) + 10 * len(network.row)
-    return int(np.clip(_ARCS_TO_SPEND / max(1, size), 100, 1000))
+    return int(np.clip(_NODES_TO_SPEND / max(1, num_nodes), 100, 1000))
 
 
 def priced_bound(
