@@ -19,7 +19,7 @@ from fastapi import FastAPI
 from service.db.migrate import upgrade
 from service.db.session import Database
 from service.main import create_app
-from service.opportunities import OpportunityReader
+from service.scenarios.opportunities import OpportunityReader
 from service.settings import Settings
 from tests.service.contract import Contract
 

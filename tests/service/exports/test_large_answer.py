@@ -11,7 +11,7 @@ import httpx
 import pytest
 import sqlalchemy as sa
 
-from service.blocks import NUM_ITEMS, blocks_of_timeline, target_blocks
+from service.answers.blocks import NUM_ITEMS, blocks_of_timeline, target_blocks
 from service.db.rows import JobBlockRow
 from service.exports.forms import FORMS
 from tests.missions import Document

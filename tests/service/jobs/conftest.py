@@ -15,16 +15,16 @@ import httpx
 import pytest
 import sqlalchemy as sa
 
+from service.answers import store as answer_store
 from service.db.clock import utc_now
+from service.db.ids import new_id
 from service.db.migrate import upgrade
 from service.db.rows import JobRow, ScenarioRow, WorkerRow
 from service.db.session import Database
-from service.ids import new_id
 from service.jobs.queue import DbosQueue, migrate_queue
 from service.jobs.supervisor import environment_of
 from service.main import create_app
 from service.settings import Settings
-from service.stores import answer_store
 from tests.missions import Document
 from tests.patience import wait_until
 from tests.service.conftest import checked_client, serve

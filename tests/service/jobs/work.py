@@ -11,7 +11,7 @@ import psutil
 
 from planner_core.budget import Budget, Progress
 from planner_core.errors import Cancelled, InvalidScenario
-from service.blocks import blocks_of_timeline, target_blocks
+from service.answers.blocks import blocks_of_timeline, target_blocks
 from service.jobs.plan_job import PlanAnswer, PlanRequest
 from service.jobs.runner import Work
 

@@ -14,18 +14,19 @@ from planner_core.errors import InvalidScenario
 from planner_core.pins import PinnedAction, Pins
 from planner_core.problem.plan import Plan
 from planner_core.reasons.what_if import Change, what_if
-from service.api.shapes import parse_instant
-from service.background import Background
-from service.opportunities import Described
-from service.rebuilt import stored_plan
-from service.scenarios.change_inputs import ChangeIn, pinned_action
+from service.answers.rebuilt import stored_plan
+from service.scenarios.background import Background
 from service.scenarios.change_pointers import Places, pointing_into, pointing_into_relax
-from service.scenarios.inputs import ScenarioFile
-from service.scenarios.pin_inputs import pins_in
+from service.scenarios.freezing import FrozenScenario, freeze_file
+from service.scenarios.opportunities import Described
+from service.scenarios.pin_inputs import pinned_action, pins_in
 from service.scenarios.relaxing import relaxed_file
 from service.scenarios.scenario_limits import ScenarioLimits
 from service.scenarios.translate import read_file, scenario_from_file, sha256_of
-from service.stores.scenario_store import FrozenScenario, freeze_file
+from service.wire.base import read
+from service.wire.changes import ChangeIn
+from service.wire.scenarios import ScenarioFile
+from service.wire.timelines import TimelineOut
 
 _KEPT = 8
 
@@ -88,10 +89,11 @@ def vary(asked: Asked, described: Described, budget: Budget) -> Variation:
     force = tuple(pinned_action(action) for action in change.force)
     forbid = tuple(pinned_action(action) for action in change.forbid)
     _check_names(scenario, change, force, forbid)
-    dropped = _dropped(asked)
+    timeline = None if asked.timeline is None else read(TimelineOut, asked.timeline)
+    dropped = _dropped(asked, timeline)
     with pointing_into(change, Places.of(scenario.pins, forbid, force, len(dropped))):
         problem = build_problem(scenario, computed, budget)
-        plan = Plan() if asked.timeline is None else stored_plan(asked.timeline, scenario, problem)
+        plan = Plan() if timeline is None else stored_plan(timeline, scenario, problem)
         wanted = Change(force=force, forbid=(*forbid, *dropped))
         changed = what_if(scenario, wanted, problem, plan)
         build_problem(changed, computed, budget)
@@ -133,15 +135,20 @@ def _geometry(scenario: Scenario) -> Scenario:
     )
 
 
-def _dropped(asked: Asked) -> list[PinnedAction]:
+def _dropped(asked: Asked, timeline: TimelineOut | None) -> list[PinnedAction]:
     """Return the actions of the plan that are to be left out."""
     if not asked.change.relax.drop_actions:
         return []
     actions = {
-        action["id"]: (satellite["id"], action)
-        for satellite in json.loads(asked.timeline or "{}")["satellites"]
-        for action in satellite["actions"]
-        if action["mode"] != "sunpoint"
+        action.id: PinnedAction(
+            satellite_id=satellite.id,
+            target_id=action.target_id,
+            station_id=action.station_id,
+            start=action.start,
+        )
+        for satellite in (timeline.satellites if timeline else ())
+        for action in satellite.actions
+        if action.mode != "sunpoint"
     }
     found = []
     for number, own_id in enumerate(asked.change.relax.drop_actions):
@@ -151,15 +158,7 @@ def _dropped(asked: Asked) -> list[PinnedAction]:
                 f"The plan has no collect or contact {own_id!r}.",
                 pointer=f"/relax/drop_actions/{number}",
             )
-        satellite_id, action = actions[own_id]
-        found.append(
-            PinnedAction(
-                satellite_id=satellite_id,
-                target_id=action["target_id"],
-                station_id=action["station_id"],
-                start=parse_instant(action["start"]),
-            )
-        )
+        found.append(actions[own_id])
     return found
 
 

@@ -16,7 +16,7 @@ from opentelemetry.trace import Span, SpanKind, Status, StatusCode
 from opentelemetry.trace.propagation.tracecontext import TraceContextTextMapPropagator
 
 import planner_core
-from service.logs import request_id
+from service.process.logs import request_id
 
 if TYPE_CHECKING:
     from opentelemetry.sdk.trace import TracerProvider

@@ -1,4 +1,4 @@
-"""One target explained at length, as a document: every opportunity, and what would give it one."""
+"""One target explained at length, every opportunity, and what would give it one."""
 
 from __future__ import annotations
 
@@ -8,11 +8,13 @@ import planner_core
 from planner_core.budget import Budget
 from planner_core.reasons.access_changes import OF_TARGETS, AccessChange, access_changes
 from planner_core.reasons.at_length import Attempt, explain_target
-from service.background import Background
-from service.instants import instant_text
-from service.opportunities import Described
-from service.rebuilt import Rebuilt, rebuild
-from service.wording import Document, Wording
+from service.answers.rebuilt import Rebuilt, rebuild
+from service.answers.rendering import Wording
+from service.scenarios.background import Background
+from service.scenarios.opportunities import Described
+from service.wire.base import Json, read
+from service.wire.instants import instant_text
+from service.wire.timelines import AttemptOut, ExplanationOut, TimelineOut
 
 _KEPT = 200
 _KEPT_JOBS = 2
@@ -27,15 +29,17 @@ class Explainer:
         # Only the thread of the background touches these.
         self._jobs: dict[str, Rebuilt] = {}
 
-    def get(self, job_id: str, described: Described, timeline: str, target: int) -> Document:
+    def get(self, job_id: str, described: Described, timeline: str, target: int) -> ExplanationOut:
         """Return what there is to say of a target; 503 ``still_computing`` where it takes long."""
 
-        def work(budget: Budget) -> Document:
-            job = self._jobs.pop(job_id, None) or rebuild(described, timeline, budget)
+        def work(budget: Budget) -> ExplanationOut:
+            job = self._jobs.pop(job_id, None) or rebuild(
+                described, read(TimelineOut, timeline), budget
+            )
             self._jobs[job_id] = job
             for oldest in list(self._jobs)[:-_KEPT_JOBS]:
                 del self._jobs[oldest]
-            return _Words(job).document(target, budget)
+            return _Words(job).explanation(target, budget)
 
         return self._background.get(f"{job_id}/{target}", work)
 
@@ -54,36 +58,36 @@ class _Words(Wording):
         super().__init__(job.scenario, job.problem, job.timeline)
         self.job = job
 
-    def document(self, target: int, budget: Budget) -> Document:
+    def explanation(self, target: int, budget: Budget) -> ExplanationOut:
         job = self.job
         found = explain_target(job.problem, job.plan, job.timeline, target, job.search)
         reason = found.outcome.reason
         is_hidden = reason is not None and reason.code == "no_access"
         changes = access_changes(job.scenario, target, budget) if is_hidden else ()
-        return {
-            **self._target(found.outcome),
-            "opportunities": [self._attempt(attempt) for attempt in found.attempts],
-            "access_changes": [self._access_change(target, change) for change in changes],
-        }
+        return ExplanationOut(
+            **dict(self.target(found.outcome)),
+            opportunities=[self._attempt(attempt) for attempt in found.attempts],
+            access_changes=[self._access_change(target, change) for change in changes],
+        )
 
-    def _attempt(self, attempt: Attempt) -> Document:
-        return {
-            "opportunity_id": f"o{attempt.scenario_row}",
-            "satellite_id": self.problem.satellites[attempt.satellite].id,
-            "start": self._instant(attempt.start_s),
-            "end": self._instant(attempt.end_s),
-            "violations": [self._violation(violation) for violation in attempt.violations],
-            "displaces": [self._action_ids[p] for p in attempt.displaces],
-            "fits_instead": attempt.is_settled,
-            "reward_delta": attempt.reward_delta,
-            "ruled_out": attempt.ruled_out,
-        }
+    def _attempt(self, attempt: Attempt) -> AttemptOut:
+        return AttemptOut(
+            opportunity_id=f"o{attempt.scenario_row}",
+            satellite_id=self.problem.satellites[attempt.satellite].id,
+            start=self.instant(attempt.start_s),
+            end=self.instant(attempt.end_s),
+            violations=[self.violation(violation) for violation in attempt.violations],
+            displaces=[self.action_ids[p] for p in attempt.displaces],
+            fits_instead=attempt.is_settled,
+            reward_delta=attempt.reward_delta,
+            ruled_out=attempt.ruled_out,
+        )
 
-    def _access_change(self, target: int, change: AccessChange) -> Document:
+    def _access_change(self, target: int, change: AccessChange) -> Json:
         """Return a change in the words of a what-if's ``relax``."""
         satellite, own = self.scenario.satellites[change.satellite], self.scenario.targets[target]
-        said: Document = {"satellite_id": satellite.id}
-        setting: Document = {change.setting: change.value}
+        said: Json = {"satellite_id": satellite.id}
+        setting: Json = {change.setting: change.value}
         if isinstance(change.value, datetime):
             setting = {change.setting: instant_text(change.value)}
         if change.setting == "horizon_end":

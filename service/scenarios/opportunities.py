@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from planner_core.budget import Budget
 from planner_core.build import ScenarioOpportunities, compute_opportunities
 from planner_core.domain import Scenario
-from service.background import Background
 from service.db.rows import ScenarioRow
 from service.db.session import Database
+from service.scenarios.background import Background
 from service.scenarios.translate import scenario_from_content
 from service.stores import opportunity_store
 

@@ -7,10 +7,9 @@ from typing import Annotated, Any, Final
 from pydantic import ConfigDict, Discriminator, Field, JsonValue, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
-from planner_core.pins import PinnedAction
-from service.api.shapes import Body, Instant
-from service.scenarios.inputs import AgilityIn, ResourcesIn, SensorIn
-from service.scenarios.pin_inputs import Id, PinnedActionIn, action_from
+from service.wire.base import Body, Id, Instant
+from service.wire.pins import PinnedActionIn
+from service.wire.satellites import AgilityIn, ResourcesIn, SensorIn
 
 PART_OF: Final[dict[str, str]] = {
     **dict.fromkeys(AgilityIn.model_fields, "agility"),
@@ -109,8 +108,3 @@ class ChangeIn(Body):
     def needs_plan(self) -> bool:
         """Whether it speaks of the plan that the job has found."""
         return bool(self.relax.drop_actions) or any(isinstance(a, str) for a in self.force)
-
-
-def pinned_action(body: str | PinnedActionIn) -> PinnedAction:
-    """Return the action that is meant; an id alone is that of a target, at any time."""
-    return PinnedAction(target_id=body) if isinstance(body, str) else action_from(body)

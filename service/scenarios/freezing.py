@@ -15,17 +15,9 @@ from sqlalchemy.orm import Session
 
 from planner_core.build import check_element_age, check_propagation, orbit_warnings
 from planner_core.errors import InvalidScenario, PlannerError
+from service.db.ids import new_id
 from service.db.rows import GroundStationRow, SatelliteRow, ScenarioRow, TargetCatalogRow, TargetRow
 from service.db.session import Database
-from service.ids import new_id
-from service.scenarios.inputs import (
-    FileGroundStation,
-    FileSatellite,
-    FileTarget,
-    Question,
-    ScenarioFile,
-    ScenarioIn,
-)
 from service.scenarios.scenario_limits import ScenarioLimits
 from service.scenarios.translate import (
     canonical_of_file,
@@ -34,6 +26,14 @@ from service.scenarios.translate import (
     sha256_of,
 )
 from service.stores import satellite_store
+from service.wire.scenarios import (
+    FileGroundStation,
+    FileSatellite,
+    FileTarget,
+    Question,
+    ScenarioFile,
+    ScenarioIn,
+)
 
 R = TypeVar("R", SatelliteRow, TargetCatalogRow, GroundStationRow)
 

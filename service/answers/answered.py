@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from datetime import datetime
 
-from service.blocks import (
+from service.answers.blocks import (
     Document,
     Entry,
     blocks_of_timeline,

@@ -1,48 +1,27 @@
-"""What clients send, as JSON: one strict schema for each noun, defaults documented.
-
-The ranges here are for the OpenAPI document and early answers; `planner_core.domain` has the
-last word. Scenario files (`ScenarioFile`) are made of the same schemas.
-"""
+"""Satellites: how they turn, what they see, their resources and orbits."""
 
 from __future__ import annotations
 
 import json
 from typing import Annotated, Any, Literal
 
-from pydantic import (
-    AfterValidator,
-    Discriminator,
-    FailFast,
-    Field,
-    StringConstraints,
-    Tag,
-    model_validator,
-)
+from pydantic import AfterValidator, Discriminator, Field, StringConstraints, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
-from planner_core.domain import (
-    CollectAlignment,
-    Dynamics,
-    LookSide,
-    Nadir,
-    OrbitDirection,
-)
-from service.api.shapes import Body, Instant, Name
-from service.scenarios.pin_inputs import Id, PinsIn
+from service.wire.base import Body, Instant, Json, Name, Open, Stored, Wire
+from service.wire.imports import RejectedRow
 
 NonNegative = Annotated[float, Field(ge=0)]
 Positive = Annotated[float, Field(gt=0)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
-Latitude = Annotated[float, Field(ge=-90, le=90, description="Geodetic (WGS84), north positive.")]
-Longitude = Annotated[
-    float, Field(ge=-180, le=360, description="East positive; both 190 and -170 are taken.")
-]
 SunElevation = Annotated[float | None, Field(ge=-90, le=90)]
 LocalTime = Annotated[float | None, Field(ge=0, le=24)]
 SensorType = Annotated[
     str, StringConstraints(min_length=1, max_length=100, pattern=r"^[^\x00-\x1f\x7f]*$")
 ]
-Altitude = Annotated[float, Field(ge=-500, le=10000, description="Above the WGS84 ellipsoid.")]
+Nadir = Literal["geodetic", "geocentric"]
+LookSide = Literal["left", "right", "any"]
+OrbitDirection = Literal["ascending", "descending", "any"]
 
 
 class AgilityIn(Body):
@@ -58,7 +37,7 @@ class AgilityIn(Body):
 class LightIn(Body):
     """When and from where an image may be taken: limits that sensor and target both have."""
 
-    look_side: LookSide = Field("any", description="Of the direction of flight.")
+    look_side: Open[LookSide] = Field("any", description="Of the direction of flight.")
     sun_elevation_min_deg: SunElevation = Field(None, description="Of the sun at the target.")
     sun_elevation_max_deg: SunElevation = Field(None, description="Of the sun at the target.")
     local_time_from_h: LocalTime = Field(
@@ -67,7 +46,7 @@ class LightIn(Body):
         "local_time_to_h. A span from 22 to 2 runs over midnight.",
     )
     local_time_to_h: LocalTime = None
-    orbit_direction: OrbitDirection = Field(
+    orbit_direction: Open[OrbitDirection] = Field(
         "any", description="Ascending while the satellite moves north."
     )
 
@@ -77,7 +56,7 @@ class SensorIn(LightIn):
 
     off_nadir_min_deg: float = Field(5.0, ge=0, le=90)
     off_nadir_max_deg: float = Field(55.0, ge=0, le=90)
-    nadir: Nadir = Field(
+    nadir: Open[Nadir] = Field(
         "geodetic", description="Perpendicular to the ellipsoid, or towards the Earth's centre."
     )
     min_elevation_deg: float = Field(0.0, ge=0, lt=90, description="At the target.")
@@ -184,119 +163,49 @@ class SatelliteIn(OrbitIn):
     )
 
 
-class GroundStationIn(Body):
-    """A ground station."""
+class ElementsOut(Stored):
+    """One element set of a satellite."""
 
-    name: Name
-    lat_deg: Latitude
-    lon_deg: Longitude
-    alt_m: Altitude = 0.0
-    min_elevation_deg: float = Field(5.0, ge=0, lt=90)
-    min_contact_s: NonNegative = Field(0.0, description="Shorter passes are no contacts.")
-    elevation_mask: list[Annotated[list[float], Field(min_length=2, max_length=2)]] = Field(
-        [],
-        max_length=720,
-        description="Knots [azimuth_deg, elevation_deg] of the horizon, azimuth ascending from "
-        "north over east, linear between them and round the compass. The higher of mask and "
-        "min_elevation_deg holds.",
+    id: str
+    epoch: Instant
+    tle: tuple[str, ...] | None
+    omm: Json | None
+    created_at: Instant
+
+
+class SatelliteOut(Stored):
+    """A satellite with the element set in force, the one of the newest epoch."""
+
+    id: str
+    name: str
+    norad_cat_id: int
+    epoch: Instant
+    tle: tuple[str, ...] | None
+    omm: Json | None
+    agility: AgilityIn
+    sensor: SensorIn
+    resources: ResourcesField
+    created_at: Instant
+    links: dict[str, str]
+
+
+class RecordWarning(RejectedRow):
+    """What was put right while reading a record."""
+
+
+ImportStatus = Literal["created", "elements_added", "unchanged"]
+
+
+class ImportedSatellite(Wire):
+    """The satellite that a record belongs to."""
+
+    id: str
+    name: str
+    norad_cat_id: int
+    epoch: Instant
+    row: int | None = Field(description="Line of the file where the record starts.")
+    status: Open[ImportStatus] = Field(
+        description="`elements_added`: the catalogue number was known, the epoch was not; "
+        "`unchanged`: both were."
     )
-    antennas: int = Field(1, ge=1, le=100, description="Satellites served at a time.")
-
-
-class TargetIn(LightIn):
-    """A point on the ground to be imaged once, by any satellite.
-
-    Its limits narrow those of the sensor: a collect meets both.
-    """
-
-    id: Id = Field(description="Your own; unique in the catalogue.")
-    lat_deg: Latitude
-    lon_deg: Longitude
-    alt_m: Altitude = 0.0
-    reward: NonNegative = 1.0
-    collect_s: Positive = Field(30.0, description="How long one image takes.")
-    off_nadir_min_deg: float | None = Field(
-        None, ge=0, le=90, description="Narrows the sensor's limit."
-    )
-    off_nadir_max_deg: float | None = Field(
-        None, ge=0, le=90, description="Narrows the sensor's limit."
-    )
-    min_elevation_deg: float | None = Field(
-        None, ge=0, lt=90, description="Narrows the sensor's limit."
-    )
-    release: Instant | None = Field(None, description="No collect of it starts earlier.")
-    due: Instant | None = Field(None, description="No collect of it ends later.")
-    sensor_type: SensorType | None = Field(
-        None,
-        description="Only satellites whose sensor has this very type collect it; null for any.",
-    )
-
-
-class HorizonIn(Body):
-    """The span to plan."""
-
-    start: Instant
-    end: Instant
-
-
-class Question(Body):
-    """What scenarios and scenario files share."""
-
-    name: Name | None = None
-    horizon: HorizonIn
-    use_resources: bool = Field(
-        True, description="False: no contacts, no sun-pointing, no battery and recorder limits."
-    )
-    dynamics: Dynamics = Field("physical", description="How battery and recorder are integrated.")
-    collect_spacing_s: Positive | None = Field(
-        None, description="Several collects per access, this far apart; null for one, centred."
-    )
-    collect_alignment: CollectAlignment = Field(
-        "access",
-        description="Whether those start from each access's own start on, or at multiples of "
-        "collect_spacing_s from the horizon's start.",
-    )
-    continuous_starts: bool = Field(
-        False, description="A solver may place a collect anywhere inside its access."
-    )
-    allow_old_elements: bool = Field(
-        False,
-        description="Plan with element sets that are more than 30 days from their epoch "
-        "(low orbits), which is refused otherwise.",
-    )
-    pins: PinsIn = PinsIn()
-
-
-class ScenarioIn(Question):
-    """A planning question over what is stored."""
-
-    satellite_ids: list[Id] = Field(min_length=1, max_length=10_000)
-    target_catalog_ids: list[Id] = Field(min_length=1, max_length=1000)
-    ground_station_ids: list[Id] = Field([], max_length=10_000)
-
-
-class FileSatellite(SatelliteIn):
-    """A satellite of a scenario file."""
-
-    id: Id | None = Field(None, description="Its name by default, made unique.")
-
-
-class FileGroundStation(GroundStationIn):
-    """A ground station of a scenario file."""
-
-    id: Id | None = Field(None, description="Its name by default, made unique.")
-
-
-class FileTarget(TargetIn):
-    """A target of a scenario file."""
-
-    catalog_id: Id | None = Field(None, description="The catalogue it came from.")
-
-
-class ScenarioFile(Question):
-    """A self-contained scenario, as ``GET /v1/scenarios/{id}?expand=true`` answers it."""
-
-    # The first thing that is wrong is told: of a whole file of them each would take memory.
-    satellites: Annotated[list[FileSatellite], FailFast()] = Field(min_length=1, max_length=10_000)
-    targets: Annotated[list[FileTarget], FailFast()] = Field(min_length=1, max_length=1_000_000)
-    ground_stations: Annotated[list[FileGroundStation], FailFast()] = Field([], max_length=10_000)
+    warnings: tuple[RecordWarning, ...]

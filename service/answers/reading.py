@@ -1,4 +1,4 @@
-"""A timeline read back: from CSV or JSON to the plan in it, whoever made the file.
+"""A plan of any origin read from a file, CSV or JSON.
 
 Only what is decided counts: who does what, where and when. All else in a timeline follows
 from that and from the scenario, so it is worked out again and not believed.
@@ -19,16 +19,15 @@ from planner_core.errors import Fault, InvalidScenario
 from planner_core.problem import (
     COLLECT,
     CONTACT,
-    Opportunities,
     Problem,
 )
 from planner_core.problem.plan import Action, Plan
-from service.api.shapes import Body, Instant
-from service.exports.table import unguarded
-from service.scenarios.pin_inputs import Id
-from service.scenarios.records import Checked, Record, Records, check, read_csv
+from planner_core.referee.plan_diff import PlannedAction
+from service.scenarios.records import Checked, Record, Records, check, read_csv, unguarded
+from service.wire.base import Body, Id, Instant
 
 _MOST_ACTIONS: Final = 1_000_000
+_PLACES: Final = {"collect": "target", "contact": "station"}
 _REQUIRED: Final = ("satellite_id", "mode", "start", "end", "target_id", "station_id")
 
 
@@ -41,6 +40,21 @@ class ActionIn(Body):
     end: Instant
     target_id: Id | None = None
     station_id: Id | None = None
+
+    @property
+    def place_id(self) -> str | None:
+        """The target of a collect, the station of a contact."""
+        return self.target_id if self.mode == "collect" else self.station_id
+
+    def planned(self) -> PlannedAction:
+        """Return it in the core's terms; it must name its place."""
+        return PlannedAction(
+            start=self.start,
+            end=self.end,
+            satellite_id=self.satellite_id,
+            mode=self.mode,
+            place_id=str(self.place_id),
+        )
 
 
 class UnreadableTimeline(Exception):
@@ -132,23 +146,22 @@ def plan_in(records: Records, scenario: Scenario, problem: Problem) -> Reading:
     UnreadableTimeline
         Where something is wrong with the file, or it names what the scenario does not have.
     """
-    names = _Names(scenario)
-    checked, faults = check(records.records, ActionIn, names.require_known)
+    finder = Finder(scenario, problem)
+    checked, faults = check(records.records, ActionIn, finder.require_known)
     if records.faults or faults:
         raise UnreadableTimeline([*records.faults, *faults])
-    tasks = [one for one in checked if one.body.mode != "sunpoint"]
-    rows = _Finder(problem.opportunities, len(scenario.targets) + len(scenario.ground_stations))
     found: list[tuple[Action, str]] = []
     impossible: list[tuple[str, str]] = []
-    for one in tasks:
-        start_s = scenario.horizon.offset_s(one.body.start)
-        row = rows.nearest(*names.key(one.body), start_s)
-        if row is None:
-            what = one.body.target_id or one.body.station_id
-            impossible.append((_place(one), f"{one.body.satellite_id} has no access to {what}."))
+    for one in checked:
+        if one.body.mode == "sunpoint":
+            continue
+        task = one.body.planned()
+        action = finder.action(task)
+        if action is None:
+            detail = f"{task.satellite_id} has no access to {task.place_id}."
+            impossible.append((_place(one), detail))
         else:
-            end_s = scenario.horizon.offset_s(one.body.end)
-            found.append((Action(start_s, end_s, row), _place(one)))
+            found.append((action, _place(one)))
     found.sort()
     return Reading(
         plan=Plan(tuple(action for action, _ in found)),
@@ -161,56 +174,36 @@ def _place(one: Checked[ActionIn]) -> str:
     return one.record.pointers[""] if one.record.row is None else f"line {one.record.row}"
 
 
-class _Names:
-    """The numbers that the ids of a scenario stand for."""
+class Finder:
+    """The opportunities of a problem, by what their scenario calls them."""
 
-    def __init__(self, scenario: Scenario):
-        self._satellites = {s.id: i for i, s in enumerate(scenario.satellites)}
-        self._targets = {t.id: i for i, t in enumerate(scenario.targets)}
-        self._stations = {s.id: i for i, s in enumerate(scenario.ground_stations)}
-
-    def require_known(self, action: ActionIn) -> None:
-        """Raise where the scenario knows nothing of what an action names."""
-        _require(self._satellites, "satellite", action.satellite_id)
-        if action.mode == "collect":
-            _require(self._targets, "target", action.target_id)
-        elif action.mode == "contact":
-            _require(self._stations, "station", action.station_id)
-        if action.end < action.start:
-            raise InvalidScenario("invalid_time", "It ends before it starts.", pointer="/end")
-
-    def key(self, action: ActionIn) -> tuple[int, int, int]:
-        """Return satellite, kind and place."""
-        satellite = self._satellites[action.satellite_id]
-        if action.mode == "collect":
-            return satellite, COLLECT, self._targets[str(action.target_id)]
-        return satellite, CONTACT, self._stations[str(action.station_id)]
-
-
-def _require(known: Mapping[str, int], what: str, own_id: str | None) -> None:
-    if own_id is None:
-        raise InvalidScenario(
-            "missing_field", f"The action names no {what}.", pointer=f"/{what}_id"
-        )
-    if own_id not in known:
-        raise InvalidScenario(
-            f"unknown_{what}", f"The scenario has no {what} {own_id!r}.", pointer=f"/{what}_id"
-        )
-
-
-class _Finder:
-    """Opportunities by satellite, kind and place."""
-
-    def __init__(self, table: Opportunities, num_places: int):
-        self._table = table
-        self._num_places = max(num_places, 1)
+    def __init__(self, scenario: Scenario, problem: Problem):
+        self._horizon = scenario.horizon
+        self._numbers = {
+            "satellite": {s.id: i for i, s in enumerate(scenario.satellites)},
+            "target": {t.id: i for i, t in enumerate(scenario.targets)},
+            "station": {s.id: i for i, s in enumerate(scenario.ground_stations)},
+        }
+        self._num_places = len(scenario.targets) + len(scenario.ground_stations) + 1
+        self._table = table = problem.opportunities
         keys = self._key(table.satellite.astype(np.int64), table.kind.astype(np.int64), table.place)
         self._order = np.argsort(keys, kind="stable")
         self._keys = keys[self._order]
 
-    def nearest(self, satellite: int, kind: int, place: int, start_s: float) -> int | None:
-        """Return the opportunity that a task is meant to take; None where there is none."""
-        key = self._key(np.int64(satellite), np.int64(kind), np.int64(place))
+    def require_known(self, action: ActionIn) -> None:
+        """Raise where the scenario knows nothing of what an action names."""
+        self._require("satellite", action.satellite_id)
+        if action.mode != "sunpoint":
+            self._require(_PLACES[action.mode], action.place_id)
+        if action.end < action.start:
+            raise InvalidScenario("invalid_time", "It ends before it starts.", pointer="/end")
+
+    def action(self, task: PlannedAction) -> Action | None:
+        """Return the action that is meant; None where no opportunity is what it names."""
+        satellite = self._numbers["satellite"][task.satellite_id]
+        place = self._numbers[_PLACES[task.mode]][task.place_id]
+        start_s = self._horizon.offset_s(task.start)
+        key = self._key(satellite, COLLECT if task.mode == "collect" else CONTACT, place)
         first, end = np.searchsorted(self._keys, key), np.searchsorted(self._keys, key, "right")
         rows = self._order[first:end]
         if len(rows) == 0:
@@ -220,7 +213,17 @@ class _Finder:
             table.access_start_s[rows] - start_s, start_s - table.access_end_s[rows]
         )
         apart_s = np.abs(table.start_s[rows] - start_s)
-        return int(rows[np.lexsort((apart_s, np.maximum(outside_s, 0.0)))[0]])
+        row = int(rows[np.lexsort((apart_s, np.maximum(outside_s, 0.0)))[0]])
+        return Action(start_s, self._horizon.offset_s(task.end), row)
+
+    def _require(self, what: str, own_id: str | None) -> None:
+        pointer = f"/{what}_id"
+        if own_id is None:
+            detail = f"The action names no {what}."
+            raise InvalidScenario("missing_field", detail, pointer=pointer)
+        if own_id not in self._numbers[what]:
+            detail = f"The scenario has no {what} {own_id!r}."
+            raise InvalidScenario(f"unknown_{what}", detail, pointer=pointer)
 
     def _key(self, satellite: Any, kind: Any, place: Any) -> npt.NDArray[np.int64]:
         return np.asarray((satellite * 2 + kind) * self._num_places + place, dtype=np.int64)

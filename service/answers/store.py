@@ -10,7 +10,7 @@ from typing import Any, Final
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
 
-from service.blocks import TIMELINE, Block, Entry, Kind, contents_of
+from service.answers.blocks import TIMELINE, Block, Entry, Kind, contents_of
 from service.db.clock import utc_now
 from service.db.rows import JobBlockRow, JobResultRow
 

@@ -9,7 +9,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, Final, TypeVar, cast
 
 from planner_core.budget import Budget
-from service.api.problems import ServiceError
+from service.problems.kinds import ServiceError
 
 T = TypeVar("T")
 

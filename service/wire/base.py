@@ -1,11 +1,10 @@
-"""What all resources share: instants, strict schemas, ETags."""
+"""What all shapes share: closed for who writes, open for who reads; instants, names, ids."""
 
 from __future__ import annotations
 
-import hashlib
 import re
 from datetime import UTC, datetime, timedelta
-from typing import Annotated, Any
+from typing import Annotated, Any, Final, Generic, Self, TypeVar
 
 from pydantic import (
     BaseModel,
@@ -13,15 +12,25 @@ from pydantic import (
     ConfigDict,
     Field,
     PlainSerializer,
+    PrivateAttr,
     StringConstraints,
+    ValidationInfo,
+    ValidatorFunctionWrapHandler,
     WithJsonSchema,
+    WrapValidator,
     model_validator,
 )
 from pydantic_core import PydanticCustomError
 
-from service.instants import instant_text
+from service.wire.instants import instant_text
 
-_MOST_FIELDS = 1000
+T = TypeVar("T")
+M = TypeVar("M", bound=BaseModel)
+
+Json = dict[str, Any]
+
+_READING: Final = "reading"
+_MOST_FIELDS: Final = 1000
 _RFC3339 = re.compile(
     r"(\d{4}-\d\d-\d\d)[Tt ](\d\d:\d\d:\d\d)(?:\.(\d{1,9})\d*)?([Zz]|[+-]\d\d:\d\d)?"
 )
@@ -69,11 +78,71 @@ Name = Annotated[
 ]
 
 
-class Body(BaseModel):
+Id = Annotated[str, StringConstraints(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")]
+
+
+def _open(value: object, known: ValidatorFunctionWrapHandler, info: ValidationInfo) -> object:
+    return value if info.context == _READING and isinstance(value, str) else known(value)
+
+
+Open = Annotated[T, WrapValidator(_open)]
+"""One of some words. Readers take any: a newer service may have more of them."""
+
+
+def _for_readers(schema: Json) -> None:
+    """Let the OpenAPI document say what readers may count on: more fields may come."""
+    schema.pop("additionalProperties", None)
+
+
+class Wire(BaseModel):
+    """Base of all that is sent."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, json_schema_extra=_for_readers)
+
+    def __getitem__(self, name: str) -> Any:
+        """Return a field by its name in JSON."""
+        return getattr(self, name)
+
+
+class Stored(Wire):
+    """Base of what has an ETag, which names its state and stands in a header."""
+
+    _etag: str | None = PrivateAttr(None)
+
+    @property
+    def etag(self) -> str | None:
+        """What names its state, for who has read it on its own."""
+        return self._etag
+
+    def with_etag(self, etag: str | None) -> Self:
+        """Return the same as it was answered under this ETag."""
+        copy = self.model_copy()
+        copy._etag = etag
+        return copy
+
+
+class Listed(Wire, Generic[T]):
+    """One page of a list."""
+
+    items: tuple[T, ...]
+    next: str | None = Field(description="Cursor of the next page; null on the last one.")
+
+
+def dumped(model: BaseModel, include: set[str] | None = None) -> Json:
+    """Return a model as JSON has it, or some of its fields."""
+    return model.model_dump(mode="json", include=include)
+
+
+def read(model: type[M], text: str | bytes) -> M:
+    """Return what an answer says: fields and words that are not known here do no harm."""
+    return model.model_validate_json(text, extra="ignore", context=_READING)
+
+
+class Body(Wire):
     """Base of everything a client sends: unknown fields, "5" for 5, and NaN are refused."""
 
     model_config = ConfigDict(
-        extra="forbid", strict=True, frozen=True, allow_inf_nan=False, validate_default=False
+        strict=True, allow_inf_nan=False, validate_default=False, json_schema_extra=None
     )
 
     @model_validator(mode="before")
@@ -87,42 +156,3 @@ class Body(BaseModel):
                 {"num_fields": len(value), "most": _MOST_FIELDS},
             )
         return value
-
-
-def etag_of(text: str) -> str:
-    """Return a strong ETag of a representation.
-
-    >>> etag_of("a")
-    '"ca978112ca1bbdca"'
-    """
-    return f'"{hashlib.sha256(text.encode()).hexdigest()[:16]}"'
-
-
-def matches(if_none_match: str | None, etag: str) -> bool:
-    """Return whether an ``If-None-Match`` header names this ETag (weak comparison).
-
-    >>> matches('"x", W/"y"', '"y"'), matches("*", '"y"'), matches(None, '"y"')
-    (True, True, False)
-    """
-    if if_none_match is None:
-        return False
-    known = {tag.strip().removeprefix("W/") for tag in if_none_match.split(",")}
-    return "*" in known or etag.removeprefix("W/") in known
-
-
-def matches_strongly(if_match: str, etag: str) -> bool:
-    """Return whether an ``If-Match`` header names this ETag; a weak tag names nothing.
-
-    >>> matches_strongly('"x", "y"', '"y"'), matches_strongly('W/"y"', '"y"')
-    (True, False)
-    """
-    named = {tag.strip() for tag in if_match.split(",")}
-    return "*" in named or etag in named
-
-
-def etagged(model: BaseModel) -> str:
-    """Return the ETag of a model's JSON."""
-    return etag_of(model.model_dump_json())
-
-
-Json = dict[str, Any]
