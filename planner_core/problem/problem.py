@@ -26,6 +26,7 @@ from planner_core.problem.slew import (
     reach_deg,
     slew_s,
 )
+from planner_core.worth import best_worths, common_unit, worth_of
 
 Floats = npt.NDArray[np.float64]
 Singles = npt.NDArray[np.float32]
@@ -270,8 +271,9 @@ class Problem:
 
     Attributes
     ----------
-    target_reward
-        Shape ``(num_targets,)``.
+    worth
+        What an image by each opportunity earns alone, 0 for contacts (see ``planner_core.worth``).
+        With continuous starts all collects of an access are worth the same. Shape ``(n,)``.
     target_access
         Why a target has no opportunity, or ``ACCESS_FOUND``. Shape ``(num_targets,)``.
     station_antennas
@@ -291,7 +293,7 @@ class Problem:
     dynamics: Dynamics
     continuous_starts: bool
     target_ids: tuple[str, ...]
-    target_reward: Floats
+    worth: Floats
     target_access: npt.NDArray[np.int8]
     station_ids: tuple[str, ...]
     station_antennas: Ints
@@ -321,6 +323,30 @@ class Problem:
         for satellite in self.satellites:
             local[satellite.rows] = np.arange(len(satellite), dtype=np.int32)
         return local
+
+    @cached_property
+    def best_worth(self) -> Floats:
+        """Return the most that an image of each target earns. Shape ``(num_targets,)``."""
+        rows, _ = self.target_opportunities
+        target = self.opportunities.place[rows]
+        return best_worths(target, self.worth[rows], len(self.target_ids))
+
+    @cached_property
+    def typical_worth(self) -> float:
+        """Return what the best image of a target earns on average; 1 where no target has any."""
+        _, offsets = self.target_opportunities
+        offered = self.best_worth[np.diff(offsets) > 0]
+        return float(offered.mean()) or 1.0 if len(offered) else 1.0
+
+    @cached_property
+    def reward_unit(self) -> float:
+        """Return an amount of which what any plan earns is a multiple; 0 where there is none."""
+        return common_unit(self.worth)
+
+    def worth_of(self, rows: npt.NDArray[np.integer]) -> float:
+        """Return what a plan earns that takes these opportunities and breaks nothing."""
+        images = rows[self.opportunities.kind[rows] == COLLECT]
+        return worth_of(self.opportunities.place[images], self.worth[images])
 
     @cached_property
     def offers_choice(self) -> bool:

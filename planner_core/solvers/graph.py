@@ -61,7 +61,7 @@ class Graph:
         def plan_turn(turn: Turn) -> list[int]:
             track = turn.track
             is_wanted = (track.is_contact == 0) & (turn.collected[track.place] == 0)
-            weight = np.where(is_wanted, problem.target_reward[track.place], 0.0)
+            weight = np.where(is_wanted, problem.worth[turn.satellite.rows], 0.0)
             links = Links.of(problem, turn.satellite)
             if self.path == "longest":
                 _, path = links.longest(weight)

@@ -6,7 +6,7 @@ import itertools
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget
@@ -15,13 +15,14 @@ from planner_core.precedence.chains import Links
 from planner_core.problem import COLLECT
 from planner_core.referee.replay import replay
 from planner_core.solvers.registry import Graph
+from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import Task, make_problem, random_problem
 
 SEEDS = st.integers(0, 10**6)
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(seed=SEEDS, num_collects=st.integers(0, 60), span_s=st.sampled_from([300.0, 5000.0]))
 def test_arcs_are_the_pairs_with_nothing_in_between(
     seed: int, num_collects: int, span_s: float
@@ -41,7 +42,7 @@ def test_arcs_are_the_pairs_with_nothing_in_between(
     assert (found == covering).all()
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(seed=SEEDS, slew_rate_deg_s=st.sampled_from([1.0, 0.3]))
 def test_chains_are_as_heavy_as_those_of_the_listing(seed: int, slew_rate_deg_s: float) -> None:
     """Alg. 3 in plain Python, over all pairs; tasks without worth stand in no chain."""
@@ -66,7 +67,7 @@ def test_chains_are_as_heavy_as_those_of_the_listing(seed: int, slew_rate_deg_s:
     assert len(set(satellite.place[tasks])) == len(tasks)
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(seed=SEEDS)
 @pytest.mark.parametrize("path", ["history", "longest"])
 def test_graph_finds_the_optimum_where_no_target_comes_twice(path: str, seed: int) -> None:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.domain import Agility
 from planner_core.precedence.network import heaviest_through, network_of
 from planner_core.problem import Floats, Problem
+from tests.examples import examples
 from tests.planner_core.problems import random_problem
 
 
@@ -33,7 +34,7 @@ def readable(problem: Problem, worth: Floats) -> tuple[float, Floats]:
 
 
 @pytest.mark.parametrize("slew_rate_deg_s", [1.0, 0.3])
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(
     seed=st.integers(0, 10**6), num_satellites=st.integers(1, 4), size=st.integers(0, 40),
     num_offers=st.sampled_from([1, 1, 6]), span_s=st.sampled_from([900.0, 4000.0]),

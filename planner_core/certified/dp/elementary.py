@@ -29,6 +29,7 @@ from planner_core.problem import (
     Ints,
     Problem,
 )
+from planner_core.worth import surplus, weights
 
 Words = npt.NDArray[np.uint64]
 
@@ -378,11 +379,8 @@ def elementary_value(problem: Problem, prices: Floats) -> tuple[float, Ints]:
     """
     network = network_of(problem)
     memory = memory_of(problem, network)
-    reward = np.append(problem.target_reward, 0.0)
-    price = np.append(np.clip(prices, 0.0, problem.target_reward), 0.0)
-    price[np.setdiff1d(np.arange(len(prices)), network.place)] = 0.0
-    counts = np.zeros(len(reward), dtype=np.int32)
-    total = elementary_paths(
-        network, memory, (reward - price)[network.place], labels_for(network, memory), counts
-    )
+    price = np.append(surplus(prices, problem.best_worth), 0.0)
+    weight = weights(problem.worth[network.row], price[network.place])
+    counts = np.zeros(len(price), dtype=np.int32)
+    total = elementary_paths(network, memory, weight, labels_for(network, memory), counts)
     return float(price.sum() + total), counts[:-1]

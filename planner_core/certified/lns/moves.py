@@ -52,7 +52,7 @@ class Ground(NamedTuple):
     is_transitive
         Whether a chain may pass through a task without taking it. Shape ``(num_parts,)``.
     worth
-        Of each target, and 0 for contacts. Shape ``(num_targets + 1,)``.
+        Of each node.
     preference
         By how much the search prefers a target to others of its worth, as a factor.
         Shape ``(num_targets + 1,)``.
@@ -113,7 +113,9 @@ class Room(NamedTuple):
     number, marked_at
         A target's place in those sets, as of which move. Shape ``(num_targets + 1,)``.
     weight
-        Of each target in the sets. Shape ``(MAX_NODES,)``.
+        Of each node of the window.
+    tie
+        By how much each target in the sets is favoured. Shape ``(MAX_NODES,)``.
     path, old, dropped
         Nodes that a move takes, lets go in the window, and lets go elsewhere.
     move
@@ -130,6 +132,7 @@ class Room(NamedTuple):
     number: Ints
     marked_at: Longs
     weight: Floats
+    tie: Floats
     path: Ints
     old: Ints
     dropped: Ints
@@ -150,6 +153,7 @@ def room_for(num_targets: int) -> Room:
         number=np.zeros(num_targets + 1, dtype=np.int32),
         marked_at=np.zeros(num_targets + 1, dtype=np.int64),
         weight=np.zeros(nodes),
+        tie=np.zeros(nodes),
         path=np.zeros(nodes, dtype=np.int32),
         old=np.zeros(nodes, dtype=np.int32),
         dropped=np.zeros(nodes, dtype=np.int32),
@@ -211,7 +215,7 @@ def _pivot(ground: Ground, taken: Taken, offered: Bools, draws: Uint64s) -> int:
     for _ in range(num_trials):
         pivot = int(next_draw(draws) * n)
         target = ground.place[pivot]
-        if offered[pivot] and taken.holder[target] == FREE and ground.worth[target] > 0.0:
+        if offered[pivot] and taken.holder[target] == FREE and ground.worth[pivot] > 0.0:
             urgency = ground.urgency[target]
             if urgency >= 1.0 or next_draw(draws) < urgency:
                 break
@@ -258,7 +262,7 @@ def _window(taken: Taken, pivot: int, begin: int, end: int, draws: Uint64s) -> t
 def _weigh(
     ground: Ground, taken: Taken, offered: Bools, room: Room, low: int, high: int, draws: Uint64s
 ) -> int:
-    """Give a window's targets numbers and weights; return how many words a set of them takes.
+    """Give a window's targets numbers, its nodes weights; return how many words a set takes.
 
     Ties are broken at random, so that the search wanders over plans of equal worth.
     """
@@ -267,22 +271,28 @@ def _weigh(
     tie = _TIE if ground.is_alike or move & 1 else _SMALL_TIE
     count = 0
     for node in range(low, high):
-        target = ground.place[node]
-        if room.marked_at[target] == move or ground.worth[target] <= 0.0:
+        room.weight[node - low] = 0.0
+        target, worth = ground.place[node], ground.worth[node]
+        if worth <= 0.0 or not (offered[node] or taken.is_taken[node]):
             continue
-        if not offered[node] and not taken.is_taken[node]:
-            continue
-        room.marked_at[target] = move
-        room.number[target] = count
         held = taken.holder[target]
-        weight = ground.worth[target] * ground.preference[target]
-        if held == FREE or low <= held < high:
-            room.weight[count] = weight * (1.0 + tie * next_draw(draws))
+        is_held_elsewhere = held != FREE and not low <= held < high
+        if room.marked_at[target] != move:
+            room.marked_at[target] = move
+            room.number[target] = count
+            if not is_held_elsewhere:
+                room.tie[count] = 1.0 + tie * next_draw(draws)
+            elif not ground.is_locked[target]:
+                room.tie[count] = 2.0 * next_draw(draws) - 1.0
+            count += 1
+        weight = worth * ground.preference[target]
+        if not is_held_elsewhere:
+            room.weight[node - low] = weight * room.tie[room.number[target]]
         elif ground.is_locked[target]:
-            room.weight[count] = -1.0
+            room.weight[node - low] = -1.0
         else:
-            room.weight[count] = weight * tie * (2.0 * next_draw(draws) - 1.0)
-        count += 1
+            better = (worth - ground.worth[held]) * ground.preference[target]
+            room.weight[node - low] = better + weight * tie * room.tie[room.number[target]]
     return (count + 63) >> 6
 
 
@@ -324,7 +334,7 @@ def _heaviest(
         if (offered[node] or taken.is_taken[node]) and room.marked_at[target] == move:
             number = room.number[target]
             word, bit = number >> 6, np.uint64(1) << np.uint64(number & 63)
-            weight = room.weight[number]
+            weight = room.weight[k]
             if ground.is_kept[node]:
                 weight += ground.kept_worth
             elif ground.is_locked[target]:
@@ -383,8 +393,9 @@ def _replace(ground: Ground, taken: Taken, room: Room, low: int, high: int, last
             room.path[num_new] = node
             num_new += 1
             held = taken.holder[ground.place[node]]
-            if held == FREE or low <= held < high:
-                worth += ground.worth[ground.place[node]]
+            worth += ground.worth[node]
+            if held != FREE and not low <= held < high:
+                worth -= ground.worth[held]
             if ground.is_kept[node]:
                 worth += ground.kept_worth
         at = room.source[at]
@@ -394,7 +405,7 @@ def _replace(ground: Ground, taken: Taken, room: Room, low: int, high: int, last
             room.old[num_old] = node
             num_old += 1
             if taken.holder[ground.place[node]] == node:
-                worth -= ground.worth[ground.place[node]]
+                worth -= ground.worth[node]
             if ground.is_kept[node]:
                 worth -= ground.kept_worth
     if worth < -1e-9:

@@ -75,8 +75,10 @@ class WindowSearch:
         is_taken[[action.opportunity for action in plan.actions]] = True
         is_taken[self.problem.opportunities.kind == CONTACT] = False
         is_taken = is_taken[self._row]
-        holder = np.full(len(self._ground.worth), FREE, dtype=np.int32)
+        holder = np.full(len(self.problem.target_ids) + 1, FREE, dtype=np.int32)
+        # The best image of a target counts, and the first of those.
         own = np.flatnonzero(is_taken)[::-1]
+        own = own[np.argsort(self._ground.worth[own], kind="stable")]
         holder[self._ground.place[own]] = own
         # Where it need not stand, a second image of a target only takes up room.
         part = np.searchsorted(self._ground.first, own, side="right") - 1
@@ -108,9 +110,9 @@ class WindowSearch:
 
     @property
     def reward(self) -> float:
-        """What its targets are worth."""
-        is_imaged = self._taken.holder[:-1] != FREE
-        return float(self.problem.target_reward[is_imaged].sum())
+        """What its targets earn."""
+        held = self._taken.holder[:-1]
+        return float(self._ground.worth[held[held != FREE]].sum())
 
 
 def num_choices(problem: Problem) -> int:
@@ -160,9 +162,8 @@ def _ground_of(
     is_transitive = np.array(
         [transitive_closure(problem, s) is s.transitions for s in satellites], dtype=np.bool_
     )
-    offered = np.unique(network.place)
     num_targets = len(problem.target_ids)
-    worth = np.append(problem.target_reward, 0.0)
+    worth = problem.worth[network.row]
     is_kept = np.isin(network.row, problem.kept_rows)
     is_locked = np.zeros(num_targets + 1, dtype=np.bool_)
     is_locked[network.place[is_kept]] = True
@@ -188,6 +189,6 @@ def _ground_of(
         num_trials=_TRIALS if urgency is None else _TRIALS_FOR_URGENT,
         is_kept=is_kept,
         is_locked=is_locked,
-        kept_worth=1.0 + float(problem.target_reward.sum()),
-        is_alike=len(np.unique(worth[offered])) <= 1,
+        kept_worth=1.0 + float(problem.best_worth.sum()),
+        is_alike=len(np.unique(worth)) <= 1,
     )

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -12,10 +13,10 @@ from planner_core.certified.mip.program import Program, Rows
 from planner_core.certified.mip.resources import ResourceTerms, add_resources, resource_terms
 from planner_core.precedence.relation import Order, order_of, transitive_closure
 from planner_core.problem import (
-    COLLECT,
     CONTACT,
     Floats,
     Ints,
+    Longs,
     Problem,
     SatelliteProblem,
 )
@@ -35,12 +36,64 @@ class PlanProgram:
         The opportunities that a plan may take.
     orders
         For each satellite, which of its tasks can stand in one plan.
+    paid
+        What the columns beside x are paid for; None where x is paid itself.
     """
 
     problem: Problem
     program: Program
     taken: Ints
     orders: tuple[Order, ...]
+    paid: Paid | None
+
+    def target_prices(self, row_prices: Floats) -> Floats:
+        """Return what a relaxation says that each target is worth by itself.
+
+        Rows of targets come first in the program.
+        """
+        most = self.problem.best_worth
+        if self.paid is None:
+            return np.clip(row_prices[: len(most)], 0.0, most)
+        prices = np.zeros(len(most))
+        left = self.paid.worth - row_prices[: len(self.paid.worth)]
+        np.maximum.at(prices, self.paid.target, left)
+        return np.clip(prices, 0.0, most)
+
+
+class Paid(NamedTuple):
+    """Images that are paid alike: those of one target that are worth the same.
+
+    Attributes
+    ----------
+    target, worth
+        Of each group; a target without images has one of them too, worth nothing.
+        Shape ``(num_groups,)``.
+    rows, offsets
+        Their images, group by group, and where each group begins.
+        Shapes ``(num_images,)`` and ``(num_groups + 1,)``.
+    """
+
+    target: Ints
+    worth: Floats
+    rows: Ints
+    offsets: Longs
+
+    @classmethod
+    def of(cls, problem: Problem) -> Paid:
+        """Return the groups of a problem, target after target."""
+        rows, offsets = problem.target_opportunities
+        empty = np.flatnonzero(np.diff(offsets) == 0)
+        target = np.concatenate([problem.opportunities.place[rows], empty])
+        worth = np.concatenate([problem.worth[rows], np.zeros(len(empty))])
+        groups, group = np.unique(np.column_stack([target, worth]), axis=0, return_inverse=True)
+        group = group.ravel()[: len(rows)]
+        counts = np.bincount(group, minlength=len(groups))
+        return cls(
+            target=groups[:, 0].astype(np.int32),
+            worth=groups[:, 1],
+            rows=rows[np.argsort(group, kind="stable")],
+            offsets=np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
+        )
 
 
 def plan_program(
@@ -72,16 +125,15 @@ def plan_program(
         for closed, satellite in zip(closures, problem.satellites, strict=True)
     )
     program = Program()
-    taken = _variables(program, problem, is_transitive)
+    taken, paid = _variables(program, problem, is_transitive)
     orders = tuple(order_of(closed) for closed in closures)
     _constraints(program, problem, taken, orders, terms, formulation, margin)
-    return PlanProgram(problem=problem, program=program, taken=taken, orders=orders)
+    return PlanProgram(problem=problem, program=program, taken=taken, orders=orders, paid=paid)
 
 
-def _variables(program: Program, problem: Problem, is_transitive: bool) -> Ints:
-    """Add x, 1 for what must be taken, and the objective: each target's reward once."""
-    table = problem.opportunities
-    worth = _objective(problem)
+def _variables(program: Program, problem: Problem, is_transitive: bool) -> tuple[Ints, Paid | None]:
+    """Add x, 1 for what must be taken, and the objective: what the images are worth."""
+    table, worth = problem.opportunities, problem.worth
     kept = np.zeros(len(table), dtype=np.bool_)
     kept[problem.kept_rows] = True
     if is_transitive:
@@ -91,37 +143,32 @@ def _variables(program: Program, problem: Problem, is_transitive: bool) -> Ints:
             worth, lower=kept.astype(np.float64), upper=useful.astype(np.float64)
         )
         _once_per_target(program, problem, taken)
-        return taken
+        return taken, None
     taken = program.add_columns(np.zeros(len(table)), lower=kept.astype(np.float64))
-    _paid_once_per_target(program, problem, taken)
-    return taken
-
-
-def _objective(problem: Problem) -> Floats:
-    """Return what each opportunity earns by itself."""
-    table = problem.opportunities
-    is_collect = table.kind == COLLECT
-    worth = np.zeros(len(table))
-    worth[is_collect] = problem.target_reward[table.place[is_collect]]
-    return worth
+    return taken, _paid_for_the_best(program, problem, taken)
 
 
 def _once_per_target(program: Program, problem: Problem, taken: Ints) -> None:
-    """At most one collect of each target, over all satellites."""
+    """At most one collect of each target, over all satellites: others could not add to the best."""
     rows, offsets = problem.target_opportunities
     program.add_rows(Rows.of(offsets, taken[rows], upper=1.0))
 
 
-def _paid_once_per_target(program: Program, problem: Problem, taken: Ints) -> None:
-    """Pay for a target where any of its collects is taken.
+def _paid_for_the_best(program: Program, problem: Problem, taken: Ints) -> Paid:
+    """Pay for one image of each target that is taken.
 
     A slow satellite may turn by way of a target that it has collected already.
     """
-    rows, offsets = problem.target_opportunities
-    collected = program.add_columns(problem.target_reward.astype(np.float64), is_integer=False)
-    column = np.insert(taken[rows], offsets[1:], collected)
-    value = np.insert(np.full(len(rows), -1.0), offsets[1:], 1.0)
+    paid = Paid.of(problem)
+    offsets = paid.offsets
+    collected = program.add_columns(paid.worth, is_integer=False)
+    column = np.insert(taken[paid.rows], offsets[1:], collected)
+    value = np.insert(np.full(len(paid.rows), -1.0), offsets[1:], 1.0)
     program.add_rows(Rows.of(offsets + np.arange(len(offsets)), column, value, upper=0.0))
+    first = np.flatnonzero(np.diff(paid.target, prepend=-1, append=-1))
+    groups = [collected[a:b] for a, b in itertools.pairwise(first) if b - a > 1]
+    program.add_rows(Rows.at_most(groups, [1.0] * len(groups)))
+    return paid
 
 
 def _constraints(

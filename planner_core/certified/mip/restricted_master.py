@@ -16,7 +16,6 @@ from planner_core.draws import draws_of
 from planner_core.jit import kernel
 from planner_core.precedence.relation import (
     Order,
-    are_comparable,
     comes_before,
     order_of,
     transitive_closure,
@@ -33,8 +32,6 @@ from planner_core.problem import (
 _TRIALS: Final = 4  # orders of elimination that are tried for odd sets
 _MAX_CUTS: Final = 150  # in a round
 _MAX_SHARED: Final = 40  # new cuts that one fractional task may stand in
-_CANDIDATES: Final = 10  # for a branch
-_TRIAL_PIVOTS: Final = 60
 _PATIENCE: Final = 2  # rounds that a cut may lie idle
 
 
@@ -53,11 +50,8 @@ class Master(Engine):
     def __init__(self, problem: Problem, rows: Ints, budget: Budget, seed: int) -> None:
         self._rows = rows
         self._problem = problem
-        table = problem.opportunities
-        self._scale = float(problem.target_reward.max(initial=1e-300))
-        self._worth = worth = np.zeros(len(table))
-        is_collect = table.kind == COLLECT
-        worth[is_collect] = problem.target_reward[table.place[is_collect]] / self._scale
+        self._scale = float(problem.worth.max(initial=1e-300))
+        self._worth = worth = problem.worth / self._scale
         self._orders = [
             _exclusion_order(order_of(transitive_closure(problem, s)), s.place, s.kind)
             for s in problem.satellites
@@ -110,42 +104,6 @@ class Master(Engine):
         upper = self._useful & is_open
         columns = np.arange(n, dtype=np.int32)
         self._highs.changeColsBounds(n, columns, np.zeros(n), upper.astype(np.float64))
-
-    def excluded_by(self, row: int) -> Bools:
-        """Return which tasks cannot stand in a plan with this one; not itself."""
-        table, local = self._problem.opportunities, self._problem.local_row
-        excluded: Bools = (table.place == table.place[row]) & (table.kind == COLLECT)
-        satellite = int(table.satellite[row])
-        own = self._problem.satellites[satellite].rows
-        order = self._orders[satellite]
-        excluded[own] |= [
-            not are_comparable(order, int(local[row]), int(other)) for other in local[own]
-        ]
-        excluded[row] = False
-        return excluded
-
-    def decisive(self, taken: Floats) -> int:
-        """Return the task of which taking and leaving it both cost the relaxation most."""
-        highs, value = self._highs, self.value / self._scale
-        basis = highs.getBasis()
-        _, patience = highs.getOptionValue("simplex_iteration_limit")
-        highs.setOptionValue("simplex_iteration_limit", _TRIAL_PIVOTS)
-        best, best_at = -1.0, int(np.argmax(np.minimum(taken, 1.0 - taken)))
-        for at in np.argsort(-np.minimum(taken, 1.0 - taken), kind="stable")[:_CANDIDATES]:
-            if min(taken[at], 1.0 - taken[at]) < 1e-3:
-                break
-            losses: list[float] = []
-            for fixed in (0.0, 1.0):
-                highs.changeColBounds(int(at), fixed, fixed)
-                highs.run()
-                losses.append(value - float(highs.getInfo().objective_function_value))
-                highs.changeColBounds(int(at), 0.0, 1.0)
-                highs.setBasis(basis)
-            score = max(losses[0], 1e-6) * max(losses[1], 1e-6)
-            if score > best:
-                best, best_at = score, int(at)
-        highs.setOptionValue("simplex_iteration_limit", patience)
-        return best_at
 
     def cut(self, taken: Floats, *, with_odd_sets: bool) -> int:
         """Add what the fractional plan breaks, drop what has long been idle; return what came."""

@@ -3,7 +3,7 @@ r"""Proofs that no plan earns as much as some amount, checked without any search
 Multipliers :math:`\lambda_i \ge 0` for the targets and :math:`\mu_c \ge 0` for cuts
 :math:`a_c x \le b_c` bound what a plan earns by :math:`\sum_i \lambda_i + \sum_c \mu_c b_c`
 and, for each satellite, its heaviest path where task k on target i is worth
-:math:`\max(0, r_i - \lambda_i - \sum_c \mu_c a_{ck})`. The same with the path led through a
+:math:`\max(0, v_k - \lambda_i - \sum_c \mu_c a_{ck})`. The same with the path led through a
 task bounds the plans that hold this task. A certificate is a sequence of multipliers: each
 strikes out the tasks that no plan worth the amount can hold, until no path is left that
 could be worth it.
@@ -196,9 +196,8 @@ def _priced(problem: Problem, rows: Ints, step: Multipliers) -> tuple[float, Flo
     """Return the constant of the bound, and what each opportunity is worth at the prices."""
     table = problem.opportunities
     is_collect = table.kind == COLLECT
-    place = table.place[is_collect]
-    worth = np.zeros(len(table))
-    worth[is_collect] = problem.target_reward[place] - step.prices[place]
+    worth = problem.worth.copy()
+    worth[is_collect] -= step.prices[table.place[is_collect]]
     constant = 0.0
     for cut, price in zip(step.cuts, step.cut_prices, strict=True):
         members, weights = cut.weights()

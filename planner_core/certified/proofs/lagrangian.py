@@ -1,8 +1,9 @@
 r"""An upper bound on what any plan of a problem can earn.
 
-Weak duality: give each target a price :math:`0 \le \lambda_i \le r_i`. Then no plan earns more
-than :math:`\sum_i \lambda_i` plus, for each satellite, the heaviest path of tasks in which
-an image of :math:`i` is worth :math:`r_i - \lambda_i` (and may be taken again and again).
+Weak duality: give each target a price :math:`\lambda_i`, from 0 to the best worth of its collects.
+Then no plan earns more than :math:`\sum_i \lambda_i` plus, for each satellite, the heaviest path
+of tasks in which collect k of :math:`i` is worth :math:`\max(0, v_k - \lambda_i)` (and may be
+followed by others of :math:`i`).
 Battery, recorder and stations are left out, which can only raise the bound. Prices come from
 a subgradient search; whatever they are, the bound holds.
 """
@@ -23,6 +24,7 @@ from planner_core.problem import (
     Ints,
     Problem,
 )
+from planner_core.worth import surplus, weights
 
 _ARCS_TO_SPEND = 150_000_000
 
@@ -33,20 +35,20 @@ def lagrangian_value(problem: Problem, prices: Floats) -> tuple[float, Ints]:
     This is the whole proof: it needs no search, only the problem.
     """
     network = network_of(problem)
-    num_targets = len(problem.target_reward)
-    reward = np.append(problem.target_reward, 0.0)
-    price = np.append(np.clip(prices, 0.0, problem.target_reward), 0.0)
-    price[np.setdiff1d(np.arange(num_targets), network.place)] = 0.0
+    num_targets = len(problem.target_ids)
+    price = np.append(surplus(prices, problem.best_worth), 0.0)
     n = len(network.row)
     previous = np.empty(n, dtype=np.int32)
     ends = np.empty(len(network.first) - 1, dtype=np.int32)
-    weight = (reward - price)[network.place]
+    worth = problem.worth[network.row]
+    weight = weights(worth, price[network.place])
     total = price.sum() + heaviest_paths(network, weight, np.empty(n), previous, ends)
     counts = np.zeros(num_targets + 1, dtype=np.int32)
     for end in ends:
         at = int(end)
         while at >= 0:
-            counts[network.place[at]] += 1
+            if worth[at] >= price[network.place[at]]:
+                counts[network.place[at]] += 1
             at = int(previous[at])
     return float(total), counts[:-1]
 
@@ -89,12 +91,11 @@ def priced_bound(
     """Return the value that prices prove after so many steps towards ``level``, and the prices."""
     if sum(len(satellite) > 0 for satellite in problem.satellites) > 1:
         return incremental_prices(problem, network, level, num_steps, stop)
-    reward = np.append(problem.target_reward, 0.0)
-    offered = np.zeros(len(reward), dtype=np.bool_)
-    offered[network.place] = True
-    whole = float(reward[offered].sum())
-    prices = reward * 0.5
-    value = improve_prices(network, reward, prices, level, num_steps, stop)
+    best = np.append(problem.best_worth, 0.0)
+    whole = float(best.sum())
+    prices = best * 0.5
+    worth = problem.worth[network.row]
+    value = improve_prices(network, worth, best, prices, level, num_steps, stop)
     if whole <= value:
-        return whole, problem.target_reward.astype(np.float64)
+        return whole, problem.best_worth
     return float(value), prices[:-1]

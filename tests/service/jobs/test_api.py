@@ -191,7 +191,7 @@ def test_the_service_is_not_ready_without_its_queue(jobs: Jobs, workers: Workers
     elsewhere = DbosQueue(f"sqlite:///{jobs.folder / 'unmigrated.db'}")
     for queue, status in ((jobs.queue, 200), (elsewhere, 503)):
         app = create_app(jobs.settings, queue)
-        with serve(app) as address, checked_client(app, address) as client:
+        with serve(app) as address, checked_client(address) as client:
             assert client.get("/health/ready").status_code == status
     elsewhere.close()
 
