@@ -102,7 +102,7 @@ check-rest:
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/lint-imports
-	$(BIN)/python -m pytest --quiet --doctest-modules planner_core service
+	$(BIN)/python -m pytest --quiet --doctest-modules slewline planner_core service
 
 format: setup
 	$(BIN)/ruff check --fix .
