@@ -111,14 +111,15 @@ class EnergyPrices:
             self._round += 1
             self._mean += _NEWEST * (self._now - self._mean)
             if self._round % _ASKED_EVERY == 0:
-                self._ask()
+                self.ask()
 
     def _answer(self, part: _Part, prices: Floats) -> tuple[float, Ints]:
         """Return the most that a satellite can gain, and the tasks of a path that does."""
         weight = (self._reward - prices)[part.target]
         return most_by_energy(part.network, part.levels, weight, self._own, self._num_own)
 
-    def _ask(self) -> None:
+    def ask(self) -> None:
+        """Note what the mean of the multipliers proves."""
         gains = sum(self._answer(part, self._mean)[0] for part in self._parts)
         value = float(self._mean.sum() + gains)
         if value < self.value:
