@@ -25,7 +25,6 @@ from planner_core.certified.drivers.agility_only import (
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.fleet_start import priced_start
 from planner_core.certified.lns.search import WindowSearch, num_choices
-from planner_core.certified.lns.stream import WindowStream
 from planner_core.certified.mip.solution_pool import PlanPool
 from planner_core.certified.multipliers.incremental import IncrementalPrices
 from planner_core.certified.proofs.bound import Bound
@@ -43,7 +42,6 @@ _EPOCHS_TO_START: Final = 80  # until a first plan is worth making
 _SMALL: Final = 60_000  # opportunities for which cutting planes are tried
 _EPOCHS: Final = (250, 500)  # at least and at most
 _STREAMS: Final = 2  # of a small fleet, that a plan does not hang on one start
-_PATIENCE: Final = 2.0  # moves for each access without any gain before a plan is shaken
 _MOVES_AT_A_TIME: Final = 500
 _MERGED_EVERY: Final = 4  # times of these
 
@@ -92,17 +90,13 @@ class FleetSearch:
         """Search windows, in several streams where the fleet is small, as far as that leads."""
         num_accesses = num_choices(self.problem)
         num_streams = _STREAMS if len(self.problem.opportunities) <= _SMALL else 1
-        streams = [
-            WindowStream(self.windows(number), self._network, self._seed + number,
-                         _PATIENCE * num_accesses)
-            for number in range(num_streams)
-        ]  # fmt: skip
+        streams = [self.windows(number) for number in range(num_streams)]
         left = int(moves_per_task * num_accesses)
         pool = PlanPool(self.problem, self.budget, self._seed)
         with ThreadPoolExecutor(self.budget.num_threads) as threads:
             while left > 0 and not self.budget.is_spent():
                 num_moves = min(left, _MOVES_AT_A_TIME)
-                going = [threads.submit(s.go_on, num_moves, self.budget) for s in streams]
+                going = [threads.submit(s.make_moves, num_moves, self.budget) for s in streams]
                 for one in going:
                     one.result()
                 left -= num_moves
@@ -115,21 +109,20 @@ class FleetSearch:
         for plan in (pool.plan, *(stream.plan for stream in streams)):
             self.best.offer(plan)
 
-    def _merge(self, pool: PlanPool, streams: Sequence[WindowStream]) -> None:
+    def _merge(self, pool: PlanPool, streams: Sequence[WindowSearch]) -> None:
         """Seek what the plans of the streams are worth together."""
         for stream in streams:
-            for plan in (*stream.ended, stream.plan):
-                pool.add(plan.with_kept(self.problem))
-            stream.ended.clear()
+            pool.add(stream.plan.with_kept(self.problem))
         pool.merge()
 
     def windows(self, number: int) -> WindowSearch:
         """Return a window search from a start of its own, the first from the best plan."""
-        share = np.minimum(self.prices / np.maximum(self.problem.best_worth, 1e-300), 1.0)
-        is_small = len(self.problem.opportunities) <= _SMALL
-        preference = None if is_small else 1.0 + _PREFERENCE * (0.5 - share)
+        preference = None
+        if len(self.problem.opportunities) > _SMALL:
+            share = np.minimum(self.prices / np.maximum(self.problem.best_worth, 1e-300), 1.0)
+            preference = 1.0 + _PREFERENCE * (0.5 - share)
         seed = self._seed + number
-        windows = WindowSearch(self.problem, seed, self._network, preference, share)
+        windows = WindowSearch(self.problem, seed, self._network, preference)
         windows.adopt(self.best.plan if number == 0 else self._priced_plan(seed))
         return windows
 

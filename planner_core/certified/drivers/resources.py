@@ -45,6 +45,7 @@ _FIRST_GOAL: Final = 0.95
 _FIRST_MOVES: Final = (10, 40)  # of the search for plans, at least and at most, before contacts
 _TASKS_A_MOVE: Final = 80  # are fixed: the more tasks, the more it finds by itself
 _FURTHER_MOVES: Final = 20  # after each round of that
+_IDLE_STEPS: Final = 5  # of the search for plans, before others have their turn
 _FIRST_STEPS: Final = 2  # of the search for prices, where sets of contacts gave new ones
 _STEPS: Final = 8
 _PATIENCE: Final = 3  # rounds without a new set of contacts or a better plan
@@ -63,7 +64,7 @@ _ROOM: Final = 0.5  # of a target: with less the search for a better plan takes 
 _TIGHT: Final = 0.05  # of a target: prices that near to a relaxation are the best
 _MOST_ROWS: Final = 3000  # of a relaxation
 _LARGE: Final = 3000  # opportunities
-_FINER: Final = 0.3  # of a target: what smaller units gain at most
+_WORTH_A_STEP: Final = 0.005  # of a bound by the battery alone
 
 
 class ResourceSearch:
@@ -75,7 +76,7 @@ class ResourceSearch:
         self._relaxed: dict[tuple[int, ...], Relaxation] = {}
         # By contacts and number of tasks offered: what no plan was found to be worth.
         self._missed: dict[tuple[tuple[int, ...], int], float] = {}
-        self._priced, self._refined = np.inf, np.inf  # bounds before they were rounded
+        self._priced = np.inf  # the bound before it was rounded
         self._one = self.problem.typical_worth
 
     @property
@@ -88,15 +89,17 @@ class ResourceSearch:
         """Whether several satellites share so much that the whole program is too large."""
         return self.is_shared and len(self.problem.opportunities) > _LARGE
 
-    def search(self, choices: ChoiceSearch, num_moves: int) -> None:
-        """Make moves from the best plan."""
-        for _ in range(num_moves):
-            if self.best.is_done:
-                return
-            choices.move()
-            if choices.reward > self.best.reward + 1e-12:
-                self.best.offer(choices.plan)
+    def search(self, turns: TurnSearch, num_steps: int) -> bool:
+        """Search for plans from the best, while that leads on; return whether one is better."""
+        before, idle_steps = self.best.reward, 0
+        for _ in range(num_steps):
+            if self.best.is_done or idle_steps == _IDLE_STEPS:
+                break
+            turns.turn(1)
+            is_better = turns.reward > self.best.reward and self.best.offer(turns.plan)
+            idle_steps = 0 if is_better else idle_steps + 1
         self.best.report("plans")
+        return self.best.reward > before
 
     def without_resources(self) -> Bools:
         """Let agility alone bound the plans; return the tasks of the best plan then."""
@@ -143,10 +146,10 @@ class ResourceSearch:
             known = lagrangian_bound(self.problem, self.best.reward).prices
         return np.zeros(len(self.problem.target_ids)) if known is None else known
 
-    def relax_sets(self, prices: PriceSearch, choices: ChoiceSearch) -> bool:
+    def relax_sets(self, prices: PriceSearch, turns: TurnSearch) -> bool:
         """Learn prices from the relaxations of sets of contacts; return whether any is new."""
         table = self.problem.opportunities
-        plans = [self.mask(a.opportunity for a in self.best.plan.actions), choices.taken]
+        plans = [self.mask(a.opportunity for a in p.actions) for p in (self.best.plan, turns.plan)]
         sets = [
             *(tuple(np.flatnonzero(p & (table.kind == CONTACT)).tolist()) for p in plans),
             *(key for key, _ in prices.contact_sets.most_common()),
@@ -154,7 +157,7 @@ class ResourceSearch:
         new = [key for key in dict.fromkeys(sets) if key not in self._relaxed][:_SETS_AT_A_TIME]
         offered = np.ones(len(table), dtype=np.bool_)
         if len(table) > _MOST_ROWS:
-            offered = (prices.usage > 0.0) | (choices.usage > 0.0)
+            offered = (prices.usage > 0.0) | (turns.usage > 0.0)
         offered |= self.mask(action.opportunity for action in self.best.plan.actions)
         for contacts in new:
             if self.best.is_done:
@@ -168,17 +171,6 @@ class ResourceSearch:
         prices.restart(np.mean(near, axis=0))
         self.best.report("contacts fixed")
         return True
-
-    def refine(self, prices: PriceSearch) -> None:
-        """See what the best prices prove in smaller units, where that may help."""
-        hoped = rounded_bound(self.problem, prices.value - _FINER * self._one, self.best.reward)
-        if hoped >= self.best.bound.value or prices.value >= self._refined or self.best.is_done:
-            return
-        self._refined = prices.value
-        value, finer, unit = prices.refined(prices.prices)
-        if not self.budget.is_spent():
-            self.best.lower(Bound(value=value, proof="dp", prices=finer, unit=unit))
-        self.best.report("prices")
 
     def fix_contacts(self, *, is_last: bool) -> bool:
         """Search for a better plan with the most promising contacts; return whether it is.
@@ -252,8 +244,9 @@ def solve_with_resources(problem: Problem, budget: Budget, seed: int, gap: float
         preferred = search.without_resources()
         choices.start(preferred, 1.0)
         search.best.offer(choices.plan)
-    search.search(choices, int(np.clip(len(problem.opportunities) // _TASKS_A_MOVE, *_FIRST_MOVES)))
-    _close_in(search, choices)
+    turns = TurnSearch(problem, best.plan, unit, budget, seed)
+    search.search(turns, int(np.clip(len(problem.opportunities) // _TASKS_A_MOVE, *_FIRST_MOVES)))
+    _close_in(search, turns)
     if not search.best.is_done:
         search.exhaust()
     return search.best.solution()
@@ -360,27 +353,43 @@ class _FleetPricing:
         self._num_steps += 1
 
 
-def _close_in(search: ResourceSearch, choices: ChoiceSearch) -> None:
-    """Search for prices and plans in turn, until neither gets anywhere."""
-    if search.best.is_done:
+def _close_in(search: ResourceSearch, turns: TurnSearch) -> None:
+    """Search for multipliers and plans in turn, until neither gets anywhere."""
+    best = search.best
+    if best.is_done:
         return
-    prices = PriceSearch(
-        search.problem, search.best.bound.value, search.prices(), search.budget.stop
-    )
-    prices.learn(search.best.plan)
+    prices = _first_prices(search)
     is_large = len(search.problem.opportunities) > _LARGE
     idle_rounds = 0
-    while idle_rounds < _PATIENCE and not search.best.is_done:
-        is_new = search.relax_sets(prices, choices)
+    while idle_rounds < _PATIENCE and not best.is_done:
+        is_new = search.relax_sets(prices, turns)
         # Where steps take long, a search for the last image is tried before them.
         is_better = is_large and not is_new and search.fix_contacts(is_last=True)
         if not is_better:
             search.price(prices, _FIRST_STEPS if is_new else _STEPS)
             is_better = search.fix_contacts(is_last=False)
         if not is_new and not is_better:
-            search.refine(prices)
             is_better = search.fix_contacts(is_last=True)
-            search.search(choices, _FURTHER_MOVES)
+            is_better |= search.search(turns, _FURTHER_MOVES)
         if is_better:
-            choices.adopt(search.best.plan)
+            turns.adopt(best.plan)
         idle_rounds = 0 if is_new or is_better else idle_rounds + 1
+
+
+def _first_prices(search: ResourceSearch) -> PriceSearch:
+    """Return a search for multipliers that begins where battery alone leads.
+
+    To ask the battery alone takes a fiftieth of the time; where that does not lead below what is
+    known by much, the exact programme is not asked at its multipliers either.
+    """
+    best, known = search.best, search.prices()
+    energy = EnergyPrices(search.problem, known, _ROUNDS_AT_A_TIME, search.seed)
+    energy.ask()
+    before = energy.value
+    energy.improve(_ROUNDS_AT_A_TIME, search.budget.stop)
+    value = min(best.bound.value, energy.value)
+    prices = PriceSearch(search.problem, value, energy.prices, search.budget.stop)
+    prices.learn(best.plan)
+    if energy.value < before - _WORTH_A_STEP * before:
+        search.price(prices, 1)
+    return prices

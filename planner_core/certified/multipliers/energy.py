@@ -111,7 +111,7 @@ class EnergyPrices:
             self._round += 1
             self._mean += _NEWEST * (self._now - self._mean)
             if self._round % _ASKED_EVERY == 0:
-                self._ask()
+                self.ask()
 
     def _answer(self, part: _Part, prices: Floats) -> tuple[float, Ints]:
         """Return the most that a satellite can gain, and the tasks of a path that does."""
@@ -122,7 +122,8 @@ class EnergyPrices:
         # What is worth less than its price is only passed through.
         return gain, path[worth[path] >= price[path]]
 
-    def _ask(self) -> None:
+    def ask(self) -> None:
+        """Note what the mean of the multipliers proves."""
         gains = sum(self._answer(part, self._mean)[0] for part in self._parts)
         value = float(self._mean.sum() + gains)
         if value < self.value:

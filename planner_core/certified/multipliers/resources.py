@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter, deque
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -32,7 +31,6 @@ _PATIENCE: Final = 7
 _SHORTER: Final = 0.6
 _NEAR: Final = 0.99
 _AFRESH: Final = 1.0  # length of the steps from given prices
-_FINER: Final = 2
 _KEPT_PATHS: Final = 30
 
 
@@ -128,21 +126,6 @@ class PriceSearch:
         self._direction = np.zeros_like(self._now)
         self.value, self.prices = np.inf, self._now
         self.theta, self._stalled = _AFRESH, 0
-
-    def refined(self, prices: Floats) -> tuple[float, Floats, float]:
-        """Return what prices prove where worth is counted in smaller units, and with which.
-
-        Without labels, which would take several times the memory.
-        """
-        unit = self.unit / _FINER
-        prices = self._whole(prices, unit)
-        worth = whole_worth(self._problem, prices, unit)
-        units = 0
-        for i, finer in enumerate(relaxations(self._problem)):
-            relaxation = replace(finer, data_price=self.satellites[i].data_price)
-            most, _ = relaxation.most(worth, 0, self._stop, near=self._known(i, worth))
-            units += most
-        return self._total(prices, units, unit), prices, unit
 
     def _whole(self, prices: Floats, unit: float) -> Floats:
         """Return prices at which the images that plans take are worth whole units."""
