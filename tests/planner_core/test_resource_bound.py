@@ -35,12 +35,12 @@ _problem = partial(varied_problem, scarce=BATTERY_ONLY)
 
 @pytest.mark.parametrize("dynamics", ["physical", "paper"])
 @examples(500)
-@example(seed=0, num_satellites=1)
-@given(seed=SEEDS, num_satellites=st.integers(1, 3))
+@example(seed=0, num_satellites=1, has_quality=False)
+@given(seed=SEEDS, num_satellites=st.integers(1, 3), has_quality=st.booleans())
 def test_no_plan_beats_the_bound(
-    dynamics: Literal["physical", "paper"], seed: int, num_satellites: int
+    dynamics: Literal["physical", "paper"], seed: int, num_satellites: int, has_quality: bool
 ) -> None:
-    problem = _problem(seed, dynamics, num_satellites)
+    problem = _problem(seed, dynamics, num_satellites, has_quality=has_quality)
     best = best_reward(problem)
     assert quick_bound(problem, reward=0.0).value >= best - 1e-9
     rng = np.random.default_rng(seed)
