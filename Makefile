@@ -53,14 +53,14 @@ $(TOOLS): $(PRODUCT) requirements-dev.lock
 
 # An edited kernel is compiled here, once, and not by each worker on its own.
 $(WARM): $(PRODUCT) $(KERNELS)
-	@echo "Compiling the planning kernels (once) ..."
 	@$(BIN)/python -m service.jobs.warm
 	@touch $@
 
-demo: $(WARM)
+# The demonstration compiles what it needs itself, and no more.
+demo: $(PRODUCT)
 	@$(BIN)/slewline demo
 
-serve: $(WARM)
+serve: $(PRODUCT)
 	@$(BIN)/slewline demo --serve
 
 # The service's tests in groups, so that few servers and workers run at a time.
@@ -89,7 +89,7 @@ check: setup
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/python -m pytest --quiet --doctest-modules planner_core service
+	$(BIN)/python -m pytest --quiet --doctest-modules slewline planner_core service
 
 format: setup
 	$(BIN)/ruff check --fix .

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planner_core.bundles import bundle
 from planner_core.jit import kernel
 from planner_core.precedence.arcs import (
     Arcs,
@@ -24,6 +25,7 @@ from planner_core.problem import (
 )
 
 
+@bundle
 class Network(NamedTuple):
     """The tasks of all satellites, one satellite after another, each in order of start.
 
