@@ -37,7 +37,6 @@ _NUM_BITS: Final = 128
 _NONE: Final = -2
 
 
-@bundle
 class Memory(NamedTuple):
     """What paths remember: a bit for each target in view, used again once it is out of view.
 
