@@ -11,13 +11,14 @@ LOCK := $(UV) pip compile --universal --python-version 3.11 --generate-hashes \
 	--no-emit-index-url
 PIP := $(BIN)/python -m pip -qq --disable-pip-version-check
 
-.PHONY: help setup demo serve test chaos fuzz browser screenshots check format lock dist paper \
-	paper-quick clean
+.PHONY: help setup demo serve test test-full chaos fuzz browser screenshots check check-types \
+	check-rest format lock dist paper paper-quick clean
 
 help:
 	@echo "make demo     plan a real-size mission through the service's own API, and end"
 	@echo "make serve    the same, and keep serving"
-	@echo "make test     every check and every test"
+	@echo "make test     every check, and every test that is not of real size"
+	@echo "make test-full  those too, and five times the examples"
 	@echo "make chaos    500 jobs while processes are killed and databases fail (needs Debian and root)"
 	@echo "make fuzz     files made by coverage-guided fuzzing, against every parser (Linux)"
 	@echo "make browser  the dashboard in a real browser (needs Chromium, or Debian and root)"
@@ -63,9 +64,15 @@ demo: $(PRODUCT)
 serve: $(PRODUCT)
 	@$(BIN)/slewline demo --serve
 
-# The service's tests in groups, so that few servers and workers run at a time.
+# A process for each core, each with a module at a time; see docs/testing.md.
+ALL_TESTS := $(BIN)/python -m pytest -n logical
+
 test: check
-	$(BIN)/python -m pytest -n 2 --dist loadgroup
+	$(ALL_TESTS)
+
+test-full: export SLEWLINE_TEST_PROFILE := full
+test-full: check
+	$(ALL_TESTS) -m ""
 
 # On a SQLite file, then on a PostgreSQL server that is killed as well.
 chaos: export SLEWLINE_TEST_CHAOS_JOBS ?= 500
@@ -84,10 +91,16 @@ browser: setup
 screenshots: setup
 	.ci/browser $(BIN)/python -m tests.service.dashboard.browser.screenshots
 
+# mypy takes one core for half a minute, all else the other one.
 check: setup
+	@$(MAKE) --no-print-directory --jobs=2 check-types check-rest
+
+check-types:
+	$(BIN)/mypy
+
+check-rest:
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/python -m pytest --quiet --doctest-modules slewline planner_core service
 

@@ -24,12 +24,10 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-import numpy as np
-
 from benchmarks.cpu_budget import CpuBudget
 from benchmarks.missions import paper_scenario, problem_of
 from planner_core.budget import Budget, Progress
-from planner_core.problem import COLLECT, Problem
+from planner_core.problem import Problem
 
 LIMIT_S = 60.0
 NEAR = 0.005  # of the bound
@@ -81,25 +79,22 @@ def pairwise(problem: Problem) -> dict[str, float]:
     outcome = engine.search(None, 0.0, 0.05, lambda _reward, _bound: None)
     reward = 0.0
     if outcome.columns is not None:
-        table = problem.opportunities
-        taken = outcome.columns[: len(table)] > 0.5
-        reward = float(problem.target_reward[table.place[taken]].sum())
+        taken = outcome.columns[: len(problem.opportunities)] > 0.5
+        reward = float(problem.worth[taken].sum())
     return {"reward": reward, "bound": outcome.bound}
 
 
 def groups_of(problem: Problem) -> dict[str, Any]:
     """Return the program for CP-SAT: a group for each set of tasks that exclude each other."""
     from planner_core.certified.mip.clique_cuts import antichain_cover
-    from planner_core.precedence.relation import order_of
+    from planner_core.precedence.relation import direct_precedence
 
-    table = problem.opportunities
     rows, offsets = problem.target_opportunities
     groups = [rows[a:b].tolist() for a, b in itertools.pairwise(offsets)]
     for satellite in problem.satellites:
-        offsets, members = antichain_cover(order_of(satellite.transitions))
+        offsets, members = antichain_cover(direct_precedence(satellite))
         groups += [satellite.rows[members[a:b]].tolist() for a, b in itertools.pairwise(offsets)]
-    worth = np.where(table.kind == COLLECT, np.append(problem.target_reward, 0.0)[table.place], 0.0)
-    return {"worth": worth.tolist(), "groups": groups, "limit_s": LIMIT_S}
+    return {"worth": problem.worth.tolist(), "groups": groups, "limit_s": LIMIT_S}
 
 
 METHODS = {"certified": certified, "pairwise": pairwise}

@@ -25,7 +25,7 @@ from benchmarks.fleet_missions import Files, fleet_scenario
 from benchmarks.service import Json, Served, post, served
 from planner_core.domain import Satellite, Scenario
 from planner_core.orbits.omm import omm_from_elements
-from service.instants import instant_text
+from service.wire.instants import instant_text
 
 PAGE: Final = 500
 FORMS: Final = ("json", "csv", "geojson", "czml", "ics", "openmct.json")

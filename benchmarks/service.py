@@ -27,13 +27,13 @@ import psutil
 import sqlalchemy as sa
 
 from benchmarks import pollers
-from service.api.shapes import parse_instant
 from service.commands import demo_mission
 from service.commands.demo import create_mission
+from service.db.ids import new_id
 from service.db.rows import JobBlockRow, JobResultRow, JobRow
 from service.db.session import Database
-from service.ids import new_id
-from service.instants import instant_text
+from service.wire.base import parse_instant
+from service.wire.instants import instant_text
 
 RUNS = 9
 POLLS = 600

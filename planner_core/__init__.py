@@ -1,3 +1,3 @@
 """The planning core: pure functions and frozen values, no web, no database."""
 
-__version__ = "0.1.0"
+__version__ = "0.2.0.dev0"

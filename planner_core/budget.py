@@ -36,8 +36,8 @@ class Progress:
     message: str = ""
 
 
-def _ignore(_: Progress) -> None:
-    pass
+def ignored(_: Progress) -> None:
+    """Take a report that nobody is to see."""
 
 
 class Budget:
@@ -63,7 +63,7 @@ class Budget:
     def __init__(
         self,
         time_s: float | None = None,
-        report: Callable[[Progress], None] = _ignore,
+        report: Callable[[Progress], None] = ignored,
         num_threads: int = 1,
     ):
         self.stop: Bytes = np.zeros(1, dtype=np.uint8)
@@ -71,6 +71,20 @@ class Budget:
         self.num_threads = num_threads
         self._deadline = None if time_s is None else time.monotonic() + time_s
         self._cancelled = False
+
+    def part(self, share: float = 1.0, report: Callable[[Progress], None] | None = None) -> Budget:
+        """Return a budget for a part of the work, which ends with the whole or before it.
+
+        It works on as many threads, and is cancelled with the whole.
+
+        Parameters
+        ----------
+        share
+            Of the time that is left now, 0 to 1.
+        report
+            Called with the part's progress; as the whole is by default.
+        """
+        return _Part(self, share, report or self.report)
 
     def cancel(self) -> None:
         """Ask the work to stop; safe to call from another thread."""
@@ -89,7 +103,6 @@ class Budget:
 
     def is_spent(self) -> bool:
         """Return whether the work should stop now and answer with the best it has."""
-        # Budgets for a part of the work share the stop byte of the whole.
         return bool(self.stop[0]) or (
             self._deadline is not None and time.monotonic() >= self._deadline
         )
@@ -100,7 +113,7 @@ class Budget:
 
     def termination(self) -> Termination:
         """Return why a spent budget ended the search."""
-        return Termination.CANCELLED if self._cancelled else Termination.TIME_LIMIT
+        return Termination.CANCELLED if self.is_cancelled else Termination.TIME_LIMIT
 
     def ending(self, *, is_optimal: bool, is_close: bool) -> Termination:
         """Return why a search for plan and bound has ended: by what it found, or by the budget."""
@@ -109,3 +122,32 @@ class Budget:
         if is_close:
             return Termination.GAP_REACHED
         return self.termination() if self.is_spent() else Termination.HORIZON_COMPLETE
+
+
+class _Part(Budget):
+    """What a part of the work may spend: the whole tells the time, and must not be outlived."""
+
+    def __init__(self, whole: Budget, share: float, report: Callable[[Progress], None]) -> None:
+        super().__init__(None, report, whole.num_threads)
+        self.stop = whole.stop
+        self._whole = whole
+        left_s = whole.remaining_s()
+        # What remains to the whole after this part, by its own clock.
+        self._reserve_s = 0.0 if left_s is None else (1.0 - share) * left_s
+
+    def cancel(self) -> None:
+        self._whole.cancel()
+
+    def expire(self) -> None:
+        self._whole.expire()
+
+    @property
+    def is_cancelled(self) -> bool:
+        return self._whole.is_cancelled
+
+    def is_spent(self) -> bool:
+        return self._whole.is_spent() or (self._reserve_s > 0.0 and self.remaining_s() == 0.0)
+
+    def remaining_s(self) -> float | None:
+        left_s = self._whole.remaining_s()
+        return None if left_s is None else max(0.0, left_s - self._reserve_s)

@@ -7,7 +7,8 @@ instead, when Python calls a kernel, and its members are read from there where t
 
 That memory never changes while the kernel runs (the arrays' elements may), and the loads say so
 to the optimizer, which keeps members in registers as it did before. Kernels read members by name,
-and hand a bundle on as it is; they can neither make nor return one.
+and hand a bundle on as it is; they can neither make nor return one. What a bundle holds of other
+bundles lies within it, and is handed on as a pointer too.
 """
 
 from __future__ import annotations
@@ -66,7 +67,11 @@ class BundleType(types.Type):
 
 
 def _words(member: types.Type) -> int:
-    """Return a data pointer and a shape for an array, else one word."""
+    """Return a data pointer and a shape for an array, else one word for each scalar."""
+    if isinstance(member, BundleType):
+        return member.num_words
+    if isinstance(member, types.BaseTuple):
+        return sum(_words(inner) for inner in member.types)
     if not isinstance(member, types.Array):
         return 1
     if member.layout != "C":
@@ -117,11 +122,26 @@ def _load(builder: Any, base: Any, word: int, kind: Any) -> Any:
 @lower_getattr_generic(BundleType)
 def _member(context: Any, builder: Any, bundle_type: BundleType, base: Any, name: str) -> Any:
     word, member = bundle_type.places[name]
-    if not isinstance(member, types.Array):
-        kind = context.get_data_type(member)
-        return context.data_model_manager[member].from_data(
-            builder, _load(builder, base, word, kind)
-        )
+    return _read(context, builder, member, base, word)
+
+
+def _read(context: Any, builder: Any, member: types.Type, base: Any, word: int) -> Any:
+    """Return the value that lies at ``word``."""
+    if isinstance(member, BundleType):
+        return _at(builder, base, word, _I8)
+    if isinstance(member, types.BaseTuple):
+        items = []
+        for inner in member.types:
+            items.append(_read(context, builder, inner, base, word))
+            word += _words(inner)
+        return context.make_tuple(builder, member, items)
+    if isinstance(member, types.Array):
+        return _read_array(context, builder, member, base, word)
+    model = context.data_model_manager[member]
+    return model.from_data(builder, _load(builder, base, word, model.get_data_type()))
+
+
+def _read_array(context: Any, builder: Any, member: types.Array, base: Any, word: int) -> Any:
     array = context.make_array(member)(context, builder)
     element = context.get_data_type(member.dtype)
     itemsize = context.get_constant(types.intp, context.get_abi_sizeof(element))
@@ -148,17 +168,26 @@ def _unbox(bundle_type: BundleType, instance: Any, c: Any) -> NativeValue:
     memory = cgutils.alloca_once(c.builder, ir.ArrayType(_I64, bundle_type.num_words))
     base = c.builder.bitcast(memory, _I8.as_pointer())
     is_error = cgutils.alloca_once_value(c.builder, cgutils.false_bit)
-    for place, (word, member) in enumerate(bundle_type.places.values()):
-        item = c.pyapi.tuple_getitem(instance, place)
-        if isinstance(member, types.Array):
-            _lay_array(c, base, word, member, item)
-            continue
-        native = c.unbox(member, item)
-        with c.builder.if_then(native.is_error, likely=False):
-            c.builder.store(cgutils.true_bit, is_error)
-        data = c.context.data_model_manager[member].as_data(c.builder, native.value)
-        c.builder.store(data, _at(c.builder, base, word, data.type))
+    _lay(c, base, 0, bundle_type, instance, is_error)
     return NativeValue(_settled(c.builder, base), is_error=c.builder.load(is_error))
+
+
+def _lay(c: Any, base: Any, word: int, member: types.Type, item: Any, is_error: Any) -> None:
+    """Write a Python object to ``word``, and what it holds behind one another."""
+    if isinstance(member, BundleType | types.BaseTuple):
+        inside = member.members if isinstance(member, BundleType) else member.types
+        for place, inner in enumerate(inside):
+            _lay(c, base, word, inner, c.pyapi.tuple_getitem(item, place), is_error)
+            word += _words(inner)
+        return
+    if isinstance(member, types.Array):
+        _lay_array(c, base, word, member, item)
+        return
+    native = c.unbox(member, item)
+    with c.builder.if_then(native.is_error, likely=False):
+        c.builder.store(cgutils.true_bit, is_error)
+    data = c.context.data_model_manager[member].as_data(c.builder, native.value)
+    c.builder.store(data, _at(c.builder, base, word, data.type))
 
 
 def _lay_array(c: Any, base: Any, word: int, member: types.Array, item: Any) -> None:

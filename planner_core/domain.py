@@ -14,6 +14,8 @@ Horizon
     The span that is planned; instants inside it are seconds from its start.
 Epoch
     The instant an element set is given for.
+Reward, quality, worth
+    What a perfect image of a target earns; how good an image is, from 0 to 1; their product.
 Pin
     What a plan must hold, or must not; see ``planner_core.pins``.
 Off-nadir angle
@@ -404,6 +406,50 @@ class GroundStation:
         _require(self.antennas >= 1, "antennas", "must be 1 or more")
 
 
+Curve = tuple[tuple[float, float], ...]
+"""Knots of an angle in degrees and a value, in ascending order; linear between, constant beyond."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Quality:
+    """How good an image is, from 0 to 1, by how it is taken: the product of all curves.
+
+    Angles are those at the middle of the collect. A curve without knots is 1 everywhere.
+
+    Attributes
+    ----------
+    off_nadir_deg
+        At the satellite.
+    sun_elevation_deg
+        At the target.
+    """
+
+    off_nadir_deg: Curve = ()
+    sun_elevation_deg: Curve = ()
+
+    def __post_init__(self) -> None:
+        _check_curve("off_nadir_deg", self.off_nadir_deg, 0.0, 90.0)
+        _check_curve("sun_elevation_deg", self.sun_elevation_deg, -90.0, 90.0)
+
+    def __bool__(self) -> bool:
+        """Whether it makes any difference between images."""
+        return bool(self.off_nadir_deg or self.sun_elevation_deg)
+
+
+def _check_curve(name: str, knots: Curve, lowest_deg: float, highest_deg: float) -> None:
+    before_deg = -math.inf
+    for row, (angle_deg, value) in enumerate(knots):
+        where = f"quality/{name}/{row}"
+        _require(
+            lowest_deg <= angle_deg <= highest_deg,
+            where,
+            f"the angle must be between {lowest_deg:g} and {highest_deg:g}",
+        )
+        _require(angle_deg > before_deg, where, "the angle must be greater than the one before")
+        _require(0.0 <= value <= 1.0, where, "the value must be between 0 and 1")
+        before_deg = angle_deg
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scenario:
     """The frozen question: who may image what, when, and under which rules.
@@ -413,6 +459,8 @@ class Scenario:
     collect_alignment
         Whether the starts of ``collect_spacing_s`` count from each access, or are multiples of it
         from the horizon's start.
+    quality
+        What part of its target's reward an image earns, by how it is taken.
     allow_old_elements
         Plan with element sets of any age (see ``build.check_element_age``).
     """
@@ -426,6 +474,7 @@ class Scenario:
     collect_spacing_s: float | None = None
     collect_alignment: CollectAlignment = "access"
     continuous_starts: bool = False
+    quality: Quality = Quality()
     allow_old_elements: bool = False
     pins: Pins = field(default_factory=Pins)
     warnings: tuple[str, ...] = field(default=(), compare=False)
@@ -442,6 +491,12 @@ class Scenario:
             or (self.collect_spacing_s is not None and not self.continuous_starts),
             "collect_alignment",
             "horizon needs a collect_spacing_s, and no continuous_starts",
+        )
+        # Plans with free starts are proven best where earlier is never worse.
+        _require(
+            not (self.quality and self.continuous_starts),
+            "continuous_starts",
+            "an image's quality would change with its start: use collect_spacing_s with quality",
         )
         for what, ids in (
             ("satellite", [s.id for s in self.satellites]),

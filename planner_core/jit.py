@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import os
 import shutil
 import tempfile
@@ -17,6 +16,8 @@ from numba.core import types
 from numba.core.caching import FunctionCache
 from numba.core.compiler_lock import global_compiler_lock
 
+from planner_core.sources import PACKAGE, fingerprint
+
 try:
     import fcntl
 except ImportError:  # Windows
@@ -24,18 +25,15 @@ except ImportError:  # Windows
 
 F = TypeVar("F", bound=Callable[..., object])
 
-_PACKAGE: Final = Path(__file__).parent
 _MARKS: Final = (b"@kernel", b"@borrowing", b"@inlined")
 
 
 def sources_fingerprint() -> str:
     """Return a hash of all the sources that hold kernels."""
-    digest = hashlib.sha256()
-    for path in sorted(_PACKAGE.rglob("*.py")):
-        source = path.read_bytes()
-        if any(mark in source for mark in _MARKS):
-            digest.update(path.relative_to(_PACKAGE).as_posix().encode() + b"\0" + source)
-    return digest.hexdigest()[:16]
+    paths = (
+        path for path in PACKAGE.rglob("*.py") if any(mark in path.read_bytes() for mark in _MARKS)
+    )
+    return fingerprint(PACKAGE, paths)
 
 
 def _set_cache_folder() -> None:
@@ -47,9 +45,9 @@ def _set_cache_folder() -> None:
     if "NUMBA_CACHE_DIR" in os.environ:
         return
     name = f"kernels-{sources_fingerprint()}"
-    beside = _PACKAGE / "__pycache__"
+    beside = PACKAGE / "__pycache__"
     folder = beside / name
-    if not os.access(beside if beside.is_dir() else _PACKAGE, os.W_OK):
+    if not os.access(beside if beside.is_dir() else PACKAGE, os.W_OK):
         folder = platformdirs.user_cache_path("slewline") / name
         _bring_along(beside / name, folder)
     config: Any = numba.config

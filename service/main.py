@@ -11,6 +11,8 @@ from fastapi import Depends, FastAPI
 from starlette.middleware.cors import CORSMiddleware
 
 import planner_core
+from service.answers.explanations import Explainer
+from service.answers.variations import Variations
 from service.api import (
     audit_events,
     comparisons,
@@ -42,11 +44,9 @@ from service.api.polls import Polls
 from service.api.security_headers import SecurityHeaders
 from service.dashboard import routes as dashboard
 from service.db.session import Database
-from service.explanations import Explainer
-from service.opportunities import OpportunityReader
-from service.scenarios.variations import Variations
+from service.process.tracing import is_untraced
+from service.scenarios.opportunities import OpportunityReader
 from service.settings import Settings
-from service.tracing import is_untraced
 
 if TYPE_CHECKING:
     from service.jobs.queue import JobQueue
@@ -102,7 +102,7 @@ def create_app(settings: Settings, queue: JobQueue | None = None) -> FastAPI:
         redirect_slashes=False,
         # What generated clients call an operation.
         generate_unique_id_function=attrgetter("name"),
-        # Spans where service.tracing has set them up; metrics and logs are our own.
+        # Spans where service.process.tracing has set them up; metrics and logs are our own.
         telemetry={
             "metrics": False,
             "logs": False,

@@ -18,11 +18,11 @@ from service.db.migrate import upgrade
 from service.db.session import Database
 from service.jobs.queue import DbosQueue, migrate_queue
 from service.jobs.supervisor import Supervisor
-from service.logs import configure_logging
 from service.main import create_app
+from service.process.logs import configure_logging
+from service.process.stopping import StopRequest
+from service.process.tracing import CannotTrace, start_tracing
 from service.settings import Settings
-from service.stopping import StopRequest
-from service.tracing import CannotTrace, start_tracing
 
 _READY_WITHIN_S: Final = 300.0  # a first start may have kernels to compile
 _LOOK_EVERY_S: Final = 0.1

@@ -4,22 +4,56 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
 
 import pytest
+from xdist.scheduler import LoadScopeScheduling
+
+from tests.examples import load_profile
 
 _ROOT = Path(__file__).resolve().parents[1]
 
+# Before any test module is read: their counts of examples follow from it.
+load_profile()
+
+
+# What shares a service is done by one process.
+_TOGETHER = {
+    "tests/service/jobs/test_diff.py": "mission",
+    "tests/service/jobs/test_explanation.py": "mission",
+    "tests/service/jobs/test_fleet.py": "mission",
+    "tests/service/jobs/test_what_if.py": "mission",
+    "tests/service/client/test_answers.py": "client",
+    "tests/service/client/test_plan_command.py": "client",
+    "tests/service/client/test_resources.py": "client",
+}
+
+# What takes longest begins first, so that nobody waits for it in the end.
+_LONG = (
+    "tests/service/jobs/test_worker.py",
+    "tests/service/test_mission.py",
+    "tests/service/test_schemathesis.py",
+    "tests/service/test_readme.py",
+)
+
+
+class _ByModule(LoadScopeScheduling):  # type: ignore[misc]  # it has no types
+    """A module's tests share servers and problems: one process has them all."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        module = nodeid.partition("::")[0]
+        return _TOGETHER.get(module, module)
+
+
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> _ByModule:
+    """Hand modules out in the order in which they were found."""
+    config.option.loadscopereorder = False
+    return _ByModule(config, log)
+
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Keep tests of the service together that start servers and workers of their own.
-
-    Where tests run in several processes (``--dist loadgroup``), one takes each of these groups.
-    """
-    service = _ROOT / "tests" / "service"
-    for item in items:
-        if service in item.path.parents:
-            part = item.path.relative_to(service).parts[0]
-            item.add_marker(pytest.mark.xdist_group("jobs" if part == "jobs" else "service"))
+    """Put the long modules first."""
+    items.sort(key=lambda item: item.nodeid.partition("::")[0] not in _LONG)
 
 
 @pytest.fixture(scope="session")

@@ -92,7 +92,7 @@ def downgrade() -> None:
 
 
 def _blocks(timeline: str, targets: str, proof: str | None) -> Iterator[Block]:
-    """Yield what ``service.blocks`` made of an answer when this was written."""
+    """Yield what ``service.answers.blocks`` made of an answer when this was written."""
     head = json.loads(timeline)
     satellites = head.pop("satellites")
     yield "head", 0, 0, None, json.dumps(head)[:-1] + ', "satellites": ['

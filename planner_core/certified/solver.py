@@ -7,7 +7,11 @@ from typing import ClassVar
 
 from planner_core.budget import Budget
 from planner_core.certified.drivers.agility_only import Effort
-from planner_core.certified.drivers.continuous import bounded, part_of, solve_continuous
+from planner_core.certified.drivers.continuous import (
+    among_opportunities,
+    bounded,
+    solve_continuous,
+)
 from planner_core.certified.drivers.fleet import solve_without_resources
 from planner_core.certified.drivers.resources import solve_with_resources
 from planner_core.problem import Problem
@@ -48,7 +52,9 @@ class Certified:
             return solve_continuous(problem, budget, seed, self.gap, self.moves_per_task)
         if problem.use_resources:
             if problem.pointing is not None:
-                solution = solve_with_resources(problem, part_of(budget), seed, self.gap)
+                solution = solve_with_resources(
+                    problem, among_opportunities(budget), seed, self.gap
+                )
                 return bounded(problem, solution, budget, self.gap)
             return solve_with_resources(problem, budget, seed, self.gap)
         if not is_free(problem):

@@ -58,11 +58,9 @@ def next_action(
                 continue
             if unimaged_only and not track.is_contact[row] and collected[track.place[row]]:
                 continue
-            if kept < m and not may_follow(
-                row, kept, track.near_from, track.far_from, track.offset, track.bits
-            ):
+            if kept < m and not may_follow(track.transitions, row, kept):
                 continue
-        if not may_follow(last, row, track.near_from, track.far_from, track.offset, track.bits):
+        if not may_follow(track.transitions, last, row):
             continue
         if row != kept and contact_may_pass(track, last, row, battery, recorder, contact_above):
             continue

@@ -55,7 +55,7 @@ def counts_as_made(
 def task_reward(
     track: Track,
     guidance: Guidance,
-    target_reward: Floats,
+    worth: Floats,
     collected: Bytes,
     waited_s: float,
     discount: float,
@@ -65,7 +65,8 @@ def task_reward(
 ) -> float:
     """Return R(s, a) of Table 2 for a collect or a contact.
 
-    ``waited_s`` is t_s - t, ``discount`` is gamma to it.
+    ``worth`` is what an image by each row earns, ``waited_s`` is t_s - t, ``discount`` is gamma
+    to it.
     """
     reward = 0.0
     if track.is_contact[row]:
@@ -74,7 +75,7 @@ def task_reward(
             counted_s = waited_s
         reward += guidance.contact_reward_per_s * counted_s
     elif not collected[track.place[row]]:
-        reward += discount * target_reward[track.place[row]]
+        reward += discount * worth[row]
     if track.use_resources:
         if battery_after <= track.battery_min:
             reward -= guidance.penalty
@@ -109,10 +110,16 @@ class Step:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Model:
-    """The readable semi-MDP of one satellite; compiled searches are compared with it."""
+    """The readable semi-MDP of one satellite; compiled searches are compared with it.
+
+    Attributes
+    ----------
+    worth
+        What an image by each row of the track earns. Shape ``(m,)``.
+    """
 
     track: Track
-    target_reward: Floats
+    worth: Floats
     guidance: Guidance
     is_hard: bool = True
     unimaged_only: bool = True
@@ -170,7 +177,7 @@ class Model:
             return Step(state=waited, reward=reward, sojourn_s=sojourn_s)
         battery, recorder, _ = take(self.track, state.last, row, state.battery, state.recorder)
         reward = task_reward(
-            self.track, self.guidance, self.target_reward, self._mask(state),
+            self.track, self.guidance, self.worth, self._mask(state),
             sojourn_s, self.guidance.gamma**sojourn_s, row, battery, recorder,
         )  # fmt: skip
         images = state.collected
@@ -184,6 +191,6 @@ class Model:
         return may_wait(self.track, state.last, row, state.battery, state.recorder, self.is_hard)
 
     def _mask(self, state: State) -> Bytes:
-        mask = np.zeros(len(self.target_reward), dtype=np.uint8)
+        mask = np.zeros(int(self.track.place.max(initial=-1)) + 1, dtype=np.uint8)
         mask[list(state.collected)] = 1
         return mask

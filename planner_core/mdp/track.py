@@ -36,11 +36,12 @@ from planner_core.problem import (
     Bytes,
     Floats,
     Ints,
-    Longs,
     Problem,
     SatelliteProblem,
+    Transitions,
     may_follow,
 )
+from planner_core.problem.transitions import near_spans
 
 STRICT: Final = 1e-9
 """How far inside its limits a planned state stays, so that rounding cannot cross them."""
@@ -75,9 +76,7 @@ class Track(NamedTuple):
     first_offer: Ints
     blocked: Bytes
     near_from: Ints
-    far_from: Ints
-    offset: Longs
-    bits: Bytes
+    transitions: Transitions
     use_resources: bool
     charge_from_s: Floats
     charge_to_s: Floats
@@ -141,10 +140,8 @@ def compile_track(problem: Problem, satellite: SatelliteProblem, blocked: Bytes)
         place=satellite.place,
         first_offer=first_offer,
         blocked=blocked,
-        near_from=satellite.transitions.near_from,
-        far_from=satellite.transitions.far_from,
-        offset=satellite.transitions.offset,
-        bits=satellite.transitions.bits,
+        near_from=near_spans(satellite.transitions)[0],
+        transitions=satellite.transitions,
         use_resources=problem.use_resources,
         **columns,
         next_kept=_next_of(is_kept),
@@ -293,7 +290,7 @@ def is_safe(track: Track, last: int, cursor: int, battery: float, recorder: floa
         row = track.fallbacks[at]
         if track.telemetry_per_s * max(0.0, track.data_peak_s[row] - data_from_s) > room:
             return False
-        if not may_follow(last, row, track.near_from, track.far_from, track.offset, track.bits):
+        if not may_follow(track.transitions, last, row):
             continue
         battery_after, recorder_after, is_within = take(track, last, row, battery, recorder)
         if not is_within:
@@ -327,9 +324,7 @@ def _fill_fallbacks(track: Track) -> None:
             if after < 0:
                 break
             following = track.fallbacks[after]
-            if not may_follow(
-                row, following, track.near_from, track.far_from, track.offset, track.bits
-            ):
+            if not may_follow(track.transitions, row, following):
                 continue
             charge = track.charge_per_s * max(
                 0.0, track.charge_to_s[following] - track.charge_from_s[row]

@@ -21,9 +21,8 @@ from planner_core.mdp.track import (
     take,
 )
 from planner_core.precedence.relation import (
-    Order,
+    Precedence,
     comes_before,
-    order_of,
     transitive_closure,
 )
 from planner_core.problem import (
@@ -123,11 +122,11 @@ def can_keep(problem: Problem, index: int, kept: Sequence[Kept], missing: Bools)
     track = compile_track(trial, satellite, missing[satellite.rows].astype(np.uint8))
     if track.is_guarded:
         return True
-    return _has_way(track, order_of(transitive_closure(problem, satellite)))
+    return _has_way(track, transitive_closure(satellite))
 
 
 @kernel
-def _has_way(track: Track, order: Order) -> bool:
+def _has_way(track: Track, precedence: Precedence) -> bool:
     """Return whether some of the fallbacks, with all that must be taken, keep the limits."""
     num_rows = len(track.fallbacks)
     battery = np.empty((num_rows, _MAX_STATES))
@@ -150,7 +149,7 @@ def _has_way(track: Track, order: Order) -> bool:
             last = track.fallbacks[before]
             if track.next_kept[last + 1] < row:
                 break
-            if not comes_before(order, last, row):
+            if not comes_before(precedence, last, row):
                 continue
             for state in range(num_states[before]):
                 left, filled, is_within = take(

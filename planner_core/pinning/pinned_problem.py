@@ -18,16 +18,10 @@ import numpy as np
 
 from planner_core.domain import Scenario
 from planner_core.errors import InvalidScenario
-from planner_core.jit import kernel
 from planner_core.pinning.limits import check_limits
 from planner_core.pinning.pinned_starts import whole_accesses, with_pinned_starts
 from planner_core.pins import PinnedAction
-from planner_core.precedence.relation import (
-    Order,
-    are_comparable,
-    order_of,
-    transitive_closure,
-)
+from planner_core.precedence.relation import excluded_by
 from planner_core.problem import (
     ACCESS_FOUND,
     COLLECT,
@@ -260,10 +254,6 @@ def _pins_that_rule_out(problem: Problem, pinned: Pinned) -> Iterator[tuple[str,
 def _kept_that_exclude(problem: Problem, pinned: Pinned) -> list[tuple[Kept, Bools]]:
     """Return for each kept action the opportunities that cannot stand beside it."""
     table = problem.opportunities
-    orders = {
-        index: order_of(transitive_closure(problem, problem.satellites[index]))
-        for index in {int(table.satellite[kept.row]) for kept in pinned.kept}
-    }
     contacts = np.array(
         [kept.row for kept in pinned.kept if table.kind[kept.row] == CONTACT], dtype=np.int64
     )
@@ -271,25 +261,15 @@ def _kept_that_exclude(problem: Problem, pinned: Pinned) -> list[tuple[Kept, Boo
     is_kept[[kept.row for kept in pinned.kept]] = True
     found = []
     for kept in pinned.kept:
-        satellite = int(table.satellite[kept.row])
+        satellite = problem.satellites[int(table.satellite[kept.row])]
         excluded = np.zeros(len(table), dtype=np.bool_)
-        own = problem.satellites[satellite].rows
-        excluded[own] = _excluded(orders[satellite], int(problem.local_row[kept.row]), len(own))
+        excluded[satellite.rows] = excluded_by(satellite, int(problem.local_row[kept.row]))
         if table.kind[kept.row] == COLLECT:
             excluded |= (table.kind == COLLECT) & (table.place == table.place[kept.row])
         else:
             excluded |= _without_antenna(problem, kept.row, contacts)
         found.append((kept, excluded & ~is_kept))
     return found
-
-
-@kernel
-def _excluded(order: Order, row: int, num_rows: int) -> Bools:
-    """Return the tasks of a satellite that cannot stand in one plan with ``row``."""
-    excluded = np.zeros(num_rows, dtype=np.bool_)
-    for other in range(num_rows):
-        excluded[other] = other != row and not are_comparable(order, row, other)
-    return excluded
 
 
 def _without_antenna(problem: Problem, row: int, kept: Longs) -> Bools:

@@ -1,4 +1,8 @@
-"""Lists of what may follow what among the tasks of one satellite."""
+"""Lists of what may follow what, where an oracle walks over each pair many times.
+
+Arcs grow with the square of how many targets are in view; paths alone need none of them (see
+``planner_core.precedence.skyline``).
+"""
 
 from __future__ import annotations
 
@@ -7,9 +11,16 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from planner_core.bundles import bundle
 from planner_core.jit import borrowing, kernel
-from planner_core.precedence.relation import Order, comes_before
-from planner_core.problem import Ints, Longs
+from planner_core.precedence.network import part_ends
+from planner_core.precedence.relation import (
+    Precedence,
+    comes_before,
+    direct_precedence,
+    is_transitive_on,
+)
+from planner_core.problem import COLLECT, Ints, Longs, Problem
 
 Words = npt.NDArray[np.uint64]
 
@@ -31,10 +42,10 @@ class Arcs(NamedTuple):
     to: Ints
 
 
-def covering_arcs(order: Order, later: Ints | None = None) -> Arcs:
+def covering_arcs(precedence: Precedence, later: Ints | None = None) -> Arcs:
     """Return the pairs of tasks that may follow each other with none in between.
 
-    Where "may follow" is transitive, as ``order`` must be, a chain of these leads from each
+    Where "may follow" is transitive, as ``precedence`` must be, a chain of these leads from each
     task to every task that may follow it. There are about ten for each task, far fewer than
     pairs; some fifty where an access offers a collect every 15 s.
 
@@ -44,8 +55,8 @@ def covering_arcs(order: Order, later: Ints | None = None) -> Arcs:
         For each task another one whose followers all may follow it too, or -1 (see
         ``waiting``): arcs to what follows that one are left out. Shape ``(m,)``.
     """
-    m = len(order.near_from)
-    return _covering(order, np.full(m, -1, dtype=np.int32) if later is None else later)
+    m = len(precedence.near_from)
+    return _covering(precedence, np.full(m, -1, dtype=np.int32) if later is None else later)
 
 
 @borrowing
@@ -76,8 +87,8 @@ def _add_followers(
 
 
 @kernel
-def _covering(order: Order, later: Ints) -> Arcs:
-    near_from, far_from, offset, bits = order
+def _covering(precedence: Precedence, later: Ints) -> Arcs:
+    near_from, far_from, offset, bits = precedence
     words = bits.view(np.uint64)
     m = len(near_from)
     first = np.zeros(m + 1, dtype=np.int64)
@@ -141,7 +152,7 @@ def _trailing_zeros(lowest: np.uint64) -> int:
 
 
 @kernel
-def waiting(order: Order, access: Ints) -> Ints:
+def waiting(precedence: Precedence, access: Ints) -> Ints:
     """Return for each task the next collect of its access, where it may as well be over by then.
 
     That is where whatever may follow the later collect may follow the earlier one too; -1
@@ -152,7 +163,7 @@ def waiting(order: Order, access: Ints) -> Ints:
     access
         Number of the access that each task lies in. Shape ``(m,)``.
     """
-    near_from, far_from, offset, bits = order
+    near_from, far_from, offset, bits = precedence
     words = bits.view(np.uint64)
     m = len(access)
     later = np.full(m, -1, dtype=np.int32)
@@ -177,19 +188,19 @@ def waiting(order: Order, access: Ints) -> Ints:
 
 
 @kernel
-def near_arcs(order: Order) -> Arcs:
+def near_arcs(precedence: Precedence) -> Arcs:
     """Return all pairs that the table of near tasks allows."""
-    m = len(order.near_from)
+    m = len(precedence.near_from)
     first = np.zeros(m + 1, dtype=np.int64)
     for a in range(m):
         first[a + 1] = first[a]
-        for b in range(order.near_from[a], order.far_from[a]):
-            first[a + 1] += comes_before(order, a, b)
+        for b in range(precedence.near_from[a], precedence.far_from[a]):
+            first[a + 1] += comes_before(precedence, a, b)
     to = np.empty(first[m], dtype=np.int32)
     count = 0
     for a in range(m):
-        for b in range(order.near_from[a], order.far_from[a]):
-            if comes_before(order, a, b):
+        for b in range(precedence.near_from[a], precedence.far_from[a]):
+            if comes_before(precedence, a, b):
                 to[count] = b
                 count += 1
     return Arcs(first, to)
@@ -212,3 +223,88 @@ def reversed_arcs(arcs: Arcs) -> Arcs:
             come_from[filled[b]] = a
             filled[b] += 1
     return Arcs(first, come_from)
+
+
+@bundle
+class ArcNetwork(NamedTuple):
+    """The nodes of ``Network`` with stored arcs, for labels that look at each pair many times.
+
+    A path is a sequence of tasks of one satellite that may follow each other directly. Where
+    that relation is transitive only covering arcs are kept (those that no third task can
+    split), for a path may pass through a task without being paid. Where an access offers
+    several collects, what may follow a later one may follow an earlier one too: the path then
+    waits, and arcs from the earlier one to what follows the later one are left out.
+
+    Attributes
+    ----------
+    row
+        Row of each node in the table of opportunities. Shape ``(n,)``.
+    place
+        Target of each node; of a contact, one past the last target. Shape ``(n,)``.
+    first
+        Where each part's nodes begin. A satellite's tasks fall into parts where a pause is
+        longer than any slew: paths before and after it do not mind each other.
+        Shape ``(num_parts + 1,)``.
+    arc_from, before
+        Predecessors of node ``b``: ``before[arc_from[b]:arc_from[b + 1]]``.
+    far_from
+        From here on every node of the satellite may follow the node; where its part ends, at
+        most. Shape ``(n,)``.
+    earlier
+        The collect before in the same access, from which a path may wait for what follows the
+        node; -1 for none. Shape ``(n,)``.
+    """
+
+    row: Ints
+    place: Ints
+    first: Longs
+    arc_from: Longs
+    before: Ints
+    far_from: Ints
+    earlier: Ints
+
+
+def arc_network_of(problem: Problem) -> ArcNetwork:
+    """Return the arcs of a problem."""
+    table = problem.opportunities
+    nothing = np.empty(0, dtype=np.int32)
+    row, before, far_from, earlier = [nothing], [nothing], [nothing], [nothing]
+    first, arc_from = [np.zeros(1, dtype=np.int64)], [np.zeros(1, dtype=np.int64)]
+    base = num_arcs = 0
+    for satellite in problem.satellites:
+        direct = direct_precedence(satellite)
+        later = waiting(direct, table.access[satellite.rows])
+        arcs = covering_arcs(direct, later) if is_transitive_on(satellite) else near_arcs(direct)
+        ends = part_ends(satellite.transitions)
+        part = np.searchsorted(ends, np.arange(len(satellite)), side="right")
+        offsets, rows = reversed_arcs(_within(arcs, part))
+        own = np.full(len(satellite), -1, dtype=np.int32)
+        waits = np.flatnonzero(later >= 0)
+        waits = waits[part[waits] == part[later[waits]]]
+        own[later[waits]] = waits + base
+        row.append(satellite.rows)
+        first.append(base + ends)
+        arc_from.append(num_arcs + offsets[1:])
+        before.append(rows + np.int32(base))
+        far_from.append(direct.far_from + np.int32(base))
+        earlier.append(own)
+        base += len(satellite)
+        num_arcs += len(rows)
+    rows = np.concatenate(row)
+    is_collect = table.kind[rows] == COLLECT
+    return ArcNetwork(
+        row=rows,
+        place=np.where(is_collect, table.place[rows], len(problem.target_ids)).astype(np.int32),
+        first=np.concatenate(first),
+        arc_from=np.concatenate(arc_from),
+        before=np.concatenate(before),
+        far_from=np.concatenate(far_from),
+        earlier=np.concatenate(earlier),
+    )
+
+
+def _within(arcs: Arcs, part: Longs) -> Arcs:
+    """Return the arcs that do not lead from part to part."""
+    is_within = np.repeat(part, np.diff(arcs.first)) == part[arcs.to]
+    count = np.concatenate([[0], np.cumsum(is_within)])
+    return Arcs(count[arcs.first].astype(np.int64), arcs.to[is_within])

@@ -1,99 +1,44 @@
-"""Longest paths through the tasks of one satellite.
+"""Heavy chains of one satellite's tasks in which no target stands twice (a heuristic of ``graph``).
 
-Where "may follow" is transitive, they run on the arcs of its Hasse diagram; for a satellite
-that turns more slowly than it tracks, on the whole table of what may follow what.
+What a chain has passed is handed on along the arcs of the relation's Hasse diagram, and the
+answer depends on them; so they are made here, as is the table of all pairs for a satellite that
+turns more slowly than it tracks.
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 
 from planner_core.jit import kernel
 from planner_core.precedence.arcs import Arcs, covering_arcs
-from planner_core.precedence.relation import Order, order_of, transitive_closure
-from planner_core.problem import (
-    Floats,
-    Ints,
-    Problem,
-    SatelliteProblem,
-)
+from planner_core.precedence.relation import Precedence, direct_precedence, is_transitive_on
+from planner_core.problem import Floats, Ints, SatelliteProblem
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Links:
-    """What may follow what among one satellite's tasks, ready for longest paths.
-
-    Attributes
-    ----------
-    arcs
-        None where "may follow" is not transitive.
-    """
-
-    order: Order
-    arcs: Arcs | None
-
-    @classmethod
-    def of(cls, problem: Problem, satellite: SatelliteProblem) -> Links:
-        """Return the links of one satellite."""
-        order = order_of(satellite.transitions)
-        is_transitive = transitive_closure(problem, satellite) is satellite.transitions
-        arcs = covering_arcs(order) if is_transitive else None
-        return cls(order=order, arcs=arcs)
-
-    @property
-    def num_steps(self) -> int:
-        """How many pairs of tasks one longest path looks at."""
-        return int(self.order.offset[-1]) if self.arcs is None else len(self.arcs.to)
-
-    def longest(self, weight: Floats) -> tuple[float, list[int]]:
-        """Return the heaviest chain: its weight, and its tasks in order of time."""
-        before = np.full(len(weight), -1, dtype=np.int32)
-        if self.arcs is None:
-            value, task = longest_chain(weight, self.order, before)
-        else:
-            value, task = longest_path(weight, self.arcs, before)
-        return value, _chain_to(task, before)
-
-    def longest_with_history(self, weight: Floats, place: Ints) -> list[int]:
-        """Return the tasks of a heavy chain in which no place stands twice."""
-        before = np.full(len(weight), -1, dtype=np.int32)
-        if self.arcs is None:
-            _, task = longest_chain_with_history(weight, place, self.order, before)
-        else:
-            _, task = longest_path_with_history(weight, place, self.arcs, before)
-        return _chain_to(task, before)
-
-
-@kernel
-def longest_path(weight: Floats, arcs: Arcs, before: Ints) -> tuple[float, int]:
-    """Return the greatest weight of a chain of tasks that may follow each other, and its end.
+def chain_with_history(satellite: SatelliteProblem, weight: Floats, place: Ints) -> list[int]:
+    """Return the tasks of a heavy chain in which no place stands twice.
 
     Parameters
     ----------
-    weight
-        Worth of each task, not negative; tasks worth 0 are passed over. Shape ``(m,)``.
-    before
-        Filled with the task before each on its best chain, or -1. Shape ``(m,)``.
+    weight, place
+        Worth of each task, not negative; where it happens. Shape ``(m,)``.
     """
-    m = len(weight)
-    value = np.zeros(m)  # of the best chain that ends here or, passing over the task, before
-    last = np.full(m, -1, dtype=np.int32)
-    best, best_task = 0.0, -1
-    for a in range(m):
-        if weight[a] > 0.0:
-            before[a] = last[a]
-            value[a] += weight[a]
-            last[a] = a
-            if value[a] > best:
-                best, best_task = value[a], a
-        for at in range(arcs.first[a], arcs.first[a + 1]):
-            b = arcs.to[at]
-            if value[a] > value[b]:
-                value[b] = value[a]
-                last[b] = last[a]
-    return best, best_task
+    before = np.full(len(weight), -1, dtype=np.int32)
+    direct = direct_precedence(satellite)
+    if is_transitive_on(satellite):
+        _, task = longest_path_with_history(weight, place, covering_arcs(direct), before)
+    else:
+        _, task = longest_chain_with_history(weight, place, direct, before)
+    return chain_to(task, before)
+
+
+def chain_to(task: int, before: Ints) -> list[int]:
+    """Return the tasks of a chain in order of time (EXTRACTPATH of Alg. 3)."""
+    chain = []
+    while task >= 0:
+        chain.append(task)
+        task = int(before[task])
+    return chain[::-1]
 
 
 @kernel
@@ -157,46 +102,11 @@ def longest_path_with_history(
 
 
 @kernel
-def longest_chain(weight: Floats, order: Order, before: Ints) -> tuple[float, int]:
-    """Return what ``longest_path`` does, on the table of all pairs."""
-    near_from, far_from, offset, bits = order
-    m = len(weight)
-    value = np.zeros(m)
-    # Beyond the longest slew everything may follow: only the best so far counts there.
-    far_value = np.zeros(m + 1)
-    far_task = np.full(m + 1, -1, dtype=np.int32)
-    best_far, best_far_task = 0.0, -1
-    best, best_task = 0.0, -1
-    for a in range(m):
-        if far_value[a] > best_far:
-            best_far, best_far_task = far_value[a], far_task[a]
-        if weight[a] <= 0.0:
-            continue
-        if best_far > value[a]:
-            value[a] = best_far
-            before[a] = best_far_task
-        elif value[a] == 0.0:
-            before[a] = -1
-        value[a] += weight[a]
-        if value[a] > best:
-            best, best_task = value[a], a
-        for b in range(near_from[a], far_from[a]):
-            bit = offset[a] + b - near_from[a]
-            if (bits[bit >> 3] >> (bit & 7)) & 1 and value[a] > value[b]:
-                value[b] = value[a]
-                before[b] = a
-        if value[a] > far_value[far_from[a]]:
-            far_value[far_from[a]] = value[a]
-            far_task[far_from[a]] = a
-    return best, best_task
-
-
-@kernel
 def longest_chain_with_history(
-    weight: Floats, place: Ints, order: Order, before: Ints
+    weight: Floats, place: Ints, precedence: Precedence, before: Ints
 ) -> tuple[float, int]:
     """Return what ``longest_path_with_history`` does, on the table of all pairs."""
-    near_from, far_from, offset, bits = order
+    near_from, far_from, offset, bits = precedence
     m = len(weight)
     num_words = 1
     for a in range(m):
@@ -248,12 +158,3 @@ def longest_chain_with_history(
                 reached[c] = reached[b]
                 before[c] = b
     return best, best_task
-
-
-def _chain_to(task: int, before: Ints) -> list[int]:
-    """Return the tasks of a chain in order of time (EXTRACTPATH of Alg. 3)."""
-    chain = []
-    while task >= 0:
-        chain.append(task)
-        task = int(before[task])
-    return chain[::-1]

@@ -1,39 +1,44 @@
-"""All satellites' tasks as one network of what may follow what, for longest paths."""
+"""All satellites' tasks in parts, and the heaviest paths through them."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from planner_core.bundles import bundle
-from planner_core.jit import kernel
-from planner_core.precedence.arcs import (
-    Arcs,
-    covering_arcs,
-    near_arcs,
-    reversed_arcs,
-    waiting,
+from planner_core.jit import borrowing, kernel
+from planner_core.precedence.relation import turns_slower_than_it_tracks
+from planner_core.precedence.skyline import (
+    Skyline,
+    best_ahead,
+    enter,
+    skyline_for,
+    value_of,
 )
-from planner_core.precedence.relation import order_of, transitive_closure
 from planner_core.problem import (
     COLLECT,
+    Bools,
     Floats,
     Ints,
     Longs,
     Problem,
+    SatelliteProblem,
+    Transitions,
 )
+from planner_core.problem.slew import TIME_TOLERANCE_S
+from planner_core.problem.transitions import Slews, turns_within
 
 
 @bundle
 class Network(NamedTuple):
     """The tasks of all satellites, one satellite after another, each in order of start.
 
-    A path is a sequence of tasks of one satellite that may follow each other directly. Where
-    that relation is transitive only covering arcs are kept (those that no third task can
-    split), for a path may pass through a task without being paid. Where an access offers
-    several collects, what may follow a later one may follow an earlier one too: the path then
-    waits, and arcs from the earlier one to what follows the later one are left out.
+    A path is a sequence of tasks of one satellite that may follow each other directly. A
+    satellite's tasks fall into parts where a pause is longer than any slew: paths before and
+    after it do not mind each other.
 
     Attributes
     ----------
@@ -42,79 +47,88 @@ class Network(NamedTuple):
     place
         Target of each node; of a contact, one past the last target. Shape ``(n,)``.
     first
-        Where each part's nodes begin. A satellite's tasks fall into parts where a pause is
-        longer than any slew: paths before and after it do not mind each other.
-        Shape ``(num_parts + 1,)``.
-    arc_from, before
-        Predecessors of node ``b``: ``before[arc_from[b]:arc_from[b + 1]]``.
-    far_from
-        From here on every node of the satellite may follow the node; where its part ends, at
-        most. Shape ``(n,)``.
-    earlier
-        The collect before in the same access, from which a path may wait for what follows the
-        node; -1 for none. Shape ``(n,)``.
+        Where each part's nodes begin. Shape ``(num_parts + 1,)``.
+    start_s, end_s, looks, looked
+        As in ``Transitions``. Shape ``(n,)``, ``(n, 3)``.
+    by_end
+        Each part's nodes in order of end. Shape ``(n,)``.
+    is_turning
+        Whether a task brings its satellite further than a slew would, so that a path may gain
+        by it whatever it is worth itself. Shape ``(n,)``.
+    satellite
+        Of each part, as a row of ``agility``. Shape ``(num_parts,)``.
+    agility
+        Rate, acceleration, settling, longest slew, entries of the table of slews for each second.
+        Shape ``(num_satellites, 5)``.
+    least_cosine
+        The tables of slews, one satellite's after another.
     """
 
     row: Ints
     place: Ints
     first: Longs
-    arc_from: Longs
-    before: Ints
-    far_from: Ints
-    earlier: Ints
+    start_s: Floats
+    end_s: Floats
+    looks: Floats
+    looked: Floats
+    by_end: Ints
+    is_turning: Bools
+    satellite: Ints
+    agility: Floats
+    least_cosine: Floats
 
 
-def network_of(problem: Problem) -> Network:
-    """Return the network of a problem."""
-    table = problem.opportunities
-    nothing = np.empty(0, dtype=np.int32)
-    row, before, far_from, earlier = [nothing], [nothing], [nothing], [nothing]
-    first, arc_from = [np.zeros(1, dtype=np.int64)], [np.zeros(1, dtype=np.int64)]
-    base = num_arcs = 0
-    for satellite in problem.satellites:
-        order = order_of(satellite.transitions)
-        is_transitive = transitive_closure(problem, satellite) is satellite.transitions
-        later = waiting(order, table.access[satellite.rows])
-        arcs = covering_arcs(order, later) if is_transitive else near_arcs(order)
-        ends = _part_ends(order.far_from)
-        part = np.searchsorted(ends, np.arange(len(satellite)), side="right")
-        offsets, rows = reversed_arcs(_within(arcs, part))
-        own = np.full(len(satellite), -1, dtype=np.int32)
-        waits = np.flatnonzero(later >= 0)
-        waits = waits[part[waits] == part[later[waits]]]
-        own[later[waits]] = waits + base
-        row.append(satellite.rows)
-        first.append(base + ends)
-        arc_from.append(num_arcs + offsets[1:])
-        before.append(rows + np.int32(base))
-        far_from.append(order.far_from + np.int32(base))
-        earlier.append(own)
-        base += len(satellite)
-        num_arcs += len(rows)
-    rows = np.concatenate(row)
-    is_collect = table.kind[rows] == COLLECT
+def network_of(problem: Problem, satellites: Sequence[SatelliteProblem] | None = None) -> Network:
+    """Return the network of a problem, or of some of its satellites."""
+    satellites = problem.satellites if satellites is None else satellites
+    tasks = [satellite.transitions for satellite in satellites]
+    bases = np.cumsum([0, *(len(satellite) for satellite in satellites)])[:-1]
+    ends = [part_ends(transitions) for transitions in tasks]
+    # Of tasks that end together those of no length come last: they may follow the others.
+    by_end = [np.lexsort((t.start_s, t.end_s)) for t in tasks]
+    rows = _joined([satellite.rows for satellite in satellites], np.int32)
+    is_collect = problem.opportunities.kind[rows] == COLLECT
+    place = np.where(is_collect, problem.opportunities.place[rows], len(problem.target_ids))
     return Network(
         row=rows,
-        place=np.where(is_collect, table.place[rows], len(problem.target_ids)).astype(np.int32),
-        first=np.concatenate(first),
-        arc_from=np.concatenate(arc_from),
-        before=np.concatenate(before),
-        far_from=np.concatenate(far_from),
-        earlier=np.concatenate(earlier),
+        place=place.astype(np.int32),
+        first=_joined([0, *(b + e for b, e in zip(bases, ends, strict=True))], np.int64),
+        start_s=_joined([t.start_s for t in tasks], np.float64),
+        end_s=_joined([t.end_s for t in tasks], np.float64),
+        looks=_joined([t.looks for t in tasks], np.float64).reshape(-1, 3),
+        looked=_joined([t.looked for t in tasks], np.float64).reshape(-1, 3),
+        by_end=_joined([b + o for b, o in zip(bases, by_end, strict=True)], np.int32),
+        is_turning=_joined([turns_slower_than_it_tracks(t) for t in tasks], np.bool_),
+        satellite=np.repeat(np.arange(len(tasks)), [len(e) for e in ends]).astype(np.int32),
+        agility=_joined([t.slews[:5] for t in tasks], np.float64).reshape(-1, 5),
+        least_cosine=_joined([t.slews.least_cosine for t in tasks], np.float64),
     )
 
 
-def _part_ends(far_from: Ints) -> Longs:
+def _joined(parts: Sequence[npt.ArrayLike], dtype: npt.DTypeLike) -> npt.NDArray[Any]:
+    """Return arrays one after another, flat; an empty one for none."""
+    flat = [np.ravel(part) for part in parts]
+    return np.concatenate([np.empty(0, dtype=dtype), *flat]).astype(dtype)
+
+
+def part_ends(transitions: Transitions) -> Longs:
     """Return where parts of a satellite's tasks end, each of them followed by all that is after."""
-    ends = np.arange(1, len(far_from) + 1, dtype=np.int64)
-    return ends[np.maximum.accumulate(far_from) <= ends]
+    slews = transitions.slews
+    free_s = np.maximum.accumulate(transitions.end_s) + (slews.longest_s + slews.settle_s)
+    ends = np.arange(1, len(free_s) + 1, dtype=np.int64)
+    return ends[np.append(transitions.start_s[1:], np.inf)[: len(ends)] >= free_s]
 
 
-def _within(arcs: Arcs, part: Longs) -> Arcs:
-    """Return the arcs that do not lead from part to part."""
-    is_within = np.repeat(part, np.diff(arcs.first)) == part[arcs.to]
-    count = np.concatenate([[0], np.cumsum(is_within)])
-    return Arcs(count[arcs.first].astype(np.int64), arcs.to[is_within])
+@borrowing
+def slews_in(network: Network, part: int) -> Slews:
+    """Return how the satellite of a part turns; only for kernels that borrow, as this one does."""
+    of = network.satellite[part]
+    num_entries = len(network.least_cosine) // len(network.agility)
+    rate, acceleration, settle, longest, per_s = (
+        network.agility[of, 0], network.agility[of, 1], network.agility[of, 2],
+        network.agility[of, 3], network.agility[of, 4],
+    )  # fmt: skip
+    return Slews(rate, acceleration, settle, longest, per_s, network.least_cosine, of * num_entries)
 
 
 @kernel
@@ -129,7 +143,8 @@ def heaviest_paths(
         Worth of each node, not negative. Shape ``(n,)``.
     value, previous
         Filled with the weight of the heaviest path that ends with each node, and with the
-        node ahead of it there, or -1. Shape ``(n,)``.
+        node ahead of it there, or -1. Nodes of no worth are on no path, but for those by
+        which a slow satellite turns. Shape ``(n,)``.
     ends
         Filled with the last node of each part's path, or -1. Shape ``(num_parts,)``.
     """
@@ -148,55 +163,57 @@ def heaviest_path(
 
     The arrays are those of ``heaviest_paths``, of which only the part's own nodes count.
     """
+    sky = skyline_for(network.first[part + 1] - network.first[part])
+    return _scan(network, part, weight, value, previous, sky, False, False)
+
+
+@borrowing
+def _scan(
+    network: Network, part: int, weight: Floats, value: Floats, previous: Ints, sky: Skyline,
+    is_backward: bool, is_every: bool,
+) -> tuple[float, int]:  # fmt: skip
+    """Fill in the heaviest paths that end with each node; backward, those that begin with it.
+
+    Backward time runs from the horizon's end, a task begins with its end and is entered by its
+    start. With ``is_every`` nodes of no worth are asked for too.
+    """
     begin, end = network.first[part], network.first[part + 1]
-    m = end - begin
-    far_value = np.zeros(m + 1)
-    far_node = np.full(m + 1, -1, dtype=np.int32)
-    onward = np.empty(m)  # of the heaviest path that ends with each node or waits until then
-    waits_at = np.empty(m, dtype=np.int32)
-    far, far_at = 0.0, -1
+    slews = slews_in(network, part)
+    by_end, is_turning = network.by_end, network.is_turning
+    starts_s, ends_s, sign = network.start_s, network.end_s, 1.0
+    looks, looked = network.looks, network.looked
+    if is_backward:
+        starts_s, ends_s, sign = network.end_s, network.start_s, -1.0
+        looks, looked = network.looked, network.looks
+    count, entered = 0, 0
     best, best_at = 0.0, -1
-    for b in range(begin, end):
-        if far_value[b - begin] > far:
-            far, far_at = far_value[b - begin], far_node[b - begin]
-        reached, at = far, far_at
-        for i in range(network.arc_from[b], network.arc_from[b + 1]):
-            a = network.before[i]
-            if onward[a - begin] > reached:
-                reached, at = onward[a - begin], a
-        value[b] = reached + weight[b]
-        previous[b] = waits_at[at - begin] if at >= 0 else -1
+    for i in range(end - begin):
+        b = by_end[end - 1 - i] if is_backward else begin + i
+        previous[b] = -1
+        value[b] = 0.0
+        if weight[b] <= 0.0 and not is_turning[b] and not is_every:
+            continue
+        start_s = sign * starts_s[b]
+        limit_s = start_s - slews.settle_s + TIME_TOLERANCE_S
+        while entered < end - begin:
+            c = end - 1 - entered if is_backward else by_end[begin + entered]
+            # Of tasks of no length at one instant none comes before those with a lower row.
+            is_next = c <= b if is_backward else c >= b
+            if is_next or sign * ends_s[c] > limit_s:
+                break
+            entered += 1
+            if value[c] > 0.0 and (weight[c] > 0.0 or is_turning[c]):
+                count = enter(
+                    sky, count, value[c], sign * ends_s[c],
+                    (looked[c, 0], looked[c, 1], looked[c, 2]), c, slews,
+                )  # fmt: skip
+        at = best_ahead(sky, count, start_s, (looks[b, 0], looks[b, 1], looks[b, 2]), slews)
+        value[b] = value_of(sky, at) + weight[b]
+        if at >= 0:
+            previous[b] = sky.node[at]
         if value[b] > best:
             best, best_at = value[b], b
-        onward[b - begin], waits_at[b - begin] = value[b], b
-        a = network.earlier[b]
-        if a >= 0 and onward[a - begin] >= value[b]:
-            onward[b - begin], waits_at[b - begin] = onward[a - begin], waits_at[a - begin]
-        to = network.far_from[b] - begin
-        if onward[b - begin] > far_value[to]:
-            far_value[to] = onward[b - begin]
-            far_node[to] = b
     return best, best_at
-
-
-@kernel
-def _heaviest_onward(network: Network, weight: Floats, value: Floats) -> None:
-    """Fill in the weight of the heaviest path that begins with each node."""
-    value[:] = 0.0  # of what follows, until the node's turn has come
-    suffix = np.zeros(len(weight) + 1)
-    for s in range(len(network.first) - 1):
-        begin, end = network.first[s], network.first[s + 1]
-        suffix[end] = 0.0
-        for b in range(end - 1, begin - 1, -1):
-            follows = max(value[b], suffix[network.far_from[b]])
-            a = network.earlier[b]
-            if a >= 0:
-                value[a] = max(value[a], follows)
-            value[b] = follows + weight[b]
-            suffix[b] = max(suffix[b + 1], value[b])
-            for i in range(network.arc_from[b], network.arc_from[b + 1]):
-                a = network.before[i]
-                value[a] = max(value[a], value[b])
 
 
 @kernel
@@ -205,11 +222,44 @@ def heaviest_through(network: Network, weight: Floats) -> tuple[float, Floats]:
     n = len(weight)
     through, onward = np.empty(n), np.empty(n)
     previous = np.empty(n, dtype=np.int32)
-    ends = np.empty(len(network.first) - 1, dtype=np.int32)
-    total = heaviest_paths(network, weight, through, previous, ends)
-    _heaviest_onward(network, weight, onward)
-    for s in range(len(ends)):
-        others = total - (through[ends[s]] if ends[s] >= 0 else 0.0)
-        for a in range(network.first[s], network.first[s + 1]):
+    num_parts = len(network.first) - 1
+    own = np.empty(num_parts)
+    total = 0.0
+    for part in range(num_parts):
+        sky = skyline_for(network.first[part + 1] - network.first[part])
+        own[part], _ = _scan(network, part, weight, through, previous, sky, False, True)
+        _scan(network, part, weight, onward, previous, sky, True, True)
+        total += own[part]
+    for part in range(num_parts):
+        others = total - own[part]
+        for a in range(network.first[part], network.first[part + 1]):
             through[a] += others + onward[a] - weight[a]
     return total, through
+
+
+@borrowing
+def first_of_equals(
+    network: Network, weight: Floats, value: Floats, previous: Ints, ends: Ints
+) -> None:
+    """Lead the heaviest paths through the first of the tasks that are as good before the next.
+
+    The arrays are those that ``heaviest_paths`` has filled; ``previous`` of other nodes stays.
+    """
+    for part in range(len(ends)):
+        b = ends[part]
+        slews = slews_in(network, part)
+        while b >= 0 and previous[b] >= 0:
+            a = network.first[part]
+            while (
+                value[a] != value[previous[b]]
+                or weight[a] <= 0.0
+                or not turns_within(
+                    slews,
+                    network.start_s[b] - network.end_s[a] - slews.settle_s + TIME_TOLERANCE_S,
+                    (network.looked[a, 0], network.looked[a, 1], network.looked[a, 2]),
+                    (network.looks[b, 0], network.looks[b, 1], network.looks[b, 2]),
+                )
+            ):
+                a += 1
+            previous[b] = a
+            b = a

@@ -4,12 +4,16 @@ While a satellite turns faster than its lines of sight, "b may follow a" is tran
 cannot follow directly cannot stand in one plan. A slow satellite may still reach b from a
 by way of a task that turns it. The transitive closure covers both: two tasks that it does not
 relate exclude each other, whatever else is planned.
+
+The table of pairs grows with the square of how many targets are in view. Longest paths do without
+it (``planner_core.precedence.skyline``); cutting planes, programs and networks with levels look
+at each pair many times and have it made when they first ask.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -22,17 +26,27 @@ from planner_core.problem import (
     Problem,
     SatelliteProblem,
     Transitions,
+    may_follow,
 )
-from planner_core.problem.slew import (
-    INSTANT,
-    TIME_TOLERANCE_S,
-    angle_between_deg,
-    slew_s,
-)
+from planner_core.problem.slew import TIME_TOLERANCE_S, angle_between_deg, slew_s
+from planner_core.problem.transitions import near_spans
 
 
-class Order(NamedTuple):
-    """A partial order of one satellite's tasks in the sparse layout of ``Transitions``."""
+class Precedence(NamedTuple):
+    """Which task of one satellite comes before which, as a table of pairs near in time.
+
+    Row ``b`` may come after ``a`` when ``b >= far_from[a]`` (even the longest slew fits), or
+    ``near_from[a] <= b < far_from[a]`` and bit ``offset[a] + b - near_from[a]`` is set.
+
+    Attributes
+    ----------
+    near_from, far_from
+        Shape ``(m,)``; the near rows of ``a`` are ``near_from[a]`` up to ``far_from[a]``.
+    offset
+        First bit of each row's near part. Shape ``(m + 1,)``.
+    bits
+        Packed, least significant bit first.
+    """
 
     near_from: Ints
     far_from: Ints
@@ -40,108 +54,148 @@ class Order(NamedTuple):
     bits: Bytes
 
 
-def order_of(transitions: Transitions) -> Order:
-    """Return the arrays of a transition table, for kernels."""
-    return Order(transitions.near_from, transitions.far_from, transitions.offset, transitions.bits)
+_tables: WeakKeyDictionary[SatelliteProblem, Precedence] = WeakKeyDictionary()
 
 
-def transitive_closure(problem: Problem, satellite: SatelliteProblem) -> Transitions:
+def direct_precedence(satellite: SatelliteProblem) -> Precedence:
+    """Return which task may follow which directly; made once for a satellite of a problem."""
+    table = _tables.get(satellite)
+    if table is None:
+        near_from, far_from = near_spans(satellite.transitions)
+        offset = np.concatenate([[0], np.cumsum(far_from.astype(np.int64) - near_from)])
+        # Whole words and two to spare, so that kernels may read any 64 bits at once.
+        bits = np.zeros(8 * (int(offset[-1]) // 64 + 3), dtype=np.uint8)
+        table = Precedence(near_from, far_from, offset, bits)
+        _fill_bits(satellite.transitions, table)
+        _tables[satellite] = table
+    return table
+
+
+def transitive_closure(satellite: SatelliteProblem) -> Precedence:
     """Return "b may follow a, directly or with tasks in between"; the same table if transitive."""
-    table = problem.opportunities
-    turning = _turns_slower_than_it_tracks(
-        satellite.start_s,
-        satellite.end_s,
-        np.ascontiguousarray(table.los_start[satellite.rows]),
-        np.ascontiguousarray(table.los_end[satellite.rows]),
-        satellite.agility.slew_rate_deg_s,
-        satellite.agility.acceleration_deg_s2 or INSTANT,
-        satellite.agility.settle_s,
-    )
-    order = order_of(satellite.transitions)
-    if not turning.any() or not _is_shortcut_missing(order, turning):
-        return satellite.transitions
-    return replace(satellite.transitions, bits=_closure_bits(order))
+    direct = direct_precedence(satellite)
+    if is_transitive_on(satellite):
+        return direct
+    return direct._replace(bits=_closure_bits(direct))
+
+
+def is_transitive_on(satellite: SatelliteProblem) -> bool:
+    """Return whether the satellite gains by way of tasks nothing that it cannot reach directly."""
+    turning = turns_slower_than_it_tracks(satellite.transitions)
+    return not turning.any() or not _is_shortcut_missing(direct_precedence(satellite), turning)
 
 
 def is_transitive(problem: Problem) -> bool:
     """Return whether no satellite gains by way of tasks what it cannot reach directly."""
-    return all(transitive_closure(problem, s) is s.transitions for s in problem.satellites)
+    return all(is_transitive_on(satellite) for satellite in problem.satellites)
 
 
 def num_near_pairs(problem: Problem) -> int:
     """Return how many pairs of tasks are near enough in time to exclude each other."""
     pairs = 0
     for satellite in problem.satellites:
-        after = np.arange(1, len(satellite) + 1)
-        pairs += int((satellite.transitions.far_from - after).sum())
+        _, far_from = near_spans(satellite.transitions)
+        pairs += int((far_from - np.arange(1, len(satellite) + 1)).sum())
     return pairs
 
 
 @kernel
-def _turns_slower_than_it_tracks(
-    start_s: np.ndarray,
-    end_s: np.ndarray,
-    los_start: np.ndarray,
-    los_end: np.ndarray,
-    rate_deg_s: float,
-    acceleration_deg_s2: float,
-    settle_s: float,
-) -> Bools:
+def _fill_bits(transitions: Transitions, table: Precedence) -> None:
+    for a in range(len(table.near_from)):
+        for b in range(table.near_from[a], table.far_from[a]):
+            if may_follow(transitions, a, b):
+                bit = table.offset[a] + b - table.near_from[a]
+                table.bits[bit >> 3] |= np.uint8(1 << (bit & 7))
+
+
+@kernel
+def turns_slower_than_it_tracks(transitions: Transitions) -> Bools:
     """Return the tasks that bring a satellite further than a slew of their length would.
 
     Slew times grow with the angle, and two slews take no less than one through both angles.
     So where no task between is one of these, what may follow by way of others may directly.
     """
-    found = np.zeros(len(start_s), dtype=np.bool_)
-    for i in range(len(start_s)):
-        turned_deg = angle_between_deg(los_start[i], los_end[i])
-        needed_s = slew_s(turned_deg, rate_deg_s, acceleration_deg_s2) - settle_s
-        # Each of the two steps may have used its own rounding.
-        found[i] = needed_s + TIME_TOLERANCE_S > end_s[i] - start_s[i]
+    looks, looked, slews = transitions.looks, transitions.looked, transitions.slews
+    found = np.zeros(len(looks), dtype=np.bool_)
+    for i in range(len(looks)):
+        turned_deg = angle_between_deg(
+            (looks[i, 0], looks[i, 1], looks[i, 2]), (looked[i, 0], looked[i, 1], looked[i, 2])
+        )
+        needed_s = slew_s(turned_deg, slews.rate_deg_s, slews.acceleration_deg_s2)
+        # Each of the two steps may have used its own rounding. Settling is only ever on top.
+        found[i] = (
+            needed_s - slews.settle_s + TIME_TOLERANCE_S
+            > transitions.end_s[i] - transitions.start_s[i]
+        )
     return found
 
 
 @kernel
-def comes_before(order: Order, a: int, b: int) -> bool:
+def comes_before(precedence: Precedence, a: int, b: int) -> bool:
     """Return whether row ``a`` is related to the later row ``b``."""
-    if b >= order.far_from[a]:
+    if b >= precedence.far_from[a]:
         return True
-    if b < order.near_from[a]:
+    if b < precedence.near_from[a]:
         return False
-    bit = order.offset[a] + b - order.near_from[a]
-    return bool((order.bits[bit >> 3] >> (bit & 7)) & 1)
+    bit = precedence.offset[a] + b - precedence.near_from[a]
+    return bool((precedence.bits[bit >> 3] >> (bit & 7)) & 1)
 
 
 @kernel
-def are_comparable(order: Order, a: int, b: int) -> bool:
+def are_comparable(precedence: Precedence, a: int, b: int) -> bool:
     """Return whether two different rows are related, whichever comes first."""
-    return comes_before(order, a, b) if a < b else comes_before(order, b, a)
+    return comes_before(precedence, a, b) if a < b else comes_before(precedence, b, a)
+
+
+def excluded_by(satellite: SatelliteProblem, row: int) -> Bools:
+    """Return the tasks that cannot stand in one plan with a satellite's local ``row``."""
+    if is_transitive_on(satellite):
+        return _not_beside(satellite.transitions, row)
+    return _not_related(transitive_closure(satellite), row)
 
 
 @kernel
-def _is_shortcut_missing(order: Order, turning: Bools) -> bool:
+def _not_beside(transitions: Transitions, row: int) -> Bools:
+    excluded = np.zeros(len(transitions.start_s), dtype=np.bool_)
+    for other in range(len(excluded)):
+        # Of two different rows only the later one may follow.
+        first, second = min(row, other), max(row, other)
+        excluded[other] = other != row and not may_follow(transitions, first, second)
+    return excluded
+
+
+@kernel
+def _not_related(precedence: Precedence, row: int) -> Bools:
+    excluded = np.zeros(len(precedence.near_from), dtype=np.bool_)
+    for other in range(len(excluded)):
+        excluded[other] = other != row and not are_comparable(precedence, row, other)
+    return excluded
+
+
+@kernel
+def _is_shortcut_missing(direct: Precedence, turning: Bools) -> bool:
     """Return whether some c may follow a by way of a turning task, but not directly."""
     for a in range(len(turning)):
-        for b in range(order.near_from[a], order.far_from[a]):
-            if not turning[b] or not comes_before(order, a, b):
+        for b in range(direct.near_from[a], direct.far_from[a]):
+            if not turning[b] or not comes_before(direct, a, b):
                 continue
-            for c in range(order.near_from[b], order.far_from[a]):
-                if comes_before(order, b, c) and not comes_before(order, a, c):
+            for c in range(direct.near_from[b], direct.far_from[a]):
+                if comes_before(direct, b, c) and not comes_before(direct, a, c):
                     return True
     return False
 
 
 @kernel
-def _closure_bits(order: Order) -> Bytes:
+def _closure_bits(direct: Precedence) -> Bytes:
     """Work backward: what a task reaches is what its direct followers reach, and they."""
-    bits = order.bits.copy()
-    closed = Order(order.near_from, order.far_from, order.offset, bits)
-    for a in range(len(order.near_from) - 1, -1, -1):
-        for b in range(order.near_from[a], order.far_from[a]):
-            if not comes_before(order, a, b):
+    bits = direct.bits.copy()
+    closed = Precedence(direct.near_from, direct.far_from, direct.offset, bits)
+    for a in range(len(direct.near_from) - 1, -1, -1):
+        for b in range(direct.near_from[a], direct.far_from[a]):
+            if not comes_before(direct, a, b):
                 continue
-            for c in range(order.near_from[b], order.far_from[a]):
+            for c in range(direct.near_from[b], direct.far_from[a]):
                 if comes_before(closed, b, c):
-                    bit = order.offset[a] + c - order.near_from[a]
+                    bit = direct.offset[a] + c - direct.near_from[a]
                     bits[bit >> 3] |= np.uint8(1 << (bit & 7))
     return bits

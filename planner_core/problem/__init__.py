@@ -25,11 +25,10 @@ from planner_core.problem.problem import (
     Singles,
     Struck,
     Sunlight,
-    Transitions,
     build_satellite_problem,
     line_of_sight,
-    may_follow,
 )
+from planner_core.problem.transitions import Transitions, may_follow
 
 __all__ = [
     "ACCESS_FOUND",

@@ -2,12 +2,11 @@
 
 Geometry has been turned into numbers here. Opportunities lie in one table of columns,
 ordered by (start, end, satellite, kind, place); each satellite has a view of its own rows
-with a sparse table of which of them may follow each other.
+which say themselves which of them may follow each other.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -17,15 +16,9 @@ import numpy as np
 import numpy.typing as npt
 
 from planner_core.domain import Agility, Dynamics, Resources
-from planner_core.jit import inlined, kernel
 from planner_core.problem.pointing import Pointing, Vector, sight
-from planner_core.problem.slew import (
-    INSTANT,
-    TIME_TOLERANCE_S,
-    angle_between_deg,
-    reach_deg,
-    slew_s,
-)
+from planner_core.problem.transitions import Transitions, slews_of
+from planner_core.worth import best_worths, common_unit, worth_of
 
 Floats = npt.NDArray[np.float64]
 Singles = npt.NDArray[np.float32]
@@ -33,8 +26,6 @@ Ints = npt.NDArray[np.int32]
 Longs = npt.NDArray[np.int64]
 Bytes = npt.NDArray[np.uint8]
 Bools = npt.NDArray[np.bool_]
-
-_CLEARLY: Final = 1e-7  # in the cosine of an angle; rounding is far smaller
 
 COLLECT: Final = 0
 CONTACT: Final = 1
@@ -138,34 +129,7 @@ class Sunlight:
         return np.where(i == 0, 0.0, before[last] + into)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Transitions:
-    """Which opportunity of one satellite may follow which: C(a, b) of eq. 4, sparse.
-
-    Local row ``b`` may follow ``a`` when ``b >= far_from[a]`` (even the longest slew fits), or
-    ``near_from[a] <= b < far_from[a]`` and bit ``offset[a] + b - near_from[a]`` is set.
-
-    Attributes
-    ----------
-    near_from, far_from
-        Shape ``(m,)``; the near rows of ``a`` are ``near_from[a]`` up to ``far_from[a]``.
-    offset
-        First bit of each row's near part. Shape ``(m + 1,)``.
-    bits
-        Packed, least significant bit first.
-    """
-
-    near_from: Ints
-    far_from: Ints
-    offset: Longs
-    bits: Bytes
-
-    def allows(self, a: int, b: int) -> bool:
-        """Return whether local row ``b`` may follow local row ``a`` directly."""
-        return bool(may_follow(a, b, self.near_from, self.far_from, self.offset, self.bits))
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, slots=True, weakref_slot=True, kw_only=True, eq=False)
 class SatelliteProblem:
     """One satellite's part: its rows of the opportunity table, and what may follow what.
 
@@ -270,8 +234,9 @@ class Problem:
 
     Attributes
     ----------
-    target_reward
-        Shape ``(num_targets,)``.
+    worth
+        What an image by each opportunity earns alone, 0 for contacts (see ``planner_core.worth``).
+        With continuous starts all collects of an access are worth the same. Shape ``(n,)``.
     target_access
         Why a target has no opportunity, or ``ACCESS_FOUND``. Shape ``(num_targets,)``.
     station_antennas
@@ -291,7 +256,7 @@ class Problem:
     dynamics: Dynamics
     continuous_starts: bool
     target_ids: tuple[str, ...]
-    target_reward: Floats
+    worth: Floats
     target_access: npt.NDArray[np.int8]
     station_ids: tuple[str, ...]
     station_antennas: Ints
@@ -321,6 +286,30 @@ class Problem:
         for satellite in self.satellites:
             local[satellite.rows] = np.arange(len(satellite), dtype=np.int32)
         return local
+
+    @cached_property
+    def best_worth(self) -> Floats:
+        """Return the most that an image of each target earns. Shape ``(num_targets,)``."""
+        rows, _ = self.target_opportunities
+        target = self.opportunities.place[rows]
+        return best_worths(target, self.worth[rows], len(self.target_ids))
+
+    @cached_property
+    def typical_worth(self) -> float:
+        """Return what the best image of a target earns on average; 1 where no target has any."""
+        _, offsets = self.target_opportunities
+        offered = self.best_worth[np.diff(offsets) > 0]
+        return float(offered.mean()) or 1.0 if len(offered) else 1.0
+
+    @cached_property
+    def reward_unit(self) -> float:
+        """Return an amount of which what any plan earns is a multiple; 0 where there is none."""
+        return common_unit(self.worth)
+
+    def worth_of(self, rows: npt.NDArray[np.integer]) -> float:
+        """Return what a plan earns that takes these opportunities and breaks nothing."""
+        images = rows[self.opportunities.kind[rows] == COLLECT]
+        return worth_of(self.opportunities.place[images], self.worth[images])
 
     @cached_property
     def offers_choice(self) -> bool:
@@ -369,7 +358,7 @@ def build_satellite_problem(
     sunlight: Sunlight,
     events: tuple[Floats, Ints] | None = None,
 ) -> SatelliteProblem:
-    """Return one satellite's view of the table, with its transitions worked out.
+    """Return one satellite's view of the table.
 
     Parameters
     ----------
@@ -388,79 +377,14 @@ def build_satellite_problem(
         place=opportunities.place[rows],
         start_s=start_s,
         end_s=end_s,
-        transitions=_transitions(
-            start_s, end_s, opportunities.los_start[rows], opportunities.los_end[rows], agility
+        transitions=Transitions(
+            start_s=start_s,
+            end_s=end_s,
+            looks=np.ascontiguousarray(opportunities.los_start[rows]),
+            looked=np.ascontiguousarray(opportunities.los_end[rows]),
+            slews=slews_of(agility),
         ),
         sunlight=sunlight,
         event_s=start_s if events is None else events[0],
         event=np.arange(len(rows), dtype=np.int32) if events is None else events[1],
     )
-
-
-def _transitions(
-    start_s: Floats, end_s: Floats, los_start: Floats, los_end: Floats, agility: Agility
-) -> Transitions:
-    acceleration = agility.acceleration_deg_s2 or INSTANT
-    longest_s = slew_s(180.0, agility.slew_rate_deg_s, acceleration) + agility.settle_s
-    near_from = np.searchsorted(start_s, end_s - TIME_TOLERANCE_S).astype(np.int32)
-    # A task of no length would come before its own end: it never follows itself.
-    near_from = np.maximum(near_from, np.arange(1, len(start_s) + 1, dtype=np.int32))
-    far_from = np.searchsorted(start_s, end_s + longest_s).astype(np.int32)
-    far_from = np.maximum(far_from, near_from)
-    offset = np.concatenate([[0], np.cumsum((far_from - near_from).astype(np.int64))])
-    # Whole words and two to spare, so that kernels may read any 64 bits at once.
-    bits = np.zeros(8 * (int(offset[-1]) // 64 + 3), dtype=np.uint8)
-    _fill_near_bits(
-        start_s, end_s, np.ascontiguousarray(los_start), np.ascontiguousarray(los_end),
-        agility.slew_rate_deg_s, acceleration, agility.settle_s,
-        near_from, far_from, offset, bits,
-    )  # fmt: skip
-    return Transitions(near_from=near_from, far_from=far_from, offset=offset, bits=bits)
-
-
-@kernel
-def _fill_near_bits(
-    start_s: Floats,
-    end_s: Floats,
-    los_start: Floats,
-    los_end: Floats,
-    rate_deg_s: float,
-    acceleration_deg_s2: float,
-    settle_s: float,
-    near_from: Ints,
-    far_from: Ints,
-    offset: Longs,
-    bits: Bytes,
-) -> None:
-    for a in range(len(start_s)):
-        for b in range(near_from[a], far_from[a]):
-            room_s = start_s[b] - end_s[a] - settle_s + TIME_TOLERANCE_S
-            if room_s < 0.0:
-                continue
-            # Most pairs are far from the limit, and cosines are cheaper than angles.
-            least = math.cos(math.radians(reach_deg(room_s, rate_deg_s, acceleration_deg_s2)))
-            dot = (
-                los_end[a, 0] * los_start[b, 0]
-                + los_end[a, 1] * los_start[b, 1]
-                + los_end[a, 2] * los_start[b, 2]
-            )
-            if dot < least - _CLEARLY:
-                continue
-            if dot < least + _CLEARLY:
-                angle_deg = angle_between_deg(los_end[a], los_start[b])
-                needed_s = slew_s(angle_deg, rate_deg_s, acceleration_deg_s2) + settle_s
-                if start_s[b] - end_s[a] < needed_s - TIME_TOLERANCE_S:
-                    continue
-            bit = offset[a] + b - near_from[a]
-            bits[bit >> 3] |= np.uint8(1 << (bit & 7))
-
-
-@inlined
-def may_follow(a: int, b: int, near_from: Ints, far_from: Ints, offset: Longs, bits: Bytes) -> bool:
-    """Return whether local row ``b`` may follow ``a``; ``a`` of -1 is "no task yet"."""
-    if a < 0 or b >= far_from[a]:
-        return True
-    if b < near_from[a]:
-        return False
-    bit = offset[a] + b - near_from[a]
-    return bool((bits[bit >> 3] >> (bit & 7)) & 1)

@@ -63,6 +63,7 @@ def with_table(
     return replace(
         problem,
         opportunities=table,
+        worth=problem.worth[origin],
         pinned=pinned,
         origin=(origin if problem.origin is None else problem.origin[origin]).astype(np.int32),
         satellites=tuple(

@@ -47,6 +47,7 @@ from planner_core.reasons.reason import (
 )
 from planner_core.reasons.teller import Teller
 from planner_core.referee.replay import Timeline
+from planner_core.worth import gain
 
 NO_ACCESS: Final = {
     NEVER_VISIBLE: "No satellite rises above its horizon during the planning horizon.",
@@ -155,16 +156,15 @@ def earned_by(problem: Problem, plan: Plan, timeline: Timeline) -> Floats:
     """Return what the plan loses with each of its actions."""
     table = problem.opportunities
     earned = np.zeros(len(plan.actions))
-    images = [
-        int(table.place[a.opportunity])
-        for a in plan.actions
-        if table.kind[a.opportunity] == COLLECT
-    ]
-    times = np.bincount(images, minlength=len(problem.target_ids))
+    images: dict[int, list[int]] = {}
+    for position, action in enumerate(plan.actions):
+        if table.kind[action.opportunity] == COLLECT:
+            images.setdefault(int(table.place[action.opportunity]), []).append(position)
     for target, collected in timeline.collected.items():
         # Another image of it would count instead.
-        if times[target] == 1:
-            earned[collected.position] = problem.target_reward[target]
+        others = [p for p in images[target] if p != collected.position]
+        rows = [plan.actions[p].opportunity for p in others]
+        earned[collected.position] = gain(collected.worth, problem.worth[rows])
     return earned
 
 
@@ -188,7 +188,7 @@ def _forced_reasons(
         for index in range(len(problem.satellites))
     ]
     tried = _try_all(problem, planned, targets)
-    chosen = _chosen(tried)
+    chosen = _chosen(tried, problem.worth)
     changes = _Changes.of(problem, tried)
     satellite = tried.satellite[chosen]
     reasons: dict[int, Reason] = {}
@@ -226,7 +226,7 @@ def _try_all(problem: Problem, planned: list[PlannedSatellite], targets: Longs) 
     return _Tried(rows, first, satellite, Forced._make(column[back] for column in columns))
 
 
-def _chosen(tried: _Tried) -> Longs:
+def _chosen(tried: _Tried, worth: Floats) -> Longs:
     """Return for each target the opportunity that comes closest: the reason speaks of it.
 
     What fits comes first, then what only a limit keeps out, then what costs least reward.
@@ -235,7 +235,7 @@ def _chosen(tried: _Tried) -> Longs:
     is_free = forced.first == forced.last
     rank = np.where(is_free, 0, 2) + (forced.broken != FITS)
     rank[np.isinf(forced.loss)] = 4
-    return _first_of_each(tried.first, forced.loss, rank)
+    return _first_of_each(tried.first, forced.loss - worth[tried.rows], rank)
 
 
 def _first_of_each(first: Longs, *keys: npt.NDArray[np.generic]) -> Longs:

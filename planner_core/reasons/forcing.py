@@ -325,4 +325,4 @@ def _rate_for(angle_deg: float, available_s: float, acceleration_deg_s2: float) 
 @inlined
 def follows(track: Track, a: int, b: int) -> bool:
     """Return whether a task may follow another directly, or stand first."""
-    return may_follow(a, b, track.near_from, track.far_from, track.offset, track.bits)
+    return may_follow(track.transitions, a, b)

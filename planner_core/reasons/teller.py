@@ -47,11 +47,11 @@ class Teller:
         blocking = tuple(sorted(self.planned.positions[dropped].tolist()))
         limit = _LIMITS.get(int(self.displaced.broken[c]))
         if limit is None and not blocking:
-            return self._fitting(c, target, opportunity)
+            return self._fitting(c, opportunity)
         is_settled = bool(self.displaced.is_settled[c])
         delta = None
         if is_settled:
-            delta = float(self.problem.target_reward[target] - sequence.earned[dropped].sum())
+            delta = float(self.problem.worth[opportunity] - sequence.earned[dropped].sum())
             change = change or Change(opportunity=opportunity, drop=blocking)
         return Reason(
             code=self._code(c, limit, delta),
@@ -64,9 +64,9 @@ class Teller:
             change=change,
         )
 
-    def _fitting(self, c: int, target: int, opportunity: int) -> Reason:
+    def _fitting(self, c: int, opportunity: int) -> Reason:
         breadth = self.search.breadth
-        if self.problem.target_reward[target] == 0.0:
+        if self.problem.worth[opportunity] == 0.0:
             detail = "The plan has room for it, but it earns nothing."
         elif breadth is not None and not self._is_looked_at(c, opportunity, breadth):
             return Reason(
@@ -87,7 +87,7 @@ class Teller:
         plan, k = self.planned.sequence, int(self.forced.first[c])
         model = Model(
             track=self.planned.track,
-            target_reward=self.problem.target_reward,
+            worth=self.problem.worth[self.problem.satellites[self.planned.index].rows],
             guidance=Guidance(1.0, 0.0, 0.0, 0.0),
             contact_above=self.search.contact_above,
         )

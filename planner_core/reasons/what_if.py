@@ -213,7 +213,7 @@ def _cheapest(problem: Problem, plan: Plan, action: PinnedAction) -> int | None:
         planned = PlannedSatellite.of(problem, plan, index, earned)
         local = problem.local_row[rows]
         displaced = displace_each(planned, local, force_each(problem, planned, local))
-        loss = displaced.dropped @ planned.sequence.earned
+        loss = displaced.dropped @ planned.sequence.earned - problem.worth[rows]
         for c in np.argsort(rows):
             offer = (not displaced.is_settled[c], float(loss[c]), int(rows[c]))
             best = offer if best is None or offer < best else best

@@ -8,6 +8,7 @@ from __future__ import annotations
 import hashlib
 import heapq
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -110,11 +111,18 @@ class SatelliteTimeline:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Collected:
-    """How a target was collected: by which plan action, and whether its image is down."""
+    """How a target was collected: by which plan action, and whether its image is down.
+
+    Attributes
+    ----------
+    worth
+        What the image earns.
+    """
 
     position: int
     satellite: int
     is_downlinked: bool
+    worth: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -124,7 +132,7 @@ class Timeline:
     Attributes
     ----------
     reward
-        Sum over the distinct targets collected by actions that break nothing.
+        Sum over targets of the best worth of their collects by actions that break nothing.
     collected
         By target index.
     downlinked
@@ -197,7 +205,7 @@ def replay(problem: Problem, plan: Plan) -> Timeline:
     blamed = {p for v in violations for p in v.blamed}
     collected, duplicates = _collected(problem, plan, blamed, by_satellite, profiles)
     violations += duplicates
-    earned = {c.position: float(problem.target_reward[target]) for target, c in collected.items()}
+    earned = {c.position: c.worth for c in collected.values()}
     points = [point for profile in profiles if profile for point in profile.points]
     return Timeline(
         satellites=tuple(
@@ -205,7 +213,7 @@ def replay(problem: Problem, plan: Plan) -> Timeline:
             for positions, profile in zip(by_satellite, profiles, strict=True)
         ),
         violations=tuple(sorted(violations, key=lambda v: (v.at_s, v.satellite, v.code))),
-        reward=float(sum(earned.values())),
+        reward=math.fsum(earned.values()),
         collected=collected,
         downlinked=tuple(profile.points[-1].removed if profile else 0.0 for profile in profiles),
         battery_min=min((p.battery for p in points), default=None),
@@ -404,27 +412,38 @@ def _collected(
     by_satellite: Sequence[Sequence[int]],
     profiles: Sequence[Profile | None],
 ) -> tuple[dict[int, Collected], list[Violation]]:
-    """Return the first unbroken collect of each target, and a warning for each further one."""
+    """Return the best unbroken collect of each target, and a warning for each other one.
+
+    Of equal ones the first is the best.
+    """
     table = problem.opportunities
     is_down = _downlinked(by_satellite, profiles)
+    images: dict[int, list[int]] = {}
+    for position in sorted(range(len(plan.actions)), key=lambda p: plan.actions[p]):
+        i = plan.actions[position].opportunity
+        if table.kind[i] == COLLECT and position not in blamed:
+            images.setdefault(int(table.place[i]), []).append(position)
     collected: dict[int, Collected] = {}
     duplicates = []
-    for position in sorted(range(len(plan.actions)), key=lambda p: plan.actions[p]):
-        action = plan.actions[position]
-        i = action.opportunity
-        if table.kind[i] != COLLECT or position in blamed:
-            continue
-        target, satellite = int(table.place[i]), int(table.satellite[i])
-        if target in collected:
-            duplicates.append(
-                Violation(code="duplicate", satellite=satellite, at_s=action.start_s, needed=1.0,
-                          available=2.0, blamed=(),
-                          detail=f"Target {problem.target_ids[target]} is collected already.")
-            )  # fmt: skip
-            continue
+    for target, positions in images.items():
+        worth = [float(problem.worth[plan.actions[p].opportunity]) for p in positions]
+        best = worth.index(max(worth))
+        satellites = [int(table.satellite[plan.actions[p].opportunity]) for p in positions]
         collected[target] = Collected(
-            position=position, satellite=satellite, is_downlinked=is_down.get(position, False)
+            position=positions[best],
+            satellite=satellites[best],
+            is_downlinked=is_down.get(positions[best], False),
+            worth=worth[best],
         )
+        for order, position in enumerate(positions):
+            if order == best:
+                continue
+            why = "is collected already" if order > best else "has a better image later"
+            duplicates.append(
+                Violation(code="duplicate", satellite=satellites[order], needed=1.0, available=2.0,
+                          at_s=plan.actions[position].start_s, blamed=(),
+                          detail=f"Target {problem.target_ids[target]} {why}.")
+            )  # fmt: skip
     return collected, duplicates
 
 

@@ -92,7 +92,7 @@ def _select_action(
     track: Track,
     guidance: Guidance,
     rules: Rules,
-    target_reward: Floats,
+    worth: Floats,
     collected: Bytes,
     chosen: Ints,
     stop: Bytes,
@@ -131,7 +131,7 @@ def _select_action(
         waited_s = track.start_s[row] - now_s
         discount = guidance.gamma**waited_s
         v = task_reward(
-            track, guidance, target_reward, collected, waited_s, discount,
+            track, guidance, worth, collected, waited_s, discount,
             row, battery_after, recorder_after,
         )  # fmt: skip
         if depth > 1:
@@ -144,7 +144,7 @@ def _select_action(
             if is_new:
                 collected[place] = 1
             a_next, v_next, first_next = _select_action(
-                track, guidance, rules, target_reward, collected, chosen,
+                track, guidance, rules, worth, collected, chosen,
                 stop, row, row, battery_after, recorder_after, depth - 1,
             )  # fmt: skip
             if is_new:
@@ -163,7 +163,7 @@ def _select_action(
         v = guidance.sunpoint_reward_per_s * waited_s
         if depth > 1:
             a_next, v_next, first_next = _select_action(
-                track, guidance, rules, target_reward, collected, chosen,
+                track, guidance, rules, worth, collected, chosen,
                 stop, first, last, battery, recorder, depth - 1,
             )  # fmt: skip
             if rules.is_discounted_by_next and a_next != NOTHING:
@@ -292,7 +292,7 @@ class ForwardSearch:
         guidance = self.guidance
 
         def plan_turn(turn: Turn) -> list[int]:
-            return self._plan_turn(turn, problem.target_reward, guidance, budget)
+            return self._plan_turn(turn, problem.worth[turn.satellite.rows], guidance, budget)
 
         solution = plan_in_turn(problem, budget, plan_turn)
         return polished(problem, solution, self.window_moves_per_task, budget)
@@ -310,7 +310,7 @@ class ForwardSearch:
         )
 
     def _plan_turn(
-        self, turn: Turn, target_reward: Floats, guidance: Guidance, budget: Budget
+        self, turn: Turn, worth: Floats, guidance: Guidance, budget: Budget
     ) -> list[int]:
         track, collected = turn.track, turn.collected
         cursor, last = NO_TASK, NO_TASK
@@ -328,7 +328,7 @@ class ForwardSearch:
         reward = 0.0
         while not budget.is_spent():
             action, _, first = _select_action(
-                track, guidance, rules, target_reward, collected, chosen, budget.stop,
+                track, guidance, rules, worth, collected, chosen, budget.stop,
                 cursor, last, battery, recorder, self.depth,
             )  # fmt: skip
             # A search that was stopped half way has not compared all its actions.
@@ -351,6 +351,6 @@ class ForwardSearch:
                 )
             ):
                 collected[place] = 1
-                reward += float(target_reward[place])
+                reward += float(worth[action])
             turn.report((action + 1) / len(track.start_s), reward)
         return taken

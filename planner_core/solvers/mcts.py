@@ -177,12 +177,12 @@ class Mcts:
         """Return the plan; the same one for the same seed."""
 
         def plan_turn(turn: Turn) -> list[int]:
-            return self._plan_turn(turn, problem.target_reward, budget, seed)
+            return self._plan_turn(turn, problem.worth[turn.satellite.rows], budget, seed)
 
         solution = plan_in_turn(problem, budget, plan_turn)
         return polished(problem, solution, self.window_moves_per_task, budget)
 
-    def _plan_turn(self, turn: Turn, target_reward: Floats, budget: Budget, seed: int) -> list[int]:
+    def _plan_turn(self, turn: Turn, worth: Floats, budget: Budget, seed: int) -> list[int]:
         track, collected = turn.track, turn.collected
         guidance = Guidance(
             gamma=self.gamma,
@@ -232,7 +232,7 @@ class Mcts:
         reward = 0.0
         while not budget.is_spent():
             edge = search(
-                tree, track, rules, guidance, successors, target_reward, collected, random,
+                tree, track, rules, guidance, successors, worth, collected, random,
                 path, self.num_simulations, budget.stop, best, best_actions,
             )  # fmt: skip
             if edge == UNSEEN or budget.is_spent():
@@ -240,9 +240,7 @@ class Mcts:
             if self.keep_incumbent:
                 edge = _edge_of(tree, int(best_actions[0]), edge)
             if self.worthless == "sunpoint":
-                edge = sunpoint_instead(
-                    tree, track, rules, guidance, target_reward, collected, edge
-                )
+                edge = sunpoint_instead(tree, track, rules, guidance, worth, collected, edge)
             action = int(tree.action[edge])
             child = int(tree.child[edge])
             if action != WAIT:
@@ -255,7 +253,7 @@ class Mcts:
                     and (self.image_needs == "nothing" or counts_as_made(track, guidance, *levels))
                 ):
                     collected[place] = successors.imaged[place] = 1
-                    reward += float(target_reward[place])
+                    reward += float(worth[action])
             best[0] = -np.inf
             copy_branch(tree, spare, child)
             tree, spare = spare, tree

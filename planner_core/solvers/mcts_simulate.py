@@ -53,7 +53,7 @@ def _simulate(
     rules: Rules,
     guidance: Guidance,
     successors: Successors,
-    target_reward: Floats,
+    worth: Floats,
     collected: Bytes,
     random: Uint64s,
     path: Path,
@@ -116,7 +116,7 @@ def _simulate(
             if track.use_resources:
                 battery, recorder, _ = take(track, last, row, battery, recorder)
             path.reward[d] = task_reward(
-                track, guidance, target_reward, collected, sojourn_s, discount,
+                track, guidance, worth, collected, sojourn_s, discount,
                 row, battery, recorder,
             )  # fmt: skip
             last = row
@@ -169,7 +169,7 @@ def search(
     rules: Rules,
     guidance: Guidance,
     successors: Successors,
-    target_reward: Floats,
+    worth: Floats,
     collected: Bytes,
     random: Uint64s,
     path: Path,
@@ -188,7 +188,7 @@ def search(
             rules,
             guidance,
             successors,
-            target_reward,
+            worth,
             collected,
             random,
             path,
@@ -213,7 +213,7 @@ def sunpoint_instead(
     track: Track,
     rules: Rules,
     guidance: Guidance,
-    target_reward: Floats,
+    worth: Floats,
     collected: Bytes,
     edge: int,
 ) -> int:
@@ -230,7 +230,7 @@ def sunpoint_instead(
         battery_after, recorder_after, _ = take(track, last, row, battery, recorder)
     now_s = track.start_s[tree.cursor[0]] if tree.cursor[0] >= 0 else 0.0
     reward = task_reward(
-        track, guidance, target_reward, collected, track.start_s[row] - now_s, 1.0,
+        track, guidance, worth, collected, track.start_s[row] - now_s, 1.0,
         row, battery_after, recorder_after,
     )  # fmt: skip
     end = tree.first_edge[0] + tree.num_edges[0]

@@ -12,15 +12,16 @@ from typing import ClassVar, Final
 
 import numpy as np
 
-from planner_core.budget import Budget, Progress, Termination
+from planner_core.budget import Budget, Progress
 from planner_core.certified.drivers.agility_only import MOST_PAIRS, Effort
 from planner_core.certified.drivers.fleet import solve_without_resources
+from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.search import improved
 from planner_core.certified.mip.clique_cuts import violated_antichains
 from planner_core.certified.mip.highs import Engine, Outcome, Watch
 from planner_core.certified.mip.model import Formulation, PlanProgram, plan_program
 from planner_core.certified.mip.program import Rows
-from planner_core.certified.proofs.bound import Bound, rounded_bound
+from planner_core.certified.proofs.bound import Bound
 from planner_core.precedence.relation import is_transitive, num_near_pairs
 from planner_core.problem import COLLECT, Floats, Problem
 from planner_core.problem.plan import Plan
@@ -88,16 +89,15 @@ class Milp:
     def solve(self, problem: Problem, budget: Budget, seed: int) -> Solution:
         """Return the best plan; the same one for the same seed where the budget suffices."""
         if self.formulation == "antichain" and is_free(problem):
-            effort = Effort(
-                moves_per_task=self.moves_per_task, max_rounds=self.cut_rounds, max_parts=0
-            )
+            effort = Effort(moves_per_task=self.moves_per_task, max_rounds=self.cut_rounds)
             return solve_without_resources(problem, budget, seed, self.gap, effort)
-        best = _Best(problem)
-        best.offer(*_starts(problem, budget))
+        best = Incumbent(problem, budget, self.gap, bound=Bound(value=np.inf, proof="milp"))
+        for plan in _starts(problem, budget):
+            best.offer(plan)
         if not problem.use_resources:
             best.offer(improved(problem, best.plan, self.moves_per_task, budget, seed))
         if len(problem.opportunities) == 0 or budget.is_spent():
-            return best.solution(problem, budget, self.gap)
+            return best.solution()
         if num_near_pairs(problem) > MOST_PAIRS:
             budget.report(
                 Progress(
@@ -107,20 +107,22 @@ class Milp:
                     message="The program is too large for HiGHS: the plan it would start from.",
                 )
             )
-            return best.solution(problem, budget, self.gap)
+            return best.solution()
         outcome = self._search(problem, budget, seed, best, _TOUCHING)
-        best.bound, best.log = outcome.bound, outcome.log
         if outcome.is_infeasible:
-            return best.solution(problem, budget, self.gap)
+            return best.solution()
         plan = _plan_of(problem, outcome)
-        best.offer(plan, _repaired(problem, plan))
+        for offered in (plan, _repaired(problem, plan)):
+            best.offer(offered)
         if not replay(problem, plan).is_valid and not budget.is_spent():
-            outcome = self._search(problem, budget, seed, best, _CLEAR)
-            best.offer(_plan_of(problem, outcome))
-        return best.solution(problem, budget, self.gap)
+            clear = self._search(problem, budget, seed, best, _CLEAR)
+            best.offer(_plan_of(problem, clear))
+        if best.is_valid:
+            best.lower(Bound(value=outcome.bound, proof="milp", log=outcome.log))
+        return best.solution()
 
     def _search(
-        self, problem: Problem, budget: Budget, seed: int, best: _Best, margin: float
+        self, problem: Problem, budget: Budget, seed: int, best: Incumbent, margin: float
     ) -> Outcome:
         model = plan_program(problem, self.formulation, margin)
         engine = Engine(model.program, budget, seed, is_chained=problem.use_resources)
@@ -131,7 +133,7 @@ class Milp:
 
         if self.formulation == "antichain":
             _cut(engine, problem, model, self.cut_rounds, watch)
-        return engine.search(best.columns(problem), self.gap, _HEURISTIC_EFFORT, watch)
+        return engine.search(_columns(best), self.gap, _HEURISTIC_EFFORT, watch)
 
 
 def is_free(problem: Problem) -> bool:
@@ -165,9 +167,9 @@ def _cut(engine: Engine, problem: Problem, model: PlanProgram, rounds: int, watc
         if len(bounds) > _PATIENCE and bounds[-1 - _PATIENCE] - bounds[-1] < _STALLED * bounds[-1]:
             return
         num_added = 0
-        for satellite, order in zip(problem.satellites, model.orders, strict=True):
+        for satellite, precedence in zip(problem.satellites, model.precedences, strict=True):
             own = model.taken[satellite.rows]
-            offsets, members = violated_antichains(order, taken[own])
+            offsets, members = violated_antichains(precedence, taken[own])
             engine.add_rows(Rows.of(offsets, own[members], upper=1.0))
             num_added += len(offsets) - 1
         if num_added == 0:
@@ -179,6 +181,15 @@ def _plan_of(problem: Problem, outcome: Outcome) -> Plan:
         return Plan()
     taken = outcome.columns[: len(problem.opportunities)]
     return Plan.of(problem, np.flatnonzero(taken > 0.5))
+
+
+def _columns(best: Incumbent) -> Floats | None:
+    """Return the plan as values of x, or None where it is not valid."""
+    if not best.is_valid:
+        return None
+    taken = np.zeros(len(best.problem.opportunities))
+    taken[[action.opportunity for action in best.plan.actions]] = 1.0
+    return taken
 
 
 def _repaired(problem: Problem, plan: Plan) -> Plan:
@@ -201,61 +212,6 @@ def _repaired(problem: Problem, plan: Plan) -> Plan:
         if not before:
             return plan
         plan = Plan(tuple(action for action in plan.actions if action is not before[-1]))
-
-
-class _Best:
-    """The best valid plan so far, by the referee, and the bound."""
-
-    def __init__(self, problem: Problem) -> None:
-        self._problem = problem
-        self.plan = Plan()
-        self._timeline = replay(problem, self.plan)
-        self.bound, self.log = np.inf, ""
-
-    @property
-    def reward(self) -> float:
-        """What the plan earns, if it may be flown."""
-        return self._timeline.reward if self._timeline.is_valid else 0.0
-
-    def offer(self, *plans: Plan) -> None:
-        """Keep the first plan that beats all others; a valid one beats any that is not."""
-        for plan in plans:
-            timeline = replay(self._problem, plan)
-            worth = (timeline.is_valid, timeline.reward)
-            if worth > (self._timeline.is_valid, self._timeline.reward):
-                self.plan, self._timeline = plan, timeline
-
-    def columns(self, problem: Problem) -> Floats | None:
-        """Return the plan as values of x, or None where it is not valid."""
-        if not self._timeline.is_valid:
-            return None
-        taken = np.zeros(len(problem.opportunities))
-        taken[[action.opportunity for action in self.plan.actions]] = 1.0
-        return taken
-
-    def solution(self, problem: Problem, budget: Budget, gap: float) -> Solution:
-        """Return the plan with what is known of it."""
-        reward = self._timeline.reward
-        bound, proven = None, None
-        if np.isfinite(self.bound) and self._timeline.is_valid and not problem.continuous_starts:
-            bound = rounded_bound(problem, self.bound, reward)
-            proven = Bound(value=bound, proof="milp", log=self.log)
-        return Solution(
-            plan=self.plan,
-            termination=_termination(reward, bound, budget, gap),
-            proven=proven,
-        )
-
-
-def _termination(reward: float, bound: float | None, budget: Budget, gap: float) -> Termination:
-    """Optimal only where proven; a search that ends without proof has come to its own end."""
-    if bound is not None and bound - reward <= 1e-5 * max(1.0, bound):
-        return Termination.OPTIMAL
-    if budget.is_spent():
-        return budget.termination()
-    if bound is not None and bound - reward <= gap * bound:
-        return Termination.GAP_REACHED
-    return Termination.HORIZON_COMPLETE
 
 
 class _Reporter:

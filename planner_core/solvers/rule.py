@@ -60,9 +60,9 @@ class Rule:
         """Return the plan; the same one whatever the seed."""
 
         def plan_turn(turn: Turn) -> list[int]:
-            before = turn.collected.copy()
+            track, before = turn.track, turn.collected.copy()
             rows = rule_plan(
-                turn.track,
+                track,
                 turn.collected,
                 self.feasibility == "hard",
                 self.unimaged_only,
@@ -70,7 +70,9 @@ class Rule:
                 NOTHING_TAKEN,
                 self.thresholds == "code",
             )
-            turn.report(1.0, float(problem.target_reward[turn.collected > before].sum()))
+            images = rows[track.is_contact[rows] == 0]
+            images = images[before[track.place[images]] == 0]
+            turn.report(1.0, problem.worth_of(turn.satellite.rows[images]))
             return [int(row) for row in rows]
 
         return plan_in_turn(problem, budget, plan_turn)

@@ -53,7 +53,7 @@ def plan_in_turn(problem: Problem, budget: Budget, plan_turn: PlanTurn) -> Solut
     taken: list[int] = []
     for step, index in enumerate(_order(problem)):
         satellite = problem.satellites[index]
-        reward_before = float(problem.target_reward[collected == 1].sum())
+        reward_before = problem.worth_of(np.array(taken, dtype=np.int64))
 
         def report(
             fraction: float, reward: float, step: int = step, so_far: float = reward_before
@@ -66,7 +66,7 @@ def plan_in_turn(problem: Problem, budget: Budget, plan_turn: PlanTurn) -> Solut
                 )
             )
 
-        blocked = blocked_rows(problem, satellite, taken)
+        blocked = blocked_rows(problem, satellite, taken) | _is_wasted(problem, satellite)
         track = compile_track(problem, satellite, blocked)
         turn = Turn(satellite=satellite, track=track, collected=collected.copy(), report=report)
         rows = [] if budget.is_spent() else plan_turn(turn)
@@ -90,6 +90,19 @@ def _rest_by_rule(track: Track, collected: Bytes, taken: list[int]) -> list[int]
     """Return what the rule adds to a search that was cut short, so that no hour stays empty."""
     rows = np.array(taken, dtype=np.int32)
     return [int(row) for row in rule_plan(track, collected, True, True, CONTACT_ABOVE, rows, False)]
+
+
+def _is_wasted(problem: Problem, satellite: SatelliteProblem) -> Bytes:
+    """Return 1 for each collect that earns nothing where another of its target earns something.
+
+    Whoever takes tasks as they come would have the target imaged for nothing.
+    """
+    is_image = satellite.kind != CONTACT
+    wasted = np.zeros(len(satellite), dtype=np.uint8)
+    wasted[is_image] = problem.best_worth[satellite.place[is_image]] > 0.0
+    wasted[problem.worth[satellite.rows] > 0.0] = 0
+    wasted[problem.kept_local(satellite)] = 0
+    return wasted
 
 
 def blocked_rows(problem: Problem, satellite: SatelliteProblem, taken: list[int]) -> Bytes:

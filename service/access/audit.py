@@ -10,8 +10,8 @@ from sqlalchemy.orm import Session
 
 from service.access.callers import Caller
 from service.db.clock import utc_now
+from service.db.ids import new_id
 from service.db.rows import AuditEventRow
-from service.ids import new_id
 
 COMMAND_LINE: Final = "command line"
 

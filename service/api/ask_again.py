@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import UTC, datetime
 from typing import Final
 
-from service.jobs import lease
+from service.wire.jobs import ACTIVE
 
 SOON_S: Final = 1
 _LATEST_S: Final = 5
@@ -25,7 +25,7 @@ def seconds_until(state: str, created_at: datetime) -> int | None:
     >>> seconds_until("running", ago[2]), seconds_until("succeeded", ago[2])
     (1, None)
     """
-    if state not in lease.ACTIVE:
+    if state not in ACTIVE:
         return None
     if state != "queued":
         return SOON_S

@@ -6,30 +6,16 @@ from typing import Annotated
 
 import sqlalchemy as sa
 from fastapi import APIRouter, Depends, Query
-from pydantic import BaseModel, Field
 
 from service.api.deps import DatabaseDep, admin_only
-from service.api.paging import Listed, PagingDep, newest_first
-from service.api.shapes import Instant
+from service.api.paging import PagingDep, newest_first
 from service.db.rows import AuditEventRow
+from service.wire.base import Listed
+from service.wire.operations import AuditEventOut
 
 router = APIRouter(
     prefix="/v1/audit-events", tags=["operations"], dependencies=[Depends(admin_only)]
 )
-
-
-class AuditEventOut(BaseModel):
-    """One change of one object."""
-
-    id: str
-    at: Instant
-    owner: str = Field(description="Whose key it was; `local` without a key.")
-    key_id: str | None
-    key_name: str | None
-    request_id: str | None = Field(description="As in the answer's `X-Request-ID` and the logs.")
-    action: str = Field(description="`create`, `delete`, `cancel` and so on; more may be added.")
-    kind: str = Field(description="`satellite`, `job` and so on; more may be added.")
-    object_id: str
 
 
 @router.get("")

@@ -3,113 +3,56 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Final, Literal, cast
+from typing import cast
 
 import sqlalchemy as sa
-from fastapi import APIRouter, Request, Response
-from pydantic import BaseModel, Field
+from fastapi import APIRouter, Response
 from sqlalchemy.orm import Session
 
 from service.api import ask_again
 from service.api import job_intake as intake
 from service.api.conditional import NOT_MODIFIED, created, unless_known
-from service.api.deps import AuditDep, CallerDep, DatabaseDep, SettingsDep
+from service.api.deps import CallDep
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
-from service.api.job_shapes import ErrorOut, ProgressOut, QuestionIn, ScenarioRef, SolverIn
-from service.api.paging import Listed, PagingDep, newest_first
-from service.api.problems import ServiceError
-from service.api.shapes import Instant
+from service.api.paging import PagingDep, newest_first
 from service.db.rows import ComparisonRow
-from service.jobs import lease
-from service.jobs.lease import JobState
+from service.jobs import submission
+from service.problems.kinds import ServiceError
 from service.scenarios.translate import inside
 from service.stores import comparison_store as store
 from service.stores import job_store
 from service.stores.comparison_store import Run
+from service.wire.base import Listed
+from service.wire.jobs import (
+    ACTIVE,
+    ComparedRun,
+    ComparisonIn,
+    ComparisonOut,
+    ErrorOut,
+    JobState,
+    ProgressOut,
+    ScenarioRef,
+)
 
 router = APIRouter(prefix="/v1/comparisons", tags=["comparisons"])
 
-MAX_RUNS: Final = 32
-
-
-class ComparisonIn(QuestionIn):
-    """A scenario and the solvers that are to plan it; limits, priority, label are of each job."""
-
-    runs: list[SolverIn] = Field(min_length=1, max_length=MAX_RUNS)
-
-
-class FiguresOut(BaseModel):
-    """Numbers of a run's timeline; all null as long as it has none."""
-
-    reward: float | None = Field(None, description="As the referee awarded it.")
-    bound: float | None = Field(None, description="No plan of the scenario can exceed it.")
-    gap: float | None = Field(None, description="`(bound - reward) / bound`.")
-    bound_proof: str | None = None
-    collects: int | None = None
-    contacts: int | None = None
-    downlinked_mbit: float | None = Field(
-        None, description="Null too where a recorder has no capacity in megabits."
-    )
-    downlinked_fraction: float | None = Field(None, description="In recorder capacities.")
-    solve_s: float | None = Field(None, description="Of the search alone.")
-    runtime_s: float | None = Field(None, description="Of the whole job's work.")
-    validity: str | None = None
-    plan_sha256: str | None = None
-
-
-class ComparedRun(FiguresOut):
-    """One line of the table."""
-
-    job_id: str
-    state: JobState
-    solver: str
-    params: dict[str, Any]
-    seed: int
-    progress: ProgressOut | None
-    termination: str | None
-    error: ErrorOut | None
-    links: dict[str, str]
-
-
-class ComparisonOut(BaseModel):
-    """Several solvers on one scenario, side by side."""
-
-    id: str
-    state: Literal["running", "finished"] = Field(
-        description="`finished` when every job is final, whether it succeeded or not."
-    )
-    scenario: ScenarioRef
-    label: str | None
-    created_at: Instant
-    runs: list[ComparedRun] = Field(description="In the order of the request.")
-    links: dict[str, str]
-
 
 @router.post("", status_code=202, responses=problem_responses(503))
-def create_comparison(
-    body: ComparisonIn,
-    database: DatabaseDep,
-    settings: SettingsDep,
-    once: OnceDep,
-    caller: CallerDep,
-    audit: AuditDep,
-    request: Request,
-    response: Response,
-) -> ComparisonOut:
+def create_comparison(body: ComparisonIn, call: CallDep, once: OnceDep) -> ComparisonOut:
     """Queue a job for each run, all or none; the answer tells where the table grows."""
-    queue = intake.queue_of(request)
+    queue = intake.queue_of(call.request)
     params = []
     for position, run in enumerate(body.runs):
         with inside(f"/runs/{position}"):
             params.append(intake.all_params(run.solver, run.params))
-    time_s, memory_mb = intake.limits_of(body.limits, settings)
-    inline = intake.frozen(database, settings, body)
+    time_s, memory_mb = intake.limits_of(body.limits, call.settings)
+    inline = intake.frozen(call.database, call.settings, body)
     with once.transaction() as session:
-        intake.require_room(session, settings, len(body.runs))
-        scenario_id = intake.stored_scenario(session, audit, body, inline)
+        intake.require_room(session, call.settings, len(body.runs))
+        scenario_id = intake.stored_scenario(session, call.audit, body, inline)
         specs = [
-            job_store.JobSpec(
+            submission.JobSpec(
                 scenario_id=scenario_id,
                 solver=run.solver,
                 params=of_run,
@@ -118,28 +61,26 @@ def create_comparison(
                 memory_mb=memory_mb,
                 priority=body.priority,
                 label=body.label,
-                owner=caller.owner,
+                owner=call.caller.owner,
             )
             for run, of_run in zip(body.runs, params, strict=True)
         ]
-        row = store.submit(session, queue, specs, label=body.label)
+        row = submission.submit_comparison(session, queue, specs, label=body.label)
         shown = _shown(session, [row])[0]
-        audit.record(session, "create", "job", *(run.job_id for run in shown.runs))
-        audit.record(session, "create", "comparison", row.id)
-        shown = created(response, shown, f"/v1/comparisons/{row.id}")
-        _describe(response, shown)
+        call.audit.record(session, "create", "job", *(run.job_id for run in shown.runs))
+        call.audit.record(session, "create", "comparison", row.id)
+        shown = created(call.response, shown, f"/v1/comparisons/{row.id}")
+        _describe(call.response, shown)
         return once.keep(session, shown)
 
 
 @router.get("")
-def list_comparisons(
-    database: DatabaseDep, caller: CallerDep, paging: PagingDep
-) -> Listed[ComparisonOut]:
+def list_comparisons(call: CallDep, paging: PagingDep) -> Listed[ComparisonOut]:
     """List the comparisons of the key's owner, newest first; all for the scope `admin`."""
     query = sa.select(ComparisonRow)
-    if caller.visible_owner is not None:
-        query = query.where(ComparisonRow.tenant == caller.visible_owner)
-    with database.reading() as session:
+    if call.caller.visible_owner is not None:
+        query = query.where(ComparisonRow.tenant == call.caller.visible_owner)
+    with call.database.reading() as session:
         page = newest_first(session, query, ComparisonRow.id, paging)
         return Listed(items=_shown(session, page.rows), next=page.next)
 
@@ -149,21 +90,15 @@ def list_comparisons(
     response_model=ComparisonOut,
     responses={**NOT_MODIFIED, **problem_responses(404)},
 )
-def get_comparison(
-    comparison_id: str,
-    database: DatabaseDep,
-    caller: CallerDep,
-    request: Request,
-    response: Response,
-) -> ComparisonOut | Response:
+def get_comparison(comparison_id: str, call: CallDep) -> ComparisonOut | Response:
     """Return the table as it stands: a line fills when its job has an answer."""
-    with database.reading() as session:
+    with call.database.reading() as session:
         row = session.get(ComparisonRow, comparison_id)
-        if row is None or caller.visible_owner not in (None, row.tenant):
+        if row is None or call.caller.visible_owner not in (None, row.tenant):
             raise ServiceError("not_found", f"There is no comparison {comparison_id!r}.")
         shown = _shown(session, [row])[0]
-    _describe(response, shown)
-    return unless_known(request, response, shown)
+    _describe(call.response, shown)
+    return unless_known(call.request, call.response, shown)
 
 
 def _describe(response: Response, shown: ComparisonOut) -> None:
@@ -178,7 +113,7 @@ def _shown(session: Session, rows: Sequence[ComparisonRow]) -> list[ComparisonOu
 
 
 def _table(row: ComparisonRow, runs: list[Run], sha256: str) -> ComparisonOut:
-    is_active = any(run.job.state in lease.ACTIVE for run in runs)
+    is_active = any(run.job.state in ACTIVE for run in runs)
     return ComparisonOut(
         id=row.id,
         state="running" if is_active else "finished",

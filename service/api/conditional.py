@@ -8,8 +8,8 @@ from typing import Any, Final, TypeVar
 from fastapi import Request, Response
 from pydantic import BaseModel
 
-from service.api.problems import ServiceError
-from service.api.shapes import etagged, matches, matches_strongly
+from service.api.etags import etagged, matches, matches_strongly
+from service.problems.kinds import ServiceError
 
 M = TypeVar("M", bound=BaseModel)
 

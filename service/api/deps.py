@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Annotated, cast
 
-from fastapi import Depends, Request
+from fastapi import Depends, Request, Response
 from fastapi.dependencies.models import Dependant
 from fastapi.routing import APIRoute
 from starlette.concurrency import run_in_threadpool
@@ -14,10 +15,10 @@ from starlette.concurrency import run_in_threadpool
 from planner_core.errors import Fault
 from service.access.audit import Audit
 from service.access.callers import Caller, Scope
-from service.api.errors import refuse
 from service.api.guard import require_scope
-from service.api.problems import ServiceError
 from service.db.session import Database
+from service.problems.faults import refuse
+from service.problems.kinds import ServiceError
 from service.settings import Settings
 from service.stores import job_store
 
@@ -52,6 +53,27 @@ async def _audit(request: Request, caller: CallerDep) -> Audit:
 
 
 AuditDep = Annotated[Audit, Depends(_audit)]
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """A request under way: who asks, what it reaches, and the headers of its answer."""
+
+    request: Request
+    response: Response
+    caller: Caller
+    database: Database
+    settings: Settings
+    audit: Audit
+
+
+async def _call(request: Request, response: Response) -> Call:
+    caller, state = request.state.caller, request.app.state
+    audit = Audit(caller=caller, request_id=request.state.request_id)
+    return Call(request, response, caller, state.database, state.settings, audit)
+
+
+CallDep = Annotated[Call, Depends(_call)]
 
 
 async def admin_only(caller: CallerDep) -> None:

@@ -12,15 +12,15 @@ from sqlalchemy.orm import Session
 from planner_core.orbits import omm_writing
 from planner_core.orbits.omm_writing import Outgoing
 from service.api.conditional import NOT_MODIFIED
-from service.api.deps import DatabaseDep
+from service.api.deps import CallDep
 from service.api.errors import problem_responses
-from service.api.problems import ServiceError
+from service.api.etags import etag_of, matches
 from service.api.satellites import find_satellite
-from service.api.shapes import etag_of, matches
 from service.db.rows import SatelliteRow
-from service.scenarios.inputs import OrbitIn
+from service.problems.kinds import ServiceError
 from service.scenarios.translate import orbit_from
 from service.stores import satellite_store as store
+from service.wire.satellites import OrbitIn
 
 router = APIRouter(prefix="/v1/satellites", tags=["satellites"])
 
@@ -54,20 +54,20 @@ Suffix = Annotated[
 
 
 @router.get("/omm.{suffix}", response_class=Response, responses=_RESPONSES)
-def get_all_omm(suffix: Suffix, database: DatabaseDep, request: Request) -> Response:
+def get_all_omm(suffix: Suffix, call: CallDep) -> Response:
     """Return the element set in force of every satellite, oldest satellite first.
 
     `POST /v1/satellites/import` takes the file back, with the media type that it comes in.
     """
     form = _form_of(suffix)
-    with database.reading() as session:
+    with call.database.reading() as session:
         rows = session.scalars(store.alive().order_by(SatelliteRow.id)).all()
         messages = [
             message
             for first in range(0, len(rows), _AT_ONCE)
             for message in _messages(session, rows[first : first + _AT_ONCE])
         ]
-    return _answer(request, form, messages, f"satellites.omm.{suffix}")
+    return _answer(call.request, form, messages, f"satellites.omm.{suffix}")
 
 
 @router.get(
@@ -75,13 +75,13 @@ def get_all_omm(suffix: Suffix, database: DatabaseDep, request: Request) -> Resp
     response_class=Response,
     responses={**_RESPONSES, **problem_responses(404)},
 )
-def get_omm(satellite_id: str, suffix: Suffix, database: DatabaseDep, request: Request) -> Response:
+def get_omm(satellite_id: str, suffix: Suffix, call: CallDep) -> Response:
     """Return the element set in force of one satellite."""
-    with database.reading() as session:
+    with call.database.reading() as session:
         row = find_satellite(session, satellite_id)
         form = _form_of(suffix)
         messages = _messages(session, [row])
-    return _answer(request, form, messages, f"{satellite_id}.omm.{suffix}")
+    return _answer(call.request, form, messages, f"{satellite_id}.omm.{suffix}")
 
 
 def _form_of(suffix: str) -> _Form:

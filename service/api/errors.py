@@ -3,50 +3,29 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from http import HTTPStatus
 from typing import Any
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
-from pydantic import BaseModel, Field, ValidationError
 from sqlalchemy.exc import SQLAlchemyError
 from starlette.exceptions import HTTPException
 
 from planner_core.errors import Fault, PlannerError
 from service.access.tokens import masked
-from service.api.problems import ServiceError, kind_of
 from service.api.security_headers import SECURITY_HEADERS
 from service.db.failures import why_unavailable
+from service.problems.faults import faults_of, refuse
+from service.problems.kinds import ServiceError, kind_of
+from service.wire.operations import FaultOut, ProblemOut
 
 PROBLEM_JSON = "application/problem+json"
 MAX_FAULTS = 100
 DATABASE_RETRY_S = 5
 
 logger = logging.getLogger(__name__)
-
-
-class FaultOut(BaseModel):
-    """One thing that is wrong, and where."""
-
-    pointer: str | None = Field(description="JSON pointer into the body, where it was JSON.")
-    code: str
-    row: int | None = Field(description="Line of the file, from 1; a header is line 1.")
-    detail: str
-
-
-class ProblemOut(BaseModel):
-    """A problem document (RFC 9457)."""
-
-    type: str = Field(description="Address of the explanation of this code.")
-    title: str
-    status: int
-    code: str = Field(description="Stable name of the problem. More codes may be added.")
-    detail: str
-    instance: str = Field(description="Path of the request.")
-    request_id: str
-    errors: list[FaultOut] = Field(description="At most 100; the detail says how many more.")
 
 
 def install_error_handlers(app: FastAPI) -> None:
@@ -112,88 +91,6 @@ def _sendable(text: str) -> str:
     # JSON can spell half a surrogate pair, as a field's name for example; UTF-8 cannot.
     # And who put a key into an address by mistake finds no copy of it in the answer.
     return masked(text.encode("utf-8", "replace").decode())
-
-
-def refuse(faults: Sequence[Fault], *, code: str | None = None) -> ServiceError:
-    """Return the error for a body with these faults; its code is theirs where they agree."""
-    codes = {fault.code for fault in faults}
-    common = codes.pop() if len(codes) == 1 else "invalid_request"
-    first = faults[0]
-    where = f"line {first.row}: " if first.row else f"{first.pointer}: " if first.pointer else ""
-    detail = f"{where}{first.detail}"
-    if len(faults) > 1:
-        detail = f"{len(faults)} errors; the first: {detail}"
-    return ServiceError(code or common, detail, faults=tuple(faults))
-
-
-def faults_of(errors: Iterable[Any], body: object) -> list[Fault]:
-    """Return what pydantic found, with JSON pointers into ``body``."""
-    return [
-        Fault(code=_code(e["type"]), detail=_sentence(e), pointer=_pointer(e["loc"], body))
-        for e in errors
-    ]
-
-
-def faults_of_validation(error: ValidationError, body: object) -> list[Fault]:
-    """Return the faults of a document that was validated outside FastAPI."""
-    found = ({**e, "loc": ("body", *e["loc"])} for e in error.errors(include_url=False))
-    return faults_of(found, body)
-
-
-_CODES = {
-    "missing": "missing_field",
-    "extra_forbidden": "unknown_field",
-    "json_invalid": "malformed_json",
-    "literal_error": "unknown_value",
-    "enum": "unknown_value",
-    "finite_number": "not_finite",
-    "greater_than": "value_out_of_range",
-    "greater_than_equal": "value_out_of_range",
-    "less_than": "value_out_of_range",
-    "less_than_equal": "value_out_of_range",
-    "too_short": "value_out_of_range",
-    "too_long": "value_out_of_range",
-    "string_too_short": "value_out_of_range",
-    "string_too_long": "value_out_of_range",
-    "too_many_fields": "too_many_fields",
-    "naive_time": "naive_time",
-    "invalid_time": "invalid_time",
-}
-
-
-def _code(pydantic_type: str) -> str:
-    return _CODES.get(pydantic_type, "invalid_value")
-
-
-def _sentence(error: Mapping[str, Any]) -> str:
-    message = str(error["msg"])
-    place, name = error["loc"][0], error["loc"][-1]
-    if error["type"] == "json_invalid":
-        return f"{error['ctx']['error']} at character {name}."
-    if place in ("query", "header", "path"):
-        return f"{place} parameter {name}: {message}."
-    if error["type"] == "extra_forbidden":
-        return f"There is no field {name!r}."
-    return message if message.endswith(".") else f"{message}."
-
-
-def _pointer(loc: Sequence[str | int], body: object) -> str | None:
-    # A pydantic location also names the branches of unions, which are no places in the
-    # document: only the parts that lead somewhere in the body are kept, and the last one,
-    # which may be a field that is missing.
-    if loc[0] != "body":
-        return None
-    parts: list[str] = []
-    here: object = body
-    for number, part in enumerate(loc[1:], start=2):
-        if isinstance(here, dict) and (part in here or number == len(loc)):
-            here = here.get(part)
-        elif isinstance(here, list) and isinstance(part, int) and part < len(here):
-            here = here[part]
-        else:
-            continue
-        parts.append(str(part).replace("~", "~0").replace("/", "~1"))
-    return "".join("/" + part for part in parts)
 
 
 def _on_service_error(request: Request, error: Exception) -> JSONResponse:

@@ -2,55 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, cast
+from typing import Annotated, cast
 
-from fastapi import APIRouter, Depends, Path, Request, Response
-from pydantic import BaseModel, Field
+from fastapi import APIRouter, Depends, Path, Response
 
+from service.answers.explanations import Explainer, version_of
 from service.api import job_intake as intake
 from service.api.conditional import NOT_MODIFIED
-from service.api.deps import DatabaseDep, own_job_only
+from service.api.deps import CallDep, own_job_only
 from service.api.errors import problem_responses
-from service.api.job_shapes import TargetItem
-from service.api.problems import ServiceError
-from service.api.shapes import Instant, etag_of, matches
-from service.api.timeline_shapes import ViolationOut
-from service.explanations import Explainer, version_of
-from service.opportunities import OpportunityReader
+from service.api.etags import etag_of, matches
+from service.problems.kinds import ServiceError
+from service.scenarios.opportunities import OpportunityReader
 from service.stores.job_store import hashes_of
+from service.wire.timelines import ExplanationOut
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[Depends(own_job_only)])
-
-
-class AttemptOut(BaseModel):
-    """One opportunity of the target, tried in the plan by the referee."""
-
-    opportunity_id: str
-    satellite_id: str
-    start: Instant
-    end: Instant
-    violations: list[ViolationOut] = Field(
-        description="What the plan with it breaks, and did not break before."
-    )
-    displaces: list[str] = Field(
-        description="Ids of the actions that have to go for it; of a pinned opportunity's rivals "
-        "where `ruled_out`."
-    )
-    fits_instead: bool = Field(description="The plan with it and without those is valid.")
-    reward_delta: float | None = Field(description="What that plan earns more.")
-    ruled_out: bool = Field(description="A pin rules it out.")
-
-
-class ExplanationOut(TargetItem):
-    """What became of a target, and what of each of its opportunities."""
-
-    opportunities: list[AttemptOut] = Field(
-        description="In order of time; none of a target that is collected."
-    )
-    access_changes: list[dict[str, Any]] = Field(
-        description="For a target without access: changes that would give it one, each by itself "
-        "and in the form that `relax` of a what-if takes."
-    )
 
 
 @router.get(
@@ -62,28 +29,25 @@ class ExplanationOut(TargetItem):
 def get_explanation(
     job_id: str,
     target_id: Annotated[str, Path(description="Percent-encoded, slashes too.")],
-    database: DatabaseDep,
-    request: Request,
-    response: Response,
+    call: CallDep,
 ) -> ExplanationOut | Response:
     """Explain one target, opportunity by opportunity: what it breaks, displaces and earns.
 
     It is worked out when it is asked for, which may take a while: 503 with `Retry-After` asks
     to come back.
     """
-    with database.reading() as session:
+    with call.database.reading() as session:
         job = intake.find_job(session, job_id)
         timeline = intake.find_timeline(session, job)
         sha256 = hashes_of(session, [job.scenario_id])[job.scenario_id]
-    reader = cast(OpportunityReader, request.app.state.opportunities)
-    described = reader.get(database, job.scenario_id, sha256)
+    reader = cast(OpportunityReader, call.request.app.state.opportunities)
+    described = reader.get(call.database, job.scenario_id, sha256)
     ids = [target.id for target in described.scenario.targets]
     if target_id not in ids:
         raise ServiceError("not_found", f"The job has no target {target_id!r}.")
     etag = etag_of(version_of(job_id, target_id))
-    if matches(request.headers.get("if-none-match"), etag):
+    if matches(call.request.headers.get("if-none-match"), etag):
         return Response(status_code=304, headers={"ETag": etag})
-    explainer = cast(Explainer, request.app.state.explainer)
-    found = explainer.get(job_id, described, timeline, ids.index(target_id))
-    response.headers["ETag"] = etag
-    return ExplanationOut.model_validate(found)
+    explainer = cast(Explainer, call.request.app.state.explainer)
+    call.response.headers["ETag"] = etag
+    return explainer.get(job_id, described, timeline, ids.index(target_id))

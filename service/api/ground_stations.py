@@ -6,31 +6,24 @@ from datetime import UTC, datetime
 from typing import Literal
 
 import sqlalchemy as sa
-from fastapi import APIRouter, Request, Response
-from pydantic import BaseModel, Field
+from fastapi import APIRouter, Response
 from sqlalchemy.orm import Session
 
 from planner_core.errors import Fault
 from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
-from service.api.deps import AuditDep, DatabaseDep, RawBodyDep, require_media_type
+from service.api.deps import CallDep, DatabaseDep, RawBodyDep, require_media_type
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
-from service.api.imports import (
-    Imported,
-    OnError,
-    OnErrorQuery,
-    body_schemas,
-    imported,
-    refuse_if_asked,
-)
-from service.api.paging import Listed, PagingDep, newest_first
-from service.api.problems import ServiceError
-from service.api.shapes import Instant
+from service.api.imports import OnError, OnErrorQuery, body_schemas, imported, refuse_if_asked
+from service.api.paging import PagingDep, newest_first
+from service.db.ids import new_id
 from service.db.rows import GroundStationRow
-from service.ids import new_id
-from service.scenarios.inputs import GroundStationIn
+from service.problems.kinds import ServiceError
 from service.scenarios.records import Checked, check, read_csv, read_geojson
 from service.scenarios.translate import ground_station_from
+from service.wire.base import Listed
+from service.wire.imports import Imported
+from service.wire.places import GroundStationIn, GroundStationOut, ImportedStation
 
 router = APIRouter(prefix="/v1/ground-stations", tags=["ground stations"])
 
@@ -40,34 +33,14 @@ _MOST_STATIONS = 10_000
 _IMPORT_TYPES = ("application/geo+json", "application/json", "text/csv")
 
 
-class GroundStationOut(GroundStationIn):
-    """A ground station."""
-
-    id: str
-    created_at: Instant
-
-
-class ImportedStation(BaseModel):
-    """The station that a record belongs to."""
-
-    id: str
-    name: str
-    row: int | None = Field(description="Line of the file, for CSV.")
-    status: Literal["created", "unchanged"] = Field(
-        description="`unchanged`: the same station is stored already."
-    )
-
-
 @router.post("", status_code=201)
-def create_ground_station(
-    body: GroundStationIn, once: OnceDep, audit: AuditDep, response: Response
-) -> GroundStationOut:
+def create_ground_station(body: GroundStationIn, once: OnceDep, call: CallDep) -> GroundStationOut:
     """Store one ground station."""
     ground_station_from(body, "new")
     with once.transaction() as session:
         row = _add(session, body)
-        audit.record(session, "create", "ground_station", row.id)
-        shown = created(response, _shown(row), f"/v1/ground-stations/{row.id}")
+        call.audit.record(session, "create", "ground_station", row.id)
+        shown = created(call.response, _shown(row), f"/v1/ground-stations/{row.id}")
         return once.keep(session, shown)
 
 
@@ -80,24 +53,20 @@ def create_ground_station(
     responses=problem_responses(413, 415),
 )
 def import_ground_stations(
-    request: Request,
-    data: RawBodyDep,
-    once: OnceDep,
-    audit: AuditDep,
-    on_error: OnErrorQuery = OnError.SKIP,
+    call: CallDep, data: RawBodyDep, once: OnceDep, on_error: OnErrorQuery = OnError.SKIP
 ) -> Imported[ImportedStation]:
     """Store the stations of a file. A station that is stored already is not stored again.
 
     CSV: `lat`, `latitude`, `lon`, `lng` and `longitude` are taken as well. GeoJSON: the
     properties that are fields of a station count, others are ignored.
     """
-    kind = require_media_type(request, *_IMPORT_TYPES)
+    kind = require_media_type(call.request, *_IMPORT_TYPES)
     good, faults = read_stations(kind, data)
     refuse_if_asked(len(good), faults, on_error)
     with once.transaction() as session:
         items = _store(session, good)
         new = [item.id for item in items if item.status == "created"]
-        audit.record(session, "create", "ground_station", *new)
+        call.audit.record(session, "create", "ground_station", *new)
         return once.keep(session, imported(items, faults))
 
 
@@ -128,25 +97,21 @@ def list_ground_stations(database: DatabaseDep, paging: PagingDep) -> Listed[Gro
     response_model=GroundStationOut,
     responses={**NOT_MODIFIED, **problem_responses(404)},
 )
-def get_ground_station(
-    station_id: str, database: DatabaseDep, request: Request, response: Response
-) -> GroundStationOut | Response:
+def get_ground_station(station_id: str, call: CallDep) -> GroundStationOut | Response:
     """Return one ground station."""
-    with database.reading() as session:
+    with call.database.reading() as session:
         shown = _shown(_find(session, station_id))
-    return unless_known(request, response, shown)
+    return unless_known(call.request, call.response, shown)
 
 
 @router.delete("/{station_id}", status_code=204, responses=problem_responses(404, 412))
-def delete_ground_station(
-    station_id: str, database: DatabaseDep, audit: AuditDep, request: Request
-) -> None:
+def delete_ground_station(station_id: str, call: CallDep) -> None:
     """Delete a ground station. Scenarios that use it keep their copy."""
-    with database.transaction() as session:
+    with call.database.transaction() as session:
         row = _find(session, station_id, to_change=True)
-        require_match(request, lambda: _shown(row))
+        require_match(call.request, lambda: _shown(row))
         row.deleted_at = datetime.now(UTC)
-        audit.record(session, "delete", "ground_station", station_id)
+        call.audit.record(session, "delete", "ground_station", station_id)
 
 
 def _find(session: Session, station_id: str, *, to_change: bool = False) -> GroundStationRow:

@@ -16,8 +16,8 @@ from service.access.callers import Scope as KeyScope
 from service.access.rate_limit import RateLimiter
 from service.access.static_keys import StaticKeys
 from service.api.errors import on_database_error, problem
-from service.api.problems import ServiceError
 from service.db.session import Database
+from service.problems.kinds import ServiceError
 from service.settings import Settings
 
 OPEN: Final = (

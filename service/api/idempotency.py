@@ -14,8 +14,8 @@ from sqlalchemy.orm import Session
 from starlette.concurrency import run_in_threadpool
 
 from service.api.deps import CallerDep, DatabaseDep, SettingsDep
-from service.api.problems import ServiceError
 from service.db.session import Database
+from service.problems.kinds import ServiceError
 from service.stores import idempotency_store as store
 from service.stores.idempotency_store import KeptAnswer, Keyed
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from enum import StrEnum
-from typing import Annotated, Any, Generic, TypeVar
+from typing import Annotated, Any, TypeVar
 
 from fastapi import Query
-from pydantic import BaseModel, Field
 
 from planner_core.errors import Fault
-from service.api.errors import refuse
+from service.problems.faults import refuse
+from service.wire.imports import Imported, RejectedRow
 
 T = TypeVar("T")
 
@@ -26,23 +26,6 @@ OnErrorQuery = Annotated[
     OnError,
     Query(description="`skip` stores the good records; `reject_all` stores nothing (422)."),
 ]
-
-
-class RejectedRow(BaseModel):
-    """A record that was not stored, and why."""
-
-    row: int | None = Field(description="Line of the file, from 1; null in JSON and XML.")
-    code: str
-    detail: str
-
-
-class Imported(BaseModel, Generic[T]):
-    """What an import stored, and what it did not."""
-
-    accepted: int
-    rejected: int
-    items: list[T]
-    errors: list[RejectedRow]
 
 
 def refuse_if_asked(accepted: int, faults: Sequence[Fault], on_error: OnError) -> None:

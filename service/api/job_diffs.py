@@ -2,70 +2,23 @@
 
 from __future__ import annotations
 
-import json
-from typing import Any, Literal
+from collections.abc import Iterator
 
-from fastapi import APIRouter, Depends, Request, Response
-from pydantic import BaseModel, Field
+from fastapi import APIRouter, Depends, Response
 
 from planner_core.referee.plan_diff import PlannedAction, plan_diff
+from service.answers.rebuilt import view_of
 from service.api import job_intake as intake
 from service.api.conditional import NOT_MODIFIED
-from service.api.deps import CallerDep, DatabaseDep, own_job_only
+from service.api.deps import CallDep, own_job_only
 from service.api.errors import problem_responses
-from service.api.problems import ServiceError
-from service.api.shapes import Instant, etag_of, matches
-from service.plan_views import view_of
+from service.api.etags import etag_of, matches
+from service.problems.kinds import ServiceError
 from service.stores import job_store as store
+from service.wire.base import read
+from service.wire.timelines import Difference, DiffOut, MovedOut, PlannedOut, TimelineOut, TotalDiff
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[Depends(own_job_only)])
-
-Difference = Literal["scenario", "horizon", "satellites", "use_resources", "dynamics"]
-
-
-class PlannedOut(BaseModel):
-    """A collect or a contact."""
-
-    satellite_id: str
-    mode: Literal["collect", "contact"]
-    target_id: str | None
-    station_id: str | None
-    start: Instant
-    end: Instant
-
-
-class MovedOut(BaseModel):
-    """The same target, or the same satellite's contact of a station, at another time."""
-
-    before: PlannedOut
-    after: PlannedOut
-
-
-class TotalDiff(BaseModel):
-    """A figure of both plans, which differs; null where there is none."""
-
-    before: float | None
-    after: float | None
-    delta: float | None = Field(description="After less before; null where one is missing.")
-
-
-class DiffOut(BaseModel):
-    """From the first job's plan to the second's; nothing of it for the same plan."""
-
-    before: str = Field(description="The first job.")
-    after: str = Field(description="The second one.")
-    is_empty: bool = Field(description="Whether actions and totals are the same.")
-    questions_differ_in: list[Difference] = Field(
-        description="Where the jobs did not plan the same: `scenario` with anything else that is "
-        "listed, or alone where pins, settings or targets differ."
-    )
-    added: list[PlannedOut]
-    removed: list[PlannedOut]
-    moved: list[MovedOut]
-    totals: dict[str, TotalDiff] = Field(
-        description="`reward`, `collects`, `contacts`, `targets` (imaged and counted), what is "
-        "downlinked, the lowest battery and the fullest recorder; only those that differ."
-    )
 
 
 @router.get(
@@ -73,40 +26,33 @@ class DiffOut(BaseModel):
     response_model=DiffOut,
     responses={**NOT_MODIFIED, **problem_responses(404, 409)},
 )
-def get_diff(
-    job_id: str,
-    other_id: str,
-    database: DatabaseDep,
-    caller: CallerDep,
-    request: Request,
-    response: Response,
-) -> DiffOut | Response:
+def get_diff(job_id: str, other_id: str, call: CallDep) -> DiffOut | Response:
     """Compare the plans of two jobs: actions added, removed and moved, and the totals.
 
     Plans of different questions are compared as well, by the ids of satellites, targets and
     stations; `questions_differ_in` says so.
     """
-    with database.reading() as session:
-        if caller.visible_owner not in (None, store.owner_of(session, other_id)):
+    with call.database.reading() as session:
+        if call.caller.visible_owner not in (None, store.owner_of(session, other_id)):
             raise ServiceError("not_found", f"There is no job {other_id!r}.")
         jobs = [intake.find_job(session, own_id) for own_id in (job_id, other_id)]
         before, after = (intake.find_timeline(session, job) for job in jobs)
     etag = etag_of(f"{job_id}/{other_id}")  # timelines never change
-    if matches(request.headers.get("if-none-match"), etag):
+    if matches(call.request.headers.get("if-none-match"), etag):
         return Response(status_code=304, headers={"ETag": etag})
-    response.headers["ETag"] = etag
+    call.response.headers["ETag"] = etag
     return _diff(job_id, other_id, before, after)
 
 
 def _diff(job_id: str, other_id: str, before: str, after: str) -> DiffOut:
-    first, second = json.loads(before), json.loads(after)
-    one, other = view_of(before, first), view_of(after, second)
+    first, second = read(TimelineOut, before), read(TimelineOut, after)
+    one, other = view_of(first), view_of(second)
     found = plan_diff(one, other)
     return DiffOut(
         before=job_id,
         after=other_id,
         is_empty=found.is_empty,
-        questions_differ_in=_differences(first, second),
+        questions_differ_in=tuple(_differences(first, second)),
         added=[_shown(action) for action in found.added],
         removed=[_shown(action) for action in found.removed],
         moved=[MovedOut(before=_shown(a), after=_shown(b)) for a, b in found.moved],
@@ -117,19 +63,17 @@ def _diff(job_id: str, other_id: str, before: str, after: str) -> DiffOut:
     )
 
 
-def _differences(first: dict[str, Any], second: dict[str, Any]) -> list[Difference]:
-    found: list[Difference] = []
-    if first["scenario_sha256"] != second["scenario_sha256"]:
-        found.append("scenario")
-    if first["horizon"] != second["horizon"]:
-        found.append("horizon")
-    if {s["id"] for s in first["satellites"]} != {s["id"] for s in second["satellites"]}:
-        found.append("satellites")
-    if first["use_resources"] != second["use_resources"]:
-        found.append("use_resources")
-    if first["dynamics"] != second["dynamics"]:
-        found.append("dynamics")
-    return found
+def _differences(first: TimelineOut, second: TimelineOut) -> Iterator[Difference]:
+    if first.scenario_sha256 != second.scenario_sha256:
+        yield "scenario"
+    if first.horizon != second.horizon:
+        yield "horizon"
+    if {s.id for s in first.satellites} != {s.id for s in second.satellites}:
+        yield "satellites"
+    if first.use_resources != second.use_resources:
+        yield "use_resources"
+    if first.dynamics != second.dynamics:
+        yield "dynamics"
 
 
 def _shown(action: PlannedAction) -> PlannedOut:

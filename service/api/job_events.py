@@ -16,7 +16,7 @@ from service.api.job_shapes import etag_of_job, shown
 from service.api.job_wait import wait_for_change
 from service.db.failures import why_unavailable
 from service.db.session import Database
-from service.jobs import lease
+from service.wire.jobs import ACTIVE, FINAL
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[Depends(own_job_only)])
 log = logging.getLogger(__name__)
@@ -49,7 +49,7 @@ async def job_events(
     """
     job, _ = await wait_for_change(database, job_id, None, 0.0, _never)
     seen = last_event_id or _NOTHING_SEEN
-    if job.state in lease.FINAL and seen == str(job.version):
+    if job.state in FINAL and seen == str(job.version):
         # What browsers do after a stream has ended is to ask for it again, for ever.
         return Response(status_code=204)
     return StreamingResponse(
@@ -74,9 +74,9 @@ async def _events(database: Database, job_id: str, seen: str) -> AsyncIterator[s
             seen = etag_of_job(job)
             data = shown(job, sha256).model_dump_json()
             yield f"id: {job.version}\nevent: job\ndata: {data}\n\n"
-        elif job.state in lease.ACTIVE:
+        elif job.state in ACTIVE:
             yield ": nothing new\n\n"
-        if job.state in lease.FINAL:
+        if job.state in FINAL:
             return
 
 

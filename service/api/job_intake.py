@@ -12,21 +12,22 @@ from sqlalchemy.orm import Session
 from planner_core.errors import Fault
 from planner_core.solvers.registry import solver_class
 from service.access.audit import Audit
+from service.answers import store as answer_store
 from service.api import ask_again
-from service.api.errors import refuse
-from service.api.job_shapes import JobOut, LimitsIn, QuestionIn, headers_of, shown
-from service.api.problems import ServiceError
+from service.api.job_shapes import headers_of, shown
 from service.db.rows import JobRow
 from service.db.session import Database
-from service.jobs import lease
 from service.jobs.queue import JobQueue
-from service.scenarios.inputs import ScenarioFile, ScenarioIn
+from service.jobs.solver_params import params_of, parse_params
+from service.problems.faults import refuse
+from service.problems.kinds import ServiceError
+from service.scenarios import freezing as scenario_store
+from service.scenarios.freezing import FrozenScenario
 from service.scenarios.translate import inside, read_file
 from service.settings import Settings
-from service.solver_params import params_of, parse_params
-from service.stores import answer_store, scenario_store
 from service.stores import job_store as store
-from service.stores.scenario_store import FrozenScenario
+from service.wire.jobs import ACTIVE, JobOut, LimitsIn, QuestionIn
+from service.wire.scenarios import ScenarioFile, ScenarioIn
 
 _QUEUE_FULL_S: Final = 30
 
@@ -110,7 +111,7 @@ def find_job(session: Session, job_id: str) -> JobRow:
 
 def not_ready(job: JobRow) -> ServiceError:
     """Return the error for a job without an answer, yet or for good."""
-    if job.state in lease.ACTIVE:
+    if job.state in ACTIVE:
         headers = {"Retry-After": str(ask_again.SOON_S)}
         return ServiceError("not_ready", f"The job is {job.state}.", headers=headers)
     why = job.error["code"] if job.error else "it was stopped before it had a plan"
@@ -126,7 +127,7 @@ def require_answer(session: Session, job: JobRow) -> datetime:
 
 
 def find_timeline(session: Session, job: JobRow) -> str:
-    """Return a job's timeline document; 409 where there is none."""
+    """Return a job's timeline as JSON text; 409 where there is none."""
     timeline = answer_store.timeline_of(session, job.id)
     if timeline is None:
         raise not_ready(job)

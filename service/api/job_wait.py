@@ -8,13 +8,13 @@ from typing import Final
 
 from starlette.concurrency import run_in_threadpool
 
+from service.api.etags import matches
 from service.api.job_shapes import etag_of_job
-from service.api.problems import ServiceError
-from service.api.shapes import matches
 from service.db.rows import JobRow
 from service.db.session import Database
-from service.jobs import lease
+from service.problems.kinds import ServiceError
 from service.stores import job_store as store
+from service.wire.jobs import ACTIVE
 
 LOOK_EVERY_S: Final = 0.1
 
@@ -42,7 +42,7 @@ async def wait_for_change(
     seen = etag_of_job(job) if known is None else known
     clock = asyncio.get_running_loop()
     until_s = clock.time() + wait_s
-    while job.state in lease.ACTIVE and matches(seen, etag_of_job(job)):
+    while job.state in ACTIVE and matches(seen, etag_of_job(job)):
         left_s = until_s - clock.time()
         if left_s <= 0 or await is_disconnected():
             break

@@ -5,24 +5,25 @@ from __future__ import annotations
 import logging
 from typing import Annotated, Final
 
-from fastapi import APIRouter, Depends, Query, Request, Response
+from fastapi import APIRouter, Depends, Query, Response
 from sqlalchemy.exc import SQLAlchemyError
 
 from service.api import job_intake as intake
 from service.api.conditional import NOT_MODIFIED
-from service.api.deps import AuditDep, CallerDep, DatabaseDep, SettingsDep, own_job_only
+from service.api.deps import CallDep, own_job_only
 from service.api.errors import problem_responses
+from service.api.etags import matches
 from service.api.idempotency import OnceDep
-from service.api.job_shapes import JobIn, JobOut, etag_of_job, shown
+from service.api.job_shapes import etag_of_job, shown
 from service.api.job_wait import wait_for_change
-from service.api.paging import Listed, PagingDep, newest_first
-from service.api.problems import ServiceError
-from service.api.shapes import matches
+from service.api.paging import PagingDep, newest_first
 from service.db.rows import JobRow
-from service.jobs import lease
-from service.jobs.lease import JobState
+from service.jobs import lease, submission
 from service.jobs.queue import JobQueue
+from service.problems.kinds import ServiceError
 from service.stores import job_store as store
+from service.wire.base import Listed
+from service.wire.jobs import JobIn, JobOut, JobState
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[Depends(own_job_only)])
 log = logging.getLogger(__name__)
@@ -31,28 +32,19 @@ LONGEST_WAIT_S: Final = 30.0
 
 
 @router.post("", status_code=202, responses=problem_responses(503))
-def create_job(
-    body: JobIn,
-    database: DatabaseDep,
-    settings: SettingsDep,
-    once: OnceDep,
-    caller: CallerDep,
-    audit: AuditDep,
-    request: Request,
-    response: Response,
-) -> JobOut:
+def create_job(body: JobIn, call: CallDep, once: OnceDep) -> JobOut:
     """Queue a job; the answer tells where to follow it.
 
     Jobs with a higher `priority` start first, those of the same priority in their order.
     """
-    queue = intake.queue_of(request)
+    queue = intake.queue_of(call.request)
     params = intake.all_params(body.solver, body.params)
-    time_s, memory_mb = intake.limits_of(body.limits, settings)
-    inline = intake.frozen(database, settings, body)
+    time_s, memory_mb = intake.limits_of(body.limits, call.settings)
+    inline = intake.frozen(call.database, call.settings, body)
     with once.transaction() as session:
-        intake.require_room(session, settings)
-        spec = store.JobSpec(
-            scenario_id=intake.stored_scenario(session, audit, body, inline),
+        intake.require_room(session, call.settings)
+        spec = submission.JobSpec(
+            scenario_id=intake.stored_scenario(session, call.audit, body, inline),
             solver=body.solver,
             params=params,
             seed=body.seed,
@@ -60,17 +52,16 @@ def create_job(
             memory_mb=memory_mb,
             priority=body.priority,
             label=body.label,
-            owner=caller.owner,
+            owner=call.caller.owner,
         )
-        job = store.submit(session, queue, spec)
-        audit.record(session, "create", "job", job.id)
-        return once.keep(session, intake.accepted(session, response, job))
+        job = submission.submit(session, queue, spec)
+        call.audit.record(session, "create", "job", job.id)
+        return once.keep(session, intake.accepted(session, call.response, job))
 
 
 @router.get("")
 def list_jobs(
-    database: DatabaseDep,
-    caller: CallerDep,
+    call: CallDep,
     paging: PagingDep,
     state: Annotated[JobState | None, Query(description="Only jobs in this state.")] = None,
     solver: Annotated[str | None, Query(description="Only jobs of this solver.")] = None,
@@ -83,9 +74,9 @@ def list_jobs(
         solver=solver,
         scenario_id=scenario_id,
         label=label,
-        tenant=caller.visible_owner,
+        tenant=call.caller.visible_owner,
     )
-    with database.reading() as session:
+    with call.database.reading() as session:
         page = newest_first(session, query, JobRow.id, paging)
         hashes = store.scenario_hashes(session, page.rows)
     return Listed(items=[shown(job, hashes[job.scenario_id]) for job in page.rows], next=page.next)
@@ -98,9 +89,7 @@ def list_jobs(
 )
 async def get_job(
     job_id: str,
-    database: DatabaseDep,
-    request: Request,
-    response: Response,
+    call: CallDep,
     wait: Annotated[
         float,
         Query(ge=0, le=LONGEST_WAIT_S, description="Hold so many seconds for a change."),
@@ -111,20 +100,20 @@ async def get_job(
     With `wait` the answer is held until the job changes: from what `If-None-Match` names, or
     else from what it is now. A finished job is answered at once.
     """
-    known = request.headers.get("if-none-match")
-    job, sha256 = await wait_for_change(database, job_id, known, wait, request.is_disconnected)
+    known = call.request.headers.get("if-none-match")
+    job, sha256 = await wait_for_change(
+        call.database, job_id, known, wait, call.request.is_disconnected
+    )
     if matches(known, etag_of_job(job)):
         return Response(status_code=304, headers={"ETag": etag_of_job(job)})
-    intake.describe(response, job)
+    intake.describe(call.response, job)
     return shown(job, sha256)
 
 
 @router.post("/{job_id}/cancel", status_code=202, responses=problem_responses(404, 409, 503))
-def cancel_job(
-    job_id: str, database: DatabaseDep, audit: AuditDep, request: Request, response: Response
-) -> JobOut:
+def cancel_job(job_id: str, call: CallDep) -> JobOut:
     """Cancel a job: at once where it waits; a running one stops and keeps its best plan so far."""
-    with database.transaction() as session:
+    with call.database.transaction() as session:
         job = intake.find_job(session, job_id)
         was_waiting = job.state == "queued"
         if not lease.request_cancel(session, job_id):
@@ -133,37 +122,29 @@ def cancel_job(
                 f"The job is {job.state}, which is final: no transition is allowed from there. "
                 "Only queued and running jobs can be cancelled.",
             )
-        audit.record(session, "cancel", "job", job_id)
+        call.audit.record(session, "cancel", "job", job_id)
         session.refresh(job)
         answer = intake.shown_job(session, job)
     if was_waiting:
-        _forget(intake.queue_of(request), job)
-    intake.describe(response, job)
+        _forget(intake.queue_of(call.request), job)
+    intake.describe(call.response, job)
     return answer
 
 
 @router.post("/{job_id}/rerun", status_code=202, responses=problem_responses(404, 503))
-def rerun_job(
-    job_id: str,
-    settings: SettingsDep,
-    once: OnceDep,
-    caller: CallerDep,
-    audit: AuditDep,
-    request: Request,
-    response: Response,
-) -> JobOut:
+def rerun_job(job_id: str, call: CallDep, once: OnceDep) -> JobOut:
     """Queue the same question again as a new job, whatever became of the first.
 
     Scenario, solver, params, seed, limits, priority and label are the first one's, to which
     `links.rerun_of` leads. Same seed and same version of the service give the same plan.
     """
-    queue = intake.queue_of(request)
+    queue = intake.queue_of(call.request)
     with once.transaction() as session:
-        spec = store.spec_again(intake.find_job(session, job_id), caller.owner)
-        intake.require_room(session, settings)
-        job = store.submit(session, queue, spec)
-        audit.record(session, "create", "job", job.id)
-        return once.keep(session, intake.accepted(session, response, job))
+        spec = submission.spec_again(intake.find_job(session, job_id), call.caller.owner)
+        intake.require_room(session, call.settings)
+        job = submission.submit(session, queue, spec)
+        call.audit.record(session, "create", "job", job.id)
+        return once.keep(session, intake.accepted(session, call.response, job))
 
 
 def _forget(queue: JobQueue, job: JobRow) -> None:

@@ -6,53 +6,20 @@ from datetime import UTC, datetime, timedelta
 from typing import Annotated
 
 import sqlalchemy as sa
-from fastapi import APIRouter, Path, Request
-from pydantic import BaseModel, Field
+from fastapi import APIRouter, Path
 
 import planner_core
-from service.api.deps import DatabaseDep
+from service.api.deps import CallDep
 from service.api.errors import problem_responses
-from service.api.problems import KINDS, ServiceError, kind_of
-from service.api.shapes import Instant
 from service.db.rows import WorkerRow
 from service.db.session import Database
 from service.jobs.queue import JobQueue
+from service.problems.kinds import KINDS, ServiceError, kind_of
+from service.wire.operations import Live, ProblemExplained, Ready, Version
 
 router = APIRouter(tags=["operations"])
 
 WORKER_SILENCE = timedelta(seconds=30)
-
-
-class Live(BaseModel):
-    """The process answers."""
-
-    status: str = "live"
-
-
-class Ready(BaseModel):
-    """Jobs can be taken and run."""
-
-    status: str = "ready"
-    database: str = "ok"
-    queue: str = "ok"
-    workers: int = Field(description="Workers heard of in the last 30 seconds.")
-    last_heartbeat: Instant
-
-
-class Version(BaseModel):
-    """What runs here."""
-
-    name: str = "slewline"
-    version: str
-
-
-class ProblemExplained(BaseModel):
-    """What a problem code means, and what to do about it."""
-
-    code: str
-    title: str
-    status: int
-    explanation: str
 
 
 @router.get("/health/live")
@@ -63,10 +30,10 @@ async def live() -> Live:
 
 
 @router.get("/health/ready", responses=problem_responses(503))
-def ready(database: DatabaseDep, request: Request) -> Ready:
+def ready(call: CallDep) -> Ready:
     """Say whether database and queue answer, and a worker was heard of in the last 30 seconds."""
-    workers = _recent_workers(database)
-    _ask_queue(request.app.state.queue)
+    workers = _recent_workers(call.database)
+    _ask_queue(call.request.app.state.queue)
     if not workers:
         raise ServiceError("not_live", "No worker has been heard of in the last 30 seconds.")
     return Ready(workers=len(workers), last_heartbeat=max(workers))

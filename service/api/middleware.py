@@ -13,8 +13,8 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.access.callers import Caller
 from service.api.metrics import CallCounters
-from service.ids import new_id
-from service.logs import request_id
+from service.db.ids import new_id
+from service.process.logs import request_id
 
 logger = logging.getLogger("service.access")
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import re
 from html import escape
 from typing import Any
 
@@ -12,12 +13,13 @@ from fastapi.openapi.utils import get_openapi
 from fastapi.responses import HTMLResponse
 from pydantic import BaseModel
 
-from service.api.errors import ProblemOut, problem_responses
+from service.api.errors import problem_responses
 from service.api.examples import add_examples
 from service.api.guard import is_limited, is_open
 from service.api.links import add_links
-from service.api.target_catalogs import TargetCatalogIn
-from service.api.timeline_shapes import ProofOut, TimelineOut
+from service.wire.operations import ProblemOut
+from service.wire.places import TargetCatalogIn
+from service.wire.timelines import ProofOut, TimelineOut
 
 router = APIRouter(include_in_schema=False)
 
@@ -29,6 +31,7 @@ _FURTHER_SCHEMAS: dict[str, type[BaseModel]] = {
     "Proof": ProofOut,
 }
 
+_SENTENCE = re.compile(r"(.+?)\.(?:\s+|$)(.*)", re.DOTALL)
 _ALWAYS = (422, 500, 503)
 _WITH_BODY = (413, 415)
 # What each of these answers says about itself, and which request header brings it about.
@@ -92,6 +95,7 @@ def _with_problems(document: dict[str, Any]) -> dict[str, Any]:
     document["components"]["securitySchemes"] = _KEYS
     for path, operations in document["paths"].items():
         for operation in operations.values():
+            _summarise(operation)
             statuses = _ALWAYS + (_WITH_BODY if "requestBody" in operation else ())
             statuses += _LIMITED if is_limited(path) else ()
             if not is_open(path):
@@ -113,6 +117,14 @@ def _with_problems(document: dict[str, Any]) -> dict[str, Any]:
     add_examples(document)
     add_links(document)
     return document
+
+
+def _summarise(operation: dict[str, Any]) -> None:
+    """Take the first sentence of the description as the summary, which was a function's name."""
+    if found := _SENTENCE.match(operation.get("description", "")):
+        first, rest = found.groups()
+        operation["summary"] = " ".join(first.split())
+        operation["description"] = rest or f"{first}."
 
 
 def _header_parameter(name: str, description: str) -> dict[str, Any]:

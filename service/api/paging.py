@@ -10,21 +10,13 @@ from typing import Annotated, Generic, TypeVar
 
 import sqlalchemy as sa
 from fastapi import Depends, Query, Request, Response
-from pydantic import BaseModel, Field
 from sqlalchemy.orm import InstrumentedAttribute, Session
 
-from service.api.problems import ServiceError
+from service.problems.kinds import ServiceError
 
 T = TypeVar("T")
 R = TypeVar("R")
 K = TypeVar("K", str, int)
-
-
-class Listed(BaseModel, Generic[T]):
-    """One page of a list."""
-
-    items: list[T]
-    next: str | None = Field(description="Cursor of the next page; null on the last one.")
 
 
 @dataclass(frozen=True, slots=True)

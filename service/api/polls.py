@@ -15,8 +15,8 @@ from starlette.responses import Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from service.access.callers import Caller
+from service.api.etags import matches
 from service.api.job_shapes import etag_of_job, etag_of_timeline, headers_of, shown
-from service.api.shapes import matches
 from service.api.together import Together
 from service.db.rows import JobResultRow, JobRow, ScenarioRow
 from service.db.session import Database

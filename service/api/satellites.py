@@ -4,34 +4,37 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from datetime import UTC, datetime
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
 import sqlalchemy as sa
-from fastapi import APIRouter, Query, Request, Response
-from pydantic import BaseModel, Field
+from fastapi import APIRouter, Query, Response
 from sqlalchemy.orm import Session
 
 from planner_core.errors import Fault
 from planner_core.orbits.ingest import read_elements
 from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
-from service.api.deps import AuditDep, DatabaseDep, RawBodyDep, require_media_type
-from service.api.errors import problem_responses, refuse
+from service.api.deps import CallDep, DatabaseDep, RawBodyDep, require_media_type
+from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
-from service.api.imports import (
-    Imported,
-    OnError,
-    OnErrorQuery,
-    body_schemas,
-    imported,
-    refuse_if_asked,
-)
-from service.api.paging import Listed, PagingDep, newest_first
-from service.api.problems import ServiceError
-from service.api.shapes import Instant
+from service.api.imports import OnError, OnErrorQuery, body_schemas, imported, refuse_if_asked
+from service.api.paging import PagingDep, newest_first
 from service.db.rows import ElementSetRow, SatelliteRow
-from service.scenarios.inputs import AgilityIn, OrbitIn, ResourcesField, SatelliteIn, SensorIn
+from service.problems.faults import refuse
+from service.problems.kinds import ServiceError
 from service.scenarios.translate import orbit_from, satellite_from
 from service.stores import satellite_store as store
+from service.wire.base import Listed
+from service.wire.imports import Imported
+from service.wire.satellites import (
+    AgilityIn,
+    ElementsOut,
+    ImportedSatellite,
+    OrbitIn,
+    RecordWarning,
+    SatelliteIn,
+    SatelliteOut,
+    SensorIn,
+)
 
 router = APIRouter(prefix="/v1/satellites", tags=["satellites"])
 
@@ -40,66 +43,15 @@ _ACTIONS: Final[dict[store.Status, str]] = {"created": "create", "elements_added
 _IMPORT_TYPES = ("text/plain", "application/json", "text/csv", "application/xml", "text/xml")
 
 
-class ElementsOut(BaseModel):
-    """One element set of a satellite."""
-
-    id: str
-    epoch: Instant
-    tle: list[str] | None
-    omm: dict[str, Any] | None
-    created_at: Instant
-
-
-class SatelliteOut(BaseModel):
-    """A satellite with the element set in force, the one of the newest epoch."""
-
-    id: str
-    name: str
-    norad_cat_id: int
-    epoch: Instant
-    tle: list[str] | None
-    omm: dict[str, Any] | None
-    agility: AgilityIn
-    sensor: SensorIn
-    resources: ResourcesField
-    created_at: Instant
-    links: dict[str, str]
-
-
-class RecordWarning(BaseModel):
-    """What was put right while reading a record."""
-
-    row: int | None
-    code: str
-    detail: str
-
-
-class ImportedSatellite(BaseModel):
-    """The satellite that a record belongs to."""
-
-    id: str
-    name: str
-    norad_cat_id: int
-    epoch: Instant
-    row: int | None = Field(description="Line of the file where the record starts.")
-    status: store.Status = Field(
-        description="`elements_added`: the catalogue number was known, the epoch was not; "
-        "`unchanged`: both were."
-    )
-    warnings: list[RecordWarning]
-
-
 @router.post("", status_code=201)
-def create_satellite(
-    body: SatelliteIn, once: OnceDep, audit: AuditDep, response: Response
-) -> SatelliteOut:
+def create_satellite(body: SatelliteIn, once: OnceDep, call: CallDep) -> SatelliteOut:
     """Store one satellite. A second one with the same catalogue number is another satellite."""
     satellite_from(body, "new")
     orbit = orbit_from(body)
     with once.transaction() as session:
-        row = store.add_satellite(session, body, orbit)
-        audit.record(session, "create", "satellite", row.id)
-        shown = created(response, _shown(session, [row])[0], f"/v1/satellites/{row.id}")
+        row = store.add_satellite(session, body, orbit.elements, orbit.stored)
+        call.audit.record(session, "create", "satellite", row.id)
+        shown = created(call.response, _shown(session, [row])[0], f"/v1/satellites/{row.id}")
         return once.keep(session, shown)
 
 
@@ -114,11 +66,7 @@ def create_satellite(
     responses=problem_responses(413, 415),
 )
 def import_satellites(
-    request: Request,
-    data: RawBodyDep,
-    once: OnceDep,
-    audit: AuditDep,
-    on_error: OnErrorQuery = OnError.SKIP,
+    call: CallDep, data: RawBodyDep, once: OnceDep, on_error: OnErrorQuery = OnError.SKIP
 ) -> Imported[ImportedSatellite]:
     """Store the element sets of a file; satellites get the paper's agility, sensor and resources.
 
@@ -126,13 +74,13 @@ def import_satellites(
     joins that satellite, as a further element set where its epoch is new. Two records of one
     satellite and epoch in a file are one; the second is reported.
     """
-    found = read_elements(data, require_media_type(request, *_IMPORT_TYPES))
+    found = read_elements(data, require_media_type(call.request, *_IMPORT_TYPES))
     refuse_if_asked(len(found.entries), found.faults, on_error)
     with once.transaction() as session:
         items = [_imported(one) for one in store.import_entries(session, found.entries)]
         for status, action in _ACTIONS.items():
             changed = [item.id for item in items if item.status == status]
-            audit.record(session, action, "satellite", *changed)
+            call.audit.record(session, action, "satellite", *changed)
         return once.keep(session, imported(items, found.faults))
 
 
@@ -158,50 +106,39 @@ def list_satellites(
     response_model=SatelliteOut,
     responses={**NOT_MODIFIED, **problem_responses(404)},
 )
-def get_satellite(
-    satellite_id: str, database: DatabaseDep, request: Request, response: Response
-) -> SatelliteOut | Response:
+def get_satellite(satellite_id: str, call: CallDep) -> SatelliteOut | Response:
     """Return one satellite with the element set in force."""
-    with database.reading() as session:
+    with call.database.reading() as session:
         shown = _shown(session, [find_satellite(session, satellite_id)])[0]
-    return unless_known(request, response, shown)
+    return unless_known(call.request, call.response, shown)
 
 
 @router.delete("/{satellite_id}", status_code=204, responses=problem_responses(404, 412))
-def delete_satellite(
-    satellite_id: str, database: DatabaseDep, audit: AuditDep, request: Request
-) -> None:
+def delete_satellite(satellite_id: str, call: CallDep) -> None:
     """Delete a satellite. Scenarios that use it keep their copy."""
-    with database.transaction() as session:
+    with call.database.transaction() as session:
         row = find_satellite(session, satellite_id, to_change=True)
-        require_match(request, lambda: _shown(session, [row])[0])
+        require_match(call.request, lambda: _shown(session, [row])[0])
         row.deleted_at = datetime.now(UTC)
-        audit.record(session, "delete", "satellite", satellite_id)
+        call.audit.record(session, "delete", "satellite", satellite_id)
 
 
 @router.put("/{satellite_id}/elements", responses=problem_responses(404, 412))
-def put_elements(
-    satellite_id: str,
-    body: OrbitIn,
-    database: DatabaseDep,
-    audit: AuditDep,
-    request: Request,
-    response: Response,
-) -> SatelliteOut:
+def put_elements(satellite_id: str, body: OrbitIn, call: CallDep) -> SatelliteOut:
     """Store a further element set of the satellite; that of the newest epoch is in force.
 
     Older ones stay readable. Scenarios that exist do not change. `If-Match` takes the ETag of
     the satellite.
     """
     orbit = orbit_from(body)
-    with database.transaction() as session:
+    with call.database.transaction() as session:
         row = find_satellite(session, satellite_id, to_change=True)
-        require_match(request, lambda: _shown(session, [row])[0])
+        require_match(call.request, lambda: _shown(session, [row])[0])
         _require_same_object(row, orbit.elements.norad_cat_id, body)
         store.add_elements(session, row.id, orbit.elements.epoch, orbit.stored)
-        audit.record(session, _ADD_ELEMENTS, "satellite", row.id)
+        call.audit.record(session, _ADD_ELEMENTS, "satellite", row.id)
         shown = _shown(session, [row])[0]
-    return created(response, shown, f"/v1/satellites/{row.id}/elements")
+    return created(call.response, shown, f"/v1/satellites/{row.id}/elements")
 
 
 @router.get("/{satellite_id}/elements", responses=problem_responses(404))

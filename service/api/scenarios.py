@@ -4,109 +4,39 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from typing import Annotated, Any, Literal, cast
+from typing import Annotated, Any, cast
 
 import numpy as np
 import sqlalchemy as sa
 from fastapi import APIRouter, Query, Request, Response
-from pydantic import BaseModel, Field
 from sqlalchemy.orm import Session
 
 from planner_core.build import view_at
-from planner_core.domain import CollectAlignment, Dynamics, Nadir
 from planner_core.orbits.places import View
 from planner_core.problem import COLLECT, CONTACT
 from service.api.conditional import NOT_MODIFIED, created, unless_known
-from service.api.deps import AuditDep, DatabaseDep, SettingsDep
+from service.api.deps import CallDep, DatabaseDep
 from service.api.errors import problem_responses
+from service.api.etags import etag_of, matches
 from service.api.idempotency import OnceDep
-from service.api.paging import Listed, PagingDep, newest_first
-from service.api.problems import ServiceError
-from service.api.shapes import Instant, etag_of, matches
+from service.api.paging import PagingDep, newest_first
 from service.db.rows import ScenarioRow
-from service.opportunities import Described, OpportunityReader
-from service.scenarios.inputs import ScenarioFile, ScenarioIn
-from service.scenarios.pin_inputs import PinsIn
-from service.stores import scenario_store as store
+from service.problems.kinds import ServiceError
+from service.scenarios import freezing as store
+from service.scenarios.opportunities import Described, OpportunityReader
+from service.wire.base import Listed
+from service.wire.scenarios import (
+    Kind,
+    OpportunityOut,
+    ScenarioFile,
+    ScenarioIn,
+    ScenarioOut,
+    ViewOut,
+)
 
 router = APIRouter(prefix="/v1/scenarios", tags=["scenarios"])
 
-Kind = Literal["collect", "contact"]
 _KINDS: dict[str, int] = {"collect": COLLECT, "contact": CONTACT}
-
-
-class HorizonOut(BaseModel):
-    """The span to plan."""
-
-    start: Instant
-    end: Instant
-
-
-class Counts(BaseModel):
-    """How much the scenario holds."""
-
-    satellites: int
-    targets: int
-    ground_stations: int
-
-
-class ScenarioOut(BaseModel):
-    """A frozen question. Later edits of what it names change nothing in it."""
-
-    id: str
-    sha256: str = Field(description="Of the canonical content, the name left out.")
-    name: str | None
-    horizon: HorizonOut
-    satellite_ids: list[str]
-    target_catalog_ids: list[str]
-    ground_station_ids: list[str]
-    use_resources: bool
-    dynamics: Dynamics
-    collect_spacing_s: float | None
-    collect_alignment: CollectAlignment = "access"
-    continuous_starts: bool
-    allow_old_elements: bool
-    pins: PinsIn = PinsIn()
-    counts: Counts
-    warnings: list[str] = Field(description="About the age of orbits, for people.")
-    created_at: Instant
-    links: dict[str, str]
-
-
-class ViewOut(BaseModel):
-    """What satellite and place see of each other at one instant."""
-
-    off_nadir_deg: float
-    elevation_deg: float
-    azimuth_deg: float
-    range_km: float
-    sun_elevation_deg: float
-    eclipse: bool
-
-
-class OpportunityOut(BaseModel):
-    """A collect or a contact that a plan may take. Angles and range hold at its middle."""
-
-    id: str
-    satellite_id: str
-    kind: Kind
-    target_id: str | None = Field(description="Of a collect.")
-    station_id: str | None = Field(description="Of a contact.")
-    start: Instant
-    end: Instant
-    access_start: Instant = Field(
-        description="The opportunity lies within its access, cut to the release and due times."
-    )
-    access_end: Instant
-    off_nadir_deg: float = Field(description="At the satellite, from the nadir named below.")
-    elevation_deg: float = Field(description="At the target or station.")
-    azimuth_deg: float = Field(description="Of the satellite, from north over east.")
-    sun_elevation_deg: float = Field(description="At the target or station.")
-    range_km: float = Field(description="From the satellite to the target or station.")
-    eclipse: bool = Field(description="The satellite is in the Earth's shadow.")
-    nadir: Nadir = Field(description="What off-nadir angles are measured from.")
-    at_start: ViewOut | None = Field(None, description="With `edges=true`.")
-    at_end: ViewOut | None = Field(None, description="With `edges=true`.")
 
 
 @router.post(
@@ -114,25 +44,18 @@ class OpportunityOut(BaseModel):
     status_code=201,
     responses={200: {"model": ScenarioOut, "description": "The same question is stored already."}},
 )
-def create_scenario(
-    body: ScenarioIn,
-    database: DatabaseDep,
-    settings: SettingsDep,
-    once: OnceDep,
-    audit: AuditDep,
-    response: Response,
-) -> ScenarioOut:
+def create_scenario(body: ScenarioIn, call: CallDep, once: OnceDep) -> ScenarioOut:
     """Freeze a question: everything it names is copied into it.
 
     The same content again, under whatever name, answers 200 with the scenario that is there.
     """
-    frozen = store.freeze(database, body, settings.scenario_limits)
+    frozen = store.freeze(call.database, body, call.settings.scenario_limits)
     with once.transaction() as session:
         row, is_new = store.save(session, frozen)
         if is_new:
-            audit.record(session, "create", "scenario", row.id)
-        response.status_code = 201 if is_new else 200
-        return once.keep(session, created(response, _shown(row), f"/v1/scenarios/{row.id}"))
+            call.audit.record(session, "create", "scenario", row.id)
+        call.response.status_code = 201 if is_new else 200
+        return once.keep(session, created(call.response, _shown(row), f"/v1/scenarios/{row.id}"))
 
 
 @router.get("")
@@ -150,19 +73,17 @@ def list_scenarios(database: DatabaseDep, paging: PagingDep) -> Listed[ScenarioO
 )
 def get_scenario(
     scenario_id: str,
-    database: DatabaseDep,
-    request: Request,
-    response: Response,
+    call: CallDep,
     expand: Annotated[
         bool, Query(description="Answer the self-contained scenario file instead.")
     ] = False,
 ) -> ScenarioOut | Response:
     """Return one scenario; with `expand`, as the file that `slewline solve` takes."""
-    with database.reading() as session:
+    with call.database.reading() as session:
         row = _find(session, scenario_id)
         if expand:
-            return _file(request, row)
-    return unless_known(request, response, _shown(row))
+            return _file(call.request, row)
+    return unless_known(call.request, call.response, _shown(row))
 
 
 def _file(request: Request, row: ScenarioRow) -> Response:
@@ -178,8 +99,7 @@ def _file(request: Request, row: ScenarioRow) -> Response:
 @router.get("/{scenario_id}/opportunities", responses=problem_responses(404, 503))
 def list_opportunities(
     scenario_id: str,
-    database: DatabaseDep,
-    request: Request,
+    call: CallDep,
     paging: PagingDep,
     target_id: Annotated[str | None, Query(description="Only collects of this target.")] = None,
     satellite_id: Annotated[str | None, Query(description="Only of this satellite.")] = None,
@@ -191,26 +111,25 @@ def list_opportunities(
     The first call computes the opportunities, which may take a while: 503 with `Retry-After`
     asks to come back.
     """
-    with database.reading() as session:
+    with call.database.reading() as session:
         sha256 = _find(session, scenario_id).sha256
-    reader = cast(OpportunityReader, request.app.state.opportunities)
-    described = reader.get(database, scenario_id, sha256)
+    reader = cast(OpportunityReader, call.request.app.state.opportunities)
+    described = reader.get(call.database, scenario_id, sha256)
     rows = _matching(described, target_id, satellite_id, kind)
     first = int(np.searchsorted(rows, paging.after_number(), side="right"))
     page = paging.answer(rows[first : first + paging.limit + 1].tolist(), lambda row: row)
-    items = [_opportunity(described, row) for row in page.rows]
-    if edges:
-        _add_edges(described, page.rows, items)
+    seen = _edges(described, page.rows) if edges else [{} for _ in page.rows]
+    items = [_opportunity(described, row, **at) for row, at in zip(page.rows, seen, strict=True)]
     return Listed(items=items, next=page.next)
 
 
-def _add_edges(described: Described, rows: Sequence[int], items: Sequence[OpportunityOut]) -> None:
+def _edges(described: Described, rows: Sequence[int]) -> list[dict[str, ViewOut]]:
+    """Return what holds at start and end of each of these opportunities."""
     scenario, table = described.scenario, described.computed.opportunities
     chosen = np.array(rows, dtype=np.int64)
     first = view_at(scenario, table, chosen, table.start_s[chosen])
     last = view_at(scenario, table, chosen, table.end_s[chosen])
-    for position, item in enumerate(items):
-        item.at_start, item.at_end = _view(first, position), _view(last, position)
+    return [{"at_start": _view(first, i), "at_end": _view(last, i)} for i in range(len(rows))]
 
 
 def _view(seen: View, position: int) -> ViewOut:
@@ -240,7 +159,7 @@ def _matching(
     return np.flatnonzero(wanted)
 
 
-def _opportunity(described: Described, row: int) -> OpportunityOut:
+def _opportunity(described: Described, row: int, **edges: ViewOut) -> OpportunityOut:
     scenario, table = described.scenario, described.computed.opportunities
     is_collect = int(table.kind[row]) == COLLECT
     place = int(table.place[row])
@@ -262,6 +181,7 @@ def _opportunity(described: Described, row: int) -> OpportunityOut:
         range_km=_rounded(table.range_m[row] / 1000.0),
         eclipse=bool(table.in_eclipse[row]),
         nadir=scenario.satellites[int(table.satellite[row])].sensor.nadir,
+        **edges,
     )
 
 

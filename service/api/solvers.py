@@ -2,32 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
-
 from fastapi import APIRouter
-from pydantic import BaseModel, Field
 
-from planner_core.solvers.base import Constraint, Solver
+from planner_core.solvers.base import Solver
 from planner_core.solvers.registry import SOLVERS
 from service.api.errors import problem_responses
-from service.api.paging import Listed
-from service.api.problems import ServiceError
-from service.solver_params import params_schema
+from service.jobs.solver_params import params_schema
+from service.problems.kinds import ServiceError
+from service.wire.base import Listed
+from service.wire.operations import SolverOut
 
 router = APIRouter(prefix="/v1/solvers", tags=["solvers"])
-
-
-class SolverOut(BaseModel):
-    """A solver."""
-
-    name: str
-    title: str
-    paper: str = Field(description="Where the paper describes it.")
-    kind: Literal["exact", "heuristic"] = Field(
-        description="An exact solver proves its plan optimal when it runs to the end."
-    )
-    honours: list[Constraint] = Field(description="Rules that its plans never break.")
-    params_schema: dict[str, Any] = Field(description="JSON Schema of `params` of a job.")
 
 
 @router.get("")
@@ -51,6 +36,6 @@ def _shown(solver: type[Solver]) -> SolverOut:
         title=solver.title,
         paper=solver.paper,
         kind="exact" if solver.exact else "heuristic",
-        honours=sorted(solver.honours),
+        honours=[rule.value for rule in sorted(solver.honours)],
         params_schema=params_schema(solver),
     )

@@ -8,27 +8,27 @@ from datetime import UTC, datetime
 from typing import Annotated, Any
 
 import sqlalchemy as sa
-from fastapi import APIRouter, Query, Request, Response
-from pydantic import BaseModel, Field, ValidationError
+from fastapi import APIRouter, Query, Response
+from pydantic import Field, ValidationError
 from sqlalchemy.orm import Session
 
 from planner_core.errors import Fault
 from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
-from service.api.deps import AuditDep, DatabaseDep, RawBodyDep, require_media_type
-from service.api.errors import faults_of_validation, problem_responses, refuse
+from service.api.deps import CallDep, DatabaseDep, RawBodyDep, require_media_type
+from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
-from service.api.paging import Listed, PagingDep, newest_first
-from service.api.problems import ServiceError
-from service.api.shapes import Body, Instant, Name
+from service.api.paging import PagingDep, newest_first
+from service.db.ids import new_id
 from service.db.rows import TargetCatalogRow, TargetRow
-from service.ids import new_id
-from service.scenarios.inputs import TargetIn
+from service.problems.faults import faults_of_validation, refuse
+from service.problems.kinds import ServiceError
 from service.scenarios.records import Record, Records, check, first_of_each, read_csv, read_geojson
 from service.scenarios.translate import target_from
+from service.wire.base import Body, Listed, Name
+from service.wire.places import MAX_TARGETS, CreatedCatalog, TargetCatalogOut, TargetIn
 
 router = APIRouter(prefix="/v1/target-catalogs", tags=["target catalogues"])
 
-MAX_TARGETS = 100_000
 _TYPES = ("application/json", "application/geo+json", "text/csv")
 _REQUIRED = ("id", "lat_deg", "lon_deg")
 _COLUMNS = tuple(TargetIn.model_fields)
@@ -36,34 +36,11 @@ _OPTIONAL = tuple(column for column in _COLUMNS if column not in _REQUIRED)
 _UNNAMED = "Targets"
 
 
-class TargetCatalogIn(Body):
-    """A catalogue of targets."""
-
-    name: Name
-    targets: list[TargetIn] = Field(min_length=1, max_length=MAX_TARGETS)
-
-
 class _Listed(Body):
     """The same, with targets that are still to be looked at one by one."""
 
     name: Name
     targets: list[dict[str, Any]] = Field(min_length=1, max_length=MAX_TARGETS)
-
-
-class TargetCatalogOut(BaseModel):
-    """A catalogue; its targets have their own address."""
-
-    id: str
-    name: str
-    num_targets: int
-    created_at: Instant
-    links: dict[str, str]
-
-
-class CreatedCatalog(TargetCatalogOut):
-    """A new catalogue."""
-
-    ignored_columns: list[str] = Field(description="Columns of a CSV file that mean nothing here.")
 
 
 _REQUEST_BODY: dict[str, Any] = {
@@ -98,22 +75,20 @@ _REQUEST_BODY: dict[str, Any] = {
     responses=problem_responses(413, 415),
 )
 def create_target_catalog(
-    request: Request,
-    response: Response,
+    call: CallDep,
     data: RawBodyDep,
     once: OnceDep,
-    audit: AuditDep,
     name: Annotated[
         Name | None, Query(description="Name of a catalogue whose file has none.")
     ] = None,
 ) -> CreatedCatalog:
     """Store a catalogue. One bad row refuses the whole of it; every bad row is named."""
-    kind = require_media_type(request, *_TYPES)
+    kind = require_media_type(call.request, *_TYPES)
     found, targets = read_targets(kind, data)
     with once.transaction() as session:
         row = _add(session, found.name or name or _UNNAMED, targets)
-        audit.record(session, "create", "target_catalog", row.id)
-        shown = created(response, _shown(row), f"/v1/target-catalogs/{row.id}")
+        call.audit.record(session, "create", "target_catalog", row.id)
+        shown = created(call.response, _shown(row), f"/v1/target-catalogs/{row.id}")
         answer = CreatedCatalog(**shown.model_dump(), ignored_columns=list(found.ignored))
         return once.keep(session, answer)
 
@@ -199,13 +174,11 @@ def list_target_catalogs(database: DatabaseDep, paging: PagingDep) -> Listed[Tar
     response_model=TargetCatalogOut,
     responses={**NOT_MODIFIED, **problem_responses(404)},
 )
-def get_target_catalog(
-    catalog_id: str, database: DatabaseDep, request: Request, response: Response
-) -> TargetCatalogOut | Response:
+def get_target_catalog(catalog_id: str, call: CallDep) -> TargetCatalogOut | Response:
     """Return one catalogue, without its targets."""
-    with database.reading() as session:
+    with call.database.reading() as session:
         shown = _shown(_find(session, catalog_id))
-    return unless_known(request, response, shown)
+    return unless_known(call.request, call.response, shown)
 
 
 @router.get("/{catalog_id}/targets", responses=problem_responses(404))
@@ -224,15 +197,13 @@ def list_targets(catalog_id: str, database: DatabaseDep, paging: PagingDep) -> L
 
 
 @router.delete("/{catalog_id}", status_code=204, responses=problem_responses(404, 412))
-def delete_target_catalog(
-    catalog_id: str, database: DatabaseDep, audit: AuditDep, request: Request
-) -> None:
+def delete_target_catalog(catalog_id: str, call: CallDep) -> None:
     """Delete a catalogue. Scenarios that use it keep their copy."""
-    with database.transaction() as session:
+    with call.database.transaction() as session:
         row = _find(session, catalog_id, to_change=True)
-        require_match(request, lambda: _shown(row))
+        require_match(call.request, lambda: _shown(row))
         row.deleted_at = datetime.now(UTC)
-        audit.record(session, "delete", "target_catalog", catalog_id)
+        call.audit.record(session, "delete", "target_catalog", catalog_id)
 
 
 def _find(session: Session, catalog_id: str, *, to_change: bool = False) -> TargetCatalogRow:

@@ -11,27 +11,30 @@ from fastapi import APIRouter, Depends, Path, Query, Request, Response
 from fastapi.responses import StreamingResponse
 
 import planner_core
+from service.answers import store as answer_store
+from service.answers.answered import Answered, in_chunks
+from service.answers.blocks import TIMELINE, Entry, holds, items_in
 from service.api import job_intake as intake
 from service.api.accept import preferred
 from service.api.conditional import NOT_MODIFIED
-from service.api.deps import DatabaseDep, own_job_only
+from service.api.deps import CallDep, DatabaseDep, own_job_only
 from service.api.errors import problem_responses
-from service.api.job_shapes import Outcome, TargetItem, etag_of_timeline
-from service.api.paging import Listed, PagingDep
-from service.api.problems import ServiceError
-from service.api.shapes import matches
-from service.api.timeline_shapes import JSON_PROOF, JSON_TIMELINE
-from service.blocks import TIMELINE, Entry, holds, items_in
+from service.api.etags import matches
+from service.api.job_shapes import etag_of_timeline
+from service.api.paging import PagingDep
 from service.db.rows import JobRow
 from service.db.session import Database
-from service.exports.answered import Answered, in_chunks
 from service.exports.forms import FORMS, Form
-from service.stores import answer_store
+from service.problems.kinds import ServiceError
 from service.stores import job_store as store
+from service.wire.base import Listed
+from service.wire.timelines import Outcome, TargetItem
 
 router = APIRouter(prefix="/v1/jobs", tags=["timelines"], dependencies=[Depends(own_job_only)])
 
 _JSON: Final = "application/json"
+_TIMELINE: Final = {"$ref": "#/components/schemas/Timeline"}
+_PROOF: Final = {"anyOf": [{"$ref": "#/components/schemas/Proof"}, {"type": "null"}]}
 _BY_SUFFIX: Final = {form.suffix: form for form in FORMS}
 _BY_TYPE: Final = {form.media_type: form for form in FORMS if form.has_own_type}
 _SUFFIXES: Final = ["json", *_BY_SUFFIX]
@@ -46,12 +49,11 @@ Suffix = Annotated[
 def _responses(forms: Sequence[Form]) -> dict[int | str, dict[str, Any]]:
     """Return the entries of the OpenAPI document for a route that offers these forms and JSON."""
     # JSON stands first: generated clients read the first form they know.
-    content: dict[str, Any] = JSON_TIMELINE | {
-        form.media_type: {} for form in forms if form.media_type != _JSON
-    }
+    content: dict[str, Any] = {_JSON: {"schema": _TIMELINE}}
+    content |= {form.media_type: {} for form in forms if form.media_type != _JSON}
     if _JSON in (form.media_type for form in forms):
         other = [{"type": "array"}, {"type": "object"}]
-        content[_JSON] = {"schema": {"anyOf": [JSON_TIMELINE[_JSON]["schema"], *other]}}
+        content[_JSON] = {"schema": {"anyOf": [_TIMELINE, *other]}}
     headers = {
         "Content-Disposition": {
             "description": "A name to save it under.",
@@ -68,59 +70,59 @@ def _responses(forms: Sequence[Form]) -> dict[int | str, dict[str, Any]]:
 @router.get(
     "/{job_id}/timeline", response_class=Response, responses=_responses(list(_BY_TYPE.values()))
 )
-def get_timeline(job_id: str, database: DatabaseDep, request: Request) -> Response:
+def get_timeline(job_id: str, call: CallDep) -> Response:
     """Return the plan, judged: actions, resources, totals, violations.
 
     `Accept` chooses the form. The suffixes of the next call do too, and offer some more.
     """
-    media_type = preferred(request.headers.get("accept"), [_JSON, *_BY_TYPE])
-    with database.reading() as session:
+    media_type = preferred(call.request.headers.get("accept"), [_JSON, *_BY_TYPE])
+    with call.database.reading() as session:
         job = intake.find_job(session, job_id)
     if media_type is None:
         raise ServiceError(
             "not_acceptable", f"The timeline is offered as {', '.join([_JSON, *_BY_TYPE])}."
         )
-    return _answer(database, request, job, _BY_TYPE.get(media_type))
+    return _answer(call.database, call.request, job, _BY_TYPE.get(media_type))
 
 
 @router.get("/{job_id}/timeline.{suffix}", response_class=Response, responses=_responses(FORMS))
-def get_timeline_as(
-    job_id: str, suffix: Suffix, database: DatabaseDep, request: Request
-) -> Response:
+def get_timeline_as(job_id: str, suffix: Suffix, call: CallDep) -> Response:
     """Return the plan in the form that the suffix names, whatever `Accept` says."""
-    with database.reading() as session:
+    with call.database.reading() as session:
         job = intake.find_job(session, job_id)
     if suffix not in _SUFFIXES:
         offered = ", ".join(f".{known}" for known in _SUFFIXES)
         raise ServiceError("not_acceptable", f"The timeline is offered as {offered}.")
-    return _answer(database, request, job, _BY_SUFFIX.get(suffix))
+    return _answer(call.database, call.request, job, _BY_SUFFIX.get(suffix))
 
 
 @router.get(
     "/{job_id}/proof",
     responses={
-        200: {"content": JSON_PROOF, "description": "The proof document."},
+        200: {"content": {_JSON: {"schema": _PROOF}}, "description": "The proof document."},
         **NOT_MODIFIED,
         **problem_responses(404, 409),
     },
 )
-def get_proof(job_id: str, database: DatabaseDep, request: Request) -> Response:
+def get_proof(job_id: str, call: CallDep) -> Response:
     """Return what proves the bound of the timeline, or `null` where it has none.
 
     `proof` names the argument and `value` the bound. `prices` holds a multiplier for each
     target, in the order of the scenario: the dual function at these prices is the bound.
     """
     etag = f'"{job_id}"'
-    with database.reading() as session:
+    with call.database.reading() as session:
         job = intake.find_job(session, job_id)
         intake.require_answer(session, job)
         proof = answer_store.proof_of(session, job_id)
-    if matches(request.headers.get("if-none-match"), etag):
+    if matches(call.request.headers.get("if-none-match"), etag):
         return Response(status_code=304, headers={"ETag": etag})
     return Response(proof or "null", media_type=_JSON, headers={"ETag": etag})
 
 
-@router.get("/{job_id}/targets", responses=problem_responses(404, 409))
+@router.get(
+    "/{job_id}/targets", responses=problem_responses(404, 409), response_model_exclude_unset=True
+)
 def list_outcomes(
     job_id: str,
     database: DatabaseDep,

@@ -4,109 +4,55 @@ from __future__ import annotations
 
 import base64
 import secrets
-from typing import Annotated, Any, Final, Literal, cast
+from typing import Any, Final
 
 import sqlalchemy as sa
-from fastapi import APIRouter, Request, Response
-from pydantic import BaseModel, Field, StringConstraints
+from fastapi import APIRouter, Response
 from sqlalchemy.orm import Session
 
 from planner_core.errors import Fault
 from service.access.callers import Caller
 from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
-from service.api.deps import AuditDep, CallerDep, DatabaseDep, SettingsDep
-from service.api.errors import problem_responses, refuse
+from service.api.deps import CallDep
+from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
-from service.api.paging import Listed, PagingDep, newest_first
-from service.api.problems import ServiceError
-from service.api.shapes import Body, Instant, Name
+from service.api.paging import PagingDep, newest_first
 from service.db.clock import utc_now
+from service.db.ids import new_id
 from service.db.rows import WebhookDeliveryRow, WebhookRow
-from service.ids import new_id
+from service.problems.faults import refuse
+from service.problems.kinds import ServiceError
 from service.webhooks import outbox
-from service.webhooks.addresses import LONGEST_URL, AddressRefused, require_good_url
-from service.webhooks.events import JOB_EVENTS, Event
-from service.webhooks.outbox import DeliveryState
+from service.webhooks.addresses import AddressRefused, require_good_url
+from service.wire.base import Listed
+from service.wire.webhooks import (
+    JOB_EVENTS,
+    CreatedWebhook,
+    DeliveryOut,
+    TestData,
+    WebhookIn,
+    WebhookOut,
+)
 
 router = APIRouter(prefix="/v1/webhooks", tags=["webhooks"])
 
 MOST_OF_AN_OWNER: Final = 20
 _SECRET_BYTES: Final = 32
-JobEvent = Literal["job.succeeded", "job.failed", "job.cancelled", "job.expired"]
-
-
-class WebhookIn(Body):
-    """Where to send, and what."""
-
-    url: Annotated[str, StringConstraints(min_length=1, max_length=LONGEST_URL)] = Field(
-        description="Gets each event as a POST. `https` only, unless the server allows more."
-    )
-    events: list[JobEvent] = Field(
-        default_factory=lambda: cast("list[JobEvent]", list(JOB_EVENTS)),
-        min_length=1,
-        max_length=len(JOB_EVENTS),
-        description="Ends of jobs that are told.",
-    )
-    name: Name | None = None
-
-
-class WebhookOut(BaseModel):
-    """A webhook, without the secret that signs what it sends."""
-
-    id: str
-    url: str
-    events: list[JobEvent]
-    name: str | None
-    owner: str = Field(description="Whose jobs it tells of.")
-    created_at: Instant
-    disabled_at: Instant | None = Field(
-        description="Since when nothing is sent any more: the receiver answered 410."
-    )
-    disabled_because: str | None
-    links: dict[str, str]
-
-
-class CreatedWebhook(WebhookOut):
-    """The same with its secret, which is shown this once."""
-
-    secret: str = Field(description="For the receiver: verify `webhook-signature` with it.")
-
-
-class DeliveryOut(BaseModel):
-    """One message and how it fared."""
-
-    id: str = Field(description="The `webhook-id` of each of its attempts.")
-    event: Event
-    job_id: str | None
-    state: DeliveryState
-    attempts: int
-    due_at: Instant | None = Field(description="When it is tried next.")
-    last_status: int | None = Field(description="What the receiver answered last.")
-    last_error: str | None
-    created_at: Instant
-    ended_at: Instant | None
 
 
 @router.post("", status_code=201)
-def create_webhook(
-    body: WebhookIn,
-    settings: SettingsDep,
-    once: OnceDep,
-    caller: CallerDep,
-    audit: AuditDep,
-    response: Response,
-) -> CreatedWebhook:
+def create_webhook(body: WebhookIn, call: CallDep, once: OnceDep) -> CreatedWebhook:
     """Tell the ends of this owner's jobs to an address; the answer holds the signing secret."""
     try:
-        require_good_url(body.url, private=settings.webhook_private_addresses)
+        require_good_url(body.url, private=call.settings.webhook_private_addresses)
     except AddressRefused as error:
         fault = Fault(code="webhook_address_refused", detail=str(error), pointer="/url")
         raise refuse([fault]) from None
     with once.transaction() as session:
-        _require_room(session, caller.owner)
+        _require_room(session, call.caller.owner)
         row = WebhookRow(
             id=new_id(),
-            owner=caller.owner,
+            owner=call.caller.owner,
             name=body.name,
             url=body.url,
             events=[event for event in JOB_EVENTS if event in body.events],
@@ -115,20 +61,18 @@ def create_webhook(
         )
         session.add(row)
         session.flush()
-        audit.record(session, "create", "webhook", row.id)
+        call.audit.record(session, "create", "webhook", row.id)
         shown = CreatedWebhook(**_shown(row).model_dump(), secret=row.secret)
-        return once.keep(session, created(response, shown, f"/v1/webhooks/{row.id}"))
+        return once.keep(session, created(call.response, shown, f"/v1/webhooks/{row.id}"))
 
 
 @router.get("")
-def list_webhooks(
-    database: DatabaseDep, caller: CallerDep, paging: PagingDep
-) -> Listed[WebhookOut]:
+def list_webhooks(call: CallDep, paging: PagingDep) -> Listed[WebhookOut]:
     """List the webhooks of the key's owner, newest first; all for the scope `admin`."""
     query = sa.select(WebhookRow)
-    if caller.visible_owner is not None:
-        query = query.where(WebhookRow.owner == caller.visible_owner)
-    with database.reading() as session:
+    if call.caller.visible_owner is not None:
+        query = query.where(WebhookRow.owner == call.caller.visible_owner)
+    with call.database.reading() as session:
         page = newest_first(session, query, WebhookRow.id, paging)
     return Listed(items=[_shown(row) for row in page.rows], next=page.next)
 
@@ -138,51 +82,43 @@ def list_webhooks(
     response_model=WebhookOut,
     responses={**NOT_MODIFIED, **problem_responses(404)},
 )
-def get_webhook(
-    webhook_id: str, database: DatabaseDep, caller: CallerDep, request: Request, response: Response
-) -> WebhookOut | Response:
+def get_webhook(webhook_id: str, call: CallDep) -> WebhookOut | Response:
     """Return one webhook."""
-    with database.reading() as session:
-        shown = _shown(_find(session, webhook_id, caller))
-    return unless_known(request, response, shown)
+    with call.database.reading() as session:
+        shown = _shown(_find(session, webhook_id, call.caller))
+    return unless_known(call.request, call.response, shown)
 
 
 @router.delete("/{webhook_id}", status_code=204, responses=problem_responses(404, 412))
-def delete_webhook(
-    webhook_id: str, database: DatabaseDep, caller: CallerDep, audit: AuditDep, request: Request
-) -> None:
+def delete_webhook(webhook_id: str, call: CallDep) -> None:
     """Delete a webhook and all that was or was to be sent to it."""
-    with database.transaction() as session:
-        row = _find(session, webhook_id, caller, to_change=True)
-        require_match(request, lambda: _shown(row))
+    with call.database.transaction() as session:
+        row = _find(session, webhook_id, call.caller, to_change=True)
+        require_match(call.request, lambda: _shown(row))
         sent = WebhookDeliveryRow.webhook_id == webhook_id
         session.execute(sa.delete(WebhookDeliveryRow).where(sent))
         session.delete(row)
-        audit.record(session, "delete", "webhook", webhook_id)
+        call.audit.record(session, "delete", "webhook", webhook_id)
 
 
 @router.post("/{webhook_id}/test", status_code=202, responses=problem_responses(404, 409))
-def test_webhook(
-    webhook_id: str, once: OnceDep, caller: CallerDep, audit: AuditDep, response: Response
-) -> DeliveryOut:
+def test_webhook(webhook_id: str, once: OnceDep, call: CallDep) -> DeliveryOut:
     """Send an event of type `test`; the deliveries tell how it fared."""
     with once.transaction() as session:
-        row = _find(session, webhook_id, caller)
+        row = _find(session, webhook_id, call.caller)
         _require_enabled(row)
-        data = {"message": "This is a test of the webhook.", "webhook_id": row.id}
+        data = TestData(message="This is a test of the webhook.", webhook_id=row.id)
         delivery_id = outbox.queue(session, row, "test", data, job_id=None)
-        audit.record(session, "test", "webhook", row.id)
-        return once.keep(session, _accepted(session, response, row, delivery_id))
+        call.audit.record(session, "test", "webhook", row.id)
+        return once.keep(session, _accepted(session, call.response, row, delivery_id))
 
 
 @router.get("/{webhook_id}/deliveries", responses=problem_responses(404))
-def list_deliveries(
-    webhook_id: str, database: DatabaseDep, caller: CallerDep, paging: PagingDep
-) -> Listed[DeliveryOut]:
+def list_deliveries(webhook_id: str, call: CallDep, paging: PagingDep) -> Listed[DeliveryOut]:
     """List what was sent, newest first. Those that ended 30 days ago are forgotten."""
     query = sa.select(WebhookDeliveryRow).where(WebhookDeliveryRow.webhook_id == webhook_id)
-    with database.reading() as session:
-        _find(session, webhook_id, caller)
+    with call.database.reading() as session:
+        _find(session, webhook_id, call.caller)
         page = newest_first(session, query, WebhookDeliveryRow.id, paging)
     return Listed(items=[_delivery(row) for row in page.rows], next=page.next)
 
@@ -192,24 +128,17 @@ def list_deliveries(
     status_code=202,
     responses=problem_responses(404, 409),
 )
-def redeliver(
-    webhook_id: str,
-    delivery_id: str,
-    once: OnceDep,
-    caller: CallerDep,
-    audit: AuditDep,
-    response: Response,
-) -> DeliveryOut:
+def redeliver(webhook_id: str, delivery_id: str, once: OnceDep, call: CallDep) -> DeliveryOut:
     """Send a message again, under a new `webhook-id`, whatever became of the first."""
     with once.transaction() as session:
-        row = _find(session, webhook_id, caller)
+        row = _find(session, webhook_id, call.caller)
         _require_enabled(row)
         delivery = session.get(WebhookDeliveryRow, delivery_id)
         if delivery is None or delivery.webhook_id != webhook_id:
             raise ServiceError("not_found", f"There is no delivery {delivery_id!r}.")
         again = outbox.repeat(session, row, delivery)
-        audit.record(session, "redeliver", "webhook", row.id)
-        return once.keep(session, _accepted(session, response, row, again))
+        call.audit.record(session, "redeliver", "webhook", row.id)
+        return once.keep(session, _accepted(session, call.response, row, again))
 
 
 def _accepted(

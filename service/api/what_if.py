@@ -4,53 +4,29 @@ from __future__ import annotations
 
 from typing import Any, Final, cast
 
-from fastapi import APIRouter, Depends, Request, Response
-from pydantic import Field
+from fastapi import APIRouter, Depends
 
+from service.answers.variations import Asked, Variations
 from service.api import job_intake as intake
-from service.api.deps import AuditDep, CallerDep, DatabaseDep, SettingsDep, own_job_only
+from service.api.deps import CallDep, own_job_only
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
-from service.api.job_shapes import JobOut, LimitsIn
-from service.api.shapes import Name
 from service.db.rows import JobRow, ScenarioRow
-from service.opportunities import OpportunityReader
-from service.scenarios.change_inputs import ChangeIn
-from service.scenarios.variations import Asked, Variations
+from service.jobs import submission
+from service.scenarios import freezing as scenario_store
+from service.scenarios.opportunities import OpportunityReader
 from service.settings import Settings
-from service.stores import answer_store, opportunity_store, scenario_store
-from service.stores import job_store as store
+from service.stores import opportunity_store
+from service.wire.changes import ChangeIn
+from service.wire.jobs import JobOut, LimitsIn, WhatIfIn
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[Depends(own_job_only)])
 
 _CHANGE: Final = set(ChangeIn.model_fields)
 
 
-class WhatIfIn(ChangeIn):
-    """A change to the question of a job. What is left out is as in that job."""
-
-    solver: str | None = Field(None, description="A name of `GET /v1/solvers`.")
-    params: dict[str, Any] | None = Field(
-        None, description="The solver's own; the others are its defaults."
-    )
-    seed: int | None = Field(None, ge=0, lt=2**63)
-    limits: LimitsIn = LimitsIn()
-    priority: int | None = Field(None, ge=0, le=9)
-    label: Name | None = None
-
-
 @router.post("/{job_id}/what-if", status_code=202, responses=problem_responses(404, 409, 503))
-def create_what_if(
-    job_id: str,
-    body: WhatIfIn,
-    database: DatabaseDep,
-    settings: SettingsDep,
-    once: OnceDep,
-    caller: CallerDep,
-    audit: AuditDep,
-    request: Request,
-    response: Response,
-) -> JobOut:
+def create_what_if(job_id: str, body: WhatIfIn, call: CallDep, once: OnceDep) -> JobOut:
     """Queue the question of a job with a change, as a scenario and a job of their own.
 
     `links.what_if_of` leads to the job, `change` repeats what was asked, and
@@ -59,32 +35,30 @@ def create_what_if(
     refused with its place in the body; working that out may take a while: 503 with
     `Retry-After` asks to come back.
     """
-    queue = intake.queue_of(request)
-    with database.reading() as session:
+    queue = intake.queue_of(call.request)
+    with call.database.reading() as session:
         job = intake.find_job(session, job_id)
-        timeline = answer_store.timeline_of(session, job_id)
+        timeline = intake.find_timeline(session, job) if body.needs_plan else None
         scenario = session.get_one(ScenarioRow, job.scenario_id)
         content, sha256 = scenario.content, scenario.sha256
-    if timeline is None and body.needs_plan:
-        raise intake.not_ready(job)
     asked = Asked(
         content=content,
-        timeline=timeline if body.needs_plan else None,
+        timeline=timeline,
         change=body,
-        limits=settings.scenario_limits,
+        limits=call.settings.scenario_limits,
     )
     solver, params = _solver(job, body)
-    time_s, memory_mb = _limits(job, body, settings)
-    reader = cast(OpportunityReader, request.app.state.opportunities)
-    described = reader.get(database, job.scenario_id, sha256)
-    varied = cast(Variations, request.app.state.variations).get(asked, described)
+    time_s, memory_mb = _limits(job, body, call.settings)
+    reader = cast(OpportunityReader, call.request.app.state.opportunities)
+    described = reader.get(call.database, job.scenario_id, sha256)
+    varied = cast(Variations, call.request.app.state.variations).get(asked, described)
     with once.transaction() as session:
-        intake.require_room(session, settings)
+        intake.require_room(session, call.settings)
         row, is_new = scenario_store.save(session, varied.frozen)
         if is_new:
-            audit.record(session, "create", "scenario", row.id)
+            call.audit.record(session, "create", "scenario", row.id)
             opportunity_store.save(session, row.sha256, varied.opportunity_block)
-        spec = store.JobSpec(
+        spec = submission.JobSpec(
             scenario_id=row.id,
             solver=solver,
             params=params,
@@ -93,13 +67,13 @@ def create_what_if(
             memory_mb=memory_mb,
             priority=job.priority if body.priority is None else body.priority,
             label=job.label if body.label is None else body.label,
-            owner=caller.owner,
+            owner=call.caller.owner,
             what_if_of=job_id,
             change=body.model_dump(mode="json", include=_CHANGE, exclude_unset=True),
         )
-        made = store.submit(session, queue, spec)
-        audit.record(session, "create", "job", made.id)
-        return once.keep(session, intake.accepted(session, response, made))
+        made = submission.submit(session, queue, spec)
+        call.audit.record(session, "create", "job", made.id)
+        return once.keep(session, intake.accepted(session, call.response, made))
 
 
 def _solver(job: JobRow, body: WhatIfIn) -> tuple[str, dict[str, Any]]:

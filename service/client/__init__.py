@@ -5,21 +5,7 @@
 Client('http://127.0.0.1:8000')
 """
 
-from service.client.answers import (
-    Action,
-    Attempt,
-    ComparedRun,
-    Explanation,
-    PlanDiff,
-    Progress,
-    SatelliteTimeline,
-    TargetOutcome,
-    Timeline,
-    Totals,
-    Violation,
-)
 from service.client.client import Client
-from service.client.comparisons import Comparison
 from service.client.errors import (
     ClientError,
     JobFailed,
@@ -29,18 +15,29 @@ from service.client.errors import (
     WaitTimedOut,
 )
 from service.client.jobs import Job
-from service.client.shapes import (
-    Fault,
-    GroundStation,
-    Import,
-    Opportunity,
-    Satellite,
-    Scenario,
-    Solver,
-    Target,
-    TargetCatalog,
-)
-from service.client.webhooks import Delivery, Webhook
+from service.client.webhooks import Webhook
+from service.wire.imports import Imported as Import
+from service.wire.jobs import ComparedRun
+from service.wire.jobs import ComparisonOut as Comparison
+from service.wire.jobs import ProgressOut as Progress
+from service.wire.operations import FaultOut as Fault
+from service.wire.operations import SolverOut as Solver
+from service.wire.places import GroundStationOut as GroundStation
+from service.wire.places import TargetCatalogOut as TargetCatalog
+from service.wire.places import TargetIn as Target
+from service.wire.satellites import SatelliteOut as Satellite
+from service.wire.scenarios import OpportunityOut as Opportunity
+from service.wire.scenarios import ScenarioOut as Scenario
+from service.wire.timelines import ActionOut as Action
+from service.wire.timelines import AttemptOut as Attempt
+from service.wire.timelines import DiffOut as PlanDiff
+from service.wire.timelines import ExplanationOut as Explanation
+from service.wire.timelines import SatelliteTimelineOut as SatelliteTimeline
+from service.wire.timelines import TargetItem as TargetOutcome
+from service.wire.timelines import TimelineOut as Timeline
+from service.wire.timelines import TotalsOut as Totals
+from service.wire.timelines import ViolationOut as Violation
+from service.wire.webhooks import DeliveryOut as Delivery
 
 __all__ = [
     "Action",

@@ -17,10 +17,11 @@ from service.client.ground_stations import GroundStations
 from service.client.jobs import Jobs
 from service.client.satellites import Satellites
 from service.client.scenarios import Scenarios
-from service.client.shapes import Ready, Solver, Version
 from service.client.target_catalogs import TargetCatalogs
-from service.client.transport import Transport, path_of, read
+from service.client.transport import Transport, held, path_of
 from service.client.webhooks import Webhooks
+from service.wire.operations import Ready, Version
+from service.wire.operations import SolverOut as Solver
 
 DEFAULT_URL: Final = "http://127.0.0.1:8000"
 _KEY = re.compile(r"[\x21-\x7e]+")
@@ -95,7 +96,7 @@ class Client:
 
     def ready(self) -> Ready:
         """Return who takes jobs there; a ``ServiceError`` at once where nobody does."""
-        return read(Ready, self._transport.request("GET", "/health/ready", patience_s=0.0))
+        return held(Ready, self._transport.request("GET", "/health/ready", patience_s=0.0))
 
     def close(self) -> None:
         """Close the connections."""

@@ -4,32 +4,14 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
-from datetime import datetime
+from functools import partial
 from typing import Any
 
-from pydantic import ValidationError
-
-from service.client.answers import ComparedRun, ScenarioRef
-from service.client.errors import UnexpectedAnswer
 from service.client.following import polled
 from service.client.jobs import question
-from service.client.shapes import Scenario, Stored
-from service.client.transport import Transport, path_of
-
-
-class Comparison(Stored):
-    """Several solvers side by side; ``runs`` are in the order in which they were asked for."""
-
-    state: str
-    scenario: ScenarioRef
-    label: str | None
-    created_at: datetime
-    runs: tuple[ComparedRun, ...]
-
-    @property
-    def is_final(self) -> bool:
-        """Whether every job has ended."""
-        return self.state == "finished"
+from service.client.transport import Transport, parsed, path_of
+from service.wire.jobs import ComparisonOut as Comparison
+from service.wire.scenarios import ScenarioOut as Scenario
 
 
 class Comparisons:
@@ -81,12 +63,6 @@ class Comparisons:
             Where one has not after ``timeout_s``.
         """
         path = path_of("comparisons", comparison_id)
-        tables = polled(self._transport, path, _read, timeout_s=timeout_s, can_hold=False)
+        read = partial(parsed, Comparison, what="a comparison")
+        tables = polled(self._transport, path, read, timeout_s=timeout_s, can_hold=False)
         return deque(tables, maxlen=1).pop()
-
-
-def _read(text: str) -> Comparison:
-    try:
-        return Comparison.model_validate_json(text)
-    except ValidationError as error:
-        raise UnexpectedAnswer(f"a comparison is not as the API says: {error}") from error

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 import httpx
 from pydantic import ValidationError
 
-from service.client.shapes import Fault, Shape
+from service.wire.base import read
+from service.wire.operations import FaultOut as Fault
+from service.wire.operations import ProblemOut
 
 if TYPE_CHECKING:
     from service.client.jobs import Job
@@ -74,18 +76,11 @@ class WaitTimedOut(ClientError):
     """What was waited for did not happen in time. It goes on: this ends only the waiting."""
 
 
-class _Problem(Shape):
-    code: str
-    detail: str
-    request_id: str | None = None
-    errors: tuple[Fault, ...] = ()
-
-
 def error_of(response: httpx.Response) -> ServiceError:
     """Return the error that an answer tells, a problem document or not."""
     retry_after_s = seconds_asked(response)
     try:
-        told = _Problem.model_validate_json(response.content)
+        told = read(ProblemOut, response.content)
     except ValidationError:
         # A proxy on the way, for example, which answers in HTML.
         where = response.headers.get("location")

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from service.client.shapes import GroundStation, Import, ImportedStation
 from service.client.transport import Transport, path_of
 from service.client.uploads import Source, upload
+from service.wire.imports import Imported as Import
+from service.wire.places import GroundStationOut as GroundStation
+from service.wire.places import ImportedStation
 
 
 class GroundStations:

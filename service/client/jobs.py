@@ -4,57 +4,29 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
-from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from pydantic import PrivateAttr, ValidationError
+from pydantic import PrivateAttr
 
-from service.client.answers import (
-    Explanation,
-    Failure,
-    Limits,
-    PlanDiff,
-    Progress,
-    ScenarioRef,
-    TargetOutcome,
-    Timeline,
-)
-from service.client.errors import JobFailed, UnexpectedAnswer
+from service.client.errors import JobFailed
 from service.client.following import follow, polled
-from service.client.shapes import Json, Scenario, Stored
-from service.client.transport import Transport, path_of
+from service.client.transport import Transport, parsed, path_of
+from service.wire.base import Json
+from service.wire.jobs import JobOut
+from service.wire.scenarios import ScenarioOut as Scenario
+from service.wire.timelines import DiffOut as PlanDiff
+from service.wire.timelines import ExplanationOut as Explanation
+from service.wire.timelines import TargetItem as TargetOutcome
+from service.wire.timelines import TimelineOut as Timeline
 
-FINAL = frozenset({"succeeded", "failed", "cancelled", "expired"})
 _OPENMCT = ".openmct.json"
 
 
-class Job(Stored):
+class Job(JobOut):
     """A job as it stood when it was read; what asks the service returns a new one."""
 
-    state: str
-    scenario: ScenarioRef
-    solver: str
-    params: Json
-    seed: int
-    limits: Limits
-    attempt: int
-    priority: int
-    label: str | None
-    progress: Progress | None
-    created_at: datetime
-    started_at: datetime | None
-    finished_at: datetime | None
-    termination: str | None
-    error: Failure | None
-    change: Json | None = None
-
     _jobs: Jobs = PrivateAttr()
-
-    @property
-    def is_final(self) -> bool:
-        """Whether it changes no more."""
-        return self.state in FINAL
 
     def refresh(self) -> Job:
         """Return the job as it stands now."""
@@ -256,11 +228,7 @@ class Jobs:
         return self._transport.get(path_of("jobs", first, "diff", second), PlanDiff)
 
     def _read(self, text: str, etag: str | None = None) -> Job:
-        try:
-            job = Job.model_validate_json(text)
-        except ValidationError as error:
-            raise UnexpectedAnswer(f"a job is not as the API says: {error}") from error
-        return self._own(job.model_copy(update={"etag": etag}))
+        return self._own(parsed(Job, text, "a job").with_etag(etag))
 
     def _own(self, job: Job) -> Job:
         job._jobs = self

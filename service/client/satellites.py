@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from service.client.shapes import Elements, Import, ImportedSatellite, Satellite
-from service.client.transport import Transport, path_of, read
+from service.client.transport import Transport, held, path_of
 from service.client.uploads import Source, upload
+from service.wire.imports import Imported as Import
+from service.wire.satellites import ElementsOut as Elements
+from service.wire.satellites import ImportedSatellite
+from service.wire.satellites import SatelliteOut as Satellite
 
 
 class Satellites:
@@ -96,7 +99,7 @@ class Satellites:
         headers = {} if if_match is None else {"If-Match": if_match}
         path = path_of("satellites", satellite_id, "elements")
         answer = self._transport.request("PUT", path, json=body, headers=headers)
-        return read(Satellite, answer)
+        return held(Satellite, answer)
 
     def delete(self, satellite_id: str, *, if_match: str | None = None) -> None:
         """Delete a satellite; scenarios keep their copy."""

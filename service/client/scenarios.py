@@ -6,8 +6,10 @@ from collections.abc import Iterator, Sequence
 from datetime import datetime
 from typing import Any
 
-from service.client.shapes import Json, Opportunity, Scenario
 from service.client.transport import Transport, path_of
+from service.wire.base import Json
+from service.wire.scenarios import OpportunityOut as Opportunity
+from service.wire.scenarios import ScenarioOut as Scenario
 
 
 class Scenarios:

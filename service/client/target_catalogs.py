@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from service.client.shapes import Target, TargetCatalog
 from service.client.transport import Transport, path_of
 from service.client.uploads import Source, upload
+from service.wire.places import CreatedCatalog
+from service.wire.places import TargetCatalogOut as TargetCatalog
+from service.wire.places import TargetIn as Target
 
 
 class TargetCatalogs:
@@ -23,7 +25,7 @@ class TargetCatalogs:
         form: str | None = None,
         *,
         idempotency_key: str | None = None,
-    ) -> TargetCatalog:
+    ) -> CreatedCatalog:
         """Store a catalogue, whole or not at all.
 
         Parameters
@@ -39,14 +41,16 @@ class TargetCatalogs:
             content, headers = upload(targets, form)
             return self._transport.post(
                 path,
-                TargetCatalog,
+                CreatedCatalog,
                 params={"name": name},
                 content=content,
                 headers=headers,
                 idempotency_key=idempotency_key,
             )
         body = {"name": name, "targets": [dict(target) for target in targets]}
-        return self._transport.post(path, TargetCatalog, json=body, idempotency_key=idempotency_key)
+        return self._transport.post(
+            path, CreatedCatalog, json=body, idempotency_key=idempotency_key
+        )
 
     def list(self) -> Iterator[TargetCatalog]:
         """Yield the catalogues, newest first."""

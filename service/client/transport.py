@@ -7,7 +7,6 @@ import os
 import secrets
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 from typing import IO, Any, Final, TypeVar
 from urllib.parse import quote
@@ -28,11 +27,11 @@ from service.client.errors import (
     Unreachable,
     error_of,
 )
-from service.client.shapes import Shape, Stored
+from service.wire.base import Listed, Stored, Wire, read
 
 log = logging.getLogger("service.client")
 
-M = TypeVar("M", bound=Shape)
+M = TypeVar("M", bound=Wire)
 R = TypeVar("R")
 
 Params = Mapping[str, str | int | float | bool | None]
@@ -93,7 +92,7 @@ class Transport:
 
     def get(self, path: str, shape: type[M], params: Params | None = None) -> M:
         """Return what is there."""
-        return read(shape, self.request("GET", path, params=params))
+        return held(shape, self.request("GET", path, params=params))
 
     def post(
         self,
@@ -106,7 +105,7 @@ class Transport:
     ) -> M:
         """Return what was created, once however often the request has to be sent."""
         key = {"Idempotency-Key": idempotency_key or secrets.token_hex(16)}
-        return read(shape, self.request("POST", path, headers={**(headers or {}), **key}, **rest))
+        return held(shape, self.request("POST", path, headers={**(headers or {}), **key}, **rest))
 
     def delete(self, path: str, *, if_match: str | None = None) -> None:
         """Delete what is there; only in the state that ``if_match`` names, where it is given."""
@@ -128,13 +127,9 @@ class Transport:
         cursor: str | None = None
         while True:
             answer = self.request("GET", path, params={**(params or {}), "cursor": cursor})
-            try:
-                page = answer.json()
-                items, cursor = page["items"], page["next"]
-            except (ValueError, KeyError, TypeError) as error:
-                raise _unexpected(answer, error) from error
-            for item in items:
-                yield _validated(answer, partial(shape.model_validate, item))
+            page = held(Listed[shape], answer)  # type: ignore[valid-type]
+            yield from page.items
+            cursor = page.next
             if cursor is None:
                 return
 
@@ -205,12 +200,19 @@ def checked(answer: httpx.Response) -> httpx.Response:
     raise error_of(answer)
 
 
-def read(shape: type[M], answer: httpx.Response) -> M:
+def held(shape: type[M], answer: httpx.Response) -> M:
     """Return what an answer holds, with its ETag where the shape has one."""
-    found = _validated(answer, lambda: shape.model_validate_json(answer.content))
-    if isinstance(found, Stored):
-        return found.model_copy(update={"etag": answer.headers.get("etag")})
-    return found
+    request = answer.request
+    found = parsed(shape, answer.content, f"{request.method} {request.url.path}")
+    return found.with_etag(answer.headers.get("etag")) if isinstance(found, Stored) else found
+
+
+def parsed(shape: type[M], text: str | bytes, what: str) -> M:
+    """Return what a text holds; ``UnexpectedAnswer`` where it is something else than ``what``."""
+    try:
+        return read(shape, text)
+    except ValidationError as error:
+        raise UnexpectedAnswer(f"{what}: not as the API says: {error}") from error
 
 
 @contextmanager
@@ -223,18 +225,6 @@ def written_whole(file: Path) -> Iterator[IO[bytes]]:
         os.replace(part, file)
     finally:
         part.unlink(missing_ok=True)
-
-
-def _validated(answer: httpx.Response, build: Callable[[], M]) -> M:
-    try:
-        return build()
-    except ValidationError as error:
-        raise _unexpected(answer, error) from error
-
-
-def _unexpected(answer: httpx.Response, error: Exception) -> UnexpectedAnswer:
-    request = answer.request
-    return UnexpectedAnswer(f"{request.method} {request.url.path}: not as the API says: {error}")
 
 
 def _is_worth_another(error: BaseException, repeatable: bool) -> bool:

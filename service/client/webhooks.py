@@ -3,37 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from datetime import datetime
 from typing import Any
 
-from service.client.shapes import Stored
 from service.client.transport import Transport, path_of
+from service.wire.webhooks import DeliveryOut as Delivery
+from service.wire.webhooks import WebhookOut
 
 
-class Webhook(Stored):
+class Webhook(WebhookOut):
     """A webhook. Only a new one has its ``secret``, which signs what it sends."""
 
-    url: str
-    events: tuple[str, ...]
-    name: str | None
-    owner: str
-    created_at: datetime
-    disabled_at: datetime | None
-    disabled_because: str | None
     secret: str | None = None
-
-
-class Delivery(Stored):
-    """One message and how it fared."""
-
-    event: str
-    job_id: str | None
-    state: str
-    attempts: int
-    last_status: int | None
-    last_error: str | None
-    created_at: datetime
-    ended_at: datetime | None
 
 
 class Webhooks:

@@ -93,7 +93,7 @@ def worker(options: argparse.Namespace) -> int:
     """Run one worker."""
     from service.jobs.__main__ import run_worker
     from service.jobs.runner import Work
-    from service.tracing import CannotTrace
+    from service.process.tracing import CannotTrace
 
     try:
         run_worker(_settings(options), Work())
@@ -214,8 +214,8 @@ def _faults_of(scenario: Path) -> Iterator[None]:
 
 def check(options: argparse.Namespace) -> int:
     """Have the referee judge a timeline."""
+    from service.answers.reading import UnreadableTimeline
     from service.commands.check import check_file
-    from service.exports.reading import UnreadableTimeline
 
     try:
         with _faults_of(options.scenario):

@@ -13,11 +13,11 @@ from planner_core.build import build_problem, compute_opportunities
 from planner_core.domain import Scenario
 from planner_core.problem import COLLECT, Problem
 from planner_core.referee.replay import Timeline, plan_sha256, replay
+from service.answers.reading import READERS, Reading, plan_in
 from service.commands.scenario_files import read_scenario
 from service.commands.summary import table
-from service.exports.reading import READERS, Reading, plan_in
-from service.instants import instant_text
 from service.scenarios.translate import canonical, scenario_from_content, sha256_of
+from service.wire.instants import instant_text
 
 _AGREED = 1e-6
 

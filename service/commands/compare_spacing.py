@@ -14,8 +14,8 @@ from planner_core.solvers.registry import solver_class
 from service.commands.scenario_files import read_scenario, require_folder
 from service.commands.solve import answer_of
 from service.jobs.plan_job import PlanRequest
+from service.jobs.solver_params import params_of, parse_params
 from service.scenarios.translate import canonical, sha256_of
-from service.solver_params import params_of, parse_params
 
 SPACINGS_S: Final = (60.0, 30.0, 15.0)
 """Those that are tried unless others are named."""

@@ -14,8 +14,8 @@ from planner_core.solvers.registry import solver_class
 from service.commands.scenario_files import read_scenario, require_folder
 from service.commands.summary import summary
 from service.jobs.plan_job import PlanAnswer, PlanRequest, run_plan_job
+from service.jobs.solver_params import params_of, parse_params
 from service.scenarios.translate import canonical, sha256_of
-from service.solver_params import params_of, parse_params
 
 _LOOK_EVERY_S: Final = 0.05
 

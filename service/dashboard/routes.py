@@ -7,9 +7,9 @@ from typing import Final
 
 from fastapi import APIRouter, Request, Response
 
-from service.api.problems import ServiceError
-from service.api.shapes import matches
+from service.api.etags import matches
 from service.dashboard.assets import load_assets
+from service.problems.kinds import ServiceError
 
 router = APIRouter(include_in_schema=False)
 

@@ -203,7 +203,7 @@ class JobResultRow(Row):
 
 
 class JobBlockRow(Row):
-    """A piece of a job's answer (``service.blocks``), which never changes.
+    """A piece of a job's answer (``service.answers.blocks``), which never changes.
 
     ``size`` counts the characters of ``text``.
     """

@@ -19,7 +19,7 @@ from icalendar import Alarm, Calendar, Event
 
 import planner_core
 from planner_core.domain import GroundStation
-from service.exports.answered import Answered, Document, in_chunks
+from service.answers.answered import Answered, Document, in_chunks
 
 ALARM: Final = timedelta(minutes=10)
 

@@ -21,8 +21,8 @@ from planner_core.domain import (
     Target,
 )
 from planner_core.orbits.ephemeris import propagate
-from service.exports.answered import Answered, Document, compact, in_chunks, listed
-from service.instants import instant_text
+from service.answers.answered import Answered, Document, compact, in_chunks, listed
+from service.wire.instants import instant_text
 
 _DEGREE: Final = 5
 _SPEED: Final = 60

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+from service.answers.answered import Answered
 from service.exports import calendar, czml, geojson, openmct, table
-from service.exports.answered import Answered
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -15,9 +15,9 @@ import numpy.typing as npt
 from planner_core.domain import GroundStation, Horizon, Satellite
 from planner_core.orbits.ephemeris import Ephemeris, propagate
 from planner_core.orbits.ground_track import sub_points, visibility_ring
-from service.exports.answered import Answered, Document, compact, in_chunks, listed
+from service.answers.answered import Answered, Document, compact, in_chunks, listed
 from service.exports.antimeridian import Piece, area, pieces_of_line
-from service.instants import instant_text
+from service.wire.instants import instant_text
 
 TRACK_STEP_S = 30.0
 _DECIMALS = 4  # of a degree: eleven metres

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from typing import Final
 
-from service.exports.answered import Answered, Document, compact, in_chunks
+from service.answers.answered import Answered, Document, compact, in_chunks
 
 _MODES: Final = {
     "collect": ("collects", "#1b7f4b", "#ffffff"),

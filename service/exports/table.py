@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import csv
 import io
-import re
 from collections.abc import Iterator
 from datetime import datetime
 from typing import Any
 
-from service.exports.answered import Answered, Document, in_chunks
+from service.answers.answered import Answered, Document, in_chunks
+from service.scenarios.records import guarded
 
 COLUMNS = (
     "action_id", "satellite_id", "satellite_name", "mode", "start", "end", "duration_s",
@@ -23,30 +23,10 @@ COLUMNS = (
     "battery_fraction_end", "recorder_fraction_end",
 )  # fmt: skip
 
-_RISKY = re.compile(r"'*[=+\-@\t\r]")
-
 
 def write(answered: Answered) -> Iterator[str]:
     """Yield the table, satellite by satellite, in order of start."""
     return in_chunks(_lines(answered))
-
-
-def guarded(text: str | None) -> str | None:
-    """Return a text that no spreadsheet takes for a formula.
-
-    >>> guarded("=1+1"), guarded("'=1"), guarded("T-1"), guarded(None)
-    ("'=1+1", "''=1", 'T-1', None)
-    """
-    return f"'{text}" if text is not None and _RISKY.match(text) else text
-
-
-def unguarded(cell: str) -> str:
-    """Return the text that `guarded` was given.
-
-    >>> [unguarded(guarded(text)) for text in ("=1", "'=1", "'tis", "T-1")]
-    ['=1', "'=1", "'tis", 'T-1']
-    """
-    return cell[1:] if cell.startswith("'") and _RISKY.match(cell) else cell
 
 
 def _lines(answered: Answered) -> Iterator[str]:

@@ -12,9 +12,9 @@ from typing import NoReturn
 from service.jobs.parent import die_with_parent
 from service.jobs.runner import Work
 from service.jobs.worker import Worker
-from service.logs import configure_logging
+from service.process.logs import configure_logging
+from service.process.tracing import start_tracing
 from service.settings import Settings
-from service.tracing import start_tracing
 
 log = logging.getLogger(__name__)
 

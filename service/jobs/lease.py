@@ -9,21 +9,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, Literal, cast
+from typing import Any, cast
 
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
 
-from service.blocks import Block
+from service.answers import store as answer_store
+from service.answers.blocks import Block
 from service.db.clock import utc_now
 from service.db.rows import JobRow
 from service.jobs.queue import JobQueue
-from service.stores import answer_store
 from service.webhooks import outbox
-
-JobState = Literal["queued", "running", "cancelling", "succeeded", "failed", "cancelled", "expired"]
-ACTIVE: Final[tuple[JobState, ...]] = ("queued", "running", "cancelling")
-FINAL: Final[tuple[JobState, ...]] = ("succeeded", "failed", "cancelled", "expired")
+from service.wire.jobs import JobState
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

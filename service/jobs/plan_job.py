@@ -3,19 +3,28 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, cast
 
+from planner_core import __version__
 from planner_core.budget import Budget
 from planner_core.build import ScenarioOpportunities
 from planner_core.certified.proofs import documents as proofs
 from planner_core.run import plan_scenario
 from planner_core.solvers.base import Solver
 from planner_core.solvers.registry import solver_class
-from service.blocks import Block, target_blocks, targets_text, timeline_blocks, timeline_text
-from service.documents import Documents, figures_of
+from service.answers.blocks import (
+    Block,
+    target_blocks,
+    targets_text,
+    timeline_blocks,
+    timeline_text,
+)
+from service.answers.rendering import Documents, figures_of
 from service.scenarios.translate import scenario_from_content
+from service.wire.base import Json, dumped
+from service.wire.timelines import SolverUsed
 
 
 class Parcel:
@@ -123,20 +132,28 @@ def run_plan_job(request: PlanRequest, budget: Budget) -> PlanAnswer:
         known,
         proofs.from_json(request.bound) if request.bound is not None else None,
     )
-    documents = Documents(judged, job_id=request.job_id, scenario_sha256=request.scenario_sha256)
-    termination = judged.solution.termination.value
-    head = documents.head(
-        solver=request.solver, params=request.params, seed=request.seed, termination=termination
+    documents = Documents(judged)
+    solver = SolverUsed(
+        name=request.solver, version=__version__, params=request.params, seed=request.seed
     )
+    sha256 = request.scenario_sha256
+    head = documents.head(job_id=request.job_id, scenario_sha256=sha256, solver=solver)
     return PlanAnswer(
         blocks=(
-            *timeline_blocks(head, documents.satellites()),
-            *target_blocks(documents.targets()),
+            *timeline_blocks(dumped(head), _satellites(documents)),
+            *target_blocks(map(dumped, documents.targets())),
         ),
-        termination=termination,
+        termination=head.termination,
         reward=judged.timeline.reward,
         bound=judged.bound.value if judged.bound else None,
         proof=proofs.to_json(judged.bound) if judged.bound else None,
         opportunity_block=judged.opportunities.to_bytes() if known is None else None,
-        figures=figures_of(head),
+        figures=figures_of(dumped(head)),
     )
+
+
+def _satellites(documents: Documents) -> Iterator[tuple[Json, Iterator[Json], Json]]:
+    """Yield what stands before the actions of each satellite, those, and what stands behind."""
+    for about, actions in documents.satellites():
+        before, behind = {"id", "name"}, {"eclipses", "resources"}
+        yield dumped(about, include=before), map(dumped, actions), dumped(about, include=behind)

@@ -17,7 +17,7 @@ from typing import Any, Final
 import psutil
 
 from planner_core.budget import Progress
-from service.blocks import Block
+from service.answers.blocks import Block
 from service.jobs import child
 from service.jobs.child import (
     Answered,

@@ -18,8 +18,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.orm import Session
 
 from planner_core.budget import Progress
-from service import tracing
-from service.blocks import proof_blocks
+from service.answers.blocks import proof_blocks
 from service.db.clock import utc_now
 from service.db.failures import why_unavailable
 from service.db.rows import JobRow, ScenarioRow, WorkerRow
@@ -32,11 +31,12 @@ from service.jobs.queue import DbosConsumer, DbosQueue
 from service.jobs.reconcile import Reconciler
 from service.jobs.renewal import Renewal
 from service.jobs.runner import Abandoned, Limits, Order, Runner, Work
-from service.logs import about_job
+from service.process import tracing
+from service.process.logs import about_job
+from service.process.stopping import StopRequest
+from service.process.tracing import JobSpan
 from service.settings import Settings
-from service.stopping import StopRequest
 from service.stores import bound_store, opportunity_store
-from service.tracing import JobSpan
 from service.webhooks.courier import Courier
 
 log = logging.getLogger(__name__)

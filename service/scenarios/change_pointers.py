@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from planner_core.errors import PlannerError
 from planner_core.pins import PinnedAction, Pins
 from planner_core.reasons.what_if import is_any_image
-from service.scenarios.change_inputs import ChangeIn
-from service.scenarios.pin_inputs import PinnedActionIn
+from service.wire.changes import ChangeIn
+from service.wire.pins import PinnedActionIn
 
 _PIN = re.compile(r"/pins/(keep|skip)/(\d+)")
 

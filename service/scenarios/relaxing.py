@@ -7,10 +7,11 @@ from dataclasses import replace
 from typing import Any
 
 from planner_core.errors import InvalidScenario, PlannerError
-from service.instants import instant_text
-from service.scenarios.change_inputs import PART_OF, RelaxIn
-from service.scenarios.inputs import ScenarioFile, TargetIn
 from service.scenarios.translate import read_file, scenario_from_file
+from service.wire.changes import PART_OF, RelaxIn
+from service.wire.instants import instant_text
+from service.wire.places import TargetIn
+from service.wire.scenarios import ScenarioFile
 
 _OF_TARGETS = TargetIn.model_fields.keys() - {"id", "lat_deg", "lon_deg", "alt_m"}
 

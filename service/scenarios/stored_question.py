@@ -16,13 +16,13 @@ from planner_core.domain import (
     Satellite,
     Target,
 )
-from service.scenarios.inputs import FileGroundStation, FileSatellite, FileTarget, HorizonIn
 from service.scenarios.translate import (
     ground_station_from,
     horizon_from,
     satellite_from,
     target_from,
 )
+from service.wire.scenarios import FileGroundStation, FileSatellite, FileTarget, HorizonIn
 
 _TARGETS: Final = "targets"
 

@@ -30,22 +30,17 @@ from planner_core.domain import (
 from planner_core.errors import InvalidScenario, PlannerError
 from planner_core.orbits.omm import elements_from_omm, omm_from_elements
 from planner_core.orbits.tle import read_tle
-from service.api.errors import faults_of_validation
-from service.scenarios.inputs import (
+from service.problems.faults import faults_of_validation
+from service.scenarios.pin_inputs import pins_from
+from service.wire.places import GroundStationIn, TargetIn
+from service.wire.satellites import OrbitIn, Preset, PresetResourcesIn, ResourcesIn, SatelliteIn
+from service.wire.scenarios import (
     FileGroundStation,
     FileSatellite,
     FileTarget,
-    GroundStationIn,
     HorizonIn,
-    OrbitIn,
-    Preset,
-    PresetResourcesIn,
-    ResourcesIn,
-    SatelliteIn,
     ScenarioFile,
-    TargetIn,
 )
-from service.scenarios.pin_inputs import pins_from
 
 _SECONDS_PER_HOUR = 3600.0
 

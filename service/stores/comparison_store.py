@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
 
-from service.db.clock import utc_now
-from service.db.rows import ComparisonRow, ComparisonRunRow, JobResultRow, JobRow
-from service.ids import new_id
-from service.jobs.queue import JobQueue
-from service.stores import job_store
-from service.stores.job_store import JobSpec
+from service.db.rows import ComparisonRunRow, JobResultRow, JobRow
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,28 +18,6 @@ class Run:
 
     job: JobRow
     figures: Mapping[str, Any] | None
-
-
-def submit(
-    session: Session, queue: JobQueue, specs: Sequence[JobSpec], *, label: str | None
-) -> ComparisonRow:
-    """Store a comparison and queue a job for each spec, all or none. All plan one scenario."""
-    own_id = new_id()
-    row = {
-        "id": own_id,
-        "scenario_id": specs[0].scenario_id,
-        "tenant": specs[0].owner,
-        "label": label,
-        "created_at": utc_now(),
-    }
-    session.execute(sa.insert(ComparisonRow).values(**row))
-    jobs = [job_store.submit(session, queue, spec) for spec in specs]
-    runs = [
-        {"comparison_id": own_id, "position": position, "job_id": job.id}
-        for position, job in enumerate(jobs)
-    ]
-    session.execute(sa.insert(ComparisonRunRow), runs)
-    return session.get_one(ComparisonRow, own_id)
 
 
 def runs_of(session: Session, comparison_ids: Iterable[str]) -> dict[str, list[Run]]:

@@ -12,10 +12,9 @@ from sqlalchemy.orm import Session
 
 from service.db.clock import seconds_between, utc_now
 from service.db.rows import JobRow, SatelliteRow, ScenarioRow, WebhookDeliveryRow, WorkerRow
-from service.jobs import lease
-from service.jobs.lease import JobState
 from service.stores import satellite_store
-from service.webhooks.outbox import DeliveryState
+from service.wire.jobs import ACTIVE, JobState
+from service.wire.webhooks import DeliveryState
 
 ORBITS_OF_LAST_S: Final = 7 * 86400.0
 """A satellite is in use while a job active or newer than this plans it."""
@@ -110,9 +109,7 @@ def _job_times(session: Session) -> list[JobTime]:
 
 
 def _orbits(session: Session, now: datetime) -> list[OrbitAge]:
-    is_in_use = sa.or_(
-        JobRow.state.in_(lease.ACTIVE), JobRow.created_at >= utc_now(-ORBITS_OF_LAST_S)
-    )
+    is_in_use = sa.or_(JobRow.state.in_(ACTIVE), JobRow.created_at >= utc_now(-ORBITS_OF_LAST_S))
     planned = sa.select(JobRow.scenario_id).where(is_in_use)
     summaries = session.scalars(sa.select(ScenarioRow.summary).where(ScenarioRow.id.in_(planned)))
     ids = {own_id for summary in summaries for own_id in summary.get("satellite_ids", ())}

@@ -10,11 +10,11 @@ from typing import Any, Literal
 import sqlalchemy as sa
 from sqlalchemy.orm import Session, aliased
 
+from planner_core.domain import OrbitElements
 from planner_core.orbits.ingest import Entry
+from service.db.ids import new_id
 from service.db.rows import ElementSetRow, SatelliteRow
-from service.ids import new_id
-from service.scenarios.inputs import AgilityIn, SatelliteIn, SensorIn
-from service.scenarios.translate import Orbit
+from service.wire.satellites import AgilityIn, SatelliteIn, SensorIn
 
 _LONGEST_NAME = 200
 
@@ -35,19 +35,21 @@ def alive() -> sa.Select[SatelliteRow]:
     return sa.select(SatelliteRow).where(SatelliteRow.deleted_at.is_(None))
 
 
-def add_satellite(session: Session, body: SatelliteIn, orbit: Orbit) -> SatelliteRow:
-    """Store a new satellite with its first element set."""
+def add_satellite(
+    session: Session, body: SatelliteIn, elements: OrbitElements, orbit: dict[str, Any]
+) -> SatelliteRow:
+    """Store a new satellite with its first element set, parsed and in its tidy form."""
     dumped = body.model_dump(mode="json", include={"agility", "sensor", "resources"})
     row = SatelliteRow(
         id=new_id(),
         name=body.name,
-        norad_cat_id=orbit.elements.norad_cat_id,
+        norad_cat_id=elements.norad_cat_id,
         created_at=datetime.now(UTC),
         **dumped,
     )
     session.add(row)
     session.flush()
-    add_elements(session, row.id, orbit.elements.epoch, orbit.stored)
+    add_elements(session, row.id, elements.epoch, orbit)
     return row
 
 

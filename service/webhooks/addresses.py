@@ -15,9 +15,10 @@ from urllib.parse import urlsplit
 
 import httpcore
 
+from service.wire.webhooks import LONGEST_URL
+
 Address = ipaddress.IPv4Address | ipaddress.IPv6Address
 
-LONGEST_URL: Final = 2000
 _TRY_OTHERS_AFTER_S: Final = 3.0
 _THIS_MACHINE: Final = ("localhost", "localhost.localdomain", "ip6-localhost")
 # An address of the internet that leads to the IPv4 address in its last four bytes (RFC 6052).

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, Final, Literal, get_args
-
 from service.db.rows import JobRow
-
-Event = Literal["job.succeeded", "job.failed", "job.cancelled", "job.expired", "test"]
-JOB_EVENTS: Final = tuple(event for event in get_args(Event) if event != "test")
+from service.wire.webhooks import JobEnd
 
 
 def event_of(state: str) -> str:
@@ -19,16 +15,16 @@ def event_of(state: str) -> str:
     return f"job.{state}"
 
 
-def data_of(job: JobRow) -> dict[str, Any]:
+def end_of(job: JobRow) -> JobEnd:
     """Return what an event tells of a job: enough to decide whether to fetch the rest."""
     address = f"/v1/jobs/{job.id}"
-    return {
-        "job_id": job.id,
-        "state": job.state,
-        "termination": job.termination,
-        "error": job.error,
-        "solver": job.solver,
-        "label": job.label,
-        "scenario_id": job.scenario_id,
-        "links": {"job": address, "timeline": f"{address}/timeline"},
-    }
+    return JobEnd(
+        job_id=job.id,
+        state=job.state,
+        termination=job.termination,
+        error=job.error,
+        solver=job.solver,
+        label=job.label,
+        scenario_id=job.scenario_id,
+        links={"job": address, "timeline": f"{address}/timeline"},
+    )

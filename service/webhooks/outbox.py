@@ -10,18 +10,17 @@ from __future__ import annotations
 import json
 from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
 
 from service.db.clock import utc_now
+from service.db.ids import new_id
 from service.db.rows import JobRow, WebhookDeliveryRow, WebhookRow
-from service.ids import new_id
-from service.instants import instant_text
 from service.webhooks import events
-
-DeliveryState = Literal["pending", "delivered", "failed"]
+from service.wire.base import dumped
+from service.wire.webhooks import EventOut, JobEnd, TestData
 
 TAKEN_S: Final = 60.0
 KEEP_S: Final = 30 * 86400.0
@@ -57,16 +56,21 @@ def tell_end_of(session: Session, job_id: str) -> None:
     for job, webhook in session.execute(wanted):
         event = events.event_of(job.state)
         if event in webhook.events:
-            queue(session, webhook, event, events.data_of(job), job_id=job_id)
+            queue(session, webhook, event, events.end_of(job), job_id=job_id)
 
 
 def queue(
-    session: Session, webhook: WebhookRow, event: str, data: dict[str, Any], *, job_id: str | None
+    session: Session,
+    webhook: WebhookRow,
+    event: str,
+    data: JobEnd | TestData,
+    *,
+    job_id: str | None,
 ) -> str:
     """Queue one delivery and return its id."""
     now = session.execute(sa.select(utc_now())).scalar_one()
     # Frozen here: each attempt signs and sends the same bytes.
-    payload = json.dumps({"type": event, "timestamp": instant_text(now), "data": data})
+    payload = json.dumps(dumped(EventOut(type=event, timestamp=now, data=data)))
     return _add(session, webhook, event, payload, job_id)
 
 

@@ -17,8 +17,8 @@ from planner_core.orbits.ingest import Entry, read_elements
 from planner_core.orbits.omm import elements_from_omm
 from planner_core.orbits.tle import read_tle
 from service.api.ground_stations import read_stations
-from service.api.problems import ServiceError
 from service.api.target_catalogs import read_targets
+from service.problems.kinds import ServiceError
 
 ELEMENT_TYPES: Final = (
     "text/plain",

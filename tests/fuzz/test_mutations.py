@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.fuzz.corpus import seeds, shared_seeds
@@ -48,7 +48,6 @@ def test_noise_is_read_or_refused(parser: str, content: str | bytes) -> None:
 
 
 @pytest.mark.parametrize("parser", REAL)
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_a_mutated_file_of_the_real_world_is_read_or_refused(
     parser: str, data: st.DataObject, shared_data: Path

@@ -14,9 +14,16 @@ from tests.fuzz.nasty import NASTIES
 from tests.fuzz.odd_values import ODD_FILES
 from tests.fuzz.parsers import PARSERS
 
-SIZE: Final = 2_000_000
-MEMORY: Final = 250_000_000
-"""A good hundred bytes for each of the file: JSON takes about thirty at most."""
+Sizes = tuple[int, int]
+
+SIZES: Final = [
+    (400_000, 80_000_000),
+    pytest.param((2_000_000, 250_000_000), marks=pytest.mark.full_size),
+]
+"""Of a file, and of the memory that it may take: a good hundred bytes for each of the file.
+
+JSON takes about thirty at most.
+"""
 DEADLINE_S: Final = 120.0
 """Far beyond the second or two that the slowest take: for what would take hours."""
 
@@ -24,18 +31,20 @@ CONTEXT = get_context("forkserver")
 CONTEXT.set_forkserver_preload(["tests.fuzz.parsers"])
 
 
+@pytest.mark.parametrize("sizes", SIZES, ids=lambda sizes: f"{sizes[0] // 1000} kB")
 @pytest.mark.parametrize("number", range(len(NASTIES)), ids=[file.name for file in NASTIES])
-def test_a_nasty_file_is_no_danger(number: int) -> None:
-    assert status_of(parse_one, number) == 0
+def test_a_nasty_file_is_no_danger(number: int, sizes: Sizes) -> None:
+    assert status_of(parse_one, number, sizes) == 0
 
 
-def test_what_takes_too_much_memory_is_noticed() -> None:
-    assert status_of(hoard, 2 * MEMORY) == 1
+@pytest.mark.parametrize("sizes", SIZES, ids=lambda sizes: f"{sizes[0] // 1000} kB")
+def test_what_takes_too_much_memory_is_noticed(sizes: Sizes) -> None:
+    assert status_of(hoard, 2, sizes) == 1
 
 
-def status_of(work: Callable[[int], None], argument: int) -> int | None:
+def status_of(work: Callable[[int, Sizes], None], argument: int, sizes: Sizes) -> int | None:
     """Return the exit status of a process that does some work, below zero where it was killed."""
-    process = CONTEXT.Process(target=work, args=(argument,))
+    process = CONTEXT.Process(target=work, args=(argument, sizes))
     process.start()
     process.join(DEADLINE_S)
     if process.is_alive():
@@ -44,23 +53,23 @@ def status_of(work: Callable[[int], None], argument: int) -> int | None:
     return process.exitcode
 
 
-def parse_one(number: int) -> None:
+def parse_one(number: int, sizes: Sizes) -> None:
     """Give one of the nasty files to each parser of its kinds."""
     file = NASTIES[number]
-    data = file.make(SIZE)
-    limit_memory()
+    data = file.make(sizes[0])
+    limit_memory(sizes)
     for name, parse in PARSERS.items():
         if name.partition(" ")[2] in file.kinds:
             parse(data)
 
 
-def hoard(size: int) -> None:
-    limit_memory()
-    bytearray(size)
+def hoard(times: int, sizes: Sizes) -> None:
+    limit_memory(sizes)
+    bytearray(times * sizes[1])
 
 
-def limit_memory() -> None:
-    most = psutil.Process().memory_info().vms + MEMORY
+def limit_memory(sizes: Sizes) -> None:
+    most = psutil.Process().memory_info().vms + sizes[1]
     resource.setrlimit(resource.RLIMIT_AS, (most, most))
 
 

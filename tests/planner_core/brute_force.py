@@ -33,8 +33,12 @@ def best_plan(problem: Problem) -> Plan | None:
     }
 
     def worth(rows: tuple[int, ...]) -> float:
-        targets = {int(table.place[row]) for row in rows if table.kind[row] == COLLECT}
-        return sum(float(problem.target_reward[target]) for target in targets)
+        best: dict[int, float] = {}
+        for row in rows:
+            if table.kind[row] == COLLECT:
+                target = int(table.place[row])
+                best[target] = max(best.get(target, 0.0), float(problem.worth[row]))
+        return sum(best.values())
 
     plans = sorted(_chains(problem, may_follow, (), 0), key=worth, reverse=True)
     for rows in plans:

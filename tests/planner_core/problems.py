@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from planner_core.domain import Agility, Dynamics, Resources
 from planner_core.problem import (
@@ -46,6 +47,7 @@ class Task:
     satellite: int = 0
     angle_deg: float = 0.0
     margin_s: float = 0.0
+    quality: float = 1.0  # of the image
     access: int | None = None  # shared by the collects that one access offers
     turn_deg: float = 0.0  # how far the line of sight turns during the task
 
@@ -69,8 +71,8 @@ def make_problem(
     ordered = sorted(tasks, key=lambda t: (t.start_s, t.end_s, t.satellite, t.kind, t.place))
     n = len(ordered)
 
-    def column(values: Sequence[float]) -> Floats:
-        return np.array(values, dtype=np.float64).reshape(n)
+    def column(values: Sequence[float], length: int = n) -> Floats:
+        return np.array(values, dtype=np.float64).reshape(length)
 
     angle = np.radians(column([t.angle_deg for t in ordered]))
     turned = angle + np.radians(column([t.turn_deg for t in ordered]))
@@ -102,6 +104,9 @@ def make_problem(
         in_eclipse=np.zeros(n, dtype=np.bool_),
     )
     whole = Sunlight(enter_s=np.array([0.0]), exit_s=np.array([horizon_s]))
+    reward = column(rewards if rewards is not None else [1.0] * num_targets, num_targets)
+    quality = column([t.quality for t in ordered])
+    worth = _worth(table, reward, quality)
     seen = set(table.place[table.kind == COLLECT].tolist())
     return Problem(
         horizon_s=horizon_s,
@@ -109,7 +114,7 @@ def make_problem(
         dynamics=dynamics,
         continuous_starts=False,
         target_ids=tuple(f"t{i}" for i in range(num_targets)),
-        target_reward=np.array(rewards if rewards is not None else [1.0] * num_targets),
+        worth=worth,
         target_access=np.array(
             [ACCESS_FOUND if i in seen else NEVER_VISIBLE for i in range(num_targets)],
             dtype=np.int8,
@@ -132,6 +137,19 @@ def make_problem(
     )
 
 
+def with_rewards(problem: Problem, rewards: Sequence[float] | npt.NDArray[np.number]) -> Problem:
+    """Return the problem with other rewards of its targets, which all their collects earn."""
+    reward, n = np.array(rewards, dtype=np.float64), len(problem.opportunities)
+    return replace(problem, worth=_worth(problem.opportunities, reward, np.ones(n)))
+
+
+def _worth(table: Opportunities, reward: Floats, quality: Floats) -> Floats:
+    worth = np.zeros(len(table))
+    collects = table.kind == COLLECT
+    worth[collects] = reward[table.place[collects]] * quality[collects]
+    return worth
+
+
 def random_problem(
     seed: int,
     *,
@@ -142,6 +160,7 @@ def random_problem(
     use_resources: bool = True,
     dynamics: Dynamics = "physical",
     has_rewards: bool = False,
+    has_quality: bool = False,
     resources: Resources = TIGHT,
     agility: Agility = Agility(),  # noqa: B008 - immutable
     max_turn_deg: float = 0.0,
@@ -153,7 +172,8 @@ def random_problem(
     """Return a small crowded problem drawn from ``seed``.
 
     Each access offers ``num_offers`` collects, 9 s apart.
-    With ``max_turn_deg`` lines of sight turn during collects, by up to that either way.
+    With ``max_turn_deg`` lines of sight turn during collects, by up to that either way. With
+    ``has_quality`` each collect has its own, some of them none at all.
     """
     rng = np.random.default_rng(seed)
     tasks: list[Task] = []
@@ -186,6 +206,9 @@ def random_problem(
             )
         )
     rewards = [float(r) for r in rng.integers(1, 9, num_targets)] if has_rewards else None
+    if has_quality:
+        drawn = np.maximum(rng.uniform(-0.1, 1.0, len(tasks)), 0.0)
+        tasks = [replace(t, quality=float(q)) for t, q in zip(tasks, drawn, strict=True)]
     return make_problem(
         tasks,
         num_targets=num_targets,

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.access.limits import Limits
@@ -22,6 +22,7 @@ from planner_core.domain import (
 from planner_core.orbits.ephemeris import propagate
 from planner_core.orbits.mask import mask_elevation_deg
 from planner_core.orbits.places import Places
+from tests.examples import examples
 from tests.geometry import (
     Ground,
     SkyfieldPath,
@@ -93,7 +94,7 @@ def test_limits_hold_half_a_second_inside_and_fail_half_a_second_outside(nadir: 
                 assert (holds == expected).all()
 
 
-@settings(max_examples=25, deadline=None)
+@examples(25)
 @given(
     st.floats(11.0, 16.0),
     st.floats(0.0, 0.02),

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget
@@ -38,6 +38,7 @@ from planner_core.solvers.registry import (
     Rule,
 )
 from planner_core.solvers.walk import naive_select_action
+from tests.examples import examples
 from tests.planner_core.problems import ECLIPSES, TIGHT, Task, make_problem, random_problem
 
 SEEDS = st.integers(0, 10**6)
@@ -45,7 +46,7 @@ GUIDANCE = ForwardSearch().guidance
 
 
 def follows(track: Track, a: int, b: int) -> bool:
-    return may_follow(a, b, track.near_from, track.far_from, track.offset, track.bits)
+    return may_follow(track.transitions, a, b)
 
 
 def may_pass(problem: Problem, track: Track, row: int, recorder: float) -> bool:
@@ -67,7 +68,7 @@ def may_pass(problem: Problem, track: Track, row: int, recorder: float) -> bool:
     return bool(recorder + written < r.recorder_max_fraction)
 
 
-@settings(max_examples=200, deadline=None)
+@examples(200)
 @given(
     seed=SEEDS,
     dynamics=st.sampled_from(["physical", "paper"]),
@@ -132,7 +133,7 @@ def test_the_next_action_is_the_first_that_the_definition_allows(
     assert found == expected
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(seed=SEEDS, breadth=st.integers(1, 30), unimaged_only=st.booleans())
 def test_what_may_follow_a_task_is_the_same_when_it_is_remembered(
     seed: int, breadth: int, unimaged_only: bool

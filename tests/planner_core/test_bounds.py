@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget
@@ -13,13 +11,14 @@ from planner_core.certified.proofs.lagrangian import lagrangian_bound, lagrangia
 from planner_core.domain import Agility
 from planner_core.referee.replay import replay
 from planner_core.solvers.registry import ForwardSearch
+from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
-from tests.planner_core.problems import random_problem
+from tests.planner_core.problems import random_problem, with_rewards
 
 SEEDS = st.integers(0, 10**6)
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100)
 @given(
     seed=SEEDS,
     use_resources=st.booleans(),
@@ -40,7 +39,7 @@ def test_no_plan_beats_the_bound(
         assert lagrangian_value(problem, prices)[0] >= best - 1e-9
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(seed=SEEDS)
 def test_a_slow_satellite_may_turn_by_way_of_tasks_that_are_worth_nothing(seed: int) -> None:
     problem = random_problem(
@@ -48,14 +47,14 @@ def test_a_slow_satellite_may_turn_by_way_of_tasks_that_are_worth_nothing(seed: 
         max_turn_deg=25.0, agility=Agility(slew_rate_deg_s=0.3),
     )  # fmt: skip
     rng = np.random.default_rng(seed)
-    problem = replace(problem, target_reward=rng.integers(0, 2, 4).astype(np.float64))
+    problem = with_rewards(problem, rng.integers(0, 2, 4))
     best = best_reward(problem)
     assert lagrangian_bound(problem, reward=0.0).value >= best - 1e-9
     for prices in (np.zeros(4), np.ones(4), rng.uniform(0.0, 1.0, 4)):
         assert lagrangian_value(problem, prices)[0] >= best - 1e-9
 
 
-@settings(max_examples=40, deadline=None)
+@examples(40)
 @given(seed=SEEDS)
 def test_the_stored_prices_prove_the_bound_again(seed: int) -> None:
     problem = random_problem(seed, num_collects=60, num_targets=20, use_resources=False)

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget, Progress, Termination
-from planner_core.certified.drivers.agility_only import TOLERANCE
+from planner_core.certified.incumbent import TOLERANCE
 from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.proofs.certificate import (
     Certificate,
@@ -26,8 +26,9 @@ from planner_core.problem import COLLECT, Problem
 from planner_core.referee.replay import replay
 from planner_core.solvers.base import Solution
 from planner_core.solvers.registry import Certified, Rule
+from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
-from tests.planner_core.problems import Task, make_problem, random_problem
+from tests.planner_core.problems import Task, make_problem, random_problem, with_rewards
 
 SEEDS = st.integers(0, 10**6)
 SLOW = Agility(slew_rate_deg_s=0.3)
@@ -36,7 +37,7 @@ AGILITY = st.sampled_from([Agility(), SLOW, SETTLING])
 SPREADS = st.sampled_from(["one", "whole", "tenfold", "odd"])
 
 
-def with_rewards(problem: Problem, seed: int, spread: str) -> Problem:
+def with_spread(problem: Problem, seed: int, spread: str) -> Problem:
     """Return the problem with rewards that are alike, whole, orders of magnitude apart, or odd."""
     rng = np.random.default_rng(seed)
     n = len(problem.target_ids)
@@ -46,7 +47,7 @@ def with_rewards(problem: Problem, seed: int, spread: str) -> Problem:
         "tenfold": 10.0 ** rng.integers(0, 6, n),
         "odd": np.exp(rng.uniform(-7.0, 7.0, n)),
     }[spread]
-    return replace(problem, target_reward=rewards)
+    return with_rewards(problem, rewards)
 
 
 def wide_problem(seed: int, *, num_collects: int, num_targets: int, span_s: float) -> Problem:
@@ -78,7 +79,7 @@ def assert_proven(problem: Problem, solution: Solution, best: float) -> None:
         assert solution.proven.log
 
 
-@settings(max_examples=1500, deadline=None)
+@examples(1500)
 @given(
     seed=SEEDS, spread=SPREADS, num_satellites=st.integers(1, 3), agility=AGILITY,
     max_turn_deg=st.sampled_from([0.0, 25.0]), num_targets=st.integers(2, 6),
@@ -95,13 +96,13 @@ def test_it_equals_brute_force(
         seed, use_resources=False, num_satellites=num_satellites, num_collects=11,
         num_targets=num_targets, span_s=400.0, agility=agility, max_turn_deg=max_turn_deg,
     )  # fmt: skip
-    problem = with_rewards(problem, seed, spread)
+    problem = with_spread(problem, seed, spread)
     solution = Certified().solve(problem, Budget(), 0)
     assert solution.termination is Termination.OPTIMAL
     assert_proven(problem, solution, best_reward(problem))
 
 
-@settings(max_examples=200, deadline=None)
+@examples(200)
 @given(
     seed=SEEDS, spread=SPREADS, num_satellites=st.integers(1, 2), agility=AGILITY,
     max_turn_deg=st.sampled_from([0.0, 25.0]), num_offers=st.integers(2, 4),
@@ -119,7 +120,7 @@ def test_with_a_choice_of_starts_it_equals_brute_force(
         num_offers=num_offers, num_targets=4, span_s=250.0, agility=agility,
         max_turn_deg=max_turn_deg,
     )  # fmt: skip
-    problem = with_rewards(problem, seed, spread)
+    problem = with_spread(problem, seed, spread)
     solution = Certified().solve(problem, Budget(), 0)
     assert solution.termination is Termination.OPTIMAL
     assert_proven(problem, solution, best_reward(problem))
@@ -142,7 +143,7 @@ def test_crowded_starts_are_planned_within_a_true_bound(seed: int) -> None:
     assert (again.plan, again.bound) == (solution.plan, solution.bound)
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @example(seed=1940, spread="odd", num_satellites=2, gap=0.0)  # tasks struck out were forgotten
 @given(
     seed=SEEDS, spread=SPREADS, num_satellites=st.integers(1, 2), gap=st.sampled_from([0.0, 0.05])
@@ -155,7 +156,7 @@ def test_crowded_problems_are_proven_and_the_proof_checks_out(
         seed, use_resources=False, num_satellites=num_satellites, num_collects=120,
         num_targets=30,
     )  # fmt: skip
-    problem = with_rewards(problem, seed, spread)
+    problem = with_spread(problem, seed, spread)
     solution = Certified(gap=gap).solve(problem, Budget(), seed)
     reward = replay(problem, solution.plan).reward
     assert solution.bound is not None
@@ -164,7 +165,7 @@ def test_crowded_problems_are_proven_and_the_proof_checks_out(
     assert_proven(problem, solution, reward)
 
 
-@settings(max_examples=40, deadline=None)
+@examples(40)
 @given(seed=SEEDS, agility=AGILITY)
 def test_a_certificate_that_claims_less_than_a_plan_earns_is_never_sound(
     seed: int, agility: Agility

@@ -7,13 +7,14 @@ from functools import partial
 from typing import Literal
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget, Progress, Termination
 from planner_core.certified.proofs.resource_bound import resource_value
 from planner_core.certified.solver import Certified
 from planner_core.referee.replay import replay
+from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import TIGHT, random_problem, varied_problem
 
@@ -24,7 +25,7 @@ _problem = partial(varied_problem, scarce=STARVED)
 
 
 @pytest.mark.parametrize("dynamics", ["physical", "paper"])
-@settings(max_examples=500, deadline=None)
+@examples(500)
 @given(seed=SEEDS, num_satellites=st.integers(1, 3))
 def test_bound_and_plan_enclose_the_optimum(
     dynamics: Literal["physical", "paper"], seed: int, num_satellites: int

@@ -6,30 +6,33 @@ import itertools
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget
 from planner_core.domain import Agility
-from planner_core.precedence.chains import Links
+from planner_core.precedence.arcs import covering_arcs
+from planner_core.precedence.chains import chain_with_history
+from planner_core.precedence.relation import direct_precedence
 from planner_core.problem import COLLECT
 from planner_core.referee.replay import replay
+from planner_core.solvers.graph import longest_chain
 from planner_core.solvers.registry import Graph
+from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import Task, make_problem, random_problem
 
 SEEDS = st.integers(0, 10**6)
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(seed=SEEDS, num_collects=st.integers(0, 60), span_s=st.sampled_from([300.0, 5000.0]))
 def test_arcs_are_the_pairs_with_nothing_in_between(
     seed: int, num_collects: int, span_s: float
 ) -> None:
     problem = random_problem(seed, num_collects=num_collects, span_s=span_s, use_resources=False)
     satellite = problem.satellites[0]
-    arcs = Links.of(problem, satellite).arcs
-    assert arcs is not None
+    arcs = covering_arcs(direct_precedence(satellite))
     m = len(satellite)
     follows = np.array(
         [[a < b and satellite.transitions.allows(a, b) for b in range(m)] for a in range(m)],
@@ -41,7 +44,7 @@ def test_arcs_are_the_pairs_with_nothing_in_between(
     assert (found == covering).all()
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(seed=SEEDS, slew_rate_deg_s=st.sampled_from([1.0, 0.3]))
 def test_chains_are_as_heavy_as_those_of_the_listing(seed: int, slew_rate_deg_s: float) -> None:
     """Alg. 3 in plain Python, over all pairs; tasks without worth stand in no chain."""
@@ -56,17 +59,15 @@ def test_chains_are_as_heavy_as_those_of_the_listing(seed: int, slew_rate_deg_s:
     for b in range(40):
         earlier = [value[a] for a in range(b) if weight[a] > 0.0 and allows(a, b)]
         value[b] = weight[b] + max(earlier, default=0.0)
-    links = Links.of(problem, satellite)
-    found, chain = links.longest(weight)
-    assert found == pytest.approx(value[weight > 0.0].max(initial=0.0))
-    assert found == pytest.approx(weight[chain].sum())
-    for tasks in (chain, links.longest_with_history(weight, satellite.place)):
+    chain = longest_chain(problem, satellite, weight)
+    assert weight[chain].sum() == pytest.approx(value[weight > 0.0].max(initial=0.0))
+    for tasks in (chain, chain_with_history(satellite, weight, satellite.place)):
         assert (weight[tasks] > 0.0).all()
         assert all(allows(a, b) for a, b in itertools.pairwise(tasks))
     assert len(set(satellite.place[tasks])) == len(tasks)
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(seed=SEEDS)
 @pytest.mark.parametrize("path", ["history", "longest"])
 def test_graph_finds_the_optimum_where_no_target_comes_twice(path: str, seed: int) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget
@@ -15,6 +15,7 @@ from planner_core.problem import CONTACT, Problem
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
 from planner_core.solvers.registry import Milp
+from tests.examples import examples
 from tests.planner_core.problems import random_problem
 
 SEEDS = st.integers(0, 10**6)
@@ -25,7 +26,7 @@ def _contacts(problem: Problem, plan: Plan) -> tuple[int, ...]:
     return tuple(row for row in rows if problem.opportunities.kind[row] == CONTACT)
 
 
-@settings(max_examples=40, deadline=None)
+@examples(40)
 @given(
     seed=SEEDS,
     dynamics=st.sampled_from(["physical", "paper"]),
@@ -55,7 +56,7 @@ def test_the_best_plan_is_found_from_its_contacts(
     assert _contacts(problem, plan) == _contacts(problem, best)
 
 
-@settings(max_examples=20, deadline=None)
+@examples(20)
 @given(seed=SEEDS, dynamics=st.sampled_from(["physical", "paper"]))
 def test_prices_from_amid_prove_what_a_corner_is_worth(seed: int, dynamics: Dynamics) -> None:
     problem = random_problem(
@@ -65,7 +66,7 @@ def test_prices_from_amid_prove_what_a_corner_is_worth(seed: int, dynamics: Dyna
     relaxation = FixedContacts(problem, every, (), Budget(), 0).relaxation()
     corner = FixedContacts(problem, every, (), Budget(), 0).relaxed()
     assert relaxation.value == pytest.approx(corner, rel=0.02)
-    assert np.all((relaxation.prices >= 0.0) & (relaxation.prices <= problem.target_reward))
+    assert np.all((relaxation.prices >= 0.0) & (relaxation.prices <= problem.best_worth))
     # Without contacts the programme over paths is no weaker than the linear one.
     proven = resource_value(problem, relaxation.prices, 1e-3)
     assert proven <= relaxation.value + 0.05

@@ -6,14 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget, Termination
 from planner_core.certified.drivers.continuous import solve_continuous, with_own_starts
 from planner_core.certified.lns.continuous_search import ContinuousSearch
 from planner_core.certified.proofs import documents as proofs
-from planner_core.certified.proofs.continuous import ContinuousDual, accessible, continuous_value
+from planner_core.certified.proofs.bound import accessible
+from planner_core.certified.proofs.continuous import ContinuousDual, continuous_value
 from planner_core.domain import Agility
 from planner_core.precedence.earliest_starts import follows_at_s
 from planner_core.precedence.time_windows import spans_of, view_of
@@ -27,6 +28,7 @@ from planner_core.problem import (
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
 from planner_core.solvers.registry import SOLVERS, Certified, Rule
+from tests.examples import examples
 from tests.planner_core.flat_earth import flat_problem
 
 SEEDS = st.integers(0, 10**6)
@@ -42,7 +44,7 @@ def best_reward(problem: Problem) -> float:
     It turns faster than its lines of sight, so each task is best begun as early as it can be.
     """
     spans, view = spans_of(problem, 0), view_of(problem, 0)
-    reward = problem.target_reward
+    reward = problem.best_worth
     best = 0.0
 
     def go_on(last: int, start_s: float, taken: frozenset[int]) -> None:
@@ -62,7 +64,7 @@ def best_reward(problem: Problem) -> float:
     return best
 
 
-@settings(max_examples=25, deadline=None)
+@examples(25)
 @given(seed=SEEDS, agility=AGILITIES, num_satellites=st.integers(1, 3), has_rewards=st.booleans(),
        spacing_s=st.sampled_from([None, 40.0]))  # fmt: skip
 def test_plans_are_valid_no_worse_than_they_began_and_below_the_bound(
@@ -85,7 +87,7 @@ def test_plans_are_valid_no_worse_than_they_began_and_below_the_bound(
     assert replay(problem, filled.plan).reward >= replay(problem, rule.plan).reward
 
 
-@settings(max_examples=40, deadline=None)
+@examples(40)
 @given(
     seed=SEEDS, rate=st.sampled_from([1.0, 2.0]), settle_s=st.sampled_from([0.0, 6.0]),
     has_rewards=st.booleans(), width_s=st.sampled_from([2.5, 7.0, 25.0]),
@@ -102,7 +104,7 @@ def test_whatever_the_prices_the_bound_is_not_below_the_best_plan(
     assert dual is not None
     rng = np.random.default_rng(seed)
     for share in (0.0, 0.3, 1.0):
-        prices = problem.target_reward * np.clip(rng.normal(share, 0.3, 6), 0.0, 1.0)
+        prices = problem.best_worth * np.clip(rng.normal(share, 0.3, 6), 0.0, 1.0)
         assert dual.at(prices)[0] >= best - 1e-9
     solution = solve_continuous(problem, Budget(), 0, 0.0, 20.0)
     reward = replay(problem, solution.plan).reward
@@ -124,7 +126,7 @@ def test_small_problems_end_at_the_optimum_and_most_are_proven() -> None:
     assert proven >= 15
 
 
-@settings(max_examples=15, deadline=None)
+@examples(15)
 @given(seed=SEEDS, num_satellites=st.integers(1, 2))
 def test_the_best_plan_on_a_grid_stays_below_the_bound(seed: int, num_satellites: int) -> None:
     problem = flat_problem(
@@ -192,7 +194,7 @@ def test_a_satellite_slower_than_its_lines_of_sight_has_the_bound_of_all_targets
     assert continuous_value(slow, np.zeros(10)) == accessible(slow).value
 
 
-@settings(max_examples=30, deadline=None)
+@examples(30)
 @given(seed=SEEDS)
 def test_pins_hold_and_blocked_intervals_stay_empty(seed: int) -> None:
     """Accesses around a blocked interval may be used on either side of it."""

@@ -64,7 +64,7 @@ def test_free_starts_gain_images_that_the_referee_grants(judged: Judged) -> None
 @pytest.mark.parametrize("use_resources", [False, True])
 def test_every_solver_answers_such_a_scenario(name: str, use_resources: bool) -> None:
     asked = scenario(use_resources=use_resources)
-    answer = plan_scenario(asked, SOLVERS[name](), 0, Budget(5.0))
+    answer = plan_scenario(asked, SOLVERS[name](), 0, Budget())
     assert answer.timeline.is_valid
     assert answer.bound is not None
     assert answer.timeline.reward <= answer.bound.value + 1e-9

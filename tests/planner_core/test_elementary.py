@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget
@@ -22,10 +22,11 @@ from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.proofs.documents import from_json, is_proven, to_json
 from planner_core.certified.proofs.lagrangian import lagrangian_bound, lagrangian_value
 from planner_core.domain import Agility
-from planner_core.precedence.network import network_of
+from planner_core.precedence.arcs import arc_network_of
 from planner_core.problem import COLLECT, Floats, Problem
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
+from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import Task, make_problem, random_problem
 
@@ -55,11 +56,11 @@ def spaced_problem(
 
 
 def random_prices(problem: Problem, rng: np.random.Generator) -> Floats:
-    prices: Floats = rng.uniform(-0.3, 1.2, len(problem.target_ids)) * problem.target_reward
+    prices: Floats = rng.uniform(-0.3, 1.2, len(problem.target_ids)) * problem.best_worth
     return prices
 
 
-@settings(max_examples=150, deadline=None)
+@examples(150)
 @given(seed=st.integers(0, 10**6))
 def test_whatever_the_prices_it_lies_between_the_optimum_and_the_plain_bound(seed: int) -> None:
     problem = spaced_problem(seed)
@@ -73,7 +74,7 @@ def test_whatever_the_prices_it_lies_between_the_optimum_and_the_plain_bound(see
         assert counts.min() >= 0
 
 
-@settings(max_examples=40, deadline=None)
+@examples(40)
 @given(seed=st.integers(0, 10**6))
 def test_crowded_problems_never_hold_a_better_plan(seed: int) -> None:
     """Too large for brute force: many accesses are open at once, and bits are used again."""
@@ -87,12 +88,12 @@ def test_crowded_problems_never_hold_a_better_plan(seed: int) -> None:
         assert reward - 1e-9 <= value <= plain + 1e-9
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100)
 @given(seed=st.integers(0, 10**6))
 def test_it_holds_for_weights_that_differ_from_collect_to_collect(seed: int) -> None:
     """Against the heaviest path without repetition, found by trying all."""
     problem = spaced_problem(seed, num_accesses=2, num_offers=4)
-    network = network_of(problem)
+    network = arc_network_of(problem)
     memory = memory_of(problem, network)
     rng = np.random.default_rng(seed)
     weight = rng.uniform(0.0, 3.0, len(network.row)) * rng.integers(0, 2, len(network.row))
@@ -136,7 +137,7 @@ def test_a_target_in_view_for_long_is_paid_once() -> None:
 
 def test_prices_get_better_and_their_proof_survives_being_written_down() -> None:
     problem = spaced_problem(5, num_accesses=60, num_offers=8, span_s=3000.0)
-    network = network_of(problem)
+    network = arc_network_of(problem)
     memory = memory_of(problem, network)
     first, again = (ElementaryPrices(problem, network, memory, 0) for _ in range(2))
     first.improve(1, NEVER)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget
@@ -33,6 +33,7 @@ from planner_core.reasons.explain import explain
 from planner_core.reasons.what_if import Relaxation, relaxed
 from planner_core.referee.replay import replay
 from planner_core.solvers.registry import SOLVERS
+from tests.examples import examples
 from tests.geometry import YEAR_2019, hours, orbit, satellite
 from tests.planner_core.brute_force import best_reward
 
@@ -106,7 +107,7 @@ def allowed_rows(scenario: Scenario, whole: ScenarioOpportunities) -> np.ndarray
     return np.array(rows, dtype=np.int32)
 
 
-@settings(max_examples=25, deadline=None)
+@examples(25)
 @given(seed=st.integers(0, 10**6))
 def test_on_a_grid_exactly_the_collects_in_time_of_the_right_type_are_left(seed: int) -> None:
     scenario, whole = everything()
@@ -140,7 +141,7 @@ def test_plans_honour_times_and_types_and_exact_ones_are_the_best(solver: str, s
     release_s=st.integers(0, 900_000).map(lambda ms: ms / 1000.0),
     length_s=st.integers(1, 900_000).map(lambda ms: ms / 1000.0),
 )
-@settings(max_examples=30, deadline=None)
+@examples(30)
 def test_centred_collects_lie_in_the_middle_of_what_times_leave(
     release_s: float, length_s: float
 ) -> None:

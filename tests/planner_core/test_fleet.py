@@ -4,21 +4,25 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget, Termination
-from planner_core.certified.drivers.fleet import FleetSearch
+from planner_core.certified.drivers.agility_only import Effort
+from planner_core.certified.drivers.fleet import FleetSearch, solve_without_resources
+from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.fleet_start import priced_start
 from planner_core.certified.mip.solution_pool import PlanPool
 from planner_core.certified.multipliers.incremental import IncrementalPrices
 from planner_core.certified.proofs.documents import from_json, is_proven, to_json
 from planner_core.domain import Agility
 from planner_core.precedence.network import network_of
+from planner_core.precedence.relation import direct_precedence
 from planner_core.problem import Problem
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
 from planner_core.solvers.registry import Certified, Milp
+from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import random_problem
 
@@ -36,14 +40,14 @@ def fleet(seed: int, slew_rate_deg_s: float = 1.0) -> Problem:
 
 def searched(problem: Problem, budget: Budget, seed: int) -> FleetSearch:
     """Return a search that has gone through all its steps."""
-    search = FleetSearch(problem, budget, seed, 0.0)
+    search = FleetSearch(Incumbent(problem, budget, 0.0), seed)
     search.price()
     search.start()
     search.search(20.0)
     return search
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(
     seed=SEEDS, num_satellites=st.integers(2, 4), has_rewards=st.booleans(),
     num_offers=st.integers(1, 2), slew_rate_deg_s=st.sampled_from([1.0, 0.3]),
@@ -58,9 +62,9 @@ def test_small_fleets_are_planned_as_brute_force_does(
     )  # fmt: skip
     best = best_reward(problem)
     search = searched(problem, Budget(), seed)
-    assert search.reward == replay(problem, search.plan).reward
-    assert search.reward <= best + 1e-9
-    proven = search.solution().proven
+    assert search.best.reward == replay(problem, search.best.plan).reward
+    assert search.best.reward <= best + 1e-9
+    proven = search.best.solution().proven
     assert proven is not None
     assert proven.value >= best - 1e-9
     assert is_proven(problem, from_json(to_json(proven)))
@@ -70,18 +74,18 @@ def test_small_fleets_are_planned_as_brute_force_does(
         assert replay(problem, solution.plan).reward == pytest.approx(best)
 
 
-@settings(max_examples=15, deadline=None)
+@examples(15)
 @given(seed=SEEDS, slew_rate_deg_s=st.sampled_from([1.0, 0.3]))
 def test_the_plan_is_the_same_however_many_threads_work(seed: int, slew_rate_deg_s: float) -> None:
     problem = fleet(seed, slew_rate_deg_s)
     alone, together = (
         searched(problem, Budget(num_threads=num_threads), seed) for num_threads in (1, 3)
     )
-    timeline = replay(problem, alone.plan)
+    timeline = replay(problem, alone.best.plan)
     assert not timeline.violations
-    assert timeline.reward == alone.reward > 0.0
-    assert together.plan == alone.plan
-    assert together.bound == alone.bound
+    assert timeline.reward == alone.best.reward > 0.0
+    assert together.best.plan == alone.best.plan
+    assert together.best.bound.value == alone.best.bound.value
 
 
 def test_what_streams_are_worth_together_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -94,10 +98,10 @@ def test_what_streams_are_worth_together_is_taken(monkeypatch: pytest.MonkeyPatc
         pool.add(best)
 
     monkeypatch.setattr(PlanPool, "merge", merge)
-    search = FleetSearch(problem, Budget(), 0, 0.0)
+    search = FleetSearch(Incumbent(problem, Budget(), 0.0), 0)
     search.search(20.0)
     assert known[0] == 2  # a plan of each stream
-    assert search.reward >= replay(problem, best).reward
+    assert search.best.reward >= replay(problem, best).reward
 
 
 def test_a_large_fleet_is_planned_in_one_stream(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -116,13 +120,14 @@ def test_prices_make_a_better_start() -> None:
     gained = 0.0
     for seed in range(10):
         problem = fleet(seed)
-        network, reward = network_of(problem), np.append(problem.target_reward, 0.0)
-        dual = IncrementalPrices(network, reward, 100, 0)
+        network, most = network_of(problem), np.append(problem.best_worth, 0.0)
+        worth = problem.worth[network.row]
+        dual = IncrementalPrices(network, worth, most, 100, 0)
         dual.improve(100, Budget().stop)
-        nothing = np.zeros(len(reward), dtype=np.bool_)
+        nothing = np.zeros(len(most), dtype=np.bool_)
         plans = [
-            Plan.of(problem, priced_start(network, reward, prices, nothing, 0))
-            for prices in (dual.prices, np.zeros(len(reward)))
+            Plan.of(problem, priced_start(network, worth, prices, nothing, 0))
+            for prices in (dual.prices, np.zeros(len(most)))
         ]
         priced, plain = (replay(problem, plan) for plan in plans)
         assert priced.is_valid
@@ -141,4 +146,23 @@ def test_who_cancels_gets_the_plan_so_far_and_its_bound() -> None:
     assert timeline.is_valid
     assert timeline.reward > 0.0
     assert solution.bound is not None
-    assert timeline.reward <= solution.bound <= problem.target_reward.sum()
+    assert timeline.reward <= solution.bound <= problem.best_worth.sum()
+
+
+def test_paths_of_a_fleet_need_no_table_of_pairs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Plan, bound and window search of a large fleet; the table grows with density squared."""
+
+    def refuse(*_: object) -> None:
+        raise AssertionError
+
+    monkeypatch.setattr("planner_core.precedence.relation._fill_bits", refuse)
+    monkeypatch.setattr("planner_core.certified.drivers.fleet._SMALL", 0)
+    problem = random_problem(
+        5, use_resources=False, num_collects=240, num_targets=90, num_satellites=8
+    )
+    effort = Effort(moves_per_task=5.0, max_rounds=0)
+    solution = solve_without_resources(problem, Budget(), 0, 0.0, effort)
+    assert solution.proven is not None
+    assert 0.0 < replay(problem, solution.plan).reward <= solution.proven.value
+    with pytest.raises(AssertionError):
+        direct_precedence(problem.satellites[0])

@@ -23,6 +23,9 @@ from planner_core.solvers.registry import (
     Milp,
     Rule,
 )
+from tests.planner_core.budgets import bounds_told, expiring
+
+pytestmark = pytest.mark.full_size
 
 TARGETS = 1000
 HARD = {"feasibility": "hard"}
@@ -83,7 +86,7 @@ def test_many_stations_cost_no_images() -> None:
 def test_with_resources_the_bound_of_the_program_is_true(dynamics: Dynamics) -> None:
     """Cut short it has proven something all the same, and no plan of anyone contradicts it."""
     problem = day(use_resources=True, dynamics=dynamics)
-    solution = Milp().solve(problem, Budget(8.0), 0)
+    solution = Milp().solve(problem, expiring(bounds_told(2)), 0)
     own = replay(problem, solution.plan)
     assert own.is_valid
     assert solution.bound is not None

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.certified.multipliers.incremental import incremental_prices
@@ -17,6 +17,7 @@ from planner_core.certified.proofs.lagrangian import lagrangian_bound, lagrangia
 from planner_core.domain import Agility
 from planner_core.precedence.network import network_of
 from planner_core.problem import Floats, Problem
+from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import random_problem
 
@@ -39,11 +40,12 @@ def settled(problem: Problem, num_epochs: int) -> tuple[float, Floats]:
 
 def best_known(problem: Problem) -> float:
     """Return what many subgradient steps prove."""
-    reward = np.append(problem.target_reward, 0.0)
-    return improve_prices(network_of(problem), reward, 0.5 * reward, 0.0, 3000, GO_ON)
+    network, most = network_of(problem), np.append(problem.best_worth, 0.0)
+    worth = problem.worth[network.row]
+    return improve_prices(network, worth, most, 0.5 * most, 0.0, 3000, GO_ON)
 
 
-@settings(max_examples=80, deadline=None)
+@examples(80)
 @given(
     seed=SEEDS, num_satellites=st.integers(2, 3), has_rewards=st.booleans(),
     slew_rate_deg_s=st.sampled_from([1.0, 0.3]), num_epochs=st.sampled_from([0, 1, 7, 60]),
@@ -82,8 +84,7 @@ def test_the_same_prices_come_out_again() -> None:
 
 def test_targets_without_access_cost_nothing() -> None:
     problem = crowded(2, 3)
-    rewards: Floats = np.append(problem.target_reward, 50.0)
-    wider = replace(problem, target_ids=(*problem.target_ids, "far"), target_reward=rewards)
+    wider = replace(problem, target_ids=(*problem.target_ids, "far"))
     value, prices = settled(wider, 40)
     assert value == settled(problem, 40)[0]
     assert prices[-1] == 0.0

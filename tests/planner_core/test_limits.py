@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.access.limits import Limits
@@ -16,6 +16,7 @@ from planner_core.domain import Sensor, Target
 from planner_core.errors import InvalidScenario
 from planner_core.orbits.ephemeris import Ephemeris, propagate
 from planner_core.orbits.places import Places, view
+from tests.examples import examples
 from tests.geometry import hours, orbit, satellite, windows_by_scan
 
 Floats = npt.NDArray[np.float64]
@@ -112,7 +113,7 @@ def test_contrary_wishes_of_sensor_and_target_leave_nothing() -> None:
         assert assert_same_windows(sensor, target) == 0
 
 
-@settings(max_examples=20, deadline=None)
+@examples(20)
 @given(
     st.floats(-80.0, 80.0),
     st.floats(-180.0, 180.0),

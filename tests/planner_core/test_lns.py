@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget
@@ -16,6 +16,7 @@ from planner_core.problem import Kept, Pinned
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
 from planner_core.solvers.registry import Graph
+from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import random_problem
 
@@ -23,7 +24,7 @@ SEEDS = st.integers(0, 10**6)
 
 
 @pytest.mark.parametrize("slew_rate_deg_s", [1.0, 0.3])
-@settings(max_examples=40, deadline=None)
+@examples(40)
 @given(
     seed=SEEDS, num_satellites=st.integers(1, 3), has_rewards=st.booleans(),
     num_offers=st.sampled_from([1, 4]), span_s=st.sampled_from([800.0, 8000.0]),

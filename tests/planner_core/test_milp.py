@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget, Progress, Termination
@@ -19,7 +19,7 @@ from planner_core.certified.mip.model import plan_program
 from planner_core.certified.mip.program import Program, Rows
 from planner_core.certified.proofs.documents import is_proven
 from planner_core.domain import Agility, Dynamics
-from planner_core.precedence.relation import transitive_closure
+from planner_core.precedence.relation import is_transitive
 from planner_core.problem import (
     COLLECT,
     CONTACT,
@@ -28,7 +28,9 @@ from planner_core.problem import (
 )
 from planner_core.referee.replay import replay
 from planner_core.solvers.registry import Milp
+from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
+from tests.planner_core.budgets import bounds_told, expiring
 from tests.planner_core.problems import TIGHT, Task, make_problem, random_problem
 
 SEEDS = st.integers(0, 10**6)
@@ -54,7 +56,7 @@ def assert_equals_brute_force(problem: Problem, formulation: Any) -> None:
     assert solution.termination is Termination.OPTIMAL
 
 
-@settings(max_examples=50, deadline=None)
+@examples(50)
 @given(
     seed=SEEDS,
     dynamics=DYNAMICS,
@@ -78,7 +80,7 @@ def test_it_equals_brute_force(
     assert_equals_brute_force(problem, formulation)
 
 
-@settings(max_examples=30, deadline=None)
+@examples(30)
 @given(seed=SEEDS, dynamics=DYNAMICS, telemetry_per_s=st.sampled_from([0.0, 3e-4, 8e-4]))
 def test_tight_resources_and_the_eclipse_are_exact(
     seed: int, dynamics: Dynamics, telemetry_per_s: float
@@ -98,7 +100,7 @@ def test_tight_resources_and_the_eclipse_are_exact(
     assert_equals_brute_force(problem, "antichain")
 
 
-@settings(max_examples=30, deadline=None)
+@examples(30)
 @given(
     seed=SEEDS,
     use_resources=st.booleans(),
@@ -125,8 +127,7 @@ def test_a_target_already_collected_may_be_the_way_to_another() -> None:
         Task(kind=COLLECT, place=2, start_s=0.5, end_s=31.0, angle_deg=3.0),
     ]
     problem = make_problem(tasks, num_targets=3, use_resources=False, agility=SLOW)
-    satellite = problem.satellites[0]
-    assert transitive_closure(problem, satellite) is not satellite.transitions
+    assert not is_transitive(problem)
     solution = Milp().solve(problem, Budget(), 0)
     assert replay(problem, solution.plan).reward == best_reward(problem) == 2.0
 
@@ -149,7 +150,7 @@ def test_two_satellites_share_a_station_up_to_its_antennas() -> None:
         assert_equals_brute_force(problem, "antichain")
 
 
-@settings(max_examples=30, deadline=None)
+@examples(30)
 @given(seed=SEEDS, dynamics=DYNAMICS, use_resources=st.booleans())
 def test_however_early_it_stops_the_plan_is_valid_and_the_bound_true(
     seed: int, dynamics: Dynamics, use_resources: bool
@@ -198,11 +199,17 @@ def crowded(seed: int) -> Problem:
     )  # fmt: skip
 
 
+def is_bounded(progress: Progress) -> bool:
+    """Return whether HiGHS has begun: no bound is told before."""
+    return progress.bound is not None
+
+
 def test_cancelling_ends_a_search_without_any_other_limit() -> None:
-    budget = Budget()
+    is_searching = threading.Event()
+    budget = Budget(report=lambda progress: is_searching.set() if is_bounded(progress) else None)
 
     def cancel() -> None:
-        time.sleep(1.0)
+        is_searching.wait()
         budget.cancel()
 
     problem = crowded(1)
@@ -252,8 +259,13 @@ def test_an_answer_does_not_wait_for_highs(
 
 def test_incumbents_and_bounds_are_reported_while_it_searches() -> None:
     reports: list[Progress] = []
-    budget = Budget(2.0, reports.append)
-    solution = Milp().solve(crowded(1), budget, 0)
+    enough = bounds_told(2)
+
+    def look_at(progress: Progress) -> bool:
+        reports.append(progress)
+        return enough(progress)
+
+    solution = Milp().solve(crowded(1), expiring(look_at), 0)
     live = [(r.reward, r.bound) for r in reports if r.reward is not None and r.bound is not None]
     assert live
     assert all(reward <= bound + 1e-4 for reward, bound in live)
@@ -270,6 +282,13 @@ def test_a_wanted_gap_is_enough() -> None:
     assert solution.termination in (Termination.GAP_REACHED, Termination.OPTIMAL)
 
 
+def num_threads() -> int:
+    """Return how many threads the system counts, when those of earlier searches have ended."""
+    for thread in highs_threads():
+        thread.join()
+    return len(os.listdir("/proc/self/task"))
+
+
 def wait_for_threads(number: int) -> int:
     """Return how many threads the system counts, when it counts no more than that or in a minute.
 
@@ -283,7 +302,7 @@ def wait_for_threads(number: int) -> int:
 
 def test_a_solve_that_ends_by_itself_leaves_no_thread_behind() -> None:
     """Workers fork from a process that has planned with every solver."""
-    before = len(os.listdir("/proc/self/task"))
+    before = num_threads()
     solution = Milp().solve(random_problem(5), Budget(), 0)
     assert not highs_threads()
     assert wait_for_threads(before) <= before
@@ -292,12 +311,12 @@ def test_a_solve_that_ends_by_itself_leaves_no_thread_behind() -> None:
 
 def test_the_thread_of_a_solve_that_was_cut_short_ends_soon() -> None:
     """It has answered before HiGHS comes to ask whether to go on."""
-    before = len(os.listdir("/proc/self/task"))
-    Milp().solve(crowded(2), Budget(1.0), 0)
+    before = num_threads()
+    Milp().solve(crowded(2), expiring(is_bounded), 0)
     assert wait_for_threads(before) <= before
 
 
-@settings(max_examples=40, deadline=None)
+@examples(40)
 @given(
     seed=SEEDS,
     dynamics=DYNAMICS,

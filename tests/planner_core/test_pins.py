@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import event, example, given, settings
+from hypothesis import event, example, given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget, Termination
@@ -33,6 +33,7 @@ from planner_core.solvers.registry import (
     Milp,
     Rule,
 )
+from tests.examples import examples
 from tests.planner_core.brute_force import best_plan
 from tests.planner_core.problems import ECLIPSES, TIGHT, random_problem
 
@@ -97,7 +98,7 @@ def drawn(seed: int, **more: Any) -> Problem:
     )
 
 
-@settings(max_examples=150, deadline=None)
+@examples(150)
 @given(
     seed=SEEDS,
     dynamics=DYNAMICS,
@@ -144,7 +145,7 @@ def test_plans_with_pins_are_the_best_that_honour_them(
             assert timeline.is_valid, (solver, timeline.violations)
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(seed=SEEDS, dynamics=DYNAMICS, num_kept=st.integers(1, 5), use_resources=st.booleans())
 def test_crowded_plans_keep_what_is_pinned(
     seed: int, dynamics: Dynamics, num_kept: int, use_resources: bool
@@ -165,7 +166,7 @@ def test_crowded_plans_keep_what_is_pinned(
             assert not [v for v in timeline.violations if v.code == "pin"], solver
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(seed=SEEDS, num_kept=st.integers(1, 2), use_resources=st.booleans())
 def test_a_satellite_that_turns_slower_than_it_tracks_honours_pins_too(
     seed: int, num_kept: int, use_resources: bool
@@ -192,7 +193,7 @@ def test_a_satellite_that_turns_slower_than_it_tracks_honours_pins_too(
         assert not [v for v in timeline.violations if v.code == "pin"], solver
 
 
-@settings(max_examples=150, deadline=None)
+@examples(150)
 @given(seed=SEEDS, dynamics=DYNAMICS)
 def test_contacts_ruled_out_are_refused_exactly_where_no_plan_is_left(
     seed: int, dynamics: Dynamics
@@ -224,7 +225,7 @@ def test_contacts_ruled_out_are_refused_exactly_where_no_plan_is_left(
         assert fault.pointer == [*names, block.pointer][has_plan.index(False) - 1]
 
 
-@settings(max_examples=150, deadline=None)
+@examples(150)
 @given(seed=SEEDS, dynamics=DYNAMICS, num_kept=st.integers(0, 3))
 def test_pins_are_refused_exactly_where_no_plan_honours_them(
     seed: int, dynamics: Dynamics, num_kept: int

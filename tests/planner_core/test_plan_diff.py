@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from datetime import UTC, datetime, timedelta
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.referee.plan_diff import PlannedAction, PlanView, plan_diff
 from planner_core.referee.replay import Mode
+from tests.examples import examples
 
 START = datetime(2026, 3, 1, tzinfo=UTC)
 
@@ -38,7 +39,7 @@ ACTIONS = st.lists(
 )
 
 
-@settings(max_examples=300, deadline=None)
+@examples(300)
 @given(first=ACTIONS, second=ACTIONS)
 def test_a_difference_applied_to_the_first_plan_gives_the_second(
     first: list[PlannedAction], second: list[PlannedAction]

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget
@@ -19,6 +19,7 @@ from planner_core.problem.plan import Plan
 from planner_core.problem.restrict import restricted
 from planner_core.referee.replay import replay
 from planner_core.solvers.registry import Rule
+from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import TIGHT, random_problem, varied_problem
 from tests.planner_core.test_program_search import STARVED
@@ -49,7 +50,7 @@ def large_problem(seed: int, dynamics: Dynamics = "physical") -> Problem:
     return replace(problem, horizon_s=9100.0)
 
 
-@settings(max_examples=40, deadline=None)
+@examples(40)
 @given(seed=SEEDS, dynamics=DYNAMICS, num_satellites=st.integers(1, 3))
 def test_merged_plans_are_no_better_than_the_best_of_what_is_merged(
     seed: int, dynamics: Dynamics, num_satellites: int

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget
@@ -32,6 +32,7 @@ from planner_core.problem.pointing import (
 )
 from planner_core.problem.retimed import offered, retimed, with_starts
 from planner_core.referee.replay import replay
+from tests.examples import examples
 from tests.geometry import SkyfieldPath, angle_deg, satellite
 from tests.geometry import orbit as paper_orbit
 from tests.planner_core.flat_earth import flat_problem
@@ -106,7 +107,7 @@ def test_only_a_problem_with_the_flag_carries_them() -> None:
     assert not problem.continuous_starts
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(
     seed=SEEDS, rate=st.sampled_from([1.0, 2.5]), settle_s=st.sampled_from([0.0, 4.0]),
     acceleration=st.sampled_from([None, 0.5]),
@@ -179,7 +180,7 @@ def test_a_problem_with_other_starts_is_the_one_that_has_them_by_itself() -> Non
             )
 
 
-@settings(max_examples=25, deadline=None)
+@examples(25)
 @given(seed=SEEDS)
 def test_a_plan_in_the_rows_of_its_own_starts_is_judged_the_same(seed: int) -> None:
     problem = flat_problem(seed, num_satellites=2, num_targets=8, num_contacts=1, horizon_s=900.0,

@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget
@@ -23,6 +23,7 @@ from planner_core.problem import CONTACT, Problem
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
 from planner_core.solvers.registry import Rule
+from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import TIGHT, random_problem, varied_problem
 
@@ -45,7 +46,7 @@ def search_of(
     return ProgramSearch(problem, pool, prices, energy.usage, budget, seed), pool
 
 
-@settings(max_examples=40, deadline=None)
+@examples(40)
 @given(seed=SEEDS, dynamics=DYNAMICS, num_satellites=st.integers(2, 3))
 def test_plans_stay_valid_and_below_the_optimum(
     seed: int, dynamics: Dynamics, num_satellites: int
@@ -102,7 +103,7 @@ def test_a_program_of_some_satellites_leaves_the_others_alone(
     assert gained > 0
 
 
-@settings(max_examples=30, deadline=None)
+@examples(30)
 @given(seed=SEEDS, dynamics=DYNAMICS)
 def test_contacts_fixed_anew_are_worth_what_a_new_program_says(
     seed: int, dynamics: Dynamics
@@ -125,7 +126,7 @@ def test_contacts_fixed_anew_are_worth_what_a_new_program_says(
             assert program.relaxed() >= replay(problem, plan).reward - 1e-5
 
 
-@settings(max_examples=40, deadline=None)
+@examples(40)
 @given(seed=SEEDS, dynamics=DYNAMICS)
 def test_what_is_shut_is_on_no_path(seed: int, dynamics: Dynamics) -> None:
     problem = _problem(seed, dynamics)

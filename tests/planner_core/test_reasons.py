@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget, Termination
@@ -32,6 +32,7 @@ from planner_core.reasons.explain import explain
 from planner_core.reasons.reason import Change, Search
 from planner_core.referee.replay import Timeline, replay
 from planner_core.solvers.registry import ForwardSearch, Milp, Rule
+from tests.examples import examples
 from tests.planner_core.brute_force import best_plan
 from tests.planner_core.problems import ECLIPSES, TIGHT, Task, make_problem, random_problem
 
@@ -128,7 +129,7 @@ def check_reasons(problem: Problem, plan: Plan, search: Search) -> set[str]:
     return codes
 
 
-@settings(max_examples=250, deadline=None)
+@examples(250)
 @given(
     seed=SEEDS,
     dynamics=DYNAMICS,
@@ -176,7 +177,7 @@ def test_all_kinds_of_reasons_and_changes_come_up() -> None:
     }  # fmt: skip
 
 
-@settings(max_examples=40, deadline=None)
+@examples(40)
 @given(seed=SEEDS, use_resources=st.booleans())
 def test_no_plan_with_a_target_earns_more_than_an_optimal_one_without(
     seed: int, use_resources: bool
@@ -199,7 +200,7 @@ def test_no_plan_with_a_target_earns_more_than_an_optimal_one_without(
             assert best is None or replay(problem, best).reward <= timeline.reward + 1e-9
 
 
-@settings(max_examples=80, deadline=None)
+@examples(80)
 @given(seed=SEEDS, use_resources=st.booleans())
 def test_what_pins_prove_no_plan_that_honours_them_contains(seed: int, use_resources: bool) -> None:
     whole = random_problem(

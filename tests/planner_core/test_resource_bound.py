@@ -8,11 +8,12 @@ from typing import Literal
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from planner_core.certified.proofs.documents import is_proven
 from planner_core.certified.proofs.resource_bound import quick_bound, relaxations, resource_value
+from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import TIGHT, Task, make_problem, random_problem, varied_problem
 
@@ -32,7 +33,7 @@ _problem = partial(varied_problem, scarce=BATTERY_ONLY)
 
 
 @pytest.mark.parametrize("dynamics", ["physical", "paper"])
-@settings(max_examples=500, deadline=None)
+@examples(500)
 @example(seed=0, num_satellites=1)
 @given(seed=SEEDS, num_satellites=st.integers(1, 3))
 def test_no_plan_beats_the_bound(
@@ -48,7 +49,7 @@ def test_no_plan_beats_the_bound(
 
 
 @pytest.mark.parametrize("dynamics", ["physical", "paper"])
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(seed=SEEDS)
 def test_it_is_the_optimum_where_no_target_can_be_collected_twice(
     dynamics: Literal["physical", "paper"], seed: int
@@ -74,7 +75,7 @@ def test_it_lies_far_below_what_agility_allows_where_energy_is_short() -> None:
     assert quick_bound(problem, 0.0).value < 0.7 * quick_bound(starved, 0.0).value
 
 
-@settings(max_examples=30, deadline=None)
+@examples(30)
 @given(seed=SEEDS)
 def test_the_stored_prices_prove_the_bound_again(seed: int) -> None:
     problem = _problem(seed, "physical", 2, num_collects=60, num_targets=30, num_contacts=4)
@@ -84,7 +85,7 @@ def test_the_stored_prices_prove_the_bound_again(seed: int) -> None:
 
 
 @pytest.mark.parametrize("dynamics", ["physical", "paper"])
-@settings(max_examples=40, deadline=None)
+@examples(40)
 @given(seed=SEEDS, near=st.sampled_from([None, 0.5, 1.0, 1.5]))
 def test_a_price_of_data_changes_nothing_but_the_time(
     dynamics: Literal["physical", "paper"], seed: int, near: float | None
@@ -100,4 +101,4 @@ def test_a_price_of_data_changes_nothing_but_the_time(
             found, path = priced.most(worth, 0, stop, near=expected, keeps_path=True)
             assert found == most
             assert path is not None
-            assert relaxation.weights(worth)[path].sum() == most
+            assert worth[relaxation.satellite.rows[path]].sum() == most

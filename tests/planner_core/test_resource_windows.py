@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget, Progress
@@ -20,6 +20,7 @@ from planner_core.problem import Kept, Pinned
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
 from planner_core.solvers.registry import Certified, Rule
+from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import TIGHT, random_problem, varied_problem
 
@@ -30,7 +31,7 @@ Dynamics = Literal["physical", "paper"]
 
 
 @pytest.mark.parametrize("slew_rate_deg_s", [1.0, 0.3])
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(
     seed=SEEDS, dynamics=st.sampled_from(["physical", "paper"]),
     num_satellites=st.integers(1, 3), has_rewards=st.booleans(),
@@ -121,7 +122,7 @@ def test_a_satellite_without_tasks_has_no_moves() -> None:
 
 
 @pytest.mark.parametrize("dynamics", ["physical", "paper"])
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(seed=SEEDS, num_satellites=st.integers(2, 3))
 def test_fleets_end_with_a_plan_and_a_bound_around_the_optimum(
     dynamics: Dynamics, seed: int, num_satellites: int

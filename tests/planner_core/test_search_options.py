@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget
@@ -21,6 +21,7 @@ from planner_core.solvers.mcts_choices import Rules, expand
 from planner_core.solvers.mcts_successors import no_successors
 from planner_core.solvers.mcts_tree import empty_tree, new_node
 from planner_core.solvers.registry import ForwardSearch, Mcts, Rule
+from tests.examples import examples
 from tests.planner_core.problems import TIGHT, Task, make_problem, random_problem
 
 
@@ -33,7 +34,7 @@ def track_of(problem: Problem) -> Track:
     return compile_track(problem, satellite, np.zeros(len(satellite), dtype=np.uint8))
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(
     seed=st.integers(0, 10**6),
     dynamics=st.sampled_from(["physical", "paper"]),
@@ -55,7 +56,7 @@ def test_the_actions_of_a_state_are_of_different_accesses_in_model_and_tree(
     problem = random_problem(seed, dynamics=dynamics, use_resources=use_resources, num_offers=4)
     track = track_of(problem)
     model = Model(
-        track=track, target_reward=problem.target_reward, guidance=ForwardSearch().guidance,
+        track=track, worth=problem.worth, guidance=ForwardSearch().guidance,
         is_hard=is_hard, unimaged_only=unimaged_only, contact_above=contact_above,
     )  # fmt: skip
     state = model.initial_state()

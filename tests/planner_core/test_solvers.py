@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget, Progress, Termination
@@ -25,6 +25,7 @@ from planner_core.solvers.registry import (
     Mcts,
     Rule,
 )
+from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import TIGHT, random_problem
 
@@ -62,7 +63,7 @@ def problems(seed: int, dynamics: Dynamics, use_resources: bool, **more: Any) ->
 
 
 @pytest.mark.parametrize("solver", VARIANTS, ids=repr)
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(seed=SEEDS, dynamics=DYNAMICS, use_resources=st.booleans(), num_satellites=st.integers(1, 3))
 def test_plans_are_valid_and_the_same_every_time(
     solver: Solver, seed: int, dynamics: Dynamics, use_resources: bool, num_satellites: int
@@ -81,7 +82,7 @@ def test_plans_are_valid_and_the_same_every_time(
     assert plan_sha256(problem, again.plan) == plan_sha256(problem, solution.plan)
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(seed=SEEDS, dynamics=DYNAMICS, telemetry_per_s=st.sampled_from([2e-4, 4e-4, 8e-4]))
 def test_hard_plans_look_ahead_so_that_telemetry_never_fills_the_recorder(
     seed: int, dynamics: Dynamics, telemetry_per_s: float
@@ -92,7 +93,7 @@ def test_hard_plans_look_ahead_so_that_telemetry_never_fills_the_recorder(
         seed, dynamics, True, num_collects=25, num_targets=20, num_contacts=8, resources=resources
     )
     contacts_only = Rule(unimaged_only=True)
-    no_images = replace(problem, target_reward=problem.target_reward * 0)
+    no_images = replace(problem, worth=problem.worth * 0)
     for satellite in no_images.satellites:
         track = compile_track(no_images, satellite, (satellite.kind == 0).astype("uint8"))
         if not track.is_guarded:
@@ -101,7 +102,7 @@ def test_hard_plans_look_ahead_so_that_telemetry_never_fills_the_recorder(
         assert replay(problem, solver.solve(problem, Budget(), 0).plan).is_valid
 
 
-@settings(max_examples=40, deadline=None)
+@examples(40)
 @given(seed=SEEDS, dynamics=DYNAMICS, use_resources=st.booleans(), has_rewards=st.booleans())
 def test_nobody_exceeds_brute_force(
     seed: int, dynamics: Dynamics, use_resources: bool, has_rewards: bool
@@ -113,7 +114,7 @@ def test_nobody_exceeds_brute_force(
         assert replay(problem, plan).reward <= best + 1e-9
 
 
-@settings(max_examples=40, deadline=None)
+@examples(40)
 @given(seed=SEEDS, dynamics=DYNAMICS, use_resources=st.booleans(), has_rewards=st.booleans())
 def test_forward_search_at_full_depth_and_breadth_equals_brute_force(
     seed: int, dynamics: Dynamics, use_resources: bool, has_rewards: bool
@@ -128,7 +129,7 @@ def test_forward_search_at_full_depth_and_breadth_equals_brute_force(
     assert timeline.reward == pytest.approx(best_reward(problem))
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(
     seed=SEEDS,
     dynamics=DYNAMICS,
@@ -169,7 +170,7 @@ def test_the_compiled_forward_search_plans_what_the_listing_plans(
     satellite = problem.satellites[0]
     model = Model(
         track=compile_track(problem, satellite, (satellite.rows * 0).astype("uint8")),
-        target_reward=problem.target_reward,
+        worth=problem.worth,
         guidance=solver.guidance,
         is_hard=feasibility == "hard",
         unimaged_only=unimaged_only,
@@ -185,7 +186,7 @@ def test_the_compiled_forward_search_plans_what_the_listing_plans(
     assert solver.solve(problem, Budget(), 0).plan == expected
 
 
-@settings(max_examples=80, deadline=None)
+@examples(80)
 @given(seed=SEEDS, dynamics=DYNAMICS)
 def test_a_step_of_the_model_agrees_with_the_referees_integral(
     seed: int, dynamics: Dynamics

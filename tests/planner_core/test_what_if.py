@@ -57,7 +57,7 @@ def computed(dynamics: Dynamics = "physical") -> ScenarioOpportunities:
 
 
 def judged(scenario: Scenario, solver: Solver | None = None, **known: Any) -> Judged:
-    return plan_scenario(scenario, solver or ForwardSearch(), 0, Budget(20.0), **known)
+    return plan_scenario(scenario, solver or ForwardSearch(), 0, Budget(), **known)
 
 
 @functools.cache

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.access.limits import Limits
@@ -28,6 +28,7 @@ from planner_core.domain import (
 from planner_core.orbits.ephemeris import propagate
 from planner_core.orbits.places import Places
 from tests.brute_force_windows import BruteForce, Comparison
+from tests.examples import examples
 from tests.geometry import Ground, SkyfieldTable, hours, off_nadir_deg, orbit, satellite
 
 
@@ -71,7 +72,15 @@ def compare(
     return comparison
 
 
-@pytest.mark.parametrize(("nadir", "num_targets"), [("geocentric", 3600), ("geodetic", 800)])
+@pytest.mark.parametrize(
+    ("nadir", "num_targets"),
+    [
+        ("geocentric", 400),
+        ("geodetic", 400),
+        pytest.param("geocentric", 3600, marks=pytest.mark.full_size),
+        pytest.param("geodetic", 800, marks=pytest.mark.full_size),
+    ],
+)
 def test_the_paper_orbit_over_real_targets(
     shared_data: Path, nadir: Nadir, num_targets: int
 ) -> None:
@@ -118,7 +127,7 @@ def test_orbits_of_every_regime(regime: str, sensor: Sensor) -> None:
         assert errors_ms.max() <= 20.0
 
 
-@settings(max_examples=8, deadline=None)
+@examples(8)
 @given(
     st.floats(11.5, 16.0),
     st.floats(0.0, 0.02),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import shutil
 import threading
 import time
@@ -18,7 +19,7 @@ from fastapi import FastAPI
 from service.db.migrate import upgrade
 from service.db.session import Database
 from service.main import create_app
-from service.opportunities import OpportunityReader
+from service.scenarios.opportunities import OpportunityReader
 from service.settings import Settings
 from tests.service.contract import Contract
 
@@ -50,10 +51,15 @@ def serve(app: FastAPI) -> Iterator[str]:
         thread.join()
 
 
-def checked_client(app: FastAPI, address: str) -> httpx.Client:
-    """Return a client that holds every answer against the application's OpenAPI document."""
-    contract = Contract(app.openapi())
-    return httpx.Client(base_url=address, timeout=60, event_hooks={"response": [contract.check]})
+@functools.cache
+def contract() -> Contract:
+    """Return what the OpenAPI document promises; it is the same whatever the settings."""
+    return Contract(create_app(Settings(database_url="sqlite:///unused.db")).openapi())
+
+
+def checked_client(address: str) -> httpx.Client:
+    """Return a client that holds every answer against the OpenAPI document."""
+    return httpx.Client(base_url=address, timeout=60, event_hooks={"response": [contract().check]})
 
 
 @pytest.fixture(scope="session")
@@ -87,7 +93,7 @@ def service(settings: Settings, running_app: tuple[FastAPI, str]) -> Iterator[Se
     app.state.settings = settings
     app.state.database = Database(settings.database_url)
     app.state.opportunities = OpportunityReader()
-    with checked_client(app, address) as client:
+    with checked_client(address) as client:
         yield Service(app=app, client=client, database=app.state.database, settings=settings)
     app.state.opportunities.close()
     app.state.database.close()

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from service.blocks import (
+from service.answers.blocks import (
     NUM_CHARS,
     NUM_ITEMS,
     Block,

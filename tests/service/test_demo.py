@@ -14,8 +14,9 @@ import psutil
 import pytest
 
 from planner_core.solvers.registry import SOLVERS
+from tests.patience import PATIENCE_S
 
-WITHIN_S = 60.0
+pytestmark = pytest.mark.full_size
 
 
 @pytest.fixture
@@ -64,6 +65,6 @@ def test_demo_plans_the_mission_with_every_solver_keeps_serving_and_ends_cleanly
 
     started = psutil.Process(demo.pid).children(recursive=True)
     demo.terminate()
-    assert demo.wait(WITHIN_S) == 0
-    assert psutil.wait_procs(started, timeout=WITHIN_S)[1] == []
+    assert demo.wait(PATIENCE_S) == 0
+    assert psutil.wait_procs(started, timeout=PATIENCE_S)[1] == []
     assert [path.name for path in tmp_path.iterdir()] == ["out"]

@@ -13,7 +13,8 @@ import sqlalchemy as sa
 from alembic import command
 from alembic.config import Config
 
-from service.blocks import (
+from service.answers import store as answer_store
+from service.answers.blocks import (
     TIMELINE,
     Block,
     blocks_of_timeline,
@@ -23,7 +24,6 @@ from service.blocks import (
 )
 from service.db.migrate import config_on
 from service.db.session import Database
-from service.stores import answer_store
 from tests.service.jobs.conftest import SERVER_URL, create_database
 from tests.service.test_blocks import target, timeline_of
 

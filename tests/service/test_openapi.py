@@ -9,10 +9,10 @@ from typing import Any
 import httpx
 import pytest
 
+from tests.patience import PATIENCE_S
 from tests.service.contract import Contract, Document
 from tests.service.serving import serving
 
-WITHIN_S = 60.0
 RARE = {
     "401": "a call without a key (tests/service/access)",
     "403": "a key without the scope, or a page of another site (tests/service/access)",
@@ -149,7 +149,7 @@ def read_all(client: Client) -> None:
 
 
 def settled(client: Client, path: str) -> httpx.Response:
-    deadline_s = time.monotonic() + WITHIN_S
+    deadline_s = time.monotonic() + PATIENCE_S
     while "retry-after" in (answer := client.http.get(path)).headers:
         assert time.monotonic() < deadline_s, answer.text
         time.sleep(0.1)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import planner_core
 import service
-from service.api.problems import KINDS
+from service.problems.kinds import KINDS
 
 COMMAND_LINE = {"solve.py"}  # answers no problem documents
 RAISING = {"Fault", "ServiceError", "InvalidElements", "InvalidScenario", "InvalidParameters"}

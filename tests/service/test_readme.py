@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 
+from tests.patience import PATIENCE_S
 from tests.service.factories import tle
 from tests.service.serving import serving
 
 ROOT = Path(__file__).resolve().parents[2]
-WITHIN_S = 120.0
 OWN_FILES = {
     "satellites.tle": ["EYE", *tle(90100)],
     "targets.csv": ["id,lat_deg,lon_deg", "bern,46.948,7.447", "quito,-0.22,-78.51"],
@@ -43,14 +43,14 @@ def _output(page: str, tmp_path: Path) -> str:
     (tmp_path / "service").symlink_to(ROOT / "service")
     for name, lines in OWN_FILES.items():
         (tmp_path / name).write_text("\n".join(lines) + "\n", encoding="utf-8")
-    with serving(tmp_path, "serve") as (_, line):
+    with serving(tmp_path, "serve", "--workers", "1") as (_, line):
         ran = subprocess.run(
             ["bash", "-eu", "-c", _walk(page, line.split()[-1])],
             cwd=tmp_path,
             env=os.environ | {"PYTHONPATH": str(ROOT)},
             capture_output=True,
             text=True,
-            timeout=WITHIN_S,
+            timeout=PATIENCE_S,
             check=False,
         )
     assert ran.returncode == 0, ran.stderr

@@ -20,6 +20,7 @@ import httpx
 import pytest
 
 from service.api.examples import BODIES
+from tests.patience import PATIENCE_S
 from tests.service.contract import Contract, Document
 from tests.service.factories import post
 from tests.service.serving import serving
@@ -28,7 +29,6 @@ EXAMPLES = os.environ.get("SLEWLINE_TEST_EXAMPLES")
 CONFIG = Path(__file__).with_name("schemathesis.toml")
 DOCUMENT = "openapi.json"
 TOKEN = "a-token-of-these-tests-and-of-nothing-else"
-WITHIN_S = 60.0
 
 Ids = dict[str, list[str]]
 
@@ -142,7 +142,7 @@ def with_ids(document: Document, ids: Ids) -> Document:
 
 
 def finished(client: httpx.Client, comparison_id: str) -> str:
-    deadline_s = time.monotonic() + WITHIN_S
+    deadline_s = time.monotonic() + PATIENCE_S
     while (answer := client.get(f"/v1/comparisons/{comparison_id}").json())["state"] == "running":
         assert time.monotonic() < deadline_s, answer
         time.sleep(0.1)

@@ -6,7 +6,6 @@ import signal
 import socket
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import httpx
@@ -14,9 +13,8 @@ import psutil
 import pytest
 
 from service.server import listen
+from tests.patience import PATIENCE_S, wait_until
 from tests.service.serving import serving
-
-WITHIN_S = 60.0
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
@@ -29,10 +27,10 @@ def test_serve_says_once_when_it_is_ready_and_ends_cleanly(
         assert httpx.get(f"{url}/health/ready").json()["workers"] == 1
         children = psutil.Process(process.pid).children(recursive=True)
         process.send_signal(number)
-        rest, _ = process.communicate(timeout=WITHIN_S)
+        rest, _ = process.communicate(timeout=PATIENCE_S)
         assert (process.returncode, rest) == (0, "")
         assert len(children) >= 1
-        _, alive = psutil.wait_procs(children, timeout=WITHIN_S)
+        _, alive = psutil.wait_procs(children, timeout=PATIENCE_S)
         assert alive == []
 
 
@@ -50,7 +48,7 @@ def test_api_alone_runs_no_worker(tmp_path: Path) -> None:
         assert httpx.get(f"{url}/health/ready").status_code == 503
         assert psutil.Process(process.pid).children() == []
         process.terminate()
-        assert process.wait(WITHIN_S) == 0
+        assert process.wait(PATIENCE_S) == 0
 
 
 def test_a_worker_process_serves_the_jobs_of_an_api_process(tmp_path: Path) -> None:
@@ -62,18 +60,9 @@ def test_a_worker_process_serves_the_jobs_of_an_api_process(tmp_path: Path) -> N
             stderr=subprocess.DEVNULL,
         )
         try:
-            assert _becomes_ready(url)
+            wait_until(lambda: httpx.get(f"{url}/health/ready").status_code == 200)
             worker.terminate()
-            assert worker.wait(WITHIN_S) == 0
+            assert worker.wait(PATIENCE_S) == 0
         finally:
             worker.kill()
             worker.wait()
-
-
-def _becomes_ready(url: str) -> bool:
-    deadline = time.monotonic() + WITHIN_S
-    while time.monotonic() < deadline:
-        if httpx.get(f"{url}/health/ready").status_code == 200:
-            return True
-        time.sleep(0.1)
-    return False

@@ -14,7 +14,7 @@ from planner_core.errors import InvalidParameters
 from planner_core.problem import Problem
 from planner_core.problem.plan import Plan
 from planner_core.solvers.base import Constraint, Solution
-from service.solver_params import params_of, params_schema, parse_params
+from service.jobs.solver_params import params_of, params_schema, parse_params
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -22,7 +22,7 @@ import numpy.typing as npt
 
 from planner_core.bundles import bundle
 from planner_core.jit import borrowing, kernel
-from planner_core.precedence.network import Network, network_of
+from planner_core.precedence.arcs import ArcNetwork, arc_network_of
 from planner_core.problem import (
     COLLECT,
     Bools,
@@ -30,6 +30,7 @@ from planner_core.problem import (
     Ints,
     Problem,
 )
+from planner_core.worth import surplus, weights
 
 Words = npt.NDArray[np.uint64]
 
@@ -68,7 +69,7 @@ class Memory(NamedTuple):
     num_started: Ints
 
 
-def memory_of(problem: Problem, network: Network) -> Memory:
+def memory_of(problem: Problem, network: ArcNetwork) -> Memory:
     """Return what paths through a network are to remember."""
     table, rows = problem.opportunities, network.row
     nodes = np.arange(len(rows))
@@ -151,7 +152,7 @@ class Labels(NamedTuple):
     bit_weight: Floats
 
 
-def labels_for(network: Network, memory: Memory) -> Labels:
+def labels_for(network: ArcNetwork, memory: Memory) -> Labels:
     """Return room for the labels of a network."""
     n = len(network.row)
     return Labels(
@@ -171,7 +172,7 @@ def labels_for(network: Network, memory: Memory) -> Labels:
 
 @borrowing
 def label_part(
-    network: Network, memory: Memory, weight: Floats, labels: Labels, part: int
+    network: ArcNetwork, memory: Memory, weight: Floats, labels: Labels, part: int
 ) -> tuple[float, int]:
     """Label the nodes of one part; return what its paths are worth at most, and the best's end.
 
@@ -350,7 +351,7 @@ def _weight_of(low: np.uint64, high: np.uint64, bit_weight: Floats) -> float:
 
 @borrowing
 def elementary_paths(
-    network: Network, memory: Memory, weight: Floats, labels: Labels, counts: Ints
+    network: ArcNetwork, memory: Memory, weight: Floats, labels: Labels, counts: Ints
 ) -> float:
     """Return what the paths of all parts are worth at most.
 
@@ -378,13 +379,10 @@ def elementary_value(problem: Problem, prices: Floats) -> tuple[float, Ints]:
 
     This is the whole proof, as ``lagrangian_value`` is that of the plain bound.
     """
-    network = network_of(problem)
+    network = arc_network_of(problem)
     memory = memory_of(problem, network)
-    reward = np.append(problem.target_reward, 0.0)
-    price = np.append(np.clip(prices, 0.0, problem.target_reward), 0.0)
-    price[np.setdiff1d(np.arange(len(prices)), network.place)] = 0.0
-    counts = np.zeros(len(reward), dtype=np.int32)
-    total = elementary_paths(
-        network, memory, (reward - price)[network.place], labels_for(network, memory), counts
-    )
+    price = np.append(surplus(prices, problem.best_worth), 0.0)
+    weight = weights(problem.worth[network.row], price[network.place])
+    counts = np.zeros(len(price), dtype=np.int32)
+    total = elementary_paths(network, memory, weight, labels_for(network, memory), counts)
     return float(price.sum() + total), counts[:-1]

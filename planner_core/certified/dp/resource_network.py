@@ -24,7 +24,7 @@ from planner_core.bundles import bundle
 from planner_core.jit import inlined, kernel
 from planner_core.mdp.track import STRICT, compile_track
 from planner_core.precedence.arcs import Arcs, reversed_arcs
-from planner_core.precedence.relation import Order, comes_before, order_of
+from planner_core.precedence.relation import Precedence, comes_before, direct_precedence
 from planner_core.problem import (
     Floats,
     Ints,
@@ -80,8 +80,8 @@ def strict_network_of(problem: Problem, satellite: SatelliteProblem) -> Network:
 def _network(problem: Problem, satellite: SatelliteProblem, slack: float) -> Network:
     """Return a network; limits are passed by ``slack`` (negative: kept clear of)."""
     track = compile_track(problem, satellite, np.zeros(len(satellite), dtype=np.uint8))
-    order = order_of(satellite.transitions)
-    idle_from, near_first, near_rows = _arcs(order)
+    precedence = direct_precedence(satellite)
+    idle_from, near_first, near_rows = _arcs(precedence)
     straight_first, straight_rows = reversed_arcs(Arcs(near_first, near_rows))
     charge_from = track.charge_per_s * track.charge_from_s
     charge_to = track.charge_per_s * track.charge_to_s
@@ -114,24 +114,24 @@ def _network(problem: Problem, satellite: SatelliteProblem, slack: float) -> Net
 
 
 @kernel
-def _arcs(order: Order) -> tuple[Ints, Longs, Ints]:
+def _arcs(precedence: Precedence) -> tuple[Ints, Longs, Ints]:
     """Return from where on everything may follow each task, and what may before that."""
-    m = len(order.near_from)
+    m = len(precedence.near_from)
     idle_from = np.empty(m, dtype=np.int32)
     first = np.zeros(m + 1, dtype=np.int64)
     for i in range(m):
-        last = order.far_from[i]
-        while last > order.near_from[i] and comes_before(order, i, last - 1):
+        last = precedence.far_from[i]
+        while last > precedence.near_from[i] and comes_before(precedence, i, last - 1):
             last -= 1
         idle_from[i] = last
         first[i + 1] = first[i]
-        for j in range(order.near_from[i], last):
-            first[i + 1] += comes_before(order, i, j)
+        for j in range(precedence.near_from[i], last):
+            first[i + 1] += comes_before(precedence, i, j)
     rows = np.empty(first[m], dtype=np.int32)
     at = 0
     for i in range(m):
-        for j in range(order.near_from[i], idle_from[i]):
-            if comes_before(order, i, j):
+        for j in range(precedence.near_from[i], idle_from[i]):
+            if comes_before(precedence, i, j):
                 rows[at] = j
                 at += 1
     return idle_from, first, rows

@@ -13,15 +13,16 @@ from typing import Final
 
 import numpy as np
 
-from planner_core.budget import Budget, Progress
+from planner_core.budget import Budget
 from planner_core.certified.dp.elementary import memory_of
+from planner_core.certified.incumbent import Incumbent, is_optimal
 from planner_core.certified.lns.search import WindowSearch
 from planner_core.certified.mip.model import plan_program
 from planner_core.certified.mip.program import Program
 from planner_core.certified.mip.prover import Prover
 from planner_core.certified.mip.restricted_master import Master
 from planner_core.certified.multipliers.elementary import ElementaryPrices
-from planner_core.certified.proofs.bound import Bound, reward_unit, rounded_bound
+from planner_core.certified.proofs.bound import Bound, accessible, rounded_bound
 from planner_core.certified.proofs.certificate import (
     Certificate,
     Multipliers,
@@ -30,6 +31,7 @@ from planner_core.certified.proofs.certificate import (
     values_through,
 )
 from planner_core.certified.proofs.lagrangian import default_steps, priced_bound
+from planner_core.precedence.arcs import arc_network_of
 from planner_core.precedence.network import network_of
 from planner_core.precedence.relation import is_transitive, num_near_pairs
 from planner_core.problem import (
@@ -40,13 +42,8 @@ from planner_core.problem import (
 )
 from planner_core.problem.plan import Plan
 from planner_core.problem.restrict import restricted
-from planner_core.referee.replay import replay
 from planner_core.solvers.base import Solution
-from planner_core.solvers.graph import Graph
 from planner_core.solvers.rule import Rule
-
-TOLERANCE: Final = 1e-6
-"""Share of the reward to which a plan is optimal where rewards are not whole."""
 
 MOST_PAIRS: Final = 8_000_000
 """Of tasks near each other, in a program; HiGHS takes about 100 bytes for each."""
@@ -54,10 +51,7 @@ MOST_PAIRS: Final = 8_000_000
 _STALLED: Final = 0.02  # of the gap, in _PATIENCE rounds of cuts
 _PATIENCE: Final = 12
 _WANTED: Final = 1e-3
-_NODE_ROUNDS: Final = 12
 _MAX_NODES: Final = 50  # of HiGHS, among the tasks that a relaxation takes
-_POLISH: Final = 50.0
-_POLISHED: Final = (1, 4)  # rounds
 _ROUNDED_OFF: Final = 8  # this round, and when cutting planes lead no further
 _REPORT_EVERY_S: Final = 0.25
 _SHARE: Final = 0.1  # moves for each task, where prices of passes take turns with them
@@ -76,103 +70,62 @@ class Effort:
         Moves of the window search for each opportunity.
     max_rounds
         Rounds of cutting planes.
-    max_parts
-        Parts into which the plans are split for the proof; beyond ten HiGHS is faster.
     """
 
     moves_per_task: float = 30.0
     max_rounds: int = 200
-    max_parts: int = 10
 
 
 class FreeSearch:
     """A plan, a bound, and the tasks that a better plan can hold."""
 
-    def __init__(self, problem: Problem, budget: Budget, seed: int, gap: float) -> None:
-        self.problem, self.budget, self.seed, self.gap = problem, budget, seed, gap
-        self.unit = reward_unit(problem)
-        self.plan = Plan().with_kept(problem)
-        self.reward = replay(problem, self.plan).reward
-        offered, _ = problem.target_opportunities
-        targets = np.unique(problem.opportunities.place[offered])
-        self.bound = float(problem.target_reward[targets].sum())
-        self.steps = [Multipliers(prices=problem.target_reward.astype(np.float64))]
-        self.log: str | None = None
-        self.tree: Refutation | None = None
-        self.num_parts = 0
-        self.is_transitive = is_transitive(problem)
-        self._rows = np.arange(len(problem.opportunities), dtype=np.int32)
-        self._rest = problem
+    def __init__(self, best: Incumbent, seed: int) -> None:
+        self.best, self.problem, self.budget = best, best.problem, best.budget
+        self.seed = seed
+        self.steps = [Multipliers(prices=self.problem.best_worth)]
+        self.is_transitive = is_transitive(self.problem)
+        self._rows = np.arange(len(self.problem.opportunities), dtype=np.int32)
+        self._rest = self.problem
         self._reported_s = 0.0
         self._num_searches = 0
         self._windows: WindowSearch | None = None
         self._window_rows: Ints = self._rows[:0]
-        self._network = network_of(problem)
+        self._network = network_of(self.problem)
         self._prices: ElementaryPrices | None = None
-        self.through: Floats = np.full(len(self._rows), self.bound)
-
-    @property
-    def better(self) -> float:
-        """What a plan must be worth that is better than the one at hand.
-
-        Refuting it must suffice for "optimal", so it stays well within the tolerance.
-        """
-        return self.reward + max(self.unit, 0.5 * TOLERANCE * self.reward, 1e-9)
+        self._certified = accessible(self.problem).value
+        self.through: Floats = np.full(len(self._rows), self._certified)
 
     @property
     def refuted(self) -> float:
         """What is known of plans once none is ``better``: they are worth no more than this."""
-        return self.reward if self.unit else self.better
-
-    @property
-    def is_done(self) -> bool:
-        """Whether plan and bound are close enough, or the budget is spent."""
-        return self.is_close or self.budget.is_spent()
-
-    @property
-    def is_close(self) -> bool:
-        """Whether plan and bound are as close as was asked for."""
-        return self.is_optimal or self.bound - self.reward <= self.gap * self.bound
-
-    @property
-    def is_optimal(self) -> bool:
-        """Whether no plan is better, to the stated tolerance."""
-        return self.bound < self.reward + max(self.unit, TOLERANCE * self.reward, 4e-9)
-
-    def offer(self, plan: Plan) -> bool:
-        """Take a plan if it is better; return whether it is."""
-        # What must be taken fits beside all that is left, where turning is transitive.
-        plan = plan.with_kept(self.problem)
-        timeline = replay(self.problem, plan)
-        if not timeline.is_valid or timeline.reward <= self.reward:
-            return False
-        self.plan, self.reward = plan, timeline.reward
-        return True
+        return self.best.reward if self.best.unit else self.best.better
 
     def lower(self, value: float) -> None:
-        """Note that no plan is worth more."""
-        self.bound = min(self.bound, rounded_bound(self.problem, value, self.reward))
+        """Note that no plan is worth more, by the steps and what they refute."""
+        known = rounded_bound(self.problem, value, self.best.reward)
+        self._certified = min(self._certified, known)
+        self.best.lower(Bound(value=value, proof="lagrangian"))
 
     def step(self, step: Multipliers) -> None:
         """Learn from prices: a bound, and of each open task what it can be part of."""
         total, through = values_through(
             self.problem, self._network, self._rows, step, ~self.is_struck
         )
-        before = self.bound
+        before = self._certified
         # Plans that hold what is struck out are worth less than a better one.
         self.lower(max(total, self.refuted))
         by_row = np.empty(len(self._rows))
         by_row[self._network.row] = through
         lower = np.minimum(self.through, by_row)
         # What is not kept must not be built upon.
-        if self.bound < before or np.any(is_below(lower, self.better) > self.is_struck):
+        if self._certified < before or np.any(is_below(lower, self.best.better) > self.is_struck):
             self.steps.append(step)
             self.through = lower
 
     @property
     def is_struck(self) -> np.ndarray:
         """Which of the open tasks no better plan can hold."""
-        return is_below(self.through, self.better)
+        return is_below(self.through, self.best.better)
 
     def shrink(self) -> None:
         """Leave out the tasks that no better plan can hold."""
@@ -184,19 +137,27 @@ class FreeSearch:
     def price(self) -> None:
         """Search for prices anew over what is open."""
         _, prices = priced_bound(
-            self._rest, self._network, self.reward, default_steps(self._network), self.budget.stop
+            self._rest,
+            self._network,
+            self.best.reward,
+            default_steps(len(self._rows)),
+            self.budget.stop,
         )
         self.step(Multipliers(prices=prices))
 
     def price_passes(self, num_rounds: int) -> None:
         """Search for prices by which no target is paid twice in one pass over it."""
         if self._prices is None:
-            memory = memory_of(self.problem, self._network)
-            self._prices = ElementaryPrices(self.problem, self._network, memory, self.seed)
+            arcs = arc_network_of(self.problem)
+            memory = memory_of(self.problem, arcs)
+            self._prices = ElementaryPrices(self.problem, arcs, memory, self.seed)
         for _ in range(num_rounds):
-            if not self.is_done:
+            if not self.best.is_done:
                 self._prices.improve(1, self.budget.stop)
-                self.lower(self._prices.bound)
+                value, prices = self._prices.bound, self._prices.prices
+                self.best.lower(
+                    Bound(value=value, proof="lagrangian", prices=prices, is_elementary=True)
+                )
 
     @property
     def is_small(self) -> bool:
@@ -211,7 +172,7 @@ class FreeSearch:
 
     def search(self, moves_per_task: float, rows: Ints) -> bool:
         """Search windows among some of the problem's tasks; return whether that helped."""
-        own = np.array([a.opportunity for a in self.plan.actions], dtype=np.int32)
+        own = np.array([a.opportunity for a in self.best.plan.actions], dtype=np.int32)
         rows = np.union1d(rows, own).astype(np.int32)
         if self._windows is None or not np.array_equal(rows, self._window_rows):
             self._num_searches += 1
@@ -224,35 +185,21 @@ class FreeSearch:
             self._window_rows = rows
         windows = self._windows
         # A search that has wandered over equal plans goes on from where it is.
-        if windows.reward < self.reward:
+        if windows.reward < self.best.reward:
             windows.adopt(Plan.of(windows.problem, np.searchsorted(rows, own)))
         windows.make_moves(int(moves_per_task * len(rows)), self.budget)
-        return self.offer(
+        return self.best.offer(
             Plan.of(self.problem, rows[[a.opportunity for a in windows.plan.actions]])
         )
-
-    def report(self, message: str) -> None:
-        """Tell how far plan and bound are apart."""
-        share = self.reward / self.bound if self.bound > 0.0 else 1.0
-        self.budget.report(
-            Progress(phase="solve", fraction=min(1.0, share), reward=self.reward,
-                     bound=self.bound, message=message)
-        )  # fmt: skip
 
     def open_rows(self, amount: float) -> Ints:
         """Return the tasks that a plan worth this much can hold."""
         return self._rows[~is_below(self.through, amount)]
 
-    def polish(self, taken: Floats) -> None:
-        """Search windows among the tasks that a relaxation takes, in part."""
-        rows = self._rows[taken > _WANTED]
-        while self.search(_POLISH, rows) and not self.is_done:
-            pass
-
     def cut(self, max_rounds: int) -> Master:
         """Price with cutting planes until that leads no further; return the relaxation."""
         self.shrink()
-        priced = self.bound + self.unit
+        priced = self.best.bound.value + self.best.unit
         master = Master(self._rest, self._rows, self.budget, self.seed)
         bounds: list[float] = []
         for number in range(1, max_rounds + 1):
@@ -260,24 +207,21 @@ class FreeSearch:
             if taken is None:
                 break
             self.step(master.multipliers())
-            self.report("cutting planes")
+            self.best.report("cutting planes")
             bounds.append(master.value)
-            if number in _POLISHED and not self.is_done:
-                self.polish(taken)
-                self.report("window search")
-            if number == _ROUNDED_OFF and not self.is_done:
+            if number == _ROUNDED_OFF and not self.best.is_done:
                 self.round_off(master, taken)
-            if self.is_done:
+            if self.best.is_done:
                 break
             master.allow(~self.is_struck)
-            gap = max(bounds[-1] - self.better, 1e-9)
+            gap = max(bounds[-1] - self.best.better, 1e-9)
             # Until paths are priced nearly as well as by the subgradient, odd sets lead astray.
             num_added = master.cut(taken, with_odd_sets=bounds[-1] <= priced + 0.2 * gap)
             is_stalled = (
                 len(bounds) > _PATIENCE and bounds[-1 - _PATIENCE] - bounds[-1] < _STALLED * gap
             )
             if num_added == 0 or is_stalled:
-                if not self.round_off(master, taken) or self.is_done:
+                if not self.round_off(master, taken) or self.best.is_done:
                     break
                 bounds.clear()
         return master
@@ -286,12 +230,12 @@ class FreeSearch:
         """Let HiGHS search among what a relaxation takes, in part; return whether that helped."""
         if not self.is_transitive:
             return False
-        is_own = np.isin(self._rows, [a.opportunity for a in self.plan.actions])
+        is_own = np.isin(self._rows, [a.opportunity for a in self.best.plan.actions])
         is_offered = is_own | (taken > _WANTED)
-        plan, _ = self._prover(master.program(is_offered), is_offered, self.better).prove(
+        plan, _ = self._prover(master.program(is_offered), is_offered, self.best.better).prove(
             0.0, self._watch, _MAX_NODES
         )
-        return plan is not None and self.offer(self._whole(plan, is_offered))
+        return plan is not None and self.best.offer(self._whole(plan, is_offered))
 
     def prove(self, master: Master, amount: float) -> None:
         """Let HiGHS find a plan worth this much, or prove that there is none."""
@@ -302,21 +246,20 @@ class FreeSearch:
             # Then a plan may need tasks that it is not paid for.
             part = restricted(self.problem, self._rows[is_open])
             program = plan_program(part, "antichain", 0.0).program
-            scale = float(self.problem.target_reward.max())
+            scale = float(self.problem.worth.max())
             program.worth = [worth / scale for worth in program.worth]
         prover = self._prover(program, is_open, amount)
         plan, bound = prover.prove(0.0, self._watch)
         if plan is not None:
-            self.offer(self._whole(plan, is_open))
-        if bound < self.bound:
-            # Whatever is worth the amount is among these tasks.
-            below = amount - self.unit if self.unit else amount
-            self.log = prover.log
-            self.lower(max(bound, below, self.reward))
+            self.best.offer(self._whole(plan, is_open))
+        # Whatever is worth the amount is among these tasks.
+        below = amount - self.best.unit if self.best.unit else amount
+        value = max(bound, below, self.best.reward)
+        self.best.lower(Bound(value=value, proof="milp", log=prover.log))
 
     def _prover(self, program: Program, is_offered: Bools, amount: float) -> Prover:
         part = restricted(self.problem, self._rows[is_offered])
-        return Prover(part, program, amount, self.bound, self.budget, self.seed)
+        return Prover(part, program, amount, self.best.bound.value, self.budget, self.seed)
 
     def _whole(self, plan: Plan, is_offered: Bools) -> Plan:
         """Return a plan of some of the open tasks as one of the whole problem."""
@@ -327,97 +270,37 @@ class FreeSearch:
         now_s = time.monotonic()
         if now_s - self._reported_s > _REPORT_EVERY_S:
             self._reported_s = now_s
-            self.report("HiGHS searches")
-
-    def refutation(self) -> Refutation:
-        """Return why no plan is worth more than the bound."""
-        if self.tree is None:
-            return Refutation(steps=tuple(self.steps))
-        return Refutation(steps=(*self.steps, *self.tree.steps), branch=self.tree.branch)
-
-    def branch(self, master: Master, max_parts: int) -> None:
-        """Split the plans by what they take until all parts are refuted."""
-        tree = self._part(master, ~self.is_struck, max_parts)
-        if tree is not None:
-            self.tree = tree
-            self.lower(self.refuted)
-
-    def _part(self, master: Master, is_open: Bools, max_parts: int) -> Refutation | None:
-        """Return why no plan of the open tasks is better; None where that takes too long."""
-        steps, values = [], []
-        while True:
-            master.allow(is_open)
-            taken = master.relaxed()
-            if taken is None:
-                return None
-            steps.append(master.multipliers())
-            total, through = values_through(
-                self.problem, self._network, self._rows, steps[-1], is_open
-            )
-            if is_below(total, self.better):
-                return Refutation(steps=tuple(steps))
-            values.append(total)
-            by_row = np.empty(len(is_open))
-            by_row[self._network.row] = through
-            is_open = is_open & ~is_below(by_row, self.better)
-            loss = np.minimum(taken, 1.0 - taken)
-            if loss.max() < _WANTED and self.offer(Plan.of(self.problem, self._rows[taken > 0.5])):
-                continue
-            is_slow = len(values) > 1 and values[-2] - total < 0.1 * (total - self.better)
-            if is_slow or len(values) == _NODE_ROUNDS or not master.cut(taken, with_odd_sets=True):
-                break
-        at = master.decisive(taken)
-        self.num_parts += 1
-        if self.is_done or self.num_parts == max_parts:
-            return None
-        self.report(f"{self.num_parts} parts")
-        first = self._part(master, is_open & ~master.excluded_by(at), max_parts)
-        if first is None or self.is_done:
-            return None
-        others = is_open.copy()
-        others[at] = False
-        second = self._part(master, others, max_parts)
-        if second is None:
-            return None
-        return Refutation(steps=tuple(steps), branch=(int(self._rows[at]), first, second))
+            self.best.report("HiGHS searches")
 
     def solution(self) -> Solution:
         """Return the plan with what is known of it."""
-        if self.problem.continuous_starts:
-            # The bound does not cover the freedom to shift tasks.
-            ended = self.budget.ending(is_optimal=False, is_close=False)
-            return Solution(plan=self.plan, termination=ended)
-        termination = self.budget.ending(is_optimal=self.is_optimal, is_close=self.is_close)
-        prices = self._prices
-        if prices and rounded_bound(self.problem, prices.bound, self.reward) <= self.bound:
-            proven = Bound(
-                value=self.bound, proof="lagrangian", prices=prices.prices, is_elementary=True
-            )
-        elif self.log:
-            proven = Bound(value=self.bound, proof="milp", log=self.log)
-        else:
-            above = self.bound + (self.unit or 4e-9 * max(1.0, self.bound))
-            certificate = Certificate(amount=above, refutation=self.refutation())
-            proven = Bound(value=self.bound, proof="lagrangian", certificate=certificate)
-        return Solution(plan=self.plan, termination=termination, proven=proven)
+        bound = self.best.bound
+        # What multipliers prove elsewhere the steps prove too, to the tolerance of "better".
+        is_certified = is_optimal(bound.value, self._certified, 0.0)
+        if bound.proof == "lagrangian" and is_certified and not bound.is_elementary:
+            value = max(bound.value, self._certified)
+            above = value + (self.best.unit or 4e-9 * max(1.0, value))
+            certificate = Certificate(amount=above, refutation=Refutation(steps=tuple(self.steps)))
+            bound = Bound(value=value, proof="lagrangian", certificate=certificate)
+        return self.best.solution(bound)
 
 
 def solve_free(problem: Problem, budget: Budget, seed: int, gap: float, effort: Effort) -> Solution:
     """Return the best plan of a problem without resources, and its proof."""
-    search = FreeSearch(problem, budget, seed, gap)
-    for solver in (Rule(), Graph()):
-        search.offer(solver.solve(problem, Budget(), seed).plan)
-    if not search.is_done and not search.problem.offers_choice:
+    best = Incumbent(problem, budget, gap)
+    best.offer(Rule().solve(problem, Budget(), seed).plan)
+    search = FreeSearch(best, seed)
+    if not best.is_done and not problem.offers_choice:
         search.price()
-        search.report("prices")
-    if not search.is_done:
+        best.report("prices")
+    if not best.is_done:
         _approach(search, effort)
-    if not search.is_done:
+    if not best.is_done:
         search.shrink()
         if search.is_small:
             close_in(search, effort)
         else:
-            search.report("too many starts for cutting planes")
+            search.best.report("too many starts for cutting planes")
     return search.solution()
 
 
@@ -426,26 +309,24 @@ def _approach(search: FreeSearch, effort: Effort) -> None:
     is_spaced = search.problem.offers_choice
     share, patience = (_SHARE, _PATIENT) if is_spaced else (5.0, 10.0)
     left, num_idle = effort.moves_per_task, 0.0
-    while left > 0 and num_idle < patience and not search.is_done:
+    while left > 0 and num_idle < patience and not search.best.is_done:
         if is_spaced and not search.is_priced_out:
             search.price_passes(_ROUNDS)
-            search.report("prices")
-        if not search.is_close:
+            search.best.report("prices")
+        if not search.best.is_close:
             left -= share
-            is_better = search.search(share, search.open_rows(search.reward))
+            is_better = search.search(share, search.open_rows(search.best.reward))
             num_idle = 0.0 if is_better else num_idle + share
-            search.report("window search")
+            search.best.report("window search")
 
 
 def close_in(search: FreeSearch, effort: Effort) -> None:
-    """Cut, search and branch until plan and bound meet or the budget is spent."""
+    """Cut and search until plan and bound meet or the budget is spent."""
     search.price()
     master = search.cut(effort.max_rounds)
-    if search.is_transitive and effort.max_parts and not search.is_done:
-        search.branch(master, effort.max_parts)
-    while not search.is_done:
-        before = (search.bound, search.reward)
-        search.prove(master, search.better)
-        search.report("HiGHS")
-        if (search.bound, search.reward) == before:
+    while not search.best.is_done:
+        before = (search.best.bound, search.best.reward)
+        search.prove(master, search.best.better)
+        search.best.report("HiGHS")
+        if (search.best.bound, search.best.reward) == before:
             return

@@ -15,26 +15,24 @@ from typing import Final
 
 import numpy as np
 
-from planner_core.budget import Budget, Progress
+from planner_core.budget import Budget
 from planner_core.certified.drivers.agility_only import (
-    TOLERANCE,
     Effort,
     FreeSearch,
     close_in,
     solve_free,
 )
+from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.fleet_start import priced_start
 from planner_core.certified.lns.search import WindowSearch, num_choices
-from planner_core.certified.lns.stream import WindowStream
 from planner_core.certified.mip.solution_pool import PlanPool
 from planner_core.certified.multipliers.incremental import IncrementalPrices
-from planner_core.certified.proofs.bound import Bound, reward_unit, rounded_bound
+from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.proofs.certificate import Multipliers
 from planner_core.certified.proofs.lagrangian import default_steps
 from planner_core.precedence.network import network_of
 from planner_core.problem import COLLECT, Floats, Problem
 from planner_core.problem.plan import Plan
-from planner_core.referee.replay import replay
 from planner_core.solvers.base import Solution
 from planner_core.solvers.rule import Rule
 
@@ -44,98 +42,46 @@ _EPOCHS_TO_START: Final = 80  # until a first plan is worth making
 _SMALL: Final = 60_000  # opportunities for which cutting planes are tried
 _EPOCHS: Final = (250, 500)  # at least and at most
 _STREAMS: Final = 2  # of a small fleet, that a plan does not hang on one start
-_PATIENCE: Final = 2.0  # moves for each access without any gain before a plan is shaken
 _MOVES_AT_A_TIME: Final = 500
 _MERGED_EVERY: Final = 4  # times of these
 
 
 class FleetSearch:
-    """A plan of a fleet and a bound that its prices prove.
+    """A plan of a fleet and a bound that multipliers of its targets prove."""
 
-    Attributes
-    ----------
-    plan, reward
-        The best plan so far, and what the referee gives for it.
-    bound
-        No plan earns more.
-    """
-
-    def __init__(self, problem: Problem, budget: Budget, seed: int, gap: float) -> None:
-        self.problem, self.budget, self.gap = problem, budget, gap
-        self.plan = Plan().with_kept(problem)
-        self.reward = replay(problem, self.plan).reward
-        self._unit = reward_unit(problem)
+    def __init__(self, best: Incumbent, seed: int) -> None:
+        self.best, self.problem, self.budget = best, best.problem, best.budget
         self._seed = seed
-        self._network = network_of(problem)
-        self._worth = np.append(problem.target_reward, 0.0)
-        num_epochs = int(np.clip(default_steps(self._network), *_EPOCHS))
-        self._dual = IncrementalPrices(self._network, self._worth, num_epochs, seed)
+        self._network = network_of(self.problem)
+        self._worth = self.problem.worth[self._network.row]
+        most = np.append(self.problem.best_worth, 0.0)
+        num_epochs = int(np.clip(default_steps(len(self._network.row)), *_EPOCHS))
+        self._dual = IncrementalPrices(self._network, self._worth, most, num_epochs, seed)
 
     @property
     def prices(self) -> Floats:
-        """What proves the bound. Shape ``(num_targets,)``."""
+        """The multipliers that prove the bound. Shape ``(num_targets,)``."""
         return self._dual.prices[:-1]
-
-    @property
-    def bound(self) -> float:
-        """What no plan exceeds."""
-        return rounded_bound(self.problem, self._dual.value, self.reward)
-
-    @property
-    def is_optimal(self) -> bool:
-        """Whether no plan is better, to the stated tolerance."""
-        return self._is_within(0.0, self.reward)
-
-    @property
-    def is_close(self) -> bool:
-        """Whether plan and bound are as close as was asked for."""
-        return self._is_within(self.gap, self.reward)
-
-    def _is_within(self, gap: float, reward: float) -> bool:
-        bound = rounded_bound(self.problem, self._dual.value, reward)
-        room = max(self._unit, TOLERANCE * reward, 4e-9)
-        return bound < reward + room or bound - reward <= gap * bound
-
-    def offer(self, plan: Plan) -> bool:
-        """Take a plan if it is better; return whether it is."""
-        # What must be taken fits beside all that is left, where turning is transitive.
-        plan = plan.with_kept(self.problem)
-        timeline = replay(self.problem, plan)
-        if not timeline.is_valid or timeline.reward <= self.reward:
-            return False
-        self.plan, self.reward = plan, timeline.reward
-        return True
-
-    def report(self, message: str, reward: float = 0.0) -> None:
-        """Tell how far plan and bound are apart; a search may know of a better plan."""
-        reward = max(self.reward, reward)
-        share = min(1.0, reward / self.bound) if self.bound > 0.0 else 1.0
-        self.budget.report(
-            Progress(
-                phase="solve", fraction=share, reward=reward, bound=max(self.bound, reward),
-                message=message,
-            )
-        )  # fmt: skip
 
     def price(self, num_epochs: float = math.inf) -> None:
         """Search for prices, so long or until more steps are of little use."""
-        while num_epochs > 0 and not (self._dual.is_settled or self.is_close):
-            if self.budget.is_spent():
-                return
+        while num_epochs > 0 and not (self._dual.is_settled or self.best.is_done):
             self._dual.improve(_EPOCHS_AT_A_TIME, self.budget.stop)
-            self.report("prices")
+            bound = Bound(value=self._dual.value, proof="lagrangian", prices=self.prices)
+            self.best.lower(bound)
+            self.best.report("prices")
             num_epochs -= _EPOCHS_AT_A_TIME
 
     def start(self) -> None:
         """Plan one stretch after another at the prices."""
-        if self.budget.is_spent() or self.is_close:
+        if self.best.is_done:
             return
-        self.offer(self._priced_plan(self._seed))
-        self.report("start")
+        self.best.offer(self._priced_plan(self._seed))
+        self.best.report("start")
 
     def _priced_plan(self, seed: int) -> Plan:
         table, kept = self.problem.opportunities, self.problem.kept_rows
-        taken = np.zeros(len(self._worth), dtype=np.bool_)
+        taken = np.zeros(len(self.problem.target_ids) + 1, dtype=np.bool_)
         taken[table.place[kept[table.kind[kept] == COLLECT]]] = True
         rows = priced_start(self._network, self._worth, self._dual.prices, taken, seed)
         return Plan.of(self.problem, rows).with_kept(self.problem)
@@ -144,55 +90,41 @@ class FleetSearch:
         """Search windows, in several streams where the fleet is small, as far as that leads."""
         num_accesses = num_choices(self.problem)
         num_streams = _STREAMS if len(self.problem.opportunities) <= _SMALL else 1
-        streams = [
-            WindowStream(self.windows(number), self._network, self._seed + number,
-                         _PATIENCE * num_accesses)
-            for number in range(num_streams)
-        ]  # fmt: skip
+        streams = [self.windows(number) for number in range(num_streams)]
         left = int(moves_per_task * num_accesses)
         pool = PlanPool(self.problem, self.budget, self._seed)
         with ThreadPoolExecutor(self.budget.num_threads) as threads:
             while left > 0 and not self.budget.is_spent():
                 num_moves = min(left, _MOVES_AT_A_TIME)
-                going = [threads.submit(s.go_on, num_moves, self.budget) for s in streams]
+                going = [threads.submit(s.make_moves, num_moves, self.budget) for s in streams]
                 for one in going:
                     one.result()
                 left -= num_moves
                 if num_streams > 1 and left // _MOVES_AT_A_TIME % _MERGED_EVERY == 0:
                     self._merge(pool, streams)
-                best = max(pool.reward, *(stream.reward for stream in streams))
-                self.report("window search", best)
-                if self._is_within(self.gap, best):
+                reward = max(pool.reward, *(stream.reward for stream in streams))
+                self.best.report("window search", reward)
+                if self.best.is_within(self.best.gap, reward):
                     break
         for plan in (pool.plan, *(stream.plan for stream in streams)):
-            self.offer(plan)
+            self.best.offer(plan)
 
-    def _merge(self, pool: PlanPool, streams: Sequence[WindowStream]) -> None:
+    def _merge(self, pool: PlanPool, streams: Sequence[WindowSearch]) -> None:
         """Seek what the plans of the streams are worth together."""
         for stream in streams:
-            for plan in (*stream.ended, stream.plan):
-                pool.add(plan.with_kept(self.problem))
-            stream.ended.clear()
+            pool.add(stream.plan.with_kept(self.problem))
         pool.merge()
 
     def windows(self, number: int) -> WindowSearch:
         """Return a window search from a start of its own, the first from the best plan."""
-        share = np.minimum(self.prices / np.maximum(self.problem.target_reward, 1e-300), 1.0)
-        is_small = len(self.problem.opportunities) <= _SMALL
-        preference = None if is_small else 1.0 + _PREFERENCE * (0.5 - share)
+        preference = None
+        if len(self.problem.opportunities) > _SMALL:
+            share = np.minimum(self.prices / np.maximum(self.problem.best_worth, 1e-300), 1.0)
+            preference = 1.0 + _PREFERENCE * (0.5 - share)
         seed = self._seed + number
-        windows = WindowSearch(self.problem, seed, self._network, preference, share)
-        windows.adopt(self.plan if number == 0 else self._priced_plan(seed))
+        windows = WindowSearch(self.problem, seed, self._network, preference)
+        windows.adopt(self.best.plan if number == 0 else self._priced_plan(seed))
         return windows
-
-    def solution(self) -> Solution:
-        """Return the plan with what is known of it."""
-        termination = self.budget.ending(is_optimal=self.is_optimal, is_close=self.is_close)
-        if self.problem.continuous_starts:
-            # The bound does not cover the freedom to shift tasks.
-            return Solution(plan=self.plan, termination=termination)
-        proven = Bound(value=self.bound, proof="lagrangian", prices=self.prices)
-        return Solution(plan=self.plan, termination=termination, proven=proven)
 
 
 def solve_without_resources(
@@ -201,9 +133,10 @@ def solve_without_resources(
     """Return the best plan of a problem without resources, and its proof."""
     if sum(len(satellite) > 0 for satellite in problem.satellites) < 2:
         return solve_free(problem, budget, seed, gap, effort)
-    fleet = FleetSearch(problem, budget, seed, gap)
-    fleet.offer(Rule().solve(problem, Budget(), seed).plan)
-    fleet.report("first plan")
+    best = Incumbent(problem, budget, gap)
+    best.offer(Rule().solve(problem, Budget(), seed).plan)
+    best.report("first plan")
+    fleet = FleetSearch(best, seed)
     fleet.price(_EPOCHS_TO_START)
     fleet.start()
     fleet.price()
@@ -212,10 +145,9 @@ def solve_without_resources(
         fleet.search(effort.moves_per_task)
     is_small = effort.max_rounds > 0 and len(problem.opportunities) <= _SMALL
     if not is_small or budget.is_spent():
-        return fleet.solution()
-    search = FreeSearch(problem, budget, seed, gap)
-    search.offer(fleet.plan)
+        return best.solution()
+    search = FreeSearch(best, seed)
     search.step(Multipliers(prices=fleet.prices))
-    if not search.is_done:
+    if not best.is_done:
         close_in(search, effort)
     return search.solution()

@@ -16,9 +16,10 @@ from typing import Final
 
 import numpy as np
 
-from planner_core.budget import Budget, Progress
-from planner_core.certified.drivers.agility_only import TOLERANCE, Effort
+from planner_core.budget import Budget, ignored
+from planner_core.certified.drivers.agility_only import Effort
 from planner_core.certified.drivers.fleet import solve_without_resources
+from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.alternating import TurnSearch
 from planner_core.certified.lns.choices import ChoiceSearch
 from planner_core.certified.mip.contact_sets import FixedContacts, Relaxation
@@ -26,7 +27,7 @@ from planner_core.certified.mip.program_search import ProgramSearch
 from planner_core.certified.mip.solution_pool import PlanPool
 from planner_core.certified.multipliers.energy import EnergyPrices
 from planner_core.certified.multipliers.resources import PriceSearch
-from planner_core.certified.proofs.bound import Bound, reward_unit, rounded_bound
+from planner_core.certified.proofs.bound import Bound, rounded_bound
 from planner_core.certified.proofs.lagrangian import lagrangian_bound
 from planner_core.certified.proofs.resource_bound import quick_bound
 from planner_core.problem import (
@@ -35,8 +36,6 @@ from planner_core.problem import (
     Floats,
     Problem,
 )
-from planner_core.problem.plan import Plan
-from planner_core.referee.replay import replay
 from planner_core.solvers.base import Solution
 from planner_core.solvers.milp import Milp
 from planner_core.solvers.rule import Rule
@@ -46,6 +45,7 @@ _FIRST_GOAL: Final = 0.95
 _FIRST_MOVES: Final = (10, 40)  # of the search for plans, at least and at most, before contacts
 _TASKS_A_MOVE: Final = 80  # are fixed: the more tasks, the more it finds by itself
 _FURTHER_MOVES: Final = 20  # after each round of that
+_IDLE_STEPS: Final = 5  # of the search for plans, before others have their turn
 _FIRST_STEPS: Final = 2  # of the search for prices, where sets of contacts gave new ones
 _STEPS: Final = 8
 _PATIENCE: Final = 3  # rounds without a new set of contacts or a better plan
@@ -64,39 +64,20 @@ _ROOM: Final = 0.5  # of a target: with less the search for a better plan takes 
 _TIGHT: Final = 0.05  # of a target: prices that near to a relaxation are the best
 _MOST_ROWS: Final = 3000  # of a relaxation
 _LARGE: Final = 3000  # opportunities
-_FINER: Final = 0.3  # of a target: what smaller units gain at most
+_WORTH_A_STEP: Final = 0.005  # of a bound by the battery alone
 
 
 class ResourceSearch:
     """A plan and a bound of a problem with resources."""
 
-    def __init__(self, problem: Problem, budget: Budget, seed: int, gap: float) -> None:
-        self.problem, self.budget, self.seed, self.gap = problem, budget, seed, gap
-        self.unit = reward_unit(problem)
-        self.plan = Plan()
-        timeline = replay(problem, self.plan)
-        self.is_valid, self.reward = timeline.is_valid, timeline.reward
-        self.bound = Bound(value=float(problem.target_reward.sum()), proof="lagrangian")
+    def __init__(self, best: Incumbent, seed: int) -> None:
+        self.best, self.problem, self.budget = best, best.problem, best.budget
+        self.seed, self._first = seed, best.bound
         self._relaxed: dict[tuple[int, ...], Relaxation] = {}
         # By contacts and number of tasks offered: what no plan was found to be worth.
         self._missed: dict[tuple[tuple[int, ...], int], float] = {}
-        self._priced, self._refined = np.inf, np.inf  # bounds before they were rounded
-        self._one = float(problem.target_reward.mean()) if len(problem.target_ids) else 1.0
-
-    @property
-    def is_optimal(self) -> bool:
-        """Whether no plan is better, to the stated tolerance."""
-        return self.bound.value - self.reward < max(self.unit, TOLERANCE * self.reward, 1e-9)
-
-    @property
-    def is_close(self) -> bool:
-        """Whether plan and bound are as close as was asked for."""
-        return self.is_optimal or self.bound.value - self.reward <= self.gap * self.bound.value
-
-    @property
-    def is_done(self) -> bool:
-        """Whether plan and bound are close enough, or the budget is spent."""
-        return self.is_close or self.budget.is_spent()
+        self._priced = np.inf  # the bound before it was rounded
+        self._one = self.problem.typical_worth
 
     @property
     def is_shared(self) -> bool:
@@ -108,65 +89,38 @@ class ResourceSearch:
         """Whether several satellites share so much that the whole program is too large."""
         return self.is_shared and len(self.problem.opportunities) > _LARGE
 
-    def offer(self, plan: Plan) -> bool:
-        """Take a plan if it is better; a valid one is better than any other."""
-        timeline = replay(self.problem, plan)
-        if (timeline.is_valid, timeline.reward) <= (self.is_valid, self.reward):
-            return False
-        self.plan, self.is_valid, self.reward = plan, timeline.is_valid, timeline.reward
-        return True
-
-    def lower(self, bound: Bound) -> None:
-        """Note what no plan exceeds."""
-        value = rounded_bound(self.problem, bound.value, self.reward)
-        if value < self.bound.value:
-            self.bound = replace(bound, value=value)
-
-    def report(self, message: str) -> None:
-        """Tell how far plan and bound are apart."""
-        share = self.reward / self.bound.value if self.bound.value > 0.0 else 1.0
-        self.budget.report(
-            Progress(
-                phase="solve",
-                fraction=min(1.0, share),
-                reward=self.reward,
-                bound=self.bound.value,
-                message=message,
-            )
-        )
-
-    def search(self, choices: ChoiceSearch, num_moves: int) -> None:
-        """Make moves from the best plan."""
-        for _ in range(num_moves):
-            if self.is_done:
-                return
-            choices.move()
-            if choices.reward > self.reward + 1e-12:
-                self.offer(choices.plan)
-        self.report("plans")
+    def search(self, turns: TurnSearch, num_steps: int) -> bool:
+        """Search for plans from the best, while that leads on; return whether one is better."""
+        before, idle_steps = self.best.reward, 0
+        for _ in range(num_steps):
+            if self.best.is_done or idle_steps == _IDLE_STEPS:
+                break
+            turns.turn(1)
+            is_better = turns.reward > self.best.reward and self.best.offer(turns.plan)
+            idle_steps = 0 if is_better else idle_steps + 1
+        self.best.report("plans")
+        return self.best.reward > before
 
     def without_resources(self) -> Bools:
         """Let agility alone bound the plans; return the tasks of the best plan then."""
         free = replace(self.problem, use_resources=False)
         # Its plans are not for this problem: they are not reported.
-        quiet = Budget(self.budget.remaining_s())
-        quiet.stop = self.budget.stop
-        solution = solve_without_resources(free, quiet, self.seed, self.gap, Effort())
+        quiet = self.budget.part(report=ignored)
+        solution = solve_without_resources(free, quiet, self.seed, self.best.gap, Effort())
         if solution.proven is not None:
-            self.lower(solution.proven)
-        self.report("without resources")
+            self.best.lower(solution.proven)
+        self.best.report("without resources")
         return self.mask(action.opportunity for action in solution.plan.actions)
 
     def exhaust(self) -> None:
         """Leave what remains to the whole program, which ends with a proof if time suffices."""
-        self.report("HiGHS")
-        quiet = Budget(self.budget.remaining_s())
-        quiet.stop = self.budget.stop
-        solution = Milp(gap=self.gap).solve(self.problem, quiet, self.seed)
-        self.offer(solution.plan)
+        self.best.report("HiGHS")
+        quiet = self.budget.part(report=ignored)
+        solution = Milp(gap=self.best.gap).solve(self.problem, quiet, self.seed)
+        self.best.offer(solution.plan)
         if solution.proven is not None:
-            self.lower(solution.proven)
-        self.report("HiGHS")
+            self.best.lower(solution.proven)
+        self.best.report("HiGHS")
 
     def mask(self, rows: Iterable[int]) -> Bools:
         """Return which opportunities these are."""
@@ -177,25 +131,25 @@ class ResourceSearch:
     def price(self, prices: PriceSearch, num_steps: int) -> None:
         """Make steps towards better prices."""
         for _ in range(num_steps):
-            if self.is_done or not prices.step(max(self.reward, self.relaxed)):
+            if self.best.is_done or not prices.step(max(self.best.reward, self.relaxed)):
                 return
             self._priced = min(self._priced, prices.value)
-            self.lower(
+            self.best.lower(
                 Bound(value=prices.value, proof="dp", prices=prices.prices, unit=prices.unit)
             )
-        self.report("prices")
+        self.best.report("prices")
 
     def prices(self) -> Floats:
         """Return prices to begin with."""
-        known = self.bound.prices
-        if known is None:
-            known = lagrangian_bound(self.problem, self.reward).prices
+        known = self.best.bound.prices
+        if known is None or self.best.bound is self._first:
+            known = lagrangian_bound(self.problem, self.best.reward).prices
         return np.zeros(len(self.problem.target_ids)) if known is None else known
 
-    def relax_sets(self, prices: PriceSearch, choices: ChoiceSearch) -> bool:
+    def relax_sets(self, prices: PriceSearch, turns: TurnSearch) -> bool:
         """Learn prices from the relaxations of sets of contacts; return whether any is new."""
         table = self.problem.opportunities
-        plans = [self.mask(a.opportunity for a in self.plan.actions), choices.taken]
+        plans = [self.mask(a.opportunity for a in p.actions) for p in (self.best.plan, turns.plan)]
         sets = [
             *(tuple(np.flatnonzero(p & (table.kind == CONTACT)).tolist()) for p in plans),
             *(key for key, _ in prices.contact_sets.most_common()),
@@ -203,10 +157,10 @@ class ResourceSearch:
         new = [key for key in dict.fromkeys(sets) if key not in self._relaxed][:_SETS_AT_A_TIME]
         offered = np.ones(len(table), dtype=np.bool_)
         if len(table) > _MOST_ROWS:
-            offered = (prices.usage > 0.0) | (choices.usage > 0.0)
-        offered |= self.mask(action.opportunity for action in self.plan.actions)
+            offered = (prices.usage > 0.0) | (turns.usage > 0.0)
+        offered |= self.mask(action.opportunity for action in self.best.plan.actions)
         for contacts in new:
-            if self.is_done:
+            if self.best.is_done:
                 return False
             program = FixedContacts(self.problem, offered, contacts, self.budget, self.seed)
             self._relaxed[contacts] = program.relaxation()
@@ -215,19 +169,8 @@ class ResourceSearch:
         least = self.relaxed - _AS_GOOD * self._one
         near = [r.prices for r in self._relaxed.values() if r.value >= least]
         prices.restart(np.mean(near, axis=0))
-        self.report("contacts fixed")
+        self.best.report("contacts fixed")
         return True
-
-    def refine(self, prices: PriceSearch) -> None:
-        """See what the best prices prove in smaller units, where that may help."""
-        hoped = rounded_bound(self.problem, prices.value - _FINER * self._one, self.reward)
-        if hoped >= self.bound.value or prices.value >= self._refined or self.is_done:
-            return
-        self._refined = prices.value
-        value, finer, unit = prices.refined(prices.prices)
-        if not self.budget.is_spent():
-            self.lower(Bound(value=value, proof="dp", prices=finer, unit=unit))
-        self.report("prices")
 
     def fix_contacts(self, *, is_last: bool) -> bool:
         """Search for a better plan with the most promising contacts; return whether it is.
@@ -241,26 +184,26 @@ class ResourceSearch:
             (relaxation.value - _LESS_LIKELY * attempt * self._one, contacts, size)
             for contacts, relaxation in self._relaxed.items()
             for attempt, size in enumerate(_OFFERED)
-            if relaxation.value >= self.better + room * self._one - 1e-6
-            and self.better < self._missed.get((contacts, size), np.inf)
+            if relaxation.value >= self.best.better + room * self._one - 1e-6
+            and self.best.better < self._missed.get((contacts, size), np.inf)
         ]
-        if not hopeful or self.is_done:
+        if not hopeful or self.best.is_done:
             return False
         _, contacts, size = max(hopeful)
         offered = self.promising(self._relaxed[contacts], size)
         part = FixedContacts(self.problem, offered, contacts, self.budget, self.seed)
         relaxed = part.relaxed()
-        if relaxed < self.better - 1e-6:
-            self._missed[contacts, size] = self.better
+        if relaxed < self.best.better - 1e-6:
+            self._missed[contacts, size] = self.best.better
             return False
         # The last image is the hardest, and may be none: whoever wants it asks again.
-        wanted = rounded_bound(self.problem, relaxed - self._one, self.better)
+        wanted = rounded_bound(self.problem, relaxed - self._one, self.best.better)
         if wanted >= self._missed.get((contacts, size), np.inf):
-            wanted = self.better
-        self.report("contacts fixed")
+            wanted = self.best.better
+        self.best.report("contacts fixed")
         plan = part.plan(wanted)
-        is_better = plan is not None and self.offer(plan)
-        if self.reward < wanted - 1e-6:
+        is_better = plan is not None and self.best.offer(plan)
+        if self.best.reward < wanted - 1e-6:
             self._missed[contacts, size] = wanted
         return is_better
 
@@ -268,7 +211,7 @@ class ResourceSearch:
         """Return the tasks that the relaxation would take at the least loss."""
         losses = relaxation.losses
         cut_off = np.sort(losses[np.isfinite(losses)])[:size][-1]
-        own = self.mask(action.opportunity for action in self.plan.actions)
+        own = self.mask(action.opportunity for action in self.best.plan.actions)
         promising: Bools = (losses <= cut_off) | own
         return promising
 
@@ -277,50 +220,36 @@ class ResourceSearch:
         """What the best relaxation with fixed contacts is worth: prices hardly get below."""
         return max((r.value for r in self._relaxed.values()), default=-np.inf)
 
-    @property
-    def better(self) -> float:
-        """What a plan must be worth that is better than the one at hand."""
-        return self.reward + max(self.unit, TOLERANCE * self.reward, 1e-9)
-
-    def solution(self) -> Solution:
-        """Return the plan with what is known of it."""
-        termination = self.budget.ending(
-            is_optimal=self.is_valid and self.is_optimal,
-            is_close=self.is_valid and self.is_close,
-        )
-        if self.problem.continuous_starts:
-            # Another start may suit the next task better: nothing here bounds that.
-            return Solution(plan=self.plan, termination=termination)
-        return Solution(plan=self.plan, termination=termination, proven=self.bound)
-
 
 def solve_with_resources(problem: Problem, budget: Budget, seed: int, gap: float) -> Solution:
     """Return the best plan of a problem with resources, and its proof."""
-    search = ResourceSearch(problem, budget, seed, gap)
-    search.offer(Rule().solve(problem, Budget(), seed).plan)
+    best = Incumbent(problem, budget, gap)
+    search = ResourceSearch(best, seed)
+    search.best.offer(Rule().solve(problem, Budget(), seed).plan)
     if len(problem.opportunities) == 0:
-        return search.solution()
-    search.lower(quick_bound(problem, search.reward))
-    unit = search.unit
-    if unit == 0.0 or search.bound.value / unit > _MAX_UNITS:
-        unit = max(search.bound.value / _MAX_UNITS, 1e-12)
-    if search.is_shared and not search.is_done:
+        return search.best.solution()
+    search.best.lower(quick_bound(problem, search.best.reward))
+    unit = search.best.unit
+    if unit == 0.0 or search.best.bound.value / unit > _MAX_UNITS:
+        unit = max(search.best.bound.value / _MAX_UNITS, 1e-12)
+    if search.is_shared and not search.best.is_done:
         _close_in_fleet(search, unit)
     if search.is_fleet:
-        return search.solution()
+        return search.best.solution()
     choices = ChoiceSearch(problem, unit, seed, budget.stop)
     choices.start(search.mask([]), _FIRST_GOAL)
-    search.offer(choices.plan)
-    search.report("plans")
-    if search.bound.proof == "lagrangian" and not search.is_done:
+    search.best.offer(choices.plan)
+    search.best.report("plans")
+    if search.best.bound.proof == "lagrangian" and not search.best.is_done:
         preferred = search.without_resources()
         choices.start(preferred, 1.0)
-        search.offer(choices.plan)
-    search.search(choices, int(np.clip(len(problem.opportunities) // _TASKS_A_MOVE, *_FIRST_MOVES)))
-    _close_in(search, choices)
-    if not search.is_done:
+        search.best.offer(choices.plan)
+    turns = TurnSearch(problem, best.plan, unit, budget, seed)
+    search.search(turns, int(np.clip(len(problem.opportunities) // _TASKS_A_MOVE, *_FIRST_MOVES)))
+    _close_in(search, turns)
+    if not search.best.is_done:
         search.exhaust()
-    return search.solution()
+    return search.best.solution()
 
 
 def _close_in_fleet(search: ResourceSearch, unit: float) -> None:
@@ -328,11 +257,11 @@ def _close_in_fleet(search: ResourceSearch, unit: float) -> None:
 
     What is left of a small fleet HiGHS soon settles.
     """
-    turns = TurnSearch(search.problem, search.plan, unit, search.budget, search.seed)
+    turns = TurnSearch(search.problem, search.best.plan, unit, search.budget, search.seed)
     pool = PlanPool(search.problem, search.budget, search.seed)
     with ThreadPoolExecutor(search.budget.num_threads) as threads:
         pricing = _FleetPricing(search)
-        while not (pricing.is_settled or search.is_done):
+        while not (pricing.is_settled or search.best.is_done):
             _take_turns(search, turns, pool, threads, pricing)
         programs = None
         if search.is_fleet and pricing.prices is not None:
@@ -341,7 +270,7 @@ def _close_in_fleet(search: ResourceSearch, unit: float) -> None:
             )
         idle_turns = 0
         while idle_turns < (_FLEET_PATIENCE if programs else _SHORT_PATIENCE):
-            if search.is_done:
+            if search.best.is_done:
                 return
             is_better = _take_turns(search, turns, pool, threads, programs)
             idle_turns = 0 if is_better else idle_turns + 1
@@ -365,8 +294,8 @@ def _take_turns(
     for turn in work:
         turn.result()
     pool.learn(turns.ended, turns.plan)
-    is_better = [search.offer(plan) for plan in (turns.plan, pool.plan)]
-    search.report("plans")
+    is_better = [search.best.offer(plan) for plan in (turns.plan, pool.plan)]
+    search.best.report("plans")
     return any(is_better)
 
 
@@ -415,34 +344,52 @@ class _FleetPricing:
         if self.prices is None:
             self.prices = PriceSearch(
                 search.problem,
-                min(search.bound.value, energy.value),
+                min(search.best.bound.value, energy.value),
                 energy.prices,
                 search.budget.stop,
             )
-            self.prices.learn(search.plan)
+            self.prices.learn(search.best.plan)
         search.price(self.prices, 1)
         self._num_steps += 1
 
 
-def _close_in(search: ResourceSearch, choices: ChoiceSearch) -> None:
-    """Search for prices and plans in turn, until neither gets anywhere."""
-    if search.is_done:
+def _close_in(search: ResourceSearch, turns: TurnSearch) -> None:
+    """Search for multipliers and plans in turn, until neither gets anywhere."""
+    best = search.best
+    if best.is_done:
         return
-    prices = PriceSearch(search.problem, search.bound.value, search.prices(), search.budget.stop)
-    prices.learn(search.plan)
+    prices = _first_prices(search)
     is_large = len(search.problem.opportunities) > _LARGE
     idle_rounds = 0
-    while idle_rounds < _PATIENCE and not search.is_done:
-        is_new = search.relax_sets(prices, choices)
+    while idle_rounds < _PATIENCE and not best.is_done:
+        is_new = search.relax_sets(prices, turns)
         # Where steps take long, a search for the last image is tried before them.
         is_better = is_large and not is_new and search.fix_contacts(is_last=True)
         if not is_better:
             search.price(prices, _FIRST_STEPS if is_new else _STEPS)
             is_better = search.fix_contacts(is_last=False)
         if not is_new and not is_better:
-            search.refine(prices)
             is_better = search.fix_contacts(is_last=True)
-            search.search(choices, _FURTHER_MOVES)
+            is_better |= search.search(turns, _FURTHER_MOVES)
         if is_better:
-            choices.adopt(search.plan)
+            turns.adopt(best.plan)
         idle_rounds = 0 if is_new or is_better else idle_rounds + 1
+
+
+def _first_prices(search: ResourceSearch) -> PriceSearch:
+    """Return a search for multipliers that begins where battery alone leads.
+
+    To ask the battery alone takes a fiftieth of the time; where that does not lead below what is
+    known by much, the exact programme is not asked at its multipliers either.
+    """
+    best, known = search.best, search.prices()
+    energy = EnergyPrices(search.problem, known, _ROUNDS_AT_A_TIME, search.seed)
+    energy.ask()
+    before = energy.value
+    energy.improve(_ROUNDS_AT_A_TIME, search.budget.stop)
+    value = min(best.bound.value, energy.value)
+    prices = PriceSearch(search.problem, value, energy.prices, search.budget.stop)
+    prices.learn(best.plan)
+    if energy.value < before - _WORTH_A_STEP * before:
+        search.price(prices, 1)
+    return prices

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from typing import Final
 
+import numpy as np
+
 from planner_core.budget import Budget
 from planner_core.certified.lns.choices import ChoiceSearch
 from planner_core.certified.lns.resource_search import ResourceWindows
@@ -29,7 +31,8 @@ class TurnSearch:
     Parameters
     ----------
     start
-        The plan to begin with, and to begin with again where a search leads nowhere.
+        The plan to begin with, and to begin with again where a search leads nowhere, until
+        another is adopted.
     unit
         Of worth, as the exact programmes count it.
 
@@ -37,6 +40,8 @@ class TurnSearch:
     ----------
     ended
         What each start but the last has led to.
+    usage
+        How many of the plans on the way took each opportunity. Shape ``(n,)``.
     """
 
     def __init__(self, problem: Problem, start: Plan, unit: float, budget: Budget, seed: int):
@@ -45,6 +50,7 @@ class TurnSearch:
         self._choices = ChoiceSearch(problem, unit, seed, budget.stop)
         self._seed, self._num_starts, self._idle_steps = seed, 0, _STALLED
         self.ended: list[Plan] = []
+        self.usage = np.zeros(len(problem.opportunities))
 
     def turn(self, num_steps: int) -> None:
         """Let each search go on from where the other got to, or begin afresh where both stall."""
@@ -55,6 +61,7 @@ class TurnSearch:
             before = self._windows.reward
             self._replan_days()
             self._replan_windows(1)
+            self._note()
             self._idle_steps = 0 if self._windows.reward > before else self._idle_steps + 1
 
     def _begin(self) -> None:
@@ -67,6 +74,14 @@ class TurnSearch:
         # Whole days first: once most targets are taken, contacts hardly move.
         self._replan_days()
         self._replan_windows(_FIRST_STEPS)
+        self._note()
+
+    def adopt(self, plan: Plan) -> None:
+        """Begin with another plan from now on."""
+        self._start, self._idle_steps = plan, _STALLED
+
+    def _note(self) -> None:
+        self.usage[[action.opportunity for action in self.plan.actions]] += 1.0
 
     def _replan_days(self) -> None:
         """Replan each satellite's whole day by choices of tasks."""

@@ -57,7 +57,7 @@ class SatelliteChoices:
         satellite = problem.satellites[index]
         network = strict_network_of(problem, satellite)
         target = np.where(satellite.kind == COLLECT, satellite.place, -1).astype(np.int32)
-        worth = np.append(problem.target_reward, 0.0)[target]
+        worth = problem.worth[satellite.rows]
         return cls(
             rows=satellite.rows,
             network=network,
@@ -100,7 +100,7 @@ class ChoiceSearch:
     taken
         Whether the plan takes each opportunity. Shape ``(n,)``.
     reward
-        What its targets are worth.
+        What its targets earn.
     usage
         How many of the plans kept so far took each opportunity. Shape ``(n,)``.
     """
@@ -198,7 +198,9 @@ class ChoiceSearch:
             counts = np.bincount(satellite.target[images], minlength=num_targets + 1)
             if value < 0 or counts.max() <= 1:
                 return value, path
+            # Of a target that is collected twice the best counts, any of equal ones.
             images = self._rng.permutation(images)
+            images = images[np.argsort(satellite.weight[images], kind="stable")]
             chosen = np.full(num_targets + 1, -1)
             chosen[satellite.target[images]] = images
             once = (counts == 1) & (self._rng.random(num_targets + 1) < _SETTLED)
@@ -235,4 +237,4 @@ class ChoiceSearch:
         return self._mask(table.place[taken & (table.kind == COLLECT)])
 
     def _worth(self, taken: Bools) -> float:
-        return float(self._problem.target_reward[self._taken_targets(taken)[:-1]].sum())
+        return self._problem.worth_of(np.flatnonzero(taken))

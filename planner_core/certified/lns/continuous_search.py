@@ -60,9 +60,9 @@ class Satellite:
         """Return a satellite with its part of a plan, each target in it once."""
         table = problem.opportunities
         spans, view = spans_of(problem, index), view_of(problem, index)
-        worth = problem.target_reward[spans.place].astype(np.float64)
+        worth = problem.worth[spans.row]
         # What must be taken is worth more than all else, so that no move drops it.
-        worth[spans.is_kept] += 1.0 + float(problem.target_reward.sum())
+        worth[spans.is_kept] += 1.0 + float(problem.best_worth.sum())
         tasks: dict[int, int] = {}
         for action in plan.actions:
             i = action.opportunity

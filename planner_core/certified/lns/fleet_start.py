@@ -20,48 +20,58 @@ _LEAST: Final = 1e-3  # of its reward that a target is worth, whatever its price
 
 
 def priced_start(
-    network: Network, reward: Floats, prices: Floats, taken: Bools, seed: int
+    network: Network, worth: Floats, prices: Floats, taken: Bools, seed: int
 ) -> list[int]:
     """Return the rows of the best of a few plans; what they earn counts without the prices.
 
     Parameters
     ----------
-    reward, prices
+    worth
+        Of each node. Shape ``(n,)``.
+    prices
         Of each place, with a last entry of zero that stands for contacts.
     taken
-        Places that are taken already. Shape of ``reward``.
+        Places that are taken already. Shape of ``prices``.
     """
     rng = np.random.default_rng(seed)
-    worth = np.maximum(reward - prices, _LEAST * reward)
+    priced = np.maximum(worth - prices[network.place], _LEAST * worth)
     weight, value = np.empty(len(network.row)), np.empty(len(network.row))
     previous = np.empty(len(network.row), dtype=np.int32)
     best, best_reward = [], -1.0
     for _ in range(_ORDERS):
-        left = np.where(taken, 0.0, worth)
-        nodes = [
-            _take(network, part, left, weight, value, previous)
-            for part in rng.permutation(len(network.first) - 1)
-        ]
-        earned = float(reward[~taken & (left == 0.0)].sum())
+        is_left = ~taken
+        nodes = np.concatenate(
+            [
+                _take(network, part, priced, worth, is_left, weight, value, previous)
+                for part in rng.permutation(len(network.first) - 1)
+            ]
+        )
+        earned = float(worth[nodes].sum())
         if earned > best_reward:
-            best, best_reward = network.row[np.concatenate(nodes)].tolist(), earned
+            best, best_reward = network.row[nodes].tolist(), earned
     return best
 
 
 @kernel
 def _take(
-    network: Network, part: int, worth: Floats, weight: Floats, value: Floats, previous: Ints
-) -> Ints:
-    """Return one node for each target of the heaviest path, and let them be worth nothing."""
+    network: Network, part: int, priced: Floats, worth: Floats, is_left: Bools,
+    weight: Floats, value: Floats, previous: Ints,
+) -> Ints:  # fmt: skip
+    """Return the best node of each target that is left on the heaviest path, and take those."""
     for a in range(network.first[part], network.first[part + 1]):
-        weight[a] = worth[network.place[a]]
+        weight[a] = priced[a] if is_left[network.place[a]] else 0.0
     _, at = heaviest_path(network, part, weight, value, previous)
     nodes = np.empty(network.first[part + 1] - network.first[part], dtype=np.int32)
     count = 0
     while at >= 0:
-        if worth[network.place[at]] > 0.0:
-            worth[network.place[at]] = 0.0
+        place = network.place[at]
+        if weight[at] > 0.0 and is_left[place]:
+            is_left[place] = False
             nodes[count] = at
             count += 1
+        elif weight[at] > 0.0:
+            for i in range(count):
+                if network.place[nodes[i]] == place and worth[nodes[i]] < worth[at]:
+                    nodes[i] = at
         at = previous[at]
     return nodes[:count].copy()

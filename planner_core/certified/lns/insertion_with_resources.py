@@ -1,7 +1,7 @@
 """Insertion where battery and recorder count: contacts stay, and the referee has the last word.
 
 Tasks move as early as those before them allow. Whatever then fits between two of them by agility
-is put in on trial, the targets of greatest reward first, and stays in where the whole plan
+is put in on trial, the images of greatest worth first, and stays in where the whole plan
 remains valid.
 """
 
@@ -69,7 +69,7 @@ def _filled(problem: Problem, plan: Plan, index: int, budget: Budget) -> Plan:
                 is_free[table.place[action.opportunity]] = False
         is_free[len(problem.target_ids) :] = False
         task, at = fitting(spans, view, route, is_free)
-        order = np.argsort(-problem.target_reward[spans.place[task]], kind="stable")
+        order = np.argsort(-problem.worth[spans.row[task]], kind="stable")
         is_better = False
         for pick in order.tolist():
             if left == 0 or budget.is_spent():

@@ -1,9 +1,10 @@
 """The moves of the window search: a stretch of one satellite's tasks is planned anew.
 
-Between two tasks that stay, the heaviest chain takes the place of what was there. Each node
-keeps one chain, the heaviest that was found, with the set of targets on it; so no target
-stands on a chain twice. A target that is imaged outside the window may be on the chain too, at
-next to no worth: its other image is then dropped, which makes room elsewhere for nothing.
+Between two tasks that stay, the heaviest chain takes the place of what was there. Labels are
+those of ``planner_core.precedence.skyline``; beside each lies the set of the targets on its chain
+that are in the window more than once, so no target stands on a chain twice. A target that is imaged
+outside the window may be on the chain too, at next to no worth: its other image is then dropped,
+which makes room elsewhere for nothing.
 """
 
 from __future__ import annotations
@@ -16,53 +17,63 @@ import numpy.typing as npt
 from planner_core.bundles import bundle
 from planner_core.draws import Uint64s, next_draw
 from planner_core.jit import borrowing
+from planner_core.precedence.network import Network, slews_in
+from planner_core.precedence.skyline import (
+    COMPARED,
+    NO_LABEL,
+    Skyline,
+    append,
+    best_ahead,
+    is_as_good,
+    reaches,
+    skyline_for,
+    top_label,
+    value_of,
+)
 from planner_core.problem import (
     Bools,
     Bytes,
     Floats,
     Ints,
     Longs,
-    may_follow,
 )
+from planner_core.problem.slew import TIME_TOLERANCE_S
+from planner_core.problem.transitions import Slews, Vector, turns_within
+
+NO_TASK: Final = -1
 
 FREE: Final = -1
 """Holder of a target that no task images."""
 
-MAX_NODES: Final = 4096
+MAX_NODES: Final = 8192
 """How many nodes a window may span."""
 
 MAX_WORDS: Final = 16
-"""How many words the set of a window's targets may take."""
+"""How many words the set of targets may take that are in a window more than once."""
 
 _FEWEST_TASKS: Final = 3
 _MORE_TASKS: Final = 12
+_TRIALS: Final = 8  # draws of a target that is not imaged
 _FOR_FREE_TARGET: Final = 0.7  # of all moves
 _TIE: Final = 0.01  # of a target's worth; a window's together stay below one task
 _SMALL_TIE: Final = 1e-5
 _NOWHERE: Final = -2
-_AT_START: Final = -1
+_EMPTY: Final = np.uint64(0)
 
 
 @bundle
 class Ground(NamedTuple):
-    """What moves do not change; nodes as in ``bounds.network``. Shape ``(n,)`` unless said.
+    """What moves do not change. Shape ``(n,)``, for the nodes of the network, unless said.
 
     Attributes
     ----------
-    order_near, order_far, order_offset, order_bits
-        Which node may follow which, all satellites in one table.
     is_transitive
-        Whether a chain may pass through a task without taking it. Shape ``(num_parts,)``.
+        Whether the tasks around one can do without it in any case. Shape ``(num_parts,)``.
     worth
-        Of each target, and 0 for contacts. Shape ``(num_targets + 1,)``.
+        Of each node.
     preference
         By how much the search prefers a target to others of its worth, as a factor.
         Shape ``(num_targets + 1,)``.
-    urgency
-        How likely a move begins at a target that is not imaged, where one is drawn.
-        Shape ``(num_targets + 1,)``.
-    num_trials
-        How many draws there are for such a target.
     is_kept
         What every plan must take.
     is_locked
@@ -71,21 +82,10 @@ class Ground(NamedTuple):
         More than all targets together.
     """
 
-    place: Ints
-    first: Longs
-    arc_from: Longs
-    before: Ints
-    far_from: Ints
-    earlier: Ints
-    order_near: Ints
-    order_far: Ints
-    order_offset: Longs
-    order_bits: Bytes
+    network: Network
     is_transitive: Bools
     worth: Floats
     preference: Floats
-    urgency: Floats
-    num_trials: int
     is_kept: Bools
     is_locked: Bools
     kept_worth: float
@@ -102,38 +102,38 @@ class Taken(NamedTuple):
 
 @bundle
 class Room(NamedTuple):
-    """Working memory of a window; shape ``(MAX_NODES + 1,)`` for nodes.
+    """Working memory of a window; shape ``(MAX_NODES + 1,)`` for nodes, which count from its first.
 
     Attributes
     ----------
-    value, source, is_paid
-        Of the chain kept by each node: weight, node before, whether it takes the node itself.
-    onward
-        The node whose chain goes on from here: itself, or one of its access before it.
-    far_value, far_node
-        The best chain that every node from here on may follow.
+    sky
+        Labels of chains, which stand for nodes.
+    value, source
+        Of the heaviest chain that ends with each node: weight, and the label before.
+    waiting
+        Nodes whose labels have not been entered yet, in order of end.
     on_chain
-        Sets of targets. Shape ``(MAX_NODES * MAX_WORDS,)``.
-    number, marked_at
-        A target's place in those sets, as of which move. Shape ``(num_targets + 1,)``.
+        Sets of targets, a label's after another's. Shape ``(MAX_NODES * MAX_WORDS,)``.
+    number, marked_at, tie
+        A target's place in those sets (-1 for none) and by how much it is favoured, as of which
+        move. Shape ``(num_targets + 1,)``.
     weight
-        Of each target in the sets. Shape ``(MAX_NODES,)``.
+        Of each node of the window.
     path, old, dropped
         Nodes that a move takes, lets go in the window, and lets go elsewhere.
     move
         Moves so far. Shape ``(1,)``.
     """
 
+    sky: Skyline
     value: Floats
     source: Ints
-    is_paid: Bools
-    onward: Ints
-    far_value: Floats
-    far_node: Ints
+    waiting: Ints
     on_chain: npt.NDArray[np.uint64]
     number: Ints
     marked_at: Longs
     weight: Floats
+    tie: Floats
     path: Ints
     old: Ints
     dropped: Ints
@@ -144,16 +144,15 @@ def room_for(num_targets: int) -> Room:
     """Return working memory for a problem of so many targets."""
     nodes = MAX_NODES + 1
     return Room(
+        sky=skyline_for(nodes),
         value=np.zeros(nodes),
         source=np.zeros(nodes, dtype=np.int32),
-        is_paid=np.zeros(nodes, dtype=np.bool_),
-        onward=np.zeros(nodes, dtype=np.int32),
-        far_value=np.zeros(nodes),
-        far_node=np.zeros(nodes, dtype=np.int32),
-        on_chain=np.zeros(MAX_NODES * MAX_WORDS, dtype=np.uint64),
+        waiting=np.zeros(nodes, dtype=np.int32),
+        on_chain=np.zeros(nodes * MAX_WORDS, dtype=np.uint64),
         number=np.zeros(num_targets + 1, dtype=np.int32),
         marked_at=np.zeros(num_targets + 1, dtype=np.int64),
         weight=np.zeros(nodes),
+        tie=np.zeros(num_targets + 1),
         path=np.zeros(nodes, dtype=np.int32),
         old=np.zeros(nodes, dtype=np.int32),
         dropped=np.zeros(nodes, dtype=np.int32),
@@ -173,61 +172,72 @@ def make_moves(
     offered
         Nodes that moves may take beside those that are taken. Shape ``(n,)``.
     """
-    if len(ground.place) == 0:
+    if len(ground.network.place) == 0:
         return
     for _ in range(num_moves):
         if stop[0]:
             return
         pivot = _pivot(ground, taken, offered, draws)
         part = _part_of(ground, pivot)
-        begin, end = ground.first[part], ground.first[part + 1]
+        begin, end = ground.network.first[part], ground.network.first[part + 1]
         low, high = _window(taken, pivot, begin, end, draws)
         left, right = low - 1, high
         while left >= begin and not taken.is_taken[left]:
             left -= 1
         while right < end and not taken.is_taken[right]:
             right += 1
+        # What begins before the task on the left ends is in no chain after it.
         if left >= begin:
-            low = max(low, ground.order_near[left])
+            after_s = ground.network.end_s[left] - TIME_TOLERANCE_S
+            while low < high and ground.network.start_s[low] < after_s:
+                low += 1
         if low >= high:
             continue
         num_words = _weigh(ground, taken, offered, room, low, high, draws)
         if num_words > MAX_WORDS:
             continue
-        last = _heaviest(ground, taken, offered, room, num_words, part, left, low, high, right)
+        ends = (left if left >= begin else NO_TASK, right if right < end else NO_TASK)
+        last = _heaviest(ground, room, num_words, part, ends, low, high)
         if last != _NOWHERE:
             _replace(ground, taken, room, low, high, last)
 
 
 @borrowing
-def _follows(ground: Ground, a: int, b: int) -> bool:
-    return may_follow(
-        a, b, ground.order_near, ground.order_far, ground.order_offset, ground.order_bits
-    )
+def _looks(network: Network, node: int) -> Vector:
+    return network.looks[node, 0], network.looks[node, 1], network.looks[node, 2]
+
+
+@borrowing
+def _looked(network: Network, node: int) -> Vector:
+    return network.looked[node, 0], network.looked[node, 1], network.looked[node, 2]
+
+
+@borrowing
+def _follows(network: Network, slews: Slews, a: int, b: int) -> bool:
+    room_s = network.start_s[b] - network.end_s[a] - slews.settle_s + TIME_TOLERANCE_S
+    return turns_within(slews, room_s, _looked(network, a), _looks(network, b))
 
 
 @borrowing
 def _pivot(ground: Ground, taken: Taken, offered: Bools, draws: Uint64s) -> int:
     """Return a node at random, mostly one of a target that is not imaged."""
-    n = len(ground.place)
-    num_trials = ground.num_trials if next_draw(draws) < _FOR_FREE_TARGET else 1
+    n = len(ground.network.place)
+    num_trials = _TRIALS if next_draw(draws) < _FOR_FREE_TARGET else 1
     pivot = 0
     for _ in range(num_trials):
         pivot = int(next_draw(draws) * n)
-        target = ground.place[pivot]
-        if offered[pivot] and taken.holder[target] == FREE and ground.worth[target] > 0.0:
-            urgency = ground.urgency[target]
-            if urgency >= 1.0 or next_draw(draws) < urgency:
-                break
+        target = ground.network.place[pivot]
+        if offered[pivot] and taken.holder[target] == FREE and ground.worth[pivot] > 0.0:
+            break
     return pivot
 
 
 @borrowing
 def _part_of(ground: Ground, node: int) -> int:
-    low, high = 0, len(ground.first) - 1
+    low, high = 0, len(ground.network.first) - 1
     while high - low > 1:
         middle = (low + high) >> 1
-        if ground.first[middle] <= node:
+        if ground.network.first[middle] <= node:
             low = middle
         else:
             high = middle
@@ -262,7 +272,9 @@ def _window(taken: Taken, pivot: int, begin: int, end: int, draws: Uint64s) -> t
 def _weigh(
     ground: Ground, taken: Taken, offered: Bools, room: Room, low: int, high: int, draws: Uint64s
 ) -> int:
-    """Give a window's targets numbers and weights; return how many words a set of them takes.
+    """Give a window's nodes weights; return how many words a set of its targets takes.
+
+    Only those targets have a place in such sets that are in the window more than once.
 
     Ties are broken at random, so that the search wanders over plans of equal worth.
     """
@@ -271,108 +283,136 @@ def _weigh(
     tie = _TIE if ground.is_alike or move & 1 else _SMALL_TIE
     count = 0
     for node in range(low, high):
-        target = ground.place[node]
-        if room.marked_at[target] == move or ground.worth[target] <= 0.0:
+        room.weight[node - low] = 0.0
+        target, worth = ground.network.place[node], ground.worth[node]
+        if worth <= 0.0 or not (offered[node] or taken.is_taken[node]):
             continue
-        if not offered[node] and not taken.is_taken[node]:
-            continue
-        room.marked_at[target] = move
-        room.number[target] = count
         held = taken.holder[target]
-        weight = ground.worth[target] * ground.preference[target]
-        if held == FREE or low <= held < high:
-            room.weight[count] = weight * (1.0 + tie * next_draw(draws))
-        elif ground.is_locked[target]:
-            room.weight[count] = -1.0
-        else:
-            room.weight[count] = weight * tie * (2.0 * next_draw(draws) - 1.0)
-        count += 1
+        is_held_elsewhere = held != FREE and not low <= held < high
+        if room.marked_at[target] != move:
+            room.marked_at[target] = move
+            room.number[target] = -1
+            if not is_held_elsewhere:
+                room.tie[target] = 1.0 + tie * next_draw(draws)
+            elif not ground.is_locked[target]:
+                room.tie[target] = 2.0 * next_draw(draws) - 1.0
+        elif room.number[target] < 0:
+            room.number[target] = count
+            count += 1
+        weight = worth * ground.preference[target]
+        if ground.is_locked[target] and not ground.is_kept[node]:
+            continue
+        if not is_held_elsewhere:
+            room.weight[node - low] = weight * room.tie[target]
+        elif not ground.is_locked[target]:
+            better = (worth - ground.worth[held]) * ground.preference[target]
+            room.weight[node - low] = better + weight * tie * room.tie[target]
+        if ground.is_kept[node]:
+            room.weight[node - low] += ground.kept_worth
     return (count + 63) >> 6
 
 
 @borrowing
 def _heaviest(
-    ground: Ground, taken: Taken, offered: Bools, room: Room, num_words: int,
-    part: int, left: int, low: int, high: int, right: int,
+    ground: Ground, room: Room, num_words: int,
+    part: int, ends: tuple[int, int], low: int, high: int,
 ) -> int:  # fmt: skip
-    """Find the heaviest chain between two tasks; return its last node less ``low``.
+    """Find the heaviest chain between two tasks, or none; return its last label.
 
-    ``_AT_START`` where that is no task at all, ``_NOWHERE`` where the two tasks cannot do
-    without any in between. Nodes in ``room`` count from ``low``.
+    ``NO_LABEL`` where that is no task at all, ``_NOWHERE`` where the two tasks cannot do
+    without any in between.
     """
-    begin, end = ground.first[part], ground.first[part + 1]
-    is_transitive = ground.is_transitive[part]
-    move = room.move[0]
-    best, best_at = 0.0, _AT_START
-    if left >= begin and right < end and not _follows(ground, left, right):
-        best, best_at = -1.0, _NOWHERE
-    for k in range(high - low):
-        room.far_node[k] = _NOWHERE
-    far = _NOWHERE
+    network, sky, (left, right) = ground.network, room.sky, ends
+    slews = slews_in(network, part)
+    until_s = np.inf
+    if right != NO_TASK:
+        until_s = network.start_s[right] - slews.settle_s + TIME_TOLERANCE_S
+    count, num_waiting, entered = 0, 0, 0
     for node in range(low, high):
-        k = node - low
-        if room.far_node[k] != _NOWHERE and (
-            far == _NOWHERE or room.value[room.far_node[k]] > room.value[far]
+        target = network.place[node]
+        weight = room.weight[node - low]
+        if weight <= 0.0 or network.end_s[node] > until_s:
+            continue
+        start_s = network.start_s[node]
+        while entered < num_waiting:
+            k = room.waiting[entered]
+            if network.end_s[low + k] > start_s - slews.settle_s + TIME_TOLERANCE_S:
+                break
+            count = _enter(network, room, slews, low, k, count, num_words)
+            entered += 1
+        at = _best_without(network, room, slews, node, count, room.number[target], num_words)
+        if at == NO_LABEL and left != NO_TASK and not _follows(network, slews, left, node):
+            continue
+        room.value[node - low] = value_of(sky, at) + weight
+        room.source[node - low] = at
+        _wait(network, room, low, node - low, entered, num_waiting)
+        num_waiting += 1
+    while entered < num_waiting:
+        count = _enter(network, room, slews, low, room.waiting[entered], count, num_words)
+        entered += 1
+    if right == NO_TASK:
+        return top_label(sky, count)
+    at = best_ahead(sky, count, network.start_s[right], _looks(network, right), slews)
+    if at == NO_LABEL and left != NO_TASK and not _follows(network, slews, left, right):
+        return _NOWHERE
+    return at
+
+
+@borrowing
+def _wait(network: Network, room: Room, low: int, k: int, entered: int, num_waiting: int) -> None:
+    """Put a node among those that wait, in order of end."""
+    at = num_waiting
+    while at > entered and network.end_s[low + room.waiting[at - 1]] > network.end_s[low + k]:
+        room.waiting[at] = room.waiting[at - 1]
+        at -= 1
+    room.waiting[at] = k
+
+
+@borrowing
+def _enter(
+    network: Network, room: Room, slews: Slews, low: int, k: int, count: int, num_words: int
+) -> int:
+    """Enter a node's label, with the targets on its chain; return how many labels there are."""
+    node, source, first = low + k, room.source[k], count * num_words
+    value, end_s, looked = room.value[k], network.end_s[node], _looked(network, node)
+    for i in range(num_words):
+        room.on_chain[first + i] = room.on_chain[source * num_words + i] if source >= 0 else _EMPTY
+    number = room.number[network.place[node]]
+    if number >= 0:
+        room.on_chain[first + (number >> 6)] |= np.uint64(1) << np.uint64(number & 63)
+    for at in range(count - 1, max(count - 1 - COMPARED, -1), -1):
+        if is_as_good(room.sky, at, value, end_s, looked, slews) and _is_subset(
+            room.on_chain, at * num_words, first, num_words
         ):
-            far = room.far_node[k]
-        room.onward[k] = _NOWHERE
-        is_last = right >= end or _follows(ground, node, right)
-        earlier = ground.earlier[node]
-        if earlier >= low:
-            room.onward[k] = room.onward[earlier - low]
-        # A path that goes on through here would reach the task on the right as well.
-        if is_transitive and not is_last:
-            continue
-        weight, word, bit = 0.0, 0, np.uint64(0)
-        target = ground.place[node]
-        if (offered[node] or taken.is_taken[node]) and room.marked_at[target] == move:
-            number = room.number[target]
-            word, bit = number >> 6, np.uint64(1) << np.uint64(number & 63)
-            weight = room.weight[number]
-            if ground.is_kept[node]:
-                weight += ground.kept_worth
-            elif ground.is_locked[target]:
-                weight = -1.0
-        if weight <= 0.0 and not is_transitive:
-            continue
-        value, source, is_paid = -1.0, _NOWHERE, False
-        if left < begin or _follows(ground, left, node):
-            value, source, is_paid = max(weight, 0.0), _AT_START, weight > 0.0
-        if far != _NOWHERE:
-            is_new = weight > 0.0 and not room.on_chain[far * num_words + word] & bit
-            reached = room.value[far] + (weight if is_new else 0.0)
-            if reached > value and (is_new or is_transitive):
-                value, source, is_paid = reached, far, is_new
-        at = ground.arc_from[node + 1] - 1
-        while at >= ground.arc_from[node] and ground.before[at] >= low:
-            other = room.onward[ground.before[at] - low]
-            at -= 1
-            if other == _NOWHERE:
-                continue
-            reached = room.value[other]
-            is_new = weight > 0.0 and not room.on_chain[other * num_words + word] & bit
-            if is_new:
-                reached += weight
-            if reached > value and (is_new or is_transitive):
-                value, source, is_paid = reached, other, is_new
-        if source == _NOWHERE:
-            continue
-        room.value[k], room.source[k], room.is_paid[k] = value, source, is_paid
-        for i in range(num_words):
-            room.on_chain[k * num_words + i] = (
-                room.on_chain[source * num_words + i] if source >= 0 else np.uint64(0)
-            )
-        if is_paid:
-            room.on_chain[k * num_words + word] |= bit
-        if is_last and value > best:
-            best, best_at = value, k
-        if room.onward[k] == _NOWHERE or room.value[room.onward[k]] < value:
-            room.onward[k] = k
-        to = ground.far_from[node] - low
-        if to < high - low:
-            other = room.far_node[to]
-            if other == _NOWHERE or room.value[other] < room.value[room.onward[k]]:
-                room.far_node[to] = room.onward[k]
+            return count
+    append(room.sky, count, value, end_s, looked, k)
+    return count + 1
+
+
+@borrowing
+def _is_subset(words: npt.NDArray[np.uint64], one: int, other: int, num_words: int) -> bool:
+    more = _EMPTY
+    for i in range(num_words):
+        more |= words[one + i] & ~words[other + i]
+    return bool(more == _EMPTY)
+
+
+@borrowing
+def _best_without(
+    network: Network, room: Room, slews: Slews, node: int, count: int, number: int, num_words: int
+) -> int:
+    """Return the best label that a node may follow and whose chain has not got its target."""
+    sky, start_s, looks = room.sky, network.start_s[node], _looks(network, node)
+    if number < 0:
+        return best_ahead(sky, count, start_s, looks, slews)
+    bit = np.uint64(1) << np.uint64(number & 63)
+    best_at, at = NO_LABEL, count - 1
+    while at >= 0 and value_of(sky, top_label(sky, at + 1)) > value_of(sky, best_at):
+        is_on_chain = room.on_chain[at * num_words + (number >> 6)] & bit
+        is_better = value_of(sky, at) > value_of(sky, best_at) and not is_on_chain
+        if is_better and reaches(sky, at, start_s, looks, slews):
+            best_at = at
+        at -= 1
     return best_at
 
 
@@ -382,23 +422,24 @@ def _replace(ground: Ground, taken: Taken, room: Room, low: int, high: int, last
     num_new, worth = 0, 0.0
     at = last
     while at >= 0:
-        if room.is_paid[at]:
-            node = low + at
-            room.path[num_new] = node
-            num_new += 1
-            held = taken.holder[ground.place[node]]
-            if held == FREE or low <= held < high:
-                worth += ground.worth[ground.place[node]]
-            if ground.is_kept[node]:
-                worth += ground.kept_worth
-        at = room.source[at]
+        k = room.sky.node[at]
+        node = low + k
+        room.path[num_new] = node
+        num_new += 1
+        held = taken.holder[ground.network.place[node]]
+        worth += ground.worth[node]
+        if held != FREE and not low <= held < high:
+            worth -= ground.worth[held]
+        if ground.is_kept[node]:
+            worth += ground.kept_worth
+        at = room.source[k]
     num_old = 0
     for node in range(low, high):
         if taken.is_taken[node]:
             room.old[num_old] = node
             num_old += 1
-            if taken.holder[ground.place[node]] == node:
-                worth -= ground.worth[ground.place[node]]
+            if taken.holder[ground.network.place[node]] == node:
+                worth -= ground.worth[node]
             if ground.is_kept[node]:
                 worth -= ground.kept_worth
     if worth < -1e-9:
@@ -407,7 +448,7 @@ def _replace(ground: Ground, taken: Taken, room: Room, low: int, high: int, last
         _let_go(ground, taken, room.old[i])
     num_dropped = 0
     for i in range(num_new):
-        held = taken.holder[ground.place[room.path[i]]]
+        held = taken.holder[ground.network.place[room.path[i]]]
         if held != FREE:
             room.dropped[num_dropped] = held
             num_dropped += 1
@@ -427,15 +468,15 @@ def _replace(ground: Ground, taken: Taken, room: Room, low: int, high: int, last
 @borrowing
 def _take(ground: Ground, taken: Taken, node: int) -> None:
     taken.is_taken[node] = True
-    if taken.holder[ground.place[node]] == FREE:
-        taken.holder[ground.place[node]] = node
+    if taken.holder[ground.network.place[node]] == FREE:
+        taken.holder[ground.network.place[node]] = node
 
 
 @borrowing
 def _let_go(ground: Ground, taken: Taken, node: int) -> None:
     taken.is_taken[node] = False
-    if taken.holder[ground.place[node]] == node:
-        taken.holder[ground.place[node]] = FREE
+    if taken.holder[ground.network.place[node]] == node:
+        taken.holder[ground.network.place[node]] = FREE
 
 
 @borrowing
@@ -445,9 +486,10 @@ def _is_sound_around(ground: Ground, taken: Taken, node: int) -> bool:
     if ground.is_transitive[part]:
         return True
     before, after = node - 1, node + 1
-    while before >= ground.first[part] and not taken.is_taken[before]:
+    while before >= ground.network.first[part] and not taken.is_taken[before]:
         before -= 1
-    while after < ground.first[part + 1] and not taken.is_taken[after]:
+    while after < ground.network.first[part + 1] and not taken.is_taken[after]:
         after += 1
-    is_between = before >= ground.first[part] and after < ground.first[part + 1]
-    return not is_between or _follows(ground, before, after)
+    is_between = before >= ground.network.first[part] and after < ground.network.first[part + 1]
+    network = ground.network
+    return not is_between or _follows(network, slews_in(network, part), before, after)

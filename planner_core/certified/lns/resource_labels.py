@@ -56,7 +56,7 @@ class Ground(NamedTuple):
     target
         Of each task; of contacts, one past the last target.
     worth
-        Of each target, and 0 for contacts. Shape ``(num_targets + 1,)``.
+        Of each opportunity. Shape ``(n,)``.
     typical
         What a target is worth, about.
     is_locked

@@ -68,7 +68,7 @@ def _pivot(ground: Ground, taken: Taken, draws: Uint64s) -> int:
     for _ in range(num_trials):
         pivot = int(next_draw(draws) * m)
         target = ground.target[pivot]
-        if taken.holder[target] == FREE and ground.worth[target] > 0.0:
+        if taken.holder[target] == FREE and ground.worth[ground.rows[pivot]] > 0.0:
             break
     return pivot
 
@@ -159,11 +159,12 @@ def _weigh(ground: Ground, taken: Taken, room: Room, low: int, high: int, draws:
         is_here = held != FREE and ground.satellite[held] == ground.number
         if is_here:
             is_here = low <= ground.local[held] < high
-        worth = ground.worth[target]
+        worth = ground.worth[ground.rows[k]]
         if held == FREE or is_here:
             room.gain[at] = worth * (1.0 + _TIE * next_draw(draws)) if worth > 0.0 else NEVER
         elif with_others and not ground.is_locked[target]:
-            room.gain[at] = worth * _TIE * next_draw(draws)
+            better = worth - ground.worth[held]
+            room.gain[at] = better + worth * _TIE * next_draw(draws)
         else:
             room.gain[at] = NEVER
         if ground.network.is_kept[k]:
@@ -182,10 +183,11 @@ def _replace(ground: Ground, taken: Taken, room: Room, low: int, high: int, last
         num_new += 1
         if not ground.network.is_contact[k]:
             held = taken.holder[place[k]]
-            if held == FREE or (
+            worth += ground.worth[ground.rows[k]]
+            if held != FREE and not (
                 ground.satellite[held] == ground.number and low <= ground.local[held] < high
             ):
-                worth += ground.worth[place[k]]
+                worth -= ground.worth[held]
         label = room.source[label]
     num_old = 0
     for k in range(low, high):
@@ -193,7 +195,7 @@ def _replace(ground: Ground, taken: Taken, room: Room, low: int, high: int, last
             room.old[num_old] = k
             num_old += 1
             if not ground.network.is_contact[k]:
-                worth -= ground.worth[place[k]]
+                worth -= ground.worth[ground.rows[k]]
     if worth < -1e-9:
         return
     for i in range(num_old):

@@ -12,7 +12,7 @@ from planner_core.certified.lns.moves import FREE, Taken
 from planner_core.certified.lns.resource_labels import Ground, room_for
 from planner_core.certified.lns.resource_moves import make_moves
 from planner_core.draws import draws_of
-from planner_core.precedence.relation import transitive_closure
+from planner_core.precedence.relation import is_transitive
 from planner_core.problem import (
     COLLECT,
     CONTACT,
@@ -33,7 +33,6 @@ class ResourceWindows:
         self._draws = draws_of(seed)
         num_targets = len(problem.target_ids)
         self._room = room_for(num_targets)
-        self._worth = np.append(problem.target_reward, 0.0)
         self._turn = 0
         is_locked = _locked_targets(problem)
         table = problem.opportunities
@@ -47,8 +46,8 @@ class ResourceWindows:
                 target=np.where(satellite.kind == COLLECT, satellite.place, num_targets).astype(
                     np.int32
                 ),
-                worth=self._worth,
-                typical=float(problem.target_reward.mean()) if num_targets else 1.0,
+                worth=problem.worth,
+                typical=problem.typical_worth,
                 is_locked=is_locked,
                 is_shut=np.zeros(len(satellite), dtype=np.bool_),
             )
@@ -62,8 +61,10 @@ class ResourceWindows:
         table = self._problem.opportunities
         is_taken = np.zeros(len(table), dtype=np.bool_)
         is_taken[[action.opportunity for action in plan.actions]] = True
-        holder = np.full(len(self._worth), FREE, dtype=np.int32)
+        holder = np.full(len(self._problem.target_ids) + 1, FREE, dtype=np.int32)
+        # The best image of a target counts, and the first of those.
         images = np.flatnonzero(is_taken & (table.kind == COLLECT))[::-1]
+        images = images[np.argsort(self._problem.worth[images], kind="stable")]
         holder[table.place[images]] = images
         self._taken = Taken(is_taken=is_taken, holder=holder)
 
@@ -93,8 +94,9 @@ class ResourceWindows:
 
     @property
     def reward(self) -> float:
-        """What its targets are worth."""
-        return float(self._problem.target_reward[self._taken.holder[:-1] != FREE].sum())
+        """What its targets earn."""
+        held = self._taken.holder[:-1]
+        return float(self._problem.worth[held[held != FREE]].sum())
 
 
 def _locked_targets(problem: Problem) -> Bools:
@@ -102,7 +104,7 @@ def _locked_targets(problem: Problem) -> Bools:
     locked = np.zeros(len(problem.target_ids) + 1, dtype=np.bool_)
     table, kept = problem.opportunities, problem.kept_rows
     locked[table.place[kept[table.kind[kept] == COLLECT]]] = True
-    if any(transitive_closure(problem, s) is not s.transitions for s in problem.satellites):
+    if not is_transitive(problem):
         # The tasks around one that is dropped could not do without it.
         locked[:] = True
     return locked

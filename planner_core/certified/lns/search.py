@@ -17,7 +17,7 @@ from planner_core.certified.lns.moves import (
 )
 from planner_core.draws import draws_of
 from planner_core.precedence.network import Network, network_of
-from planner_core.precedence.relation import transitive_closure
+from planner_core.precedence.relation import is_transitive_on
 from planner_core.problem import (
     COLLECT,
     CONTACT,
@@ -29,8 +29,6 @@ from planner_core.problem.plan import Plan
 from planner_core.solvers.base import Solution
 
 _MOVES_AT_A_TIME: Final = 500
-_TRIALS: Final = 8
-_TRIALS_FOR_URGENT: Final = 200
 
 
 class WindowSearch:
@@ -47,9 +45,6 @@ class WindowSearch:
         By how much targets not yet imaged are preferred to others of the same reward, as a
         factor for each; a plan is never given up for one that earns less. Shape
         ``(num_targets,)``.
-    urgency
-        How much targets not yet imaged are worth trying for, from 0 to 1; all the same by
-        default. Shape ``(num_targets,)``.
     """
 
     def __init__(
@@ -58,12 +53,11 @@ class WindowSearch:
         seed: int,
         network: Network | None = None,
         preference: Floats | None = None,
-        urgency: Floats | None = None,
     ) -> None:
         self.problem = problem
         network = network or network_of(problem)
         self._row = network.row
-        self._ground = _ground_of(problem, network, preference, urgency)
+        self._ground = _ground_of(problem, network, preference)
         self._draws = draws_of(seed)
         self._room = room_for(len(problem.target_ids))
         self._every = np.ones(len(self._row), dtype=np.bool_)
@@ -75,12 +69,14 @@ class WindowSearch:
         is_taken[[action.opportunity for action in plan.actions]] = True
         is_taken[self.problem.opportunities.kind == CONTACT] = False
         is_taken = is_taken[self._row]
-        holder = np.full(len(self._ground.worth), FREE, dtype=np.int32)
+        holder = np.full(len(self.problem.target_ids) + 1, FREE, dtype=np.int32)
+        # The best image of a target counts, and the first of those.
         own = np.flatnonzero(is_taken)[::-1]
-        holder[self._ground.place[own]] = own
+        own = own[np.argsort(self._ground.worth[own], kind="stable")]
+        holder[self._ground.network.place[own]] = own
         # Where it need not stand, a second image of a target only takes up room.
-        part = np.searchsorted(self._ground.first, own, side="right") - 1
-        is_spare = holder[self._ground.place[own]] != own
+        part = np.searchsorted(self._ground.network.first, own, side="right") - 1
+        is_spare = holder[self._ground.network.place[own]] != own
         is_spare &= self._ground.is_transitive[part] & ~self._ground.is_kept[own]
         is_taken[own[is_spare]] = False
         self._taken = Taken(is_taken=is_taken, holder=holder)
@@ -108,9 +104,9 @@ class WindowSearch:
 
     @property
     def reward(self) -> float:
-        """What its targets are worth."""
-        is_imaged = self._taken.holder[:-1] != FREE
-        return float(self.problem.target_reward[is_imaged].sum())
+        """What its targets earn."""
+        held = self._taken.holder[:-1]
+        return float(self._ground.worth[held[held != FREE]].sum())
 
 
 def num_choices(problem: Problem) -> int:
@@ -147,47 +143,20 @@ def polished(
     return replace(solution, plan=plan)
 
 
-def _ground_of(
-    problem: Problem, network: Network, preference: Floats | None, urgency: Floats | None
-) -> Ground:
-    satellites = problem.satellites
-    tables = [satellite.transitions for satellite in satellites]
-    # Bits of the next satellite begin with a whole byte.
-    starts = np.cumsum([0, *(8 * len(table.bits) for table in tables)])
-    bases = np.cumsum([0, *(len(satellite) for satellite in satellites)]).astype(np.int32)
-    pairs = list(zip(tables, bases[:-1], starts[:-1], strict=True))
-    nothing = np.empty(0, dtype=np.int32)
-    is_transitive = np.array(
-        [transitive_closure(problem, s) is s.transitions for s in satellites], dtype=np.bool_
-    )
-    offered = np.unique(network.place)
+def _ground_of(problem: Problem, network: Network, preference: Floats | None) -> Ground:
+    is_transitive = np.array([is_transitive_on(s) for s in problem.satellites], dtype=np.bool_)
     num_targets = len(problem.target_ids)
-    worth = np.append(problem.target_reward, 0.0)
+    worth = problem.worth[network.row]
     is_kept = np.isin(network.row, problem.kept_rows)
     is_locked = np.zeros(num_targets + 1, dtype=np.bool_)
     is_locked[network.place[is_kept]] = True
     return Ground(
-        place=network.place,
-        first=network.first,
-        arc_from=network.arc_from,
-        before=network.before,
-        far_from=network.far_from,
-        earlier=network.earlier,
-        order_near=np.concatenate([nothing, *(t.near_from + base for t, base, _ in pairs)]),
-        order_far=network.far_from,
-        order_offset=np.concatenate([t.offset[:-1] + start for t, _, start in pairs]),
-        order_bits=tables[0].bits
-        if len(tables) == 1
-        else np.concatenate([table.bits for table in tables]),
-        is_transitive=is_transitive[
-            problem.opportunities.satellite[network.row[network.first[:-1]]]
-        ],
+        network=network,
+        is_transitive=is_transitive[network.satellite],
         worth=worth,
         preference=np.ones(num_targets + 1) if preference is None else np.append(preference, 1.0),
-        urgency=np.ones(num_targets + 1) if urgency is None else np.append(urgency, 0.0),
-        num_trials=_TRIALS if urgency is None else _TRIALS_FOR_URGENT,
         is_kept=is_kept,
         is_locked=is_locked,
-        kept_worth=1.0 + float(problem.target_reward.sum()),
-        is_alike=len(np.unique(worth[offered])) <= 1,
+        kept_worth=1.0 + float(problem.best_worth.sum()),
+        is_alike=len(np.unique(worth)) <= 1,
     )

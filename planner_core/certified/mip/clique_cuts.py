@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from planner_core.jit import kernel
-from planner_core.precedence.relation import Order, are_comparable, comes_before
+from planner_core.precedence.relation import Precedence, are_comparable, comes_before
 from planner_core.problem import Floats, Ints, Longs
 
 _MIN_VIOLATION = 1e-4
@@ -17,58 +17,58 @@ _MAX_STEPS = 2000  # of a search for one antichain
 
 
 @kernel
-def excluding_pairs(order: Order) -> tuple[Ints, Ints]:
+def excluding_pairs(precedence: Precedence) -> tuple[Ints, Ints]:
     """Return all pairs of tasks that exclude each other, the earlier one first."""
-    m = len(order.near_from)
+    m = len(precedence.near_from)
     count = 0
     for a in range(m):
-        for b in range(a + 1, order.far_from[a]):
-            count += not comes_before(order, a, b)
+        for b in range(a + 1, precedence.far_from[a]):
+            count += not comes_before(precedence, a, b)
     first, second = np.empty(count, dtype=np.int32), np.empty(count, dtype=np.int32)
     count = 0
     for a in range(m):
-        for b in range(a + 1, order.far_from[a]):
-            if not comes_before(order, a, b):
+        for b in range(a + 1, precedence.far_from[a]):
+            if not comes_before(precedence, a, b):
                 first[count], second[count] = a, b
                 count += 1
     return first, second
 
 
 @kernel
-def _first_near(order: Order) -> Ints:
+def _first_near(precedence: Precedence) -> Ints:
     """Return the first row from which each row could be unrelated."""
-    m = len(order.near_from)
+    m = len(precedence.near_from)
     first = np.empty(m, dtype=np.int32)
     at = 0
     for b in range(m):
-        while at < b and order.far_from[at] <= b:
+        while at < b and precedence.far_from[at] <= b:
             at += 1
         first[b] = at
     return first
 
 
 @kernel
-def antichain_cover(order: Order) -> tuple[Longs, Ints]:
+def antichain_cover(precedence: Precedence) -> tuple[Longs, Ints]:
     """Return antichains that together hold every pair of tasks that exclude each other.
 
     Greedy: each pair not yet covered is extended, in order of time, by every task that
     excludes all members so far. Answers offsets, and the members of all of them.
     """
-    m = len(order.near_from)
-    first_near = _first_near(order)
+    m = len(precedence.near_from)
+    first_near = _first_near(precedence)
     base = np.zeros(m + 1, dtype=np.int64)
     for a in range(m):
-        base[a + 1] = base[a] + max(0, order.far_from[a] - a - 1)
+        base[a + 1] = base[a] + max(0, precedence.far_from[a] - a - 1)
     covered = np.zeros(base[m], dtype=np.bool_)
     offsets = [np.int64(0)]
     members = [np.int32(0) for _ in range(0)]
     clique = np.empty(m, dtype=np.int32)
     for a in range(m):
-        for b in range(a + 1, order.far_from[a]):
-            if covered[base[a] + b - a - 1] or comes_before(order, a, b):
+        for b in range(a + 1, precedence.far_from[a]):
+            if covered[base[a] + b - a - 1] or comes_before(precedence, a, b):
                 continue
             clique[0], clique[1] = a, b
-            size = _extend(order, clique, 2, first_near[a], order.far_from[a])
+            size = _extend(precedence, clique, 2, first_near[a], precedence.far_from[a])
             for i in range(size):
                 members.append(clique[i])
                 for j in range(size):
@@ -79,12 +79,12 @@ def antichain_cover(order: Order) -> tuple[Longs, Ints]:
 
 
 @kernel
-def _extend(order: Order, clique: Ints, size: int, from_row: int, to_row: int) -> int:
+def _extend(precedence: Precedence, clique: Ints, size: int, from_row: int, to_row: int) -> int:
     """Add every row of the range that excludes all members; return the new size."""
     for row in range(from_row, to_row):
         is_free = True
         for i in range(size):
-            if clique[i] == row or are_comparable(order, clique[i], row):
+            if clique[i] == row or are_comparable(precedence, clique[i], row):
                 is_free = False
                 break
         if is_free:
@@ -94,7 +94,7 @@ def _extend(order: Order, clique: Ints, size: int, from_row: int, to_row: int) -
 
 
 @kernel
-def violated_antichains(order: Order, taken: Floats) -> tuple[Longs, Ints]:
+def violated_antichains(precedence: Precedence, taken: Floats) -> tuple[Longs, Ints]:
     """Return antichains of which a fractional plan takes more than one task.
 
     For each fractional task: the most taken antichain in which it is the first, if that is
@@ -106,19 +106,19 @@ def violated_antichains(order: Order, taken: Floats) -> tuple[Longs, Ints]:
         How much of each task the plan takes, 0 to 1. Shape ``(m,)``.
     """
     m = len(taken)
-    first_near = _first_near(order)
+    first_near = _first_near(precedence)
     offsets = [np.int64(0)]
     members = [np.int32(0) for _ in range(0)]
     clique = np.empty(m, dtype=np.int32)
     for row in range(m):
         if taken[row] <= _MIN_VIOLATION or taken[row] >= 1.0 - _MIN_VIOLATION:
             continue
-        near = np.arange(row + 1, max(row + 1, order.far_from[row])).astype(np.int32)
+        near = np.arange(row + 1, max(row + 1, precedence.far_from[row])).astype(np.int32)
         wanted = near[taken[near] > _MIN_VIOLATION]
-        size, total = _heaviest_antichain(order, taken, row, wanted, clique)
+        size, total = _heaviest_antichain(precedence, taken, row, wanted, clique)
         if total <= 1.0 + _MIN_VIOLATION:
             continue
-        size = _extend(order, clique, size, first_near[row], order.far_from[row])
+        size = _extend(precedence, clique, size, first_near[row], precedence.far_from[row])
         for member in np.sort(clique[:size]):
             members.append(member)
         offsets.append(np.int64(len(members)))
@@ -127,14 +127,16 @@ def violated_antichains(order: Order, taken: Floats) -> tuple[Longs, Ints]:
 
 @kernel
 def _heaviest_antichain(
-    order: Order, taken: Floats, row: int, wanted: Ints, clique: Ints
+    precedence: Precedence, taken: Floats, row: int, wanted: Ints, clique: Ints
 ) -> tuple[int, float]:
     """Fill ``clique`` with ``row`` and the heaviest antichain of ``wanted`` beside it.
 
     Depth first over the candidates by falling weight, with the sum of what remains as the
     bound; cut short where that would take long, for a good antichain is enough.
     """
-    excluded = np.array([not are_comparable(order, row, other) for other in wanted], dtype=np.bool_)
+    excluded = np.array(
+        [not are_comparable(precedence, row, other) for other in wanted], dtype=np.bool_
+    )
     others = wanted[excluded]
     others = others[np.argsort(-taken[others], kind="mergesort")]
     k = len(others)
@@ -167,7 +169,9 @@ def _heaviest_antichain(
         at[depth] = i + 1
         chosen[depth] = i
         for j in range(i + 1, k):
-            free[depth + 1, j] = free[depth, j] and not are_comparable(order, others[i], others[j])
+            free[depth + 1, j] = free[depth, j] and not are_comparable(
+                precedence, others[i], others[j]
+            )
         free[depth + 1, : i + 1] = False
         weight[depth + 1] = weight[depth] + taken[others[i]]
         at[depth + 1] = i + 1
@@ -176,7 +180,7 @@ def _heaviest_antichain(
 
 
 @kernel
-def detours(direct: Order, closed: Order) -> tuple[Ints, Ints, Longs, Ints]:
+def detours(direct: Precedence, closed: Precedence) -> tuple[Ints, Ints, Longs, Ints]:
     """Return the pairs of tasks that need another between them, and which ones may be it.
 
     Answers the earlier and the later tasks, then offsets and rows of the tasks of which

@@ -169,13 +169,11 @@ class FixedContacts:
 
     def relaxation(self) -> Relaxation:
         """Return what the relaxation tells, with prices amid all that prove it."""
-        reward = self._problem.target_reward
-        prices, losses = np.zeros(len(reward)), np.full(len(self._problem.opportunities), np.inf)
+        prices = np.zeros(len(self._problem.target_ids))
+        losses = np.full(len(self._problem.opportunities), np.inf)
         point = self._cut(_CENTRAL_ROUNDS, self._engine.central)
         if point is not None:
-            # The rows of the targets come first in the program.
-            worth = point.row_prices[: len(reward)]
-            prices = np.clip(worth if self._is_plain else reward - worth, 0.0, reward)
+            prices = self._model.target_prices(point.row_prices)
             losses[self._rows] = point.losses[: len(self._rows)]
         value = -np.inf if point is None else point.value
         return Relaxation(value=value, prices=prices, losses=losses)
@@ -193,11 +191,6 @@ class FixedContacts:
         point = self._engine.corner()
         self._point = None if point is None else point.columns
         self._engine.weigh(worth)
-
-    @property
-    def _is_plain(self) -> bool:
-        """Whether tasks earn what their targets are worth, in a row for each target."""
-        return bool(np.any(self._model.program.worth[0] > 0.0))
 
     def fix(self, contacts: tuple[int, ...]) -> None:
         """Fix other contacts than so far, all known to the program."""
@@ -226,7 +219,7 @@ class FixedContacts:
         """Fix tasks, and let rows alone limit the collects, so that they get all prices."""
         program, m = self._model.program, len(is_fixed)
         lower, upper = np.concatenate(program.lower), np.concatenate(program.upper)
-        if self._is_plain:
+        if self._model.paid is None:
             upper[:m][upper[:m] > 0.0] = np.inf
         upper[:m][self._is_contact] = 0.0
         lower[:m][is_fixed] = upper[:m][is_fixed] = 1.0
@@ -242,12 +235,12 @@ class FixedContacts:
 
     def _add_cuts(self, taken: Floats) -> bool:
         is_cut = False
-        satellites = zip(self._model.problem.satellites, self._model.orders, strict=True)
-        for satellite, order in satellites:
+        satellites = zip(self._model.problem.satellites, self._model.precedences, strict=True)
+        for satellite, precedence in satellites:
             if len(satellite) == 0:
                 continue
             own = self._model.taken[satellite.rows]
-            offsets, members = violated_antichains(order, taken[own])
+            offsets, members = violated_antichains(precedence, taken[own])
             cuts = Rows.of(offsets, own[members], upper=1.0)
             self._engine.add_rows(cuts)
             self._cuts.append(cuts)

@@ -76,7 +76,7 @@ class ProgramSearch:
         self._is_promising = usage > 0.0
         self._rng = np.random.default_rng(seed)
         self._work = self._steps()
-        self.steps_beside = next(self._work)
+        self.steps_beside = next(self._work, 1)
 
     def turn(self) -> None:
         """Draw sets of contacts, see what some are worth, or solve a program with one."""
@@ -153,9 +153,9 @@ class ProgramSearch:
 
     def _draw(self, group: Bools, beside: Rows) -> Rows:
         """Return contacts that satellites would have in turn, at prices that are a little off."""
-        reward = self._problem.target_reward
-        off = _OFF * reward * self._rng.standard_normal(len(reward)) * (self._prices > 0.0)
-        prices = np.clip(self._prices + off, 0.0, reward)
+        most = self._problem.best_worth
+        off = _OFF * most * self._rng.standard_normal(len(most)) * (self._prices > 0.0)
+        prices = np.clip(self._prices + off, 0.0, most)
         prices = leaving_whole_units(self._problem, prices, self._unit)
         worth = whole_worth(self._problem, prices, self._unit)
         table = self._problem.opportunities

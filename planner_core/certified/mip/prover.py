@@ -27,7 +27,7 @@ class Prover(Engine):
         seed: int,
     ) -> None:
         self._problem = problem
-        self._scale = float(problem.target_reward.max(initial=1e-300))
+        self._scale = float(problem.worth.max(initial=1e-300))
         super().__init__(program, budget, seed, is_chained=False)
         highs = self._highs
         for option, limit in (("objective_bound", amount), ("objective_target", enough)):

@@ -15,10 +15,8 @@ from planner_core.certified.proofs.certificate import Cut, Multipliers
 from planner_core.draws import draws_of
 from planner_core.jit import kernel
 from planner_core.precedence.relation import (
-    Order,
-    are_comparable,
+    Precedence,
     comes_before,
-    order_of,
     transitive_closure,
 )
 from planner_core.problem import (
@@ -33,8 +31,6 @@ from planner_core.problem import (
 _TRIALS: Final = 4  # orders of elimination that are tried for odd sets
 _MAX_CUTS: Final = 150  # in a round
 _MAX_SHARED: Final = 40  # new cuts that one fractional task may stand in
-_CANDIDATES: Final = 10  # for a branch
-_TRIAL_PIVOTS: Final = 60
 _PATIENCE: Final = 2  # rounds that a cut may lie idle
 
 
@@ -53,22 +49,18 @@ class Master(Engine):
     def __init__(self, problem: Problem, rows: Ints, budget: Budget, seed: int) -> None:
         self._rows = rows
         self._problem = problem
-        table = problem.opportunities
-        self._scale = float(problem.target_reward.max(initial=1e-300))
-        self._worth = worth = np.zeros(len(table))
-        is_collect = table.kind == COLLECT
-        worth[is_collect] = problem.target_reward[table.place[is_collect]] / self._scale
-        self._orders = [
-            _exclusion_order(order_of(transitive_closure(problem, s)), s.place, s.kind)
-            for s in problem.satellites
+        self._scale = float(problem.worth.max(initial=1e-300))
+        self._worth = worth = problem.worth / self._scale
+        self._precedences = [
+            _exclusion(transitive_closure(s), s.place, s.kind) for s in problem.satellites
         ]
         self._draws = draws_of(seed)
         self._cuts: dict[tuple[int, ...], Cut] = {}
         members, offsets = problem.target_opportunities
         self._sets = Sets(offsets, members)
         self._num_targets = len(offsets) - 1
-        for satellite, order in zip(problem.satellites, self._orders, strict=True):
-            cover, rows = antichain_cover(order)
+        for satellite, precedence in zip(problem.satellites, self._precedences, strict=True):
+            cover, rows = antichain_cover(precedence)
             self._keep_sets(cover, satellite.rows[rows])
         program = Program()
         self._useful = worth > 0.0
@@ -111,49 +103,13 @@ class Master(Engine):
         columns = np.arange(n, dtype=np.int32)
         self._highs.changeColsBounds(n, columns, np.zeros(n), upper.astype(np.float64))
 
-    def excluded_by(self, row: int) -> Bools:
-        """Return which tasks cannot stand in a plan with this one; not itself."""
-        table, local = self._problem.opportunities, self._problem.local_row
-        excluded: Bools = (table.place == table.place[row]) & (table.kind == COLLECT)
-        satellite = int(table.satellite[row])
-        own = self._problem.satellites[satellite].rows
-        order = self._orders[satellite]
-        excluded[own] |= [
-            not are_comparable(order, int(local[row]), int(other)) for other in local[own]
-        ]
-        excluded[row] = False
-        return excluded
-
-    def decisive(self, taken: Floats) -> int:
-        """Return the task of which taking and leaving it both cost the relaxation most."""
-        highs, value = self._highs, self.value / self._scale
-        basis = highs.getBasis()
-        _, patience = highs.getOptionValue("simplex_iteration_limit")
-        highs.setOptionValue("simplex_iteration_limit", _TRIAL_PIVOTS)
-        best, best_at = -1.0, int(np.argmax(np.minimum(taken, 1.0 - taken)))
-        for at in np.argsort(-np.minimum(taken, 1.0 - taken), kind="stable")[:_CANDIDATES]:
-            if min(taken[at], 1.0 - taken[at]) < 1e-3:
-                break
-            losses: list[float] = []
-            for fixed in (0.0, 1.0):
-                highs.changeColBounds(int(at), fixed, fixed)
-                highs.run()
-                losses.append(value - float(highs.getInfo().objective_function_value))
-                highs.changeColBounds(int(at), 0.0, 1.0)
-                highs.setBasis(basis)
-            score = max(losses[0], 1e-6) * max(losses[1], 1e-6)
-            if score > best:
-                best, best_at = score, int(at)
-        highs.setOptionValue("simplex_iteration_limit", patience)
-        return best_at
-
     def cut(self, taken: Floats, *, with_odd_sets: bool) -> int:
         """Add what the fractional plan breaks, drop what has long been idle; return what came."""
         self._drop_idle()
         num_before = len(self._row_sets)
         picked = self._odd_sets(taken) if with_odd_sets else []
-        for satellite, order in zip(self._problem.satellites, self._orders, strict=True):
-            offsets, members = violated_antichains(order, taken[satellite.rows])
+        for satellite, precedence in zip(self._problem.satellites, self._precedences, strict=True):
+            offsets, members = violated_antichains(precedence, taken[satellite.rows])
             if len(offsets) > 1:
                 first = len(self._sets.offsets) - 1
                 self._keep_sets(offsets, satellite.rows[members])
@@ -230,17 +186,19 @@ class Master(Engine):
             self._idle = [idle for idle in self._idle if idle < _PATIENCE]
 
 
-def _exclusion_order(order: Order, place: Ints, kind: np.ndarray) -> Order:
+def _exclusion(precedence: Precedence, place: Ints, kind: np.ndarray) -> Precedence:
     """Return an order without the pairs of tasks on one target: those exclude each other too."""
-    return order._replace(bits=_without_equals(order, np.where(kind == COLLECT, place, -1)))
+    return precedence._replace(
+        bits=_without_equals(precedence, np.where(kind == COLLECT, place, -1))
+    )
 
 
 @kernel
-def _without_equals(order: Order, place: Ints) -> Bytes:
-    bits = order.bits.copy()
+def _without_equals(precedence: Precedence, place: Ints) -> Bytes:
+    bits = precedence.bits.copy()
     for a in range(len(place)):
-        for b in range(order.near_from[a], order.far_from[a]):
-            if place[a] >= 0 and place[a] == place[b] and comes_before(order, a, b):
-                bit = order.offset[a] + b - order.near_from[a]
+        for b in range(precedence.near_from[a], precedence.far_from[a]):
+            if place[a] >= 0 and place[a] == place[b] and comes_before(precedence, a, b):
+                bit = precedence.offset[a] + b - precedence.near_from[a]
                 bits[bit >> 3] ^= np.uint8(1 << (bit & 7))
     return bits

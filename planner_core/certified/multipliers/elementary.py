@@ -20,7 +20,7 @@ from planner_core.certified.dp.elementary import (
 )
 from planner_core.draws import Uint64s, draws_of, next_draw
 from planner_core.jit import borrowing
-from planner_core.precedence.network import Network
+from planner_core.precedence.arcs import ArcNetwork
 from planner_core.problem import (
     Bools,
     Bytes,
@@ -29,6 +29,7 @@ from planner_core.problem import (
     Longs,
     Problem,
 )
+from planner_core.worth import weights
 
 ROUND: Final = 6
 """Steps over all parts in a round: five that move the prices, and one that asks for a bound."""
@@ -59,7 +60,7 @@ class ElementaryPrices:
     def __init__(
         self,
         problem: Problem,
-        network: Network,
+        network: ArcNetwork,
         memory: Memory,
         seed: int,
         num_rounds: int | None = None,
@@ -69,17 +70,15 @@ class ElementaryPrices:
         if num_rounds is not None:
             self._shorter = (_LAST_STEP / _FIRST_STEP) ** (1.0 / (num_rounds * (ROUND - 1)))
         self._labels = labels_for(network, memory)
-        self._reward = np.append(problem.target_reward, 0.0)
-        self._is_offered = np.zeros(len(self._reward), dtype=np.bool_)
-        self._is_offered[network.place] = True
-        self._is_offered[-1] = False
-        self._now = np.where(self._is_offered, 0.5 * self._reward, 0.0)
+        self._worth = problem.worth[network.row]
+        self._top = np.append(problem.best_worth, 0.0)
+        self._now = 0.5 * self._top
         self._mean = self._now.copy()
         self._draws = draws_of(seed)
         self._weight = np.zeros(len(network.row))
         self._is_on_path = np.zeros(len(network.row), dtype=np.bool_)
-        self._wanted = np.zeros(len(self._reward), dtype=np.int32)
-        self._counts = np.zeros(len(self._reward), dtype=np.int32)
+        self._wanted = np.zeros(len(self._top), dtype=np.int32)
+        self._counts = np.zeros(len(self._top), dtype=np.int32)
         self._order = np.arange(len(network.first) - 1)
         self.step = _FIRST_STEP
         self.bound, self.prices = np.inf, self._now[:-1].copy()
@@ -94,7 +93,7 @@ class ElementaryPrices:
         for _ in range(num_rounds):
             for _ in range(ROUND - 1):
                 _epoch(
-                    self._network, self._memory, self._labels, self._reward, self._is_offered,
+                    self._network, self._memory, self._labels, self._worth, self._top,
                     self._now, self._weight, self._is_on_path, self._wanted, self._order,
                     self.step, self._draws, stop,
                 )  # fmt: skip
@@ -106,7 +105,7 @@ class ElementaryPrices:
 
     def ask(self, prices: Floats) -> None:
         """Note what bound some prices prove. Shape ``(num_targets + 1,)``, the last one zero."""
-        weight = (self._reward - prices)[self._network.place]
+        weight = weights(self._worth, prices[self._network.place])
         paths = elementary_paths(self._network, self._memory, weight, self._labels, self._counts)
         value = float(prices.sum() + paths)
         if value < self.bound:
@@ -115,11 +114,11 @@ class ElementaryPrices:
 
 @borrowing
 def _epoch(
-    network: Network,
+    network: ArcNetwork,
     memory: Memory,
     labels: Labels,
-    reward: Floats,
-    is_offered: Bools,
+    worth: Floats,
+    top: Floats,
     now: Floats,
     weight: Floats,
     is_on_path: Bools,
@@ -140,17 +139,16 @@ def _epoch(
         part = order[i]
         for b in range(network.first[part], network.first[part + 1]):
             place = network.place[b]
-            weight[b] = reward[place] - now[place]
+            weight[b] = max(0.0, worth[b] - now[place])
             if is_on_path[b]:
                 is_on_path[b] = False
                 wanted[place] -= 1
         _, at = label_part(network, memory, weight, labels, part)
         while at >= 0:
-            if labels.is_paid[at]:
+            if labels.is_paid[at] and worth[at] >= now[network.place[at]]:
                 is_on_path[at] = True
                 wanted[network.place[at]] += 1
             at = labels.previous[at]
         for place in range(len(now) - 1):
-            if is_offered[place]:
-                moved = now[place] + step / num_parts * reward[place] * (wanted[place] - 1)
-                now[place] = min(max(moved, 0.0), reward[place])
+            moved = now[place] + step / num_parts * top[place] * (wanted[place] - 1)
+            now[place] = min(max(moved, 0.0), top[place])

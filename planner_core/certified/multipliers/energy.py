@@ -22,6 +22,7 @@ from planner_core.problem import (
     Problem,
     SatelliteProblem,
 )
+from planner_core.worth import weights
 
 _PER_COLLECT: Final = 24  # levels of energy
 _FIRST_STEP: Final = 0.3  # of a reward, for all satellites together
@@ -75,12 +76,11 @@ class EnergyPrices:
         widest = max((part.levels.width for part in self._parts), default=0)
         self._own = np.empty((most_rows, widest))
         self._num_own = np.zeros(most_rows, dtype=np.int64)
-        self._reward = np.append(problem.target_reward, 0.0)
-        offered = np.diff(problem.target_opportunities[1]) > 0
-        self._top = np.where(np.append(offered, False), self._reward, 0.0)
+        self._worth = problem.worth
+        self._top = np.append(problem.best_worth, 0.0)
         self._now = np.minimum(np.append(prices, 0.0), self._top)
         self._mean = self._now.copy()
-        self._count = np.zeros((len(self._parts), len(self._reward)))
+        self._count = np.zeros((len(self._parts), len(self._top)))
         self._rng = np.random.default_rng(seed)
         self._round, self._num_rounds = 0, max(1, num_rounds)
         self.value, self.prices = float(self._top.sum()), self._top[:-1]
@@ -101,7 +101,7 @@ class EnergyPrices:
                     return
                 part = self._parts[index]
                 _, path = self._answer(part, self._now)
-                self._count[index] = np.bincount(part.target[path], minlength=len(self._reward))
+                self._count[index] = np.bincount(part.target[path], minlength=len(self._top))
                 if self._round >= _NOTED_FROM * self._num_rounds:
                     self.usage[part.rows[path]] += 1.0
                 if self._round == 0:
@@ -111,14 +111,19 @@ class EnergyPrices:
             self._round += 1
             self._mean += _NEWEST * (self._now - self._mean)
             if self._round % _ASKED_EVERY == 0:
-                self._ask()
+                self.ask()
 
     def _answer(self, part: _Part, prices: Floats) -> tuple[float, Ints]:
         """Return the most that a satellite can gain, and the tasks of a path that does."""
-        weight = (self._reward - prices)[part.target]
-        return most_by_energy(part.network, part.levels, weight, self._own, self._num_own)
+        worth, price = self._worth[part.rows], prices[part.target]
+        gain, path = most_by_energy(
+            part.network, part.levels, weights(worth, price), self._own, self._num_own
+        )
+        # What is worth less than its price is only passed through.
+        return gain, path[worth[path] >= price[path]]
 
-    def _ask(self) -> None:
+    def ask(self) -> None:
+        """Note what the mean of the multipliers proves."""
         gains = sum(self._answer(part, self._mean)[0] for part in self._parts)
         value = float(self._mean.sum() + gains)
         if value < self.value:

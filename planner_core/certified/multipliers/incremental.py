@@ -36,18 +36,22 @@ class IncrementalPrices:
 
     Parameters
     ----------
-    reward
-        Of each place, with a last entry of zero that stands for contacts.
+    worth
+        Of each node. Shape ``(n,)``.
+    most
+        The best worth of each place, with a last entry of zero that stands for contacts.
     num_epochs
         After how many the steps shall be so short that more are of little use.
 
     Attributes
     ----------
     value, prices
-        The least bound that was proven so far, and the prices that prove it. Shape of ``reward``.
+        The least bound that was proven so far, and the prices that prove it. Shape of ``most``.
     """
 
-    def __init__(self, network: Network, reward: Floats, num_epochs: int, seed: int) -> None:
+    def __init__(
+        self, network: Network, worth: Floats, most: Floats, num_epochs: int, seed: int
+    ) -> None:
         n = len(network.row)
         self._network = network
         self._busy = np.flatnonzero(np.diff(network.first))
@@ -55,11 +59,8 @@ class IncrementalPrices:
         self._previous = np.empty(n, dtype=np.int32)
         self._ends = np.empty(len(network.first) - 1, dtype=np.int32)
         self._is_on_path = np.zeros(n, dtype=np.bool_)
-        self._count = np.zeros(len(reward), dtype=np.int32)
-        offered = np.zeros(len(reward), dtype=np.bool_)
-        offered[network.place] = True
-        self._reward = reward
-        self._top = np.where(offered, reward, 0.0)
+        self._count = np.zeros(len(most), dtype=np.int32)
+        self._worth, self._top = worth, most
         self._now = 0.5 * self._top
         self._mean = self._now.copy()
         self._rng = np.random.default_rng(seed)
@@ -79,7 +80,7 @@ class IncrementalPrices:
         for _ in range(num_epochs):
             order = self._rng.permutation(self._busy)
             _answer_in_turn(
-                self._network, order, min(_MOVES, len(order)), self._reward, self._top, self._now,
+                self._network, order, min(_MOVES, len(order)), self._worth, self._top, self._now,
                 _FIRST_STEP * shorter**self._epoch, self._count, self._is_on_path,
                 self._weight, self._value, self._previous, stop,
             )  # fmt: skip
@@ -92,7 +93,8 @@ class IncrementalPrices:
 
     def ask(self, prices: Floats) -> float:
         """Return the bound that prices prove, and keep it if it is the least."""
-        np.take(self._reward - prices, self._network.place, out=self._weight)
+        np.take(prices, self._network.place, out=self._weight)
+        np.maximum(self._worth - self._weight, 0.0, out=self._weight)
         value = float(prices.sum()) + heaviest_paths(
             self._network, self._weight, self._value, self._previous, self._ends
         )
@@ -108,8 +110,8 @@ def incremental_prices(
 
     Ends early at ``level``, which some plan earns. Shape of the prices ``(num_targets,)``.
     """
-    reward = np.append(problem.target_reward, 0.0)
-    search = IncrementalPrices(network, reward, max(1, num_epochs), 0)
+    worth, most = problem.worth[network.row], np.append(problem.best_worth, 0.0)
+    search = IncrementalPrices(network, worth, most, max(1, num_epochs), 0)
     done = 0
     while done < num_epochs and search.value > level and not stop[0]:
         search.improve(_ASKED_EVERY, stop)
@@ -122,7 +124,7 @@ def _answer_in_turn(
     network: Network,
     order: Longs,
     num_moves: int,
-    reward: Floats,
+    worth: Floats,
     top: Floats,
     prices: Floats,
     step: float,
@@ -157,7 +159,7 @@ def _answer_in_turn(
             part = order[num_done]
             num_done += 1
             for a in range(network.first[part], network.first[part + 1]):
-                weight[a] = reward[network.place[a]] - prices[network.place[a]]
+                weight[a] = max(0.0, worth[a] - prices[network.place[a]])
                 if is_on_path[a]:
                     is_on_path[a] = False
                     count[network.place[a]] -= 1

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter, deque
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
 from planner_core.certified.proofs.resource_bound import (
     COARSE,
@@ -31,7 +31,6 @@ _PATIENCE: Final = 7
 _SHORTER: Final = 0.6
 _NEAR: Final = 0.99
 _AFRESH: Final = 1.0  # length of the steps from given prices
-_FINER: Final = 2
 _KEPT_PATHS: Final = 30
 
 
@@ -55,7 +54,9 @@ class PriceSearch:
     def __init__(self, problem: Problem, value: float, prices: Floats, stop: Bytes) -> None:
         self._problem, self._stop = problem, stop
         self._is_reachable = np.diff(problem.target_opportunities[1]) > 0
-        self._typical = float(problem.target_reward[self._is_reachable].mean()) or 1.0
+        self._typical = problem.typical_worth
+        # By target: what the image earns that plans take of it, as far as they are known.
+        self._worth_taken = problem.best_worth.copy()
         coarse = relaxations(problem, COARSE)
         num_images = int(value / self._typical / len(coarse))
         self.satellites = tuple(s.with_data_price(num_images) for s in coarse)
@@ -85,9 +86,8 @@ class PriceSearch:
         level
             Where the best prices are expected.
         """
-        reward_of = self._problem.target_reward
-        prices = leaving_whole_units(self._problem, self._now, self.unit)
-        prices[~self._is_reachable] = 0.0
+        most = self._problem.best_worth
+        prices = self._whole(self._now, self.unit)
         outcome = self._evaluate(prices)
         if outcome is None:
             return False
@@ -101,15 +101,15 @@ class PriceSearch:
             return True
         gradient = np.where(self._is_reachable, counts - 1.0, 0.0)
         gradient[(self._now <= 0.0) & (gradient < 0.0)] = 0.0
-        gradient[(self._now >= reward_of) & (gradient > 0.0)] = 0.0
+        gradient[(self._now >= most) & (gradient > 0.0)] = 0.0
         # A step moves prices in proportion to what the targets are worth.
-        scale = np.where(reward_of > 0.0, reward_of, 1.0)
+        scale = np.where(most > 0.0, most, 1.0)
         self._direction = (1.0 - _DEFLECTION) * gradient + _DEFLECTION * self._direction
         norm = float(self._direction @ (scale * self._direction))
         if norm == 0.0:
             return False
         length = self.theta * (value - max(level, _NEAR * self.value)) / norm
-        self._now = np.clip(self._now + length * scale * self._direction, 0.0, reward_of)
+        self._now = np.clip(self._now + length * scale * self._direction, 0.0, most)
         return True
 
     def learn(self, plan: Plan) -> None:
@@ -118,6 +118,7 @@ class PriceSearch:
         taken[[action.opportunity for action in plan.actions]] = True
         for relaxation, paths in zip(self.satellites, self._paths, strict=True):
             paths.append(np.flatnonzero(taken[relaxation.satellite.rows]).astype(np.int32))
+        self._note_images(np.flatnonzero(taken))
 
     def restart(self, prices: Floats) -> None:
         """Go on from other prices, in shorter steps."""
@@ -126,25 +127,20 @@ class PriceSearch:
         self.value, self.prices = np.inf, self._now
         self.theta, self._stalled = _AFRESH, 0
 
-    def refined(self, prices: Floats) -> tuple[float, Floats, float]:
-        """Return what prices prove where worth is counted in smaller units, and with which.
+    def _whole(self, prices: Floats, unit: float) -> Floats:
+        """Return prices at which the images that plans take are worth whole units."""
+        whole = leaving_whole_units(self._problem, prices, unit, self._worth_taken)
+        whole[~self._is_reachable] = 0.0
+        return whole
 
-        Without labels, which would take several times the memory.
-        """
-        unit = self.unit / _FINER
-        prices = leaving_whole_units(self._problem, prices, unit)
-        prices[~self._is_reachable] = 0.0
-        worth = whole_worth(self._problem, prices, unit)
-        units = 0
-        for i, finer in enumerate(relaxations(self._problem)):
-            relaxation = replace(finer, data_price=self.satellites[i].data_price)
-            most, _ = relaxation.most(worth, 0, self._stop, near=self._known(i, worth))
-            units += most
-        return self._total(prices, units, unit), prices, unit
+    def _note_images(self, rows: npt.NDArray[np.integer]) -> None:
+        """Note what the images among these opportunities earn, as what plans take."""
+        images = rows[self._problem.opportunities.kind[rows] == COLLECT]
+        self._worth_taken[self._problem.opportunities.place[images]] = self._problem.worth[images]
 
     def _known(self, i: int, worth: Ints) -> int | None:
         """Return what a satellite gains on one of the paths that are known, if there are any."""
-        weight = self.satellites[i].weights(worth)
+        weight = worth[self.satellites[i].satellite.rows]
         return max((int(weight[path].sum()) for path in self._paths[i]), default=None)
 
     def _total(self, prices: Floats, units: int, unit: float) -> float:
@@ -170,7 +166,9 @@ class PriceSearch:
             rows = relaxation.satellite.rows[path]
             self.usage[rows] += 1.0
             images = rows[problem.opportunities.kind[rows] == COLLECT]
-            np.add.at(counts, problem.opportunities.place[images], 1.0)
+            target = problem.opportunities.place[images]
+            np.add.at(counts, target[problem.worth[images] >= prices[target]], 1.0)
+            self._note_images(rows)
             contacts += [int(r) for r in rows[problem.opportunities.kind[rows] == CONTACT]]
         self.contact_sets[tuple(sorted(contacts))] += 1
         return self._total(prices, units, self.unit), counts

@@ -21,7 +21,8 @@ _NEAR: Final = 0.8
 @kernel
 def improve_prices(
     network: Network,
-    reward: Floats,
+    worth: Floats,
+    most: Floats,
     prices: Floats,
     level: float,
     num_steps: int,
@@ -31,12 +32,14 @@ def improve_prices(
 
     Parameters
     ----------
-    reward, prices
-        Of each place, with a last entry of zero that stands for contacts.
+    worth
+        Of each node. Shape ``(n,)``.
+    most, prices
+        The best worth and the price of each place, with a last entry of zero for contacts.
     level
         What some plan earns: steps aim there, and end once the value is as low.
     """
-    n, num_places = len(network.row), len(reward)
+    n, num_places = len(network.row), len(most)
     weight, value = np.empty(n), np.empty(n)
     previous = np.empty(n, dtype=np.int32)
     ends = np.empty(len(network.first) - 1, dtype=np.int32)
@@ -50,7 +53,7 @@ def improve_prices(
     best, theta, stalled = np.inf, 1.0, 0
     for _ in range(num_steps):
         for a in range(n):
-            weight[a] = reward[network.place[a]] - now[network.place[a]]
+            weight[a] = max(0.0, worth[a] - now[network.place[a]])
         total = now.sum() + heaviest_paths(network, weight, value, previous, ends)
         if total < best:
             stalled = 0 if total < best - _GAIN * abs(total) else stalled
@@ -68,14 +71,16 @@ def improve_prices(
         for s in range(len(ends)):
             at = ends[s]
             while at >= 0:
-                excess[network.place[at]] += 1.0
+                # What is worth less than its price is only passed through.
+                if worth[at] >= now[network.place[at]]:
+                    excess[network.place[at]] += 1.0
                 at = previous[at]
         norm = 0.0
         for i in range(num_places):
             if not is_reachable[i]:
                 continue
-            # At a price of zero (or of the whole reward) a step outward leads nowhere.
-            can_fall, can_rise = now[i] > 0.0, now[i] < reward[i]
+            # At a price of zero (or of the best worth) a step outward leads nowhere.
+            can_fall, can_rise = now[i] > 0.0, now[i] < most[i]
             if (excess[i] < 0.0 and not can_fall) or (excess[i] > 0.0 and not can_rise):
                 excess[i] = 0.0
             direction[i] = excess[i] + _DEFLECTION * direction[i]
@@ -88,5 +93,5 @@ def improve_prices(
         step = theta * (total - max(level, _NEAR * best)) / norm
         for i in range(num_places):
             if is_reachable[i]:
-                now[i] = min(max(now[i] + step * direction[i], 0.0), reward[i])
+                now[i] = min(max(now[i] + step * direction[i], 0.0), most[i])
     return best

@@ -46,10 +46,7 @@ class Bound:
 
 def reward_unit(problem: Problem) -> float:
     """Return an amount of which what any plan earns is a multiple; 0 where there is none."""
-    rewards = problem.target_reward
-    if len(rewards) == 0 or rewards.max() >= 2.0**50 or np.any(rewards != np.round(rewards)):
-        return 0.0
-    return float(np.gcd.reduce(rewards.astype(np.int64)))
+    return problem.reward_unit
 
 
 def rounded_bound(problem: Problem, value: float, reward: float) -> float:
@@ -62,3 +59,10 @@ def rounded_bound(problem: Problem, value: float, reward: float) -> float:
     if unit > 0.0:
         safe = float(np.floor((safe + _ROUNDING) / unit) * unit)
     return max(safe, reward)
+
+
+def accessible(problem: Problem) -> Bound:
+    """Return the bound that every accessible target is imaged: prices of its best worth."""
+    prices = problem.best_worth
+    value = rounded_bound(problem, float(prices.sum()), 0.0)
+    return Bound(value=value, proof="lagrangian", prices=prices)

@@ -3,7 +3,7 @@ r"""Proofs that no plan earns as much as some amount, checked without any search
 Multipliers :math:`\lambda_i \ge 0` for the targets and :math:`\mu_c \ge 0` for cuts
 :math:`a_c x \le b_c` bound what a plan earns by :math:`\sum_i \lambda_i + \sum_c \mu_c b_c`
 and, for each satellite, its heaviest path where task k on target i is worth
-:math:`\max(0, r_i - \lambda_i - \sum_c \mu_c a_{ck})`. The same with the path led through a
+:math:`\max(0, v_k - \lambda_i - \sum_c \mu_c a_{ck})`. The same with the path led through a
 task bounds the plans that hold this task. A certificate is a sequence of multipliers: each
 strikes out the tasks that no plan worth the amount can hold, until no path is left that
 could be worth it.
@@ -17,9 +17,9 @@ import numpy as np
 
 from planner_core.precedence.network import Network, heaviest_through, network_of
 from planner_core.precedence.relation import (
-    Order,
+    Precedence,
     are_comparable,
-    order_of,
+    is_transitive,
     transitive_closure,
 )
 from planner_core.problem import (
@@ -107,16 +107,16 @@ class Certificate:
 def is_refuted(problem: Problem, certificate: Certificate) -> bool:
     """Return whether the certificate proves what it claims. This is the whole proof."""
     every = np.arange(len(problem.opportunities), dtype=np.int32)
-    orders = [order_of(transitive_closure(problem, s)) for s in problem.satellites]
-    checked = _Checked(problem, orders, certificate.amount)
+    checked = _Checked(problem, certificate.amount)
     return checked.is_refuted(certificate.refutation, every)
 
 
 class _Checked:
     """A problem and an amount that its plans do not reach, as is to be proven."""
 
-    def __init__(self, problem: Problem, orders: list[Order], amount: float) -> None:
-        self._problem, self._orders, self._amount = problem, orders, amount
+    def __init__(self, problem: Problem, amount: float) -> None:
+        self._problem, self._amount = problem, amount
+        self._closures: dict[int, Precedence] = {}  # of satellites that a cut speaks of
 
     def is_refuted(self, refutation: Refutation, left: Ints) -> bool:
         for step in refutation.steps:
@@ -135,13 +135,9 @@ class _Checked:
             return False
         row, taken, leaving = refutation.branch
         # A slow satellite may pass by a target again, which is not to take it.
-        is_transitive = all(
-            order.bits is satellite.transitions.bits
-            for order, satellite in zip(self._orders, self._problem.satellites, strict=True)
-        )
         beside = left[[a == row or not self._exclude(row, int(a)) for a in left]]
         return (
-            is_transitive
+            is_transitive(self._problem)
             and self.is_refuted(taken, beside)
             and self.is_refuted(leaving, left[left != row])
         )
@@ -156,7 +152,9 @@ class _Checked:
         satellite = int(table.satellite[a])
         if table.satellite[b] != satellite:
             return False
-        return not are_comparable(self._orders[satellite], int(local[a]), int(local[b]))
+        if satellite not in self._closures:
+            self._closures[satellite] = transitive_closure(self._problem.satellites[satellite])
+        return not are_comparable(self._closures[satellite], int(local[a]), int(local[b]))
 
     def _is_sound(self, cut: Cut) -> bool:
         """Return whether the sets are an odd number and hold what excludes each other."""
@@ -196,9 +194,8 @@ def _priced(problem: Problem, rows: Ints, step: Multipliers) -> tuple[float, Flo
     """Return the constant of the bound, and what each opportunity is worth at the prices."""
     table = problem.opportunities
     is_collect = table.kind == COLLECT
-    place = table.place[is_collect]
-    worth = np.zeros(len(table))
-    worth[is_collect] = problem.target_reward[place] - step.prices[place]
+    worth = problem.worth.copy()
+    worth[is_collect] -= step.prices[table.place[is_collect]]
     constant = 0.0
     for cut, price in zip(step.cuts, step.cut_prices, strict=True):
         members, weights = cut.weights()

@@ -25,7 +25,7 @@ from planner_core.certified.dp.start_labels import (
     heaviest,
     labels_of,
 )
-from planner_core.certified.proofs.bound import Bound, rounded_bound
+from planner_core.certified.proofs.bound import Bound, accessible
 from planner_core.certified.proofs.totals import totals_bound
 from planner_core.precedence.time_windows import (
     Spans,
@@ -34,13 +34,13 @@ from planner_core.precedence.time_windows import (
     view_of,
 )
 from planner_core.problem import (
-    COLLECT,
     Bools,
     Bytes,
     Floats,
     Ints,
     Problem,
 )
+from planner_core.worth import surplus, weights
 
 LABELS: Final = 2
 _WIDTHS_S: Final = (2.5, 25.0)
@@ -57,15 +57,6 @@ _LONGEST_S: Final = 15_000.0
 _TOLD: Final = 14
 
 
-def accessible(problem: Problem) -> Bound:
-    """Return the bound that every accessible target is imaged: prices of the whole reward."""
-    table = problem.opportunities
-    targets = np.unique(table.place[table.kind == COLLECT])
-    value = float(problem.target_reward[targets].sum())
-    prices = problem.target_reward.astype(np.float64)
-    return Bound(value=rounded_bound(problem, value, 0.0), proof="lagrangian", prices=prices)
-
-
 def quick_bound(problem: Problem) -> Bound:
     """Return the better of the bounds that take no time."""
     totals, every = totals_bound(problem), accessible(problem)
@@ -74,15 +65,13 @@ def quick_bound(problem: Problem) -> Bound:
 
 def continuous_value(problem: Problem, prices: Floats) -> float:
     """Return the bound that ``prices`` prove. This is the whole proof: it needs no search."""
-    if np.any(prices < problem.target_reward):
+    if np.any(prices < problem.best_worth):
         dual = ContinuousDual.of(problem, width_for(problem))
         if dual is not None:
             value, _ = dual.at(prices)
             return value
-    # Prices of the whole reward leave nothing to earn on any chain.
-    table = problem.opportunities
-    prices = np.maximum(prices, problem.target_reward)
-    return float(prices[np.unique(table.place[table.kind == COLLECT])].sum())
+    # Prices of the best worth leave nothing to earn on any chain.
+    return float(problem.best_worth.sum())
 
 
 def width_for(problem: Problem) -> float:
@@ -144,7 +133,7 @@ class ContinuousDual:
 
     def clipped(self, prices: Floats) -> Floats:
         """Return prices as they count."""
-        return np.where(self.is_offered, np.clip(prices, 0.0, self.problem.target_reward), 0.0)
+        return np.where(self.is_offered, surplus(prices, self.problem.best_worth), 0.0)
 
     def at(self, prices: Floats, *, is_exact: bool = True) -> tuple[float, Ints]:
         """Return the value at prices, and how often the chains there take each target.
@@ -163,12 +152,14 @@ class ContinuousDual:
     def chain(self, number: int, price: Floats, *, is_exact: bool) -> tuple[float, Ints]:
         """Return the heaviest chain of one part: its worth, and the targets that it is paid for."""
         cells, labels = self.parts[number]
-        weight = (self.problem.target_reward - price)[cells.spans.place]
+        worth = self.problem.worth[cells.spans.row]
+        weight = weights(worth, price[cells.spans.place])
         value, slot = heaviest(cells, weight, labels, LABELS, is_exact)
         taken = []
         while slot >= 0:
-            if labels.is_paid[slot]:
-                taken.append(cells.spans.place[cells.task[slot // LABELS]])
+            task = cells.task[slot // LABELS]
+            if labels.is_paid[slot] and worth[task] >= price[cells.spans.place[task]]:
+                taken.append(cells.spans.place[task])
             slot = int(labels.parent[slot])
         return value, np.array(taken, dtype=np.int32)
 
@@ -221,7 +212,7 @@ class ContinuousPrices:
 
     def round(self, budget_stop: Bytes) -> None:
         """Go once over all parts."""
-        reward = self.dual.problem.target_reward
+        most = self.dual.problem.best_worth
         for number in self._random.permutation(len(self.dual.parts)).tolist():
             if budget_stop[0]:
                 return
@@ -230,7 +221,7 @@ class ContinuousPrices:
             np.add.at(self._counts, taken, 1.0)
             self._taken[number] = taken
             share = self._step / len(self.dual.parts)
-            self._now = self.dual.clipped(self._now + share * reward * (self._counts - 1.0))
+            self._now = self.dual.clipped(self._now + share * most * (self._counts - 1.0))
         self._step *= _SHORTER
         self.prices = _KEPT * self.prices + (1.0 - _KEPT) * self._now
 
@@ -241,7 +232,7 @@ def search_prices(problem: Problem, stop: Bytes) -> Iterator[tuple[float, Floats
     if num_followers(problem, width_s) > _MOST_FOLLOWERS:
         return
     rough_s = max(_ROUGH_S, width_s)
-    best, prices = np.inf, 0.9 * problem.target_reward
+    best, prices = np.inf, 0.9 * problem.best_worth
     proving = prices
     for cell_s, num_rounds, step in ((rough_s, _ROUGH, _STEPS[0]), (width_s, _FINE, _STEPS[1])):
         dual = None if stop[0] else ContinuousDual.of(problem, cell_s, stop)

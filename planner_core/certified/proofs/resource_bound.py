@@ -36,6 +36,7 @@ from planner_core.problem import (
     SatelliteProblem,
     Singles,
 )
+from planner_core.worth import surplus, weights
 
 _MAX_CELLS: Final = 30_000_000  # of one table of least energy
 _MAX_UNITS: Final = 2000
@@ -102,13 +103,6 @@ class SatelliteRelaxation:
         before = np.where(is_shut, -1, self.levels.before).astype(np.int32)
         return replace(self, levels=self.levels._replace(before=before))
 
-    def weights(self, worth: Ints) -> Ints:
-        """Return the worth of each task, from that of each target."""
-        own = np.zeros(len(self.satellite), dtype=np.int32)
-        is_collect = self.satellite.kind == COLLECT
-        own[is_collect] = worth[self.satellite.place[is_collect]]
-        return own
-
     def most(
         self,
         worth: Ints,
@@ -125,12 +119,14 @@ class SatelliteRelaxation:
 
         Parameters
         ----------
+        worth
+            In units, of every opportunity of the problem. Shape ``(n,)``.
         near
             What is expected at least, if anything.
         keeps_path
             Whether to answer the path.
         """
-        weight = self.weights(worth)
+        weight = worth[self.satellite.rows]
         needs = _Needs.of(self.network, self.levels, weight, self._price_in(weight), near)
         top = needs.top
         step = max(1, int(_FIRST_STEP * top))
@@ -216,9 +212,14 @@ def relaxations(
 
 
 def whole_worth(problem: Problem, prices: Floats, unit: float) -> Ints:
-    """Return what an image of each target is worth at these prices, in units, rounded up."""
-    worth = (problem.target_reward - np.maximum(prices, 0.0)) / unit
-    return np.maximum(np.ceil(worth - _ROUNDING), 0.0).astype(np.int32)
+    """Return what each opportunity is worth at these prices, in units, rounded up."""
+    table = problem.opportunities
+    is_collect = table.kind == COLLECT
+    units = np.zeros(len(table), dtype=np.int32)
+    price = np.maximum(prices[table.place[is_collect]], 0.0)
+    worth = weights(problem.worth[is_collect], price)
+    units[is_collect] = np.maximum(np.ceil(worth / unit - _ROUNDING), 0.0)
+    return units
 
 
 def resource_value(problem: Problem, prices: Floats, unit: float) -> float:
@@ -243,8 +244,7 @@ def _value(
     stop: Bytes,
 ) -> float:
     """Return the bound of these prices, or ``enough`` where that is more."""
-    reachable = problem.target_opportunities[1]
-    prices = np.where(np.diff(reachable) > 0, np.maximum(prices, 0.0), 0.0)
+    prices = surplus(prices, problem.best_worth)
     worth = whole_worth(problem, prices, unit)
     paid = float(prices.sum())
     # What the other satellites gain is known only afterwards: one alone may stop early.
@@ -264,7 +264,7 @@ def quick_bound(problem: Problem, reward: float) -> Bound:
     """
     best = lagrangian_bound(problem, reward)
     # Where all targets are worth the same and energy is short, prices of zero are best.
-    is_plain = len(problem.satellites) == 1 and np.ptp(problem.target_reward) == 0.0
+    is_plain = len(problem.satellites) == 1 and _is_alike(problem)
     satellites: tuple[SatelliteRelaxation, ...] = ()
     if problem.use_resources:
         is_quick = is_plain or len(problem.opportunities) <= _FEW
@@ -293,21 +293,38 @@ def _battery_value(
 ) -> float:
     """Return what bounds all plans where recorders are left out."""
     worth = whole_worth(problem, prices, unit)
-    needs = [_Needs.of(s.network, s.levels, s.weights(worth), 0.0, None) for s in satellites]
+    needs = [_Needs.of(s.network, s.levels, worth[s.satellite.rows], 0.0, None) for s in satellites]
     return float(prices.sum()) + unit * sum(n.top for n in needs)
 
 
 def _unit(problem: Problem, satellites: tuple[SatelliteRelaxation, ...], value: float) -> float:
     """Return a unit: 1 where rewards are whole and few, or what can be counted in good time."""
-    reward = problem.target_reward
     largest = max(len(s.satellite) for s in satellites)
     most_units = min(_MAX_UNITS, _MAX_CELLS // largest)
-    if np.all(reward == np.round(reward)) and value <= most_units:
+    if problem.reward_unit > 0.0 and value <= most_units:
         return 1.0
     return max(value / most_units, 1e-12)
 
 
-def leaving_whole_units(problem: Problem, prices: Floats, unit: float) -> Floats:
-    """Return the nearest prices at which an image is worth a whole number of units."""
-    worth = np.round((problem.target_reward - prices) / unit)
-    return np.maximum(problem.target_reward - worth * unit, 0.0)
+def leaving_whole_units(
+    problem: Problem, prices: Floats, unit: float, typical: Floats | None = None
+) -> Floats:
+    """Return the nearest prices at which an image of each target is worth a whole number of units.
+
+    Other images of it are then rounded up, which costs a bound up to a unit for each that is
+    taken: the typical one should be the one that plans take.
+
+    Parameters
+    ----------
+    typical
+        What that image earns; by default the best of the target. Shape ``(num_targets,)``.
+    """
+    worth = problem.best_worth if typical is None else typical
+    units = np.round((worth - prices) / unit)
+    return np.clip(worth - units * unit, 0.0, problem.best_worth)
+
+
+def _is_alike(problem: Problem) -> bool:
+    """Return whether all images earn the same."""
+    collects, _ = problem.target_opportunities
+    return len(collects) == 0 or bool(np.ptp(problem.worth[collects]) == 0.0)

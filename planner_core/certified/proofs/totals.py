@@ -37,11 +37,11 @@ def totals_bound(problem: Problem) -> Bound | None:
     length_s = np.full(len(problem.target_ids), np.inf)
     np.minimum.at(length_s, table.place[collects], table.end_s[collects] - table.start_s[collects])
     offered = np.flatnonzero(np.isfinite(length_s))
-    worth = problem.target_reward[offered] / length_s[offered]
+    worth_per_s = problem.best_worth[offered] / length_s[offered]
     value = 0.0
-    for target in offered[np.argsort(-worth, kind="stable")].tolist():
+    for target in offered[np.argsort(-worth_per_s, kind="stable")].tolist():
         share = min(1.0, room_s / length_s[target])
-        value += share * float(problem.target_reward[target])
+        value += share * float(problem.best_worth[target])
         room_s -= share * length_s[target]
         if room_s <= 0.0:
             break

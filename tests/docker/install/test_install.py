@@ -18,13 +18,13 @@ from pathlib import Path
 import httpx
 import pytest
 
+from tests.patience import PATIENCE_S
 from tests.service import factories
 
 ROOT = Path(__file__).resolve().parents[3]
 AS_NOBODY = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"]
 # It may read all the same: the interpreter may lie in a folder of root's own.
 AS_NOBODY += ["--inh-caps=+dac_read_search", "--ambient-caps=+dac_read_search"]
-WITHIN_S = 120.0
 
 
 @pytest.fixture(scope="module")
@@ -93,11 +93,11 @@ def test_nobody_runs_a_job_and_no_kernel_is_compiled_for_it(prefix: Path, scratc
     try:
         line = process.stdout.readline()
         assert line.startswith("Slewline is ready at "), line
-        with httpx.Client(base_url=line.split()[-1], timeout=WITHIN_S) as client:
+        with httpx.Client(base_url=line.split()[-1], timeout=PATIENCE_S) as client:
             job = plan(client)
         assert job["state"] == "succeeded", job["error"]
         process.terminate()
-        assert process.wait(WITHIN_S) == 0
+        assert process.wait(PATIENCE_S) == 0
     finally:
         process.kill()
         process.wait()

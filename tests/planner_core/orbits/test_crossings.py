@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.domain import Target
@@ -24,7 +24,6 @@ ALL_CODES = [
     crossings.HEADING,
     crossings.SUNLIT,
 ]
-unhurried = settings(deadline=None)  # the first call may compile
 instants = st.floats(0.0, 21599.0)
 latitudes = st.floats(-89.0, 89.0)
 longitudes = st.floats(-180.0, 180.0)
@@ -42,7 +41,6 @@ def value_at(code: int, t_s: float, place: Floats) -> tuple[float, float]:
     return crossings.limit_value((code, 1.0, 0.0), cubic, place, t_s - k * PATH.step_s)
 
 
-@unhurried
 @given(instants, latitudes, longitudes)
 def test_cosines_are_those_of_the_plain_geometry(t_s: float, lat: float, lon: float) -> None:
     t = np.array([t_s])
@@ -59,7 +57,6 @@ def test_cosines_are_those_of_the_plain_geometry(t_s: float, lat: float, lon: fl
 
 
 @pytest.mark.parametrize("code", ALL_CODES)
-@unhurried
 @given(instants, latitudes, longitudes)
 def test_rates_are_those_of_the_values(code: int, t_s: float, lat: float, lon: float) -> None:
     within = t_s % PATH.step_s
@@ -71,7 +68,6 @@ def test_rates_are_those_of_the_values(code: int, t_s: float, lat: float, lon: f
     assert rate == pytest.approx((ahead - behind) / 0.2, abs=1e-6)
 
 
-@unhurried
 @given(
     st.sampled_from(ALL_CODES),
     instants,

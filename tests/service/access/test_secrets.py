@@ -12,7 +12,7 @@ from service.access.tokens import new_token
 from service.commands.bodies import WRONG_INPUT
 from service.commands.cli import main
 from service.jobs.supervisor import environment_of
-from service.logs import JsonFormatter
+from service.process.logs import JsonFormatter
 from service.settings import Settings
 from tests.service.access.conftest import Door
 

@@ -18,7 +18,7 @@ from tests.service.serving import serving
 __all__ = ["jobs", "queue_http", "template_url", "workers"]
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """The address of a whole service with workers, for all tests."""
     with serving(tmp_path_factory.mktemp("served"), "serve", "--workers", "1") as (_, line):

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from service.blocks import blocks_of_timeline
+from service.answers.blocks import blocks_of_timeline
 from service.client import (
     Client,
     JobFailed,

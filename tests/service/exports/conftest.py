@@ -11,12 +11,12 @@ import pytest
 import sqlalchemy as sa
 
 from planner_core.domain import Scenario
-from service.blocks import Block, targets_text, timeline_text
+from service.answers import store as answer_store
+from service.answers.answered import Answered
+from service.answers.blocks import Block, targets_text, timeline_text
+from service.db.ids import new_id
 from service.db.rows import JobResultRow, JobRow, ScenarioRow
-from service.exports.answered import Answered
-from service.ids import new_id
 from service.scenarios.translate import canonical, scenario_from_content, sha256_of
-from service.stores import answer_store
 from tests.missions import PAPER_ORBIT, Document, drawn_targets, paper_mission
 from tests.service.conftest import Service
 from tests.service.test_plan_job import run

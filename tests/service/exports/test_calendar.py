@@ -9,8 +9,8 @@ import pytest
 from ical.calendar_stream import IcsCalendarStream
 from ical.event import Event
 
+from service.answers.answered import Answered
 from service.exports import calendar
-from service.exports.answered import Answered
 from tests.missions import Document
 from tests.service.exports.conftest import FINISHED_AT, Mission
 

@@ -12,8 +12,8 @@ from skyfield.api import EarthSatellite, load
 from skyfield.framelib import itrs
 
 from planner_core.orbits.ephemeris import propagate
+from service.answers.answered import Answered
 from service.exports import czml
-from service.exports.answered import Answered
 from tests.missions import PAPER_ORBIT, Document
 from tests.service.exports.conftest import Mission
 

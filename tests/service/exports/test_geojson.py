@@ -15,8 +15,8 @@ from skyfield.api import EarthSatellite, load, wgs84
 
 from planner_core.domain import GroundStation
 from planner_core.orbits.ground_track import visibility_ring
+from service.answers.answered import Answered
 from service.exports import geojson
-from service.exports.answered import Answered
 from service.exports.antimeridian import area
 from service.scenarios.translate import canonical
 from tests.missions import PAPER_ORBIT, Document

@@ -11,7 +11,7 @@ import httpx
 import pytest
 import sqlalchemy as sa
 
-from service.blocks import NUM_ITEMS, blocks_of_timeline, target_blocks
+from service.answers.blocks import NUM_ITEMS, blocks_of_timeline, target_blocks
 from service.db.rows import JobBlockRow
 from service.exports.forms import FORMS
 from tests.missions import Document
@@ -24,6 +24,14 @@ BLOCK_BYTES = 100_000
 """About what a block of this answer takes."""
 NUM_HELD = 30
 """Blocks that may be held at a time, as text and as what is made of them (a track is the most)."""
+
+
+OTHERS = [
+    pytest.param(form.suffix, marks=pytest.mark.full_size)
+    for form in FORMS
+    if form.suffix != "czml"
+]
+"""Forms that take less at a time than tracks do."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,7 +123,7 @@ def test_a_filtered_page_passes_over_blocks_without_what_is_wanted(
     assert nothing == {"items": [], "next": None}
 
 
-@pytest.mark.parametrize("suffix", ["json", *(form.suffix for form in FORMS)])
+@pytest.mark.parametrize("suffix", ["json", "czml", *OTHERS])
 def test_no_form_holds_the_answer_as_a_whole(
     client: httpx.Client, large: Large, suffix: str
 ) -> None:

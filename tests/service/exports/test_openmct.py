@@ -8,8 +8,8 @@ from datetime import UTC, datetime
 import pytest
 from jsonschema import Draft202012Validator
 
+from service.answers.answered import Answered
 from service.exports import openmct
-from service.exports.answered import Answered
 from tests.missions import Document
 from tests.service.exports.conftest import Mission
 

@@ -17,11 +17,12 @@ from planner_core.build import build_problem, compute_opportunities
 from planner_core.domain import Scenario
 from planner_core.problem import Problem
 from planner_core.referee.replay import plan_sha256, replay
+from service.answers.answered import Answered
+from service.answers.reading import READERS, Reading, UnreadableTimeline, plan_in
 from service.commands.bodies import FAILED, OK, WRONG_INPUT
 from service.commands.cli import main
 from service.exports import table
-from service.exports.answered import Answered
-from service.exports.reading import READERS, Reading, UnreadableTimeline, plan_in
+from service.scenarios.records import guarded, unguarded
 from service.scenarios.translate import canonical, scenario_from_content
 from tests.missions import Document, drawn_targets, paper_mission
 from tests.service.exports.conftest import FINISHED_AT, Mission
@@ -62,7 +63,7 @@ def test_the_table_has_one_row_for_each_action(answered: Answered) -> None:
     assert text.count("\r\n") == text.count("\n") == 1 + len(list(answered.each_action()))
     for row, (satellite, action) in zip(rows_of(answered), answered.each_action(), strict=True):
         assert row["action_id"] == action["id"]
-        assert table.unguarded(row["satellite_id"]) == satellite["id"]
+        assert unguarded(row["satellite_id"]) == satellite["id"]
         for name in ("mode", "start", "end"):
             assert row[name] == action[name]
         for name in ("off_nadir_deg", "reward", "battery_fraction_end"):
@@ -82,10 +83,10 @@ def test_no_cell_is_a_formula(answered: Answered) -> None:
 
 @given(st.text(alphabet="'=+-@\t\rA1", max_size=6))
 def test_every_text_comes_back_from_behind_its_apostrophe(text: str) -> None:
-    guarded = table.guarded(text)
-    assert guarded is not None
-    assert table.unguarded(guarded) == text
-    assert guarded[:1] not in tuple("=+-@\t\r")
+    cell = guarded(text)
+    assert cell is not None
+    assert unguarded(cell) == text
+    assert cell[:1] not in tuple("=+-@\t\r")
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".json"])

@@ -5,8 +5,8 @@ from __future__ import annotations
 import httpx
 import pytest
 
+from service.answers.answered import Answered
 from service.api.accept import preferred
-from service.exports.answered import Answered
 from service.exports.forms import FORMS, Form
 from tests.service.exports.conftest import Mission
 from tests.service.problems import assert_problem

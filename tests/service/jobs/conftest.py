@@ -6,7 +6,6 @@ import os
 import shutil
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,22 +15,22 @@ import httpx
 import pytest
 import sqlalchemy as sa
 
+from service.answers import store as answer_store
 from service.db.clock import utc_now
+from service.db.ids import new_id
 from service.db.migrate import upgrade
 from service.db.rows import JobRow, ScenarioRow, WorkerRow
 from service.db.session import Database
-from service.ids import new_id
 from service.jobs.queue import DbosQueue, migrate_queue
 from service.jobs.supervisor import environment_of
 from service.main import create_app
 from service.settings import Settings
-from service.stores import answer_store
 from tests.missions import Document
+from tests.patience import wait_until
 from tests.service.conftest import checked_client, serve
 from tests.service.jobs.mission import Mission, running, small_mission
 from tests.service.jobs.work import WORK
 
-PATIENCE_S = 60.0
 SUMMARY = {
     "horizon": {"start": "2026-03-01T00:00:00Z", "end": "2026-03-02T00:00:00Z"},
     **dict.fromkeys(("satellite_ids", "target_catalog_ids", "ground_station_ids"), ()),
@@ -68,7 +67,7 @@ class Jobs:
         """Queue a job and return its id."""
         job_id = job_id or new_id()
         values: dict[str, Any] = {
-            "params": {"log": str(self.folder / "starts.log")},
+            "params": {"log": str(self.folder / "starts.log"), "until": str(self.folder / "over")},
             "limits": {"time_s": 60.0, "memory_mb": 2048},
             "priority": 5,
         } | changes
@@ -103,6 +102,10 @@ class Jobs:
         targets = "".join(text for _, text in texts)
         return None if timeline is None else (timeline, f"[{targets}]")
 
+    def end_searches(self) -> None:
+        """Let searches that run, and that are begun from now on, come to their own end."""
+        (self.folder / "over").touch()
+
     def starts(self) -> list[str]:
         """Return a line for each time a solver began: job, solver, process."""
         log = self.folder / "starts.log"
@@ -114,11 +117,8 @@ class Jobs:
             return list(session.scalars(sa.select(WorkerRow.id)))
 
     def until(self, condition: Callable[[], bool]) -> None:
-        """Wait for a condition, generously."""
-        deadline_s = time.monotonic() + PATIENCE_S
-        while not condition():
-            assert time.monotonic() < deadline_s, "it never happened"
-            time.sleep(0.02)
+        """Wait for a condition."""
+        wait_until(condition)
 
     def until_state(self, job_id: str, *states: str) -> JobRow:
         """Wait until a job is in one of these states."""
@@ -208,7 +208,7 @@ def jobs(template_url: str, tmp_path: Path) -> Iterator[Jobs]:
 def client(jobs: Jobs) -> Iterator[httpx.Client]:
     """A client of a server that sends jobs to the queue, with nobody to run them."""
     app = create_app(jobs.settings, jobs.queue)
-    with serve(app) as address, checked_client(app, address) as client:
+    with serve(app) as address, checked_client(address) as client:
         yield client
 
 
@@ -222,14 +222,14 @@ def workers(jobs: Jobs) -> Iterator[Workers]:
         process.wait()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def mission(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Mission]:
-    """A whole service with a worker, for all tests."""
+    """A whole service with a worker, for all tests of these folders."""
     with running(tmp_path_factory.mktemp("mission")) as mission:
         yield mission
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def planned(mission: Mission) -> Document:
     """A job that has planned the small mission; nobody changes it."""
     return mission.plan(small_mission())

@@ -13,10 +13,10 @@ from urllib.parse import quote
 import httpx
 
 from tests.missions import Document, drawn_targets, paper_mission
+from tests.patience import PATIENCE_S
 from tests.service.contract import Contract
 from tests.service.serving import serving
 
-WITHIN_S = 120.0
 HALF_A_DAY = {"start": "2019-01-01T00:00:00Z", "end": "2019-01-01T12:00:00Z"}
 ODD = "50% of a/b c?é#1"
 HIDDEN = "hidden/one"
@@ -44,7 +44,7 @@ class Mission:
     def ended(self, accepted: httpx.Response, state: str = "succeeded") -> Document:
         """Return the job that was accepted, at its end."""
         assert accepted.status_code == 202, accepted.text
-        deadline_s = time.monotonic() + WITHIN_S
+        deadline_s = time.monotonic() + PATIENCE_S
         while True:
             job: Document = self.http.get(accepted.headers["location"], params={"wait": 5}).json()
             if job["finished_at"] is not None:

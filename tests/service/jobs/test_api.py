@@ -13,13 +13,13 @@ import pytest
 import sqlalchemy as sa
 
 from planner_core.solvers.registry import SOLVERS
-from service.blocks import blocks_of_timeline, proof_blocks, target_blocks
+from service.answers.blocks import blocks_of_timeline, proof_blocks, target_blocks
 from service.db.rows import JobRow
 from service.jobs import lease
 from service.jobs.lease import Lease, Outcome
 from service.jobs.queue import DbosQueue
+from service.jobs.solver_params import params_of
 from service.main import create_app
-from service.solver_params import params_of
 from tests.service.conftest import checked_client, serve
 from tests.service.jobs.conftest import Jobs, Workers
 from tests.service.jobs.work import EMPTY
@@ -191,7 +191,7 @@ def test_the_service_is_not_ready_without_its_queue(jobs: Jobs, workers: Workers
     elsewhere = DbosQueue(f"sqlite:///{jobs.folder / 'unmigrated.db'}")
     for queue, status in ((jobs.queue, 200), (elsewhere, 503)):
         app = create_app(jobs.settings, queue)
-        with serve(app) as address, checked_client(app, address) as client:
+        with serve(app) as address, checked_client(address) as client:
             assert client.get("/health/ready").status_code == status
     elsewhere.close()
 

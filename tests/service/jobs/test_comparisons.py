@@ -7,8 +7,8 @@ from typing import Any
 import httpx
 import pytest
 
-from service.blocks import blocks_of_timeline
-from service.documents import figures_of
+from service.answers.blocks import blocks_of_timeline
+from service.answers.rendering import figures_of
 from service.jobs.lease import Outcome
 from service.main import create_app
 from tests.service.conftest import serve

@@ -18,6 +18,7 @@ from service.db.postgresql import make_postgresql_engine
 from service.jobs import lease
 from service.jobs.queue import DbosQueue
 from service.main import create_app
+from tests.patience import PATIENCE_S
 from tests.service.conftest import serve
 from tests.service.jobs.conftest import Jobs, Workers
 from tests.service.jobs.proxy import FreezingProxy
@@ -172,10 +173,8 @@ def test_polls_outlive_their_connections(client: httpx.Client, jobs: Jobs) -> No
 
 
 def test_a_worker_cut_off_from_a_hanging_server_loses_its_job_and_goes_on(
-    proxy: FreezingProxy, jobs: Jobs, monkeypatch: pytest.MonkeyPatch
+    proxy: FreezingProxy, jobs: Jobs
 ) -> None:
-    # The queue's library waits longer and longer before it tries again, up to a minute.
-    monkeypatch.setattr("tests.service.jobs.conftest.PATIENCE_S", 180.0)
     cut_off, others = Workers(through(proxy, jobs)), Workers(jobs)
     try:
         worker = cut_off.start()
@@ -197,7 +196,7 @@ def test_a_worker_cut_off_from_a_hanging_server_loses_its_job_and_goes_on(
         assert json.loads(result[0])["run"] == 2
         # It claims jobs again, once its queue has found the server.
         others.processes[0].terminate()
-        assert others.processes[0].wait(30) == 0
+        assert others.processes[0].wait(PATIENCE_S) == 0
         assert jobs.until_state(jobs.submit("answer"), "succeeded").run == 1
     finally:
         for process in (*cut_off.processes, *others.processes):
@@ -216,7 +215,7 @@ def test_limits_hold_and_a_worker_ends_while_the_server_hangs(
         proxy.freeze()
         jobs.until(lambda: not psutil.pid_exists(solver))
         worker.terminate()
-        assert worker.wait(60) == 0
+        assert worker.wait(PATIENCE_S) == 0
     finally:
         for process in workers.processes:
             process.kill()

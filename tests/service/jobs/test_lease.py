@@ -8,10 +8,10 @@ import pytest
 import sqlalchemy as sa
 from sqlalchemy.exc import IntegrityError
 
-from service.blocks import blocks_of_timeline
+from service.answers.blocks import blocks_of_timeline
 from service.db.clock import utc_now
+from service.db.ids import new_id
 from service.db.rows import JobResultRow, JobRow
-from service.ids import new_id
 from service.jobs import lease
 from service.jobs.lease import Lease, Outcome
 from tests.service.jobs.conftest import Jobs

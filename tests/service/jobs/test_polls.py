@@ -104,7 +104,7 @@ def test_polls_are_refused_as_by_the_routes_while_the_database_is_away(jobs: Job
     at_hand = app.state.database
     # Where a folder stands no file can be opened.
     away = Database(f"sqlite:///{jobs.folder}")
-    with serve(app) as address, checked_client(app, address) as client:
+    with serve(app) as address, checked_client(address) as client:
         path = f"/v1/jobs/{posted(client, jobs)}"
         known = {"If-None-Match": client.get(path).headers["etag"]}
         app.state.database = away

@@ -17,10 +17,10 @@ from service.db.backup import back_up
 from service.db.rows import JobRow
 from service.db.session import Database
 from service.jobs import lease
-from service.jobs.lease import FINAL
 from service.jobs.queue import DbosQueue
 from service.jobs.supervisor import Supervisor
 from service.server import prepare_database
+from service.wire.jobs import FINAL
 from tests.service.jobs.chaos import ledger
 from tests.service.jobs.conftest import SERVER_URL, Jobs, create_database
 from tests.service.jobs.work import WORK

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import threading
 
-from service.stores import bound_store, scenario_store
-from service.stores.scenario_store import FrozenScenario
+from service.scenarios import freezing as scenario_store
+from service.scenarios.freezing import FrozenScenario
+from service.stores import bound_store
 from tests.service.jobs.conftest import Jobs
 
 

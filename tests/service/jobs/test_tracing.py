@@ -22,9 +22,9 @@ from opentelemetry.sdk.trace.export.in_memory_span_exporter import InMemorySpanE
 
 from service.jobs.supervisor import Supervisor
 from service.jobs.worker import Worker
-from service.logs import JsonFormatter
+from service.process.logs import JsonFormatter
+from service.process.tracing import CannotTrace, is_asked_for, start_tracing
 from service.settings import Settings
-from service.tracing import CannotTrace, is_asked_for, start_tracing
 from tests.service.jobs.conftest import Jobs
 from tests.service.jobs.test_api import posted
 from tests.service.jobs.work import WORK
@@ -189,7 +189,7 @@ def test_nothing_is_loaded_where_nobody_asks() -> None:
     script = (
         "import sys, service.main, service.jobs.worker as w\n"
         "from service.settings import Settings\n"
-        "from service.tracing import start_tracing\n"
+        "from service.process.tracing import start_tracing\n"
         "assert start_tracing(Settings(), 'api') is None\n"
         "print(*sys.modules)"
     )

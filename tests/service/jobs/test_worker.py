@@ -16,6 +16,7 @@ import sqlalchemy as sa
 from service.db.rows import OpportunitySetRow
 from service.jobs import lease
 from service.jobs.supervisor import Supervisor
+from tests.patience import PATIENCE_S
 from tests.service.jobs.conftest import Jobs, Workers
 from tests.service.jobs.work import WORK
 
@@ -51,10 +52,12 @@ def test_a_job_survives_its_worker_and_finishes_once(jobs: Jobs) -> None:
     supervisor = Supervisor(jobs.settings, work=WORK)
     supervisor.start()
     try:
-        job_id = jobs.submit("search", limits={"time_s": 1.0, "memory_mb": 2048})
+        job_id = jobs.submit("search")
         orphan = solver_pid(jobs, job_id)
         (first,) = supervisor.pids()
         os.kill(first, signal.SIGKILL)
+        jobs.until(lambda: len(jobs.starts()) == 2)
+        jobs.end_searches()
         job = jobs.until_state(job_id, "succeeded", "failed", "cancelled")
         assert (job.state, job.dispatch, job.run, job.lost_runs) == ("succeeded", 2, 2, 1)
         assert jobs.result(job_id) is not None
@@ -86,14 +89,15 @@ def test_workers_take_over_from_a_frozen_and_from_a_stopped_one(
     job = jobs.until_state(job_id, "succeeded", "failed", "cancelled")
     assert (job.state, job.dispatch, job.termination) == ("cancelled", 2, "cancelled")
 
-    handed_back = jobs.submit("search", limits={"time_s": 3.0, "memory_mb": 2048})
+    handed_back = jobs.submit("search")
     solver = solver_pid(jobs, handed_back)
     owner.terminate()
-    assert owner.wait(30) == 0
+    assert owner.wait(PATIENCE_S) == 0
     assert not psutil.pid_exists(solver)
     waiting = jobs.job(handed_back)
     assert (waiting.state, waiting.dispatch, waiting.lost_runs) == ("queued", 2, 0)
 
+    jobs.end_searches()
     frozen.send_signal(signal.SIGCONT)
     assert jobs.until_state(handed_back, "succeeded", "failed").state == "succeeded"
     unchanged = jobs.job(job_id)
@@ -139,7 +143,7 @@ def test_one_worker_serves_cancels_and_failures_by_priority(jobs: Jobs, workers:
     assert jobs.job(low).run == 1
 
     worker.terminate()
-    assert worker.wait(30) == 0
+    assert worker.wait(PATIENCE_S) == 0
     assert jobs.workers() == []
 
 
@@ -186,4 +190,4 @@ def test_a_worker_ends_however_many_signals_come(jobs: Jobs, workers: Workers) -
         process = workers.start()
         for _ in range(300):
             process.send_signal(signal.SIGTERM)
-        assert process.wait(30) == 0
+        assert process.wait(PATIENCE_S) == 0

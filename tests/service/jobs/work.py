@@ -11,7 +11,7 @@ import psutil
 
 from planner_core.budget import Budget, Progress
 from planner_core.errors import Cancelled, InvalidScenario
-from service.blocks import blocks_of_timeline, target_blocks
+from service.answers.blocks import blocks_of_timeline, target_blocks
 from service.jobs.plan_job import PlanAnswer, PlanRequest
 from service.jobs.runner import Work
 
@@ -85,13 +85,14 @@ def run(request: PlanRequest, budget: Budget) -> PlanAnswer:
 
 
 def search(request: PlanRequest, budget: Budget) -> PlanAnswer:
-    """Get better and better until the budget is spent."""
+    """Get better and better until the budget is spent, or the file is there that params name."""
     steps = 0
-    while not budget.is_spent():
+    until = Path(request.params.get("until", "/nonexistent"))
+    while not (budget.is_spent() or until.exists()):
         steps += 1
         budget.report(Progress(phase="solve", fraction=0.5, reward=float(steps)))
         time.sleep(0.01)
-    return answer(request, budget.termination().value)
+    return answer(request, budget.ending(is_optimal=False, is_close=False).value)
 
 
 def answer(request: PlanRequest, termination: str) -> PlanAnswer:

@@ -16,6 +16,7 @@ from service.jobs import lease
 from service.jobs.lease import Outcome
 from service.jobs.reconcile import Reconciler
 from service.webhooks import outbox
+from tests.patience import PATIENCE_S
 from tests.service.jobs.conftest import Jobs, Workers
 from tests.service.webhooks.conftest import Post, StartCourier
 
@@ -273,7 +274,7 @@ def test_workers_are_couriers(post: Post) -> None:
         post.until_ended()
     finally:
         worker.terminate()
-        assert worker.wait(30) == 0
+        assert worker.wait(PATIENCE_S) == 0
     (one,) = post.receiver.received
     assert one.is_signed_with(webhook["secret"])
     assert one.event["data"]["job_id"] == job_id

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import sqlalchemy as sa
 
-from service.blocks import head_in
+from service.answers.blocks import head_in
 from service.db.rows import JobBlockRow, JobRow
-from service.jobs.lease import FINAL
+from service.wire.jobs import FINAL
 from tests.service.jobs.conftest import Jobs
 
 _ENDINGS = sa.table("ending", sa.column("job_id"))

@@ -10,7 +10,7 @@ from functools import partial
 from sqlalchemy.exc import IntegrityError, SQLAlchemyError
 
 from service.db.failures import why_unavailable
-from service.ids import new_id
+from service.db.ids import new_id
 from tests.service.jobs.chaos.api import Api
 from tests.service.jobs.conftest import Jobs
 

@@ -1,0 +1,131 @@
+"""The ablation's rows as a page: what each strategy is worth, and what constants do."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from benchmarks.ablation.constants import FACTORS
+from benchmarks.ablation.strategies import NOTHING
+from benchmarks.ablation.trials import Trial
+from benchmarks.suite.compare import Line, line_of
+from benchmarks.suite.engine import LEVELS
+
+POINTS: Final = 0.2  # of gap
+RATIO: Final = 1.1  # of time
+LABELS: Final = tuple(f" {label}" for label in FACTORS)
+"""How changes of constants end."""
+
+_HEAD: Final = """\
+# What the engine's parts are worth
+
+`python -m benchmarks.ablation` plans cases of the suite with one thing changed: a strategy left
+out, or a constant halved or doubled (of a share above one half, the rest to 1). Its rows are in
+[ablation.csv](ablation.csv); this page is made of them. Draws, seeds and CPU seconds are those of
+the solver as it is, beside which each change stands.
+
+A strategy earns its place where, without it, the gap grows by more than 0.2 percentage points on
+some family, or the time to some gap by more than 10 %. One image is 0.1 to 0.3 points, and the
+last image a matter of luck: the time to 0 % differs by a factor of two from seed to seed, so a
+verdict on that column alone takes more than two draws. What was not missed is gone from the
+engine since; its rows stay, with the revision that still had it.
+"""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """A change on one family, beside the solver as it is."""
+
+    change: str
+    line: Line
+
+    @property
+    def is_worse(self) -> bool:
+        """Whether what was changed is missed."""
+        slower = (ratio is not None and ratio > RATIO for ratio in self.line.ratios)
+        return self.line.points > POINTS or any(slower) or self.line.failures > 0
+
+    @property
+    def time(self) -> float:
+        """The ratio of times over all gaps that were reached."""
+        known = [math.log(ratio) for ratio in self.line.ratios if ratio is not None]
+        return math.exp(sum(known) / len(known)) if known else math.nan
+
+
+def findings(trials: Iterable[Trial]) -> list[Finding]:
+    """Return what each change has done to each family, in the order of the rows."""
+    by_change: dict[str, list[Trial]] = {}
+    for trial in trials:
+        by_change.setdefault(trial.change, []).append(trial)
+    plain = {trial.case: trial for trial in by_change.pop(NOTHING, [])}
+    found = []
+    for change, rows in by_change.items():
+        pairs = [(plain[row.case], row) for row in rows if row.case in plain]
+        for family in dict.fromkeys(row.family for _, row in pairs):
+            own = [pair for pair in pairs if pair[1].family == family]
+            found.append(Finding(change=change, line=line_of(own)))
+    return found
+
+
+def page(trials: Sequence[Trial]) -> str:
+    """Return the page as Markdown."""
+    found = findings(trials)
+    about_constants = [finding for finding in found if finding.change.endswith(LABELS)]
+    about_strategies = [finding for finding in found if finding not in about_constants]
+    revisions = ", ".join(dict.fromkeys(trial.revision for trial in trials))
+    parts = [
+        _HEAD,
+        f"Revisions: {revisions}.\n",
+        "## Strategies\n",
+        strategy_table(about_strategies),
+    ]
+    if about_constants:
+        parts += ["## Constants\n", constant_table(about_constants)]
+    return "\n".join(parts)
+
+
+def strategy_table(found: Sequence[Finding]) -> str:
+    """Return a line for each strategy and family: what it is like without."""
+    levels = [f"time to {100.0 * level:g} %" for level in LEVELS]
+    head = ["without", "family", "cases", "gap %", "then", "points", *levels, "missed"]
+    rows = []
+    for finding in found:
+        line = finding.line
+        gaps = [f"{line.gap_before:.2f}", f"{line.gap_after:.2f}", f"{line.points:+.2f}"]
+        times = ["-" if ratio is None else f"x {ratio:.2f}" for ratio in line.ratios]
+        missed = "**yes**" if finding.is_worse else "no"
+        rows.append([finding.change, line.family, str(line.num_cases), *gaps, *times, missed])
+    return _table(head, rows)
+
+
+def constant_table(found: Sequence[Finding]) -> str:
+    """Return a line for each constant and family: what half and double of it do."""
+    pairs: dict[tuple[str, str], dict[str, Finding]] = {}
+    for finding in found:
+        constant, _, label = finding.change.rpartition(" ")
+        pairs.setdefault((constant, finding.line.family), {})[label] = finding
+    head = ["constant", "family", "half: points", "time", "double: points", "time", "matters"]
+    rows = [
+        [f"`{constant}`", family, *_cells(of.get("half")), *_cells(of.get("double")), _matters(of)]
+        for (constant, family), of in pairs.items()
+    ]
+    return _table(head, rows)
+
+
+def _cells(finding: Finding | None) -> list[str]:
+    if finding is None:
+        return ["", ""]
+    if finding.line.failures:
+        return ["fails", ""]
+    return [f"{finding.line.points:+.2f}", f"x {finding.time:.2f}"]
+
+
+def _matters(of: Mapping[str, Finding]) -> str:
+    return "**yes**" if any(finding.is_worse for finding in of.values()) else "no"
+
+
+def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"

@@ -1,0 +1,146 @@
+"""The strategies of ``certified`` and how each is switched off, by name.
+
+Everything that a change of the engine may rename stands in ``STRATEGIES``. Bounds stay valid in
+all variants: strategies are only left out, or begun at another time.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import reduce
+from typing import Any, Final
+
+DRIVERS: Final = "planner_core.certified.drivers"
+NOTHING: Final = ""
+"""The change that changes nothing."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Patch:
+    """A name in a module, with dots for members of a class, and what takes its place there."""
+
+    module: str
+    name: str
+    value: Any
+
+    @property
+    def place(self) -> tuple[Any, str]:
+        """The module or class, and the name in it.
+
+        Raises
+        ------
+        AttributeError
+            Where there is no such name: a patch that misses would measure nothing.
+        """
+        *owners, last = self.name.split(".")
+        owner = reduce(getattr, owners, importlib.import_module(self.module))
+        if not hasattr(owner, last):
+            raise AttributeError(f"{self.module} has no {self.name}")
+        return owner, last
+
+    def apply(self) -> None:
+        """Put it there, for the rest of this process."""
+        owner, last = self.place
+        setattr(owner, last, self.value)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Change:
+    """What is patched, and on which families of the suite that may show.
+
+    Attributes
+    ----------
+    families
+        Names of families and the CPU seconds of a run.
+    num_draws
+        How many missions of each family are planned, each with a seed of its own.
+    """
+
+    patches: tuple[Patch, ...]
+    families: Mapping[str, float]
+    num_draws: int = 2
+
+
+def _nothing(*_: object, **__: object) -> None:
+    """Do nothing, whatever is asked for."""
+
+
+class _Idle:
+    """Takes the turns of another search without doing anything."""
+
+    steps_beside = 6
+
+    def __init__(self, *_: object) -> None:
+        pass
+
+    def turn(self) -> None:
+        """Do nothing."""
+
+
+def _calm_windows(*args: Any) -> Any:
+    """Return the window search of a fleet without urgency, its last argument."""
+    from planner_core.certified.lns.search import WindowSearch
+
+    return WindowSearch(*args[:4])
+
+
+def _in_turns(search: Any, choices: Any, num_moves: int) -> None:
+    """Let windows and choices take turns on one satellite, where choices moved alone."""
+    from planner_core.certified.lns.alternating import TurnSearch
+
+    turns = search.__dict__.get("turns")
+    if turns is None:
+        unit = search.unit or max(search.bound.value / 2000.0, 1e-12)
+        turns = search.turns = TurnSearch(
+            search.problem, search.plan, unit, search.budget, search.seed
+        )
+    for _ in range(num_moves):
+        if search.is_done:
+            return
+        turns.turn(1)
+        search.offer(turns.plan)
+    choices.adopt(search.plan)
+    search.report("plans")
+
+
+def _off(module: str, name: str, value: Callable[..., Any] = _nothing) -> tuple[Patch, ...]:
+    return (Patch(module=module, name=name, value=value),)
+
+
+def _set(module: str, name: str, value: object) -> tuple[Patch, ...]:
+    return (Patch(module=module, name=name, value=value),)
+
+
+_RESOURCES: Final = {
+    "paper-200": 10.0, "paper-500": 15.0, "weights-1000": 15.0, "paper-1000": 12.0,
+}  # fmt: skip
+_FLEET: Final = {"fleet-4x2000": 12.0, "fleet-2x500": 10.0}
+_STATIONS: Final = {"fleet-stations-4x2000": 60.0}
+
+STRATEGIES: Final[Mapping[str, Change]] = {
+    "shaking": Change(patches=_set(f"{DRIVERS}.fleet", "_PATIENCE", math.inf), families=_FLEET),
+    "urgency": Change(
+        patches=_off(f"{DRIVERS}.fleet", "WindowSearch", _calm_windows), families=_FLEET
+    ),
+    "cuts after a fleet": Change(patches=_off(f"{DRIVERS}.fleet", "close_in"), families=_FLEET),
+    "refinement": Change(
+        patches=_off(f"{DRIVERS}.resources", "ResourceSearch.refine"), families=_RESOURCES
+    ),
+    "exhaust": Change(
+        patches=_off(f"{DRIVERS}.resources", "ResourceSearch.exhaust"), families=_RESOURCES
+    ),
+    "choice moves": Change(
+        patches=_off(f"{DRIVERS}.resources", "ResourceSearch.search"), families=_RESOURCES
+    ),
+    "choice moves alone, not in turns with windows": Change(
+        patches=_off(f"{DRIVERS}.resources", "ResourceSearch.search", _in_turns),
+        families=_RESOURCES,
+    ),
+    "program search": Change(
+        patches=_off(f"{DRIVERS}.resources", "ProgramSearch", _Idle), families=_STATIONS
+    ),
+}
+"""What is left out, or, where the name says so, done in another way."""

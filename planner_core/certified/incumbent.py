@@ -1,0 +1,164 @@
+"""The best plan so far, the lowest bound, and how far they are apart."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from planner_core.budget import Budget, Progress
+from planner_core.certified.proofs.bound import (
+    Bound,
+    accessible,
+    reward_unit,
+    rounded_bound,
+)
+from planner_core.problem import Problem
+from planner_core.problem.plan import Plan
+from planner_core.referee.replay import replay
+from planner_core.solvers.base import Solution
+
+TOLERANCE: Final = 1e-6
+"""Share of the reward to which a plan is optimal where rewards are not whole."""
+
+_LEAST: Final = 4e-9  # rounding of a bound, where nearly nothing can be earned
+
+
+def is_optimal(reward: float, bound: float, unit: float) -> bool:
+    """Return whether no plan earns more than ``reward``, to the stated tolerance.
+
+    Parameters
+    ----------
+    bound
+        What no plan exceeds.
+    unit
+        An amount of which what any plan earns is a multiple; 0 where there is none.
+    """
+    return bound < reward + max(unit, TOLERANCE * reward, _LEAST)
+
+
+class Incumbent:
+    """The plan and the bound of one search.
+
+    Parameters
+    ----------
+    gap
+        The share of the bound within which a plan is close enough.
+    plan, bound
+        What is known at first; by default what must be taken, and what all targets are worth.
+    covers_starts
+        Whether bounds hold for plans with continuous starts too, where the problem has such.
+
+    Attributes
+    ----------
+    plan, is_valid, reward
+        The best plan, and what the referee says of it.
+    bound
+        The lowest bound that is proven.
+    unit
+        An amount of which what any plan earns is a multiple; 0 where there is none.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        budget: Budget,
+        gap: float,
+        plan: Plan | None = None,
+        bound: Bound | None = None,
+        *,
+        covers_starts: bool = False,
+    ) -> None:
+        self.problem, self.budget, self.gap = problem, budget, gap
+        self.unit = reward_unit(problem)
+        self.plan = (plan or Plan()).with_kept(problem)
+        timeline = replay(problem, self.plan)
+        self.is_valid, self.reward = timeline.is_valid, timeline.reward
+        self.bound = bound or accessible(problem)
+        self._is_proof = covers_starts or not problem.continuous_starts
+
+    @property
+    def is_optimal(self) -> bool:
+        """Whether no plan is better, to the stated tolerance."""
+        return self.is_within(0.0)
+
+    @property
+    def is_close(self) -> bool:
+        """Whether plan and bound are as close as was asked for."""
+        return self.is_within(self.gap)
+
+    @property
+    def is_done(self) -> bool:
+        """Whether plan and bound are close enough, or the budget is spent."""
+        return self.is_close or self.budget.is_spent()
+
+    @property
+    def better(self) -> float:
+        """What a plan must be worth that is better than the one at hand.
+
+        Refuting it must suffice for "optimal", so it stays well within the tolerance.
+        """
+        return self.reward + max(self.unit, 0.5 * TOLERANCE * self.reward, 1e-9)
+
+    def is_within(self, gap: float, reward: float = 0.0) -> bool:
+        """Return whether the plan, or one worth ``reward``, is as close to the bound."""
+        reward, bound = max(self.reward, reward), self.bound.value
+        return is_optimal(reward, bound, self.unit) or reward >= (1.0 - gap) * bound
+
+    def offer(self, plan: Plan) -> bool:
+        """Take a plan if it is better; return whether it is.
+
+        What must be taken is taken as well. A valid plan is better than any other.
+        """
+        plan = plan.with_kept(self.problem)
+        timeline = replay(self.problem, plan)
+        if (timeline.is_valid, timeline.reward) <= (self.is_valid, self.reward):
+            return False
+        self.plan, self.is_valid, self.reward = plan, timeline.is_valid, timeline.reward
+        return True
+
+    def lower(self, bound: Bound) -> bool:
+        """Note what no plan exceeds; return whether that is less than what was known."""
+        value = rounded_bound(self.problem, bound.value, self.reward)
+        if value >= self.bound.value:
+            return False
+        self.bound = replace(bound, value=value)
+        return True
+
+    def report(self, message: str, reward: float = 0.0) -> None:
+        """Tell how far plan and bound are apart; a search may know of a better plan."""
+        reward = max(self.reward, reward)
+        bound = max(self.bound.value, reward)
+        is_known = np.isfinite(bound)
+        self.budget.report(
+            Progress(
+                phase="solve",
+                fraction=reward / bound if is_known and bound > 0.0 else float(is_known),
+                reward=reward,
+                bound=bound if is_known else None,
+                message=message,
+            )
+        )
+
+    def solution(self, bound: Bound | None = None) -> Solution:
+        """Return the plan with what is known of it.
+
+        Parameters
+        ----------
+        bound
+            The same bound with all that proves it, where that is gathered at the end.
+        """
+        if not self._is_proof:
+            # Another start may suit the next task better: nothing here bounds that.
+            ended = self.budget.ending(is_optimal=False, is_close=False)
+            return Solution(plan=self.plan, termination=ended)
+        proven = bound or self.bound
+        termination = self.budget.ending(
+            is_optimal=self.is_valid and self.is_optimal, is_close=self.is_valid and self.is_close
+        )
+        return Solution(
+            plan=self.plan,
+            termination=termination,
+            proven=proven if np.isfinite(proven.value) else None,
+        )

@@ -1,0 +1,161 @@
+"""Which task of one satellite may follow which: C(a, b) of eq. 4, asked of geometry.
+
+A pair costs two loads of a line of sight and one look into a small table of slews. So there is
+no table of pairs, which would grow with the square of how many targets are in view; whoever asks
+for each pair many times makes itself one (``planner_core.precedence.pairs``).
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from planner_core.bundles import bundle
+from planner_core.domain import Agility
+from planner_core.jit import borrowing, kernel
+from planner_core.problem.slew import (
+    INSTANT,
+    TIME_TOLERANCE_S,
+    angle_between_deg,
+    reach_deg,
+    slew_s,
+)
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int32]
+Vector = tuple[float, float, float]
+
+CLEARLY: Final = 1e-7
+"""In the cosine of an angle: rounding is far smaller."""
+
+_NUM_ROOMS: Final = 4096
+"""Entries of a table of slews: 32 kB stay in the first cache, and one pair in a thousand or so
+lies between two entries and is worked out."""
+
+
+class Slews(NamedTuple):
+    """How far a satellite turns in some time.
+
+    Attributes
+    ----------
+    longest_s
+        A turn through 180 degrees, without settling.
+    per_s
+        Entries of ``least_cosine`` for each second.
+    least_cosine
+        Cosine of the angle that the satellite turns through in 0, 1 / ``per_s``, ... seconds.
+        Several satellites' tables may lie in one array.
+    first
+        Where this one begins there.
+    """
+
+    rate_deg_s: float
+    acceleration_deg_s2: float
+    settle_s: float
+    longest_s: float
+    per_s: float
+    least_cosine: Floats
+    first: int
+
+
+@bundle
+class Transitions(NamedTuple):
+    """Tasks of one satellite in order of start, and how it turns from one to the next.
+
+    Attributes
+    ----------
+    start_s, end_s
+        Shape ``(m,)``.
+    looks, looked
+        Lines of sight at start and at end, unit vectors. Shape ``(m, 3)``, C order.
+    """
+
+    start_s: Floats
+    end_s: Floats
+    looks: Floats
+    looked: Floats
+    slews: Slews
+
+    def allows(self, a: int, b: int) -> bool:
+        """Return whether local row ``b`` may follow local row ``a`` directly."""
+        return bool(may_follow(self, a, b))
+
+
+@lru_cache(maxsize=64)
+def slews_of(agility: Agility) -> Slews:
+    """Return how a satellite turns."""
+    acceleration = agility.acceleration_deg_s2 or INSTANT
+    longest_s = float(slew_s(180.0, agility.slew_rate_deg_s, acceleration))
+    per_s = (_NUM_ROOMS - 2) / max(longest_s, 1e-3)
+    return Slews(
+        rate_deg_s=float(agility.slew_rate_deg_s),
+        acceleration_deg_s2=float(acceleration),
+        settle_s=float(agility.settle_s),
+        longest_s=longest_s,
+        per_s=per_s,
+        least_cosine=_least_cosines(agility.slew_rate_deg_s, acceleration, per_s),
+        first=0,
+    )
+
+
+@kernel
+def _least_cosines(rate_deg_s: float, acceleration_deg_s2: float, per_s: float) -> Floats:
+    cosines = np.empty(_NUM_ROOMS)
+    for k in range(_NUM_ROOMS):
+        angle_deg = reach_deg(k / per_s, rate_deg_s, acceleration_deg_s2)
+        cosines[k] = math.cos(math.radians(angle_deg))
+    return cosines
+
+
+@borrowing
+def turns_within(slews: Slews, room_s: float, looked: Vector, looks: Vector) -> bool:
+    """Return whether the satellite turns from one line of sight to another in some time.
+
+    Settling is not part of the time; ``TIME_TOLERANCE_S`` is.
+    """
+    if room_s < 0.0:
+        return False
+    if room_s >= slews.longest_s + TIME_TOLERANCE_S:
+        return True
+    at = slews.first + int(room_s * slews.per_s)
+    # Most pairs are far from the limit, and cosines are cheaper than angles.
+    cosine = looked[0] * looks[0] + looked[1] * looks[1] + looked[2] * looks[2]
+    if cosine >= slews.least_cosine[at] + CLEARLY:
+        return True
+    if cosine < slews.least_cosine[at + 1] - CLEARLY:
+        return False
+    angle_deg = angle_between_deg(looked, looks)
+    return slew_s(angle_deg, slews.rate_deg_s, slews.acceleration_deg_s2) <= room_s
+
+
+@borrowing
+def may_follow(transitions: Transitions, a: int, b: int) -> bool:
+    """Return whether local row ``b`` may follow ``a``; ``a`` of -1 is "no task yet"."""
+    if a < 0:
+        return True
+    # A task of no length would come before its own end: it never follows itself.
+    if b <= a:
+        return False
+    slews, looks, looked = transitions.slews, transitions.looks, transitions.looked
+    return turns_within(
+        slews,
+        transitions.start_s[b] - transitions.end_s[a] - slews.settle_s + TIME_TOLERANCE_S,
+        (looked[a, 0], looked[a, 1], looked[a, 2]),
+        (looks[b, 0], looks[b, 1], looks[b, 2]),
+    )
+
+
+def near_spans(transitions: Transitions) -> tuple[Ints, Ints]:
+    """Return for each task the first row that begins after it, and from where on all may follow.
+
+    Shape ``(m,)`` each; what lies between depends on where the satellite looks.
+    """
+    start_s, end_s, slews = transitions.start_s, transitions.end_s, transitions.slews
+    near_from = np.searchsorted(start_s, end_s - TIME_TOLERANCE_S)
+    near_from = np.maximum(near_from, np.arange(1, len(start_s) + 1))
+    far_from = np.searchsorted(start_s, end_s + (slews.longest_s + slews.settle_s))
+    return near_from.astype(np.int32), np.maximum(far_from, near_from).astype(np.int32)

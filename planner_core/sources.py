@@ -1,0 +1,36 @@
+"""Fingerprints of the core's own sources: what was stored by other code is made anew."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable
+from functools import cache
+from pathlib import Path
+from typing import Final
+
+PACKAGE: Final = Path(__file__).parent
+
+_WHAT_MAKES_OPPORTUNITIES: Final = ("build.py", "domain.py", "access", "data", "orbits", "problem")
+
+
+def fingerprint(package: Path, paths: Iterable[Path]) -> str:
+    """Return a hash of files and of where they lie in their package."""
+    digest = hashlib.sha256()
+    for path in sorted(paths):
+        digest.update(path.relative_to(package).as_posix().encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def opportunity_sources(package: Path = PACKAGE) -> tuple[Path, ...]:
+    """Return the files on which a scenario's opportunities and their stored form depend."""
+    found: list[Path] = []
+    for name in _WHAT_MAKES_OPPORTUNITIES:
+        path = package / name
+        found += [path] if path.is_file() else [*path.rglob("*.py"), *path.rglob("*.csv")]
+    return tuple(found)
+
+
+@cache
+def opportunity_version() -> str:
+    """Return what changes whenever opportunities or their stored form may have changed."""
+    return fingerprint(PACKAGE, opportunity_sources())

@@ -1,0 +1,140 @@
+"""What every export is made of: a finished job, read piece by piece as it is written."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from datetime import datetime
+
+from service.answers.blocks import (
+    Document,
+    Entry,
+    blocks_of_timeline,
+    contents_of,
+    head_in,
+    items_in,
+    satellite_in,
+    target_blocks,
+)
+from service.scenarios.stored_question import StoredQuestion
+
+__all__ = ["Answered", "Document", "compact", "in_chunks", "listed"]
+
+Texts = Callable[[Iterable[Entry]], Iterator[tuple[Entry, str]]]
+"""Yields blocks with their texts."""
+
+_CHUNK = 1 << 16
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Satellite:
+    """Id and name, and the blocks of its actions."""
+
+    about: Document
+    entries: list[Entry]
+
+
+class Answered:
+    """A finished job.
+
+    Parameters
+    ----------
+    contents
+        The table of contents of its answer.
+    texts
+        Reads blocks.
+    content
+        The frozen question: a canonical scenario file.
+
+    Attributes
+    ----------
+    head
+        The timeline document but for its satellites.
+    finished_at
+        When the answer was stored, in UTC.
+    """
+
+    def __init__(
+        self, contents: Iterable[Entry], texts: Texts, content: str, finished_at: datetime
+    ):
+        self._texts = texts
+        self.question = StoredQuestion(content)
+        self.finished_at = finished_at
+        known = list(contents)
+        self._targets = [entry for entry in known if entry.kind == "targets"]
+        self._satellites: list[_Satellite] = []
+        told = [entry for entry in known if entry.kind in ("head", "satellite")]
+        names = {entry.position: text for entry, text in texts(told)}
+        self.head = head_in(names[told[0].position])
+        for entry in known:
+            if entry.kind == "satellite":
+                about = satellite_in(names[entry.position])
+                self._satellites.append(_Satellite(about=about, entries=[]))
+            elif entry.kind == "actions":
+                self._satellites[-1].entries.append(entry)
+
+    @classmethod
+    def of(cls, timeline: str, targets: str, content: str, finished_at: datetime) -> Answered:
+        """Return what the texts of a job say; ``content`` is its scenario file."""
+        blocks = [
+            *blocks_of_timeline(json.loads(timeline)),
+            *target_blocks(json.loads(targets)),
+        ]
+
+        def texts(entries: Iterable[Entry]) -> Iterator[tuple[Entry, str]]:
+            return ((entry, blocks[entry.position].text) for entry in entries)
+
+        return cls(contents_of(blocks), texts, content, finished_at)
+
+    @property
+    def satellites(self) -> list[Document]:
+        """Return id and name of each satellite, as the timeline has them."""
+        return [satellite.about for satellite in self._satellites]
+
+    def actions_of(self, number: int) -> Iterator[Document]:
+        """Yield the actions of a satellite, which is named by its number."""
+        for _, text in self._texts(self._satellites[number].entries):
+            yield from items_in(text)
+
+    def each_action(self) -> Iterator[tuple[Document, Document]]:
+        """Yield each action behind its satellite."""
+        for number, satellite in enumerate(self._satellites):
+            for action in self.actions_of(number):
+                yield satellite.about, action
+
+    def each_target(self) -> Iterator[Document]:
+        """Yield every target with its outcome."""
+        for _, text in self._texts(self._targets):
+            yield from items_in(text)
+
+
+def compact(value: object) -> str:
+    """Return JSON without blanks."""
+    return json.dumps(value, separators=(",", ":"), allow_nan=False)
+
+
+def listed(items: Iterable[str]) -> Iterator[str]:
+    """Yield the items with a comma between them."""
+    separator = ""
+    for item in items:
+        yield separator + item
+        separator = ",\n"
+
+
+def in_chunks(parts: Iterable[str]) -> Iterator[str]:
+    """Join small parts of a text: each piece that is sent costs the same, whatever its size.
+
+    >>> list(in_chunks(["a", "b"]))
+    ['ab']
+    """
+    waiting: list[str] = []
+    size = 0
+    for part in parts:
+        waiting.append(part)
+        size += len(part)
+        if size >= _CHUNK:
+            yield "".join(waiting)
+            waiting, size = [], 0
+    if waiting:
+        yield "".join(waiting)

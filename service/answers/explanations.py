@@ -1,0 +1,108 @@
+"""One target explained at length, every opportunity, and what would give it one."""
+
+from __future__ import annotations
+
+from datetime import datetime
+
+import planner_core
+from planner_core.budget import Budget
+from planner_core.reasons.access_changes import OF_TARGETS, AccessChange, access_changes
+from planner_core.reasons.at_length import Attempt, explain_target
+from service.answers.rebuilt import Rebuilt, rebuild
+from service.answers.rendering import Wording
+from service.scenarios.background import Background
+from service.scenarios.opportunities import Described
+from service.wire.base import Json, read
+from service.wire.instants import instant_text
+from service.wire.timelines import AttemptOut, ExplanationOut, TimelineOut
+
+_KEPT = 200
+_KEPT_JOBS = 2
+
+
+class Explainer:
+    """Explains targets beside the requests; the jobs looked at last stay compiled."""
+
+    def __init__(self) -> None:
+        told = "The explanation is being worked out."
+        self._background = Background("explanations", kept=_KEPT, told=told)
+        # Only the thread of the background touches these.
+        self._jobs: dict[str, Rebuilt] = {}
+
+    def get(self, job_id: str, described: Described, timeline: str, target: int) -> ExplanationOut:
+        """Return what there is to say of a target; 503 ``still_computing`` where it takes long."""
+
+        def work(budget: Budget) -> ExplanationOut:
+            job = self._jobs.pop(job_id, None) or rebuild(
+                described, read(TimelineOut, timeline), budget
+            )
+            self._jobs[job_id] = job
+            for oldest in list(self._jobs)[:-_KEPT_JOBS]:
+                del self._jobs[oldest]
+            return _Words(job).explanation(target, budget)
+
+        return self._background.get(f"{job_id}/{target}", work)
+
+    def close(self) -> None:
+        """Stop the work under way."""
+        self._background.close()
+
+
+def version_of(job_id: str, target_id: str) -> str:
+    """Return what names an explanation: it follows from the job and this version alone."""
+    return f"{planner_core.__version__}/{job_id}/{target_id}"
+
+
+class _Words(Wording):
+    def __init__(self, job: Rebuilt):
+        super().__init__(job.scenario, job.problem, job.timeline)
+        self.job = job
+
+    def explanation(self, target: int, budget: Budget) -> ExplanationOut:
+        job = self.job
+        found = explain_target(job.problem, job.plan, job.timeline, target, job.search)
+        reason = found.outcome.reason
+        is_hidden = reason is not None and reason.code == "no_access"
+        changes = access_changes(job.scenario, target, budget) if is_hidden else ()
+        return ExplanationOut(
+            **dict(self.target(found.outcome)),
+            opportunities=[self._attempt(attempt) for attempt in found.attempts],
+            access_changes=[self._access_change(target, change) for change in changes],
+        )
+
+    def _attempt(self, attempt: Attempt) -> AttemptOut:
+        return AttemptOut(
+            opportunity_id=f"o{attempt.scenario_row}",
+            satellite_id=self.problem.satellites[attempt.satellite].id,
+            start=self.instant(attempt.start_s),
+            end=self.instant(attempt.end_s),
+            violations=[self.violation(violation) for violation in attempt.violations],
+            displaces=[self.action_ids[p] for p in attempt.displaces],
+            fits_instead=attempt.is_settled,
+            reward_delta=attempt.reward_delta,
+            ruled_out=attempt.ruled_out,
+        )
+
+    def _access_change(self, target: int, change: AccessChange) -> Json:
+        """Return a change in the words of a what-if's ``relax``."""
+        satellite, own = self.scenario.satellites[change.satellite], self.scenario.targets[target]
+        said: Json = {"satellite_id": satellite.id}
+        setting: Json = {change.setting: change.value}
+        if isinstance(change.value, datetime):
+            setting = {change.setting: instant_text(change.value)}
+        if change.setting == "horizon_end":
+            return said | setting
+        if change.setting in OF_TARGETS:
+            return said | {"targets": {own.id: setting}}
+        if _is_narrower(getattr(satellite.sensor, change.setting), change):
+            said |= setting
+        if _is_narrower(getattr(own, change.setting), change):
+            said["targets"] = {own.id: setting}
+        return said
+
+
+def _is_narrower(limit: object, change: AccessChange) -> bool:
+    """Return whether a limit is tighter than what the change needs."""
+    if isinstance(limit, float | int) and isinstance(change.value, float):
+        return limit < change.value if "_max" in change.setting else limit > change.value
+    return limit is not None and limit != change.value

@@ -1,0 +1,90 @@
+"""A finished job taken up again: its plan read back, beside others or in its problem."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+from planner_core.budget import Budget, Termination
+from planner_core.build import ScenarioOpportunities, build_problem
+from planner_core.domain import Scenario
+from planner_core.problem import Problem
+from planner_core.problem.plan import Plan
+from planner_core.reasons.reason import Search
+from planner_core.referee.plan_diff import PlannedAction, PlanView
+from planner_core.referee.replay import Timeline, replay
+from service.answers.reading import Finder
+from service.scenarios.opportunities import Described
+from service.wire.timelines import TimelineOut
+
+_FIGURES: Final = (
+    "reward", "collects", "contacts", "downlinked_mbit", "downlinked_fraction",
+    "battery_min_fraction", "recorder_max_fraction",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Rebuilt:
+    """What the solver's process had at its end."""
+
+    scenario: Scenario
+    computed: ScenarioOpportunities
+    problem: Problem
+    plan: Plan
+    timeline: Timeline
+    search: Search
+
+
+def rebuild(described: Described, timeline: TimelineOut, budget: Budget) -> Rebuilt:
+    """Return the problem and the plan of a stored timeline."""
+    problem = build_problem(described.scenario, described.computed, budget)
+    plan = stored_plan(timeline, described.scenario, problem)
+    judged = replay(problem, plan)
+    params = timeline.solver.params
+    return Rebuilt(
+        scenario=described.scenario,
+        computed=described.computed,
+        problem=problem,
+        plan=plan,
+        timeline=judged,
+        search=Search(
+            is_optimal=judged.is_valid and timeline.termination == Termination.OPTIMAL.value,
+            breadth=params.get("breadth"),
+            contact_above=params.get("contact_above_fraction", 0.0),
+        ),
+    )
+
+
+def stored_plan(timeline: TimelineOut, scenario: Scenario, problem: Problem) -> Plan:
+    """Return the plan of a stored timeline as actions of a problem, as far as it has them."""
+    found = map(Finder(scenario, problem).action, planned(timeline))
+    plan = Plan(tuple(sorted(action for action in found if action is not None)))
+    if problem.continuous_starts:
+        return plan
+    # Documents have milliseconds; the opportunities' own times are exact.
+    return Plan.of(problem, dict.fromkeys(action.opportunity for action in plan.actions))
+
+
+def view_of(timeline: TimelineOut) -> PlanView:
+    """Return what a stored timeline is compared by."""
+    totals = timeline.totals
+    imaged = totals.targets["downlinked"] + totals.targets["collected"]
+    return PlanView(
+        actions=tuple(sorted(planned(timeline))),
+        totals={**{name: getattr(totals, name) for name in _FIGURES}, "targets": float(imaged)},
+    )
+
+
+def planned(timeline: TimelineOut) -> Iterator[PlannedAction]:
+    """Yield the collects and contacts of a stored timeline."""
+    for satellite in timeline.satellites:
+        for action in satellite.actions:
+            if action.mode != "sunpoint":
+                yield PlannedAction(
+                    start=action.start,
+                    end=action.end,
+                    satellite_id=satellite.id,
+                    mode=action.mode,
+                    place_id=str(action.target_id or action.station_id),
+                )

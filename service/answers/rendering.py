@@ -1,0 +1,289 @@
+"""A judged plan in the words of the API: its timeline, what became of each target, and why."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from itertools import count
+from typing import Final, get_args
+
+import numpy as np
+
+from planner_core.build import view_at
+from planner_core.domain import Scenario
+from planner_core.orbits.sgp4_record import GRAVITY
+from planner_core.problem import Problem
+from planner_core.problem.slew import TIME_TOLERANCE_S
+from planner_core.reasons.reason import Change, Reason, TargetOutcome
+from planner_core.referee.replay import (
+    JudgedAction,
+    Resourceline,
+    Slew,
+    Timeline,
+    Violation,
+    plan_sha256,
+)
+from planner_core.run import Judged
+from service.wire.base import Json
+from service.wire.jobs import FiguresOut
+from service.wire.scenarios import HorizonOut
+from service.wire.timelines import (
+    ActionOut,
+    ModelsOut,
+    Outcome,
+    ReasonOut,
+    ResourceCurvesOut,
+    RuntimeOut,
+    SatelliteTimelineOut,
+    SlewOut,
+    SolverUsed,
+    TargetItem,
+    TimelineHead,
+    TotalsOut,
+    ViolationOut,
+)
+
+SCHEMA_VERSION: Final = "1.0"
+_OF_TOTALS: Final = FiguresOut.model_fields.keys() & TotalsOut.model_fields.keys()
+
+
+def figures_of(timeline: Json) -> Json:
+    """Return the numbers of a timeline (its head will do) that a table of several plans shows."""
+    runtime_s = timeline["runtime_s"]
+    figures = FiguresOut(
+        **{name: timeline["totals"][name] for name in _OF_TOTALS},
+        solve_s=runtime_s["solve"],
+        runtime_s=round(sum(runtime_s.values()), 6),
+        validity=timeline["validity"],
+        plan_sha256=timeline["plan_sha256"],
+    )
+    return figures.model_dump()
+
+
+class Wording:
+    """What a judged plan is called: its actions, opportunities, instants, reasons.
+
+    Action ids run through all satellites, ``a1``, ``a2``, ...
+    """
+
+    def __init__(self, scenario: Scenario, problem: Problem, timeline: Timeline):
+        self.scenario = scenario
+        self.problem = problem
+        self.instant = scenario.horizon.instant
+        actions = [a for s in timeline.satellites for a in s.actions]
+        self.action_ids = {
+            action.position: f"a{number}"
+            for number, action in enumerate(actions, start=1)
+            if action.position is not None
+        }
+
+    def opportunity_id(self, row: int | None) -> str | None:
+        """Return the id of an opportunity of the problem."""
+        return None if row is None else f"o{self.problem.scenario_row(row)}"
+
+    def violation(self, found: Violation) -> ViolationOut:
+        """Return a rule that is broken; actions that the plan does not have are left out."""
+        ids = self.action_ids
+        return ViolationOut(
+            code=found.code,
+            satellite_id=self.problem.satellites[found.satellite].id,
+            at=self.instant(found.at_s),
+            needed=found.needed,
+            available=found.available,
+            actions=[ids[p] for p in found.blamed if p in ids],
+            detail=found.detail,
+        )
+
+    def target(self, found: TargetOutcome) -> TargetItem:
+        """Return what became of a target."""
+        target, satellite = self.scenario.targets[found.target], found.satellite
+        return TargetItem(
+            target_id=target.id,
+            target_catalog_id=target.catalog_id,
+            outcome=found.outcome,
+            action_id=None if found.position is None else self.action_ids[found.position],
+            satellite_id=None if satellite is None else self.problem.satellites[satellite].id,
+            reason=None if found.reason is None else self._reason(found.reason),
+        )
+
+    def _reason(self, found: Reason) -> ReasonOut:
+        return ReasonOut(
+            code=found.code,
+            certainty=found.certainty,
+            blocking_actions=[self.action_ids[p] for p in found.blocking],
+            opportunity_id=self.opportunity_id(found.opportunity),
+            at=None if found.at_s is None else self.instant(found.at_s),
+            reward_delta=found.reward_delta,
+            change=None if found.change is None else self._change(found.change),
+            detail=found.detail,
+        )
+
+    def _change(self, change: Change) -> Json:
+        """Return a change in the words of a what-if's ``relax``."""
+        found: Json = {"opportunity_id": self.opportunity_id(change.opportunity)}
+        if change.satellite is None:
+            return found | {"drop_actions": [self.action_ids[p] for p in change.drop]}
+        satellite_id = self.problem.satellites[change.satellite].id
+        return found | {"satellite_id": satellite_id} | dict(change.settings)
+
+
+class Documents(Wording):
+    """Renders one judged plan."""
+
+    def __init__(self, judged: Judged):
+        super().__init__(judged.scenario, judged.problem, judged.timeline)
+        self._judged = judged
+        self._seen = _seen_at_own_starts(judged)
+
+    def head(self, *, job_id: str, scenario_sha256: str, solver: SolverUsed) -> TimelineHead:
+        """Return the timeline but for its satellites."""
+        judged, horizon = self._judged, self.scenario.horizon
+        phases = ("access", "compile", "solve", "verify")
+        return TimelineHead(
+            schema_version=SCHEMA_VERSION,
+            job=job_id,
+            scenario_sha256=scenario_sha256,
+            plan_sha256=plan_sha256(judged.problem, judged.solution.plan),
+            solver=solver,
+            horizon=HorizonOut(start=horizon.start, end=horizon.end),
+            dynamics=judged.problem.dynamics,
+            use_resources=judged.problem.use_resources,
+            termination=judged.solution.termination.value,
+            runtime_s=RuntimeOut(**{p: round(getattr(judged.runtime_s, p), 6) for p in phases}),
+            validity="valid" if judged.timeline.is_valid else "violations",
+            violations=[self.violation(v) for v in judged.timeline.violations],
+            totals=self._totals(),
+            warnings=judged.opportunities.warnings,
+            models=ModelsOut(
+                gravity=GRAVITY,
+                nadir={s.id: s.sensor.nadir for s in self.scenario.satellites},
+            ),
+        )
+
+    def satellites(self) -> Iterator[tuple[SatelliteTimelineOut, Iterator[ActionOut]]]:
+        """Yield what the timeline says of each satellite, and apart from that its actions."""
+        judged, numbers = self._judged, count(1)
+        for satellite, line, lit in zip(
+            judged.problem.satellites,
+            judged.timeline.satellites,
+            judged.opportunities.sunlight,
+            strict=True,
+        ):
+            gaps = lit.gaps(judged.problem.horizon_s)
+            limits = satellite.resources
+            about = SatelliteTimelineOut(
+                id=satellite.id,
+                name=satellite.name,
+                actions=(),
+                eclipses=[HorizonOut(start=self.instant(a), end=self.instant(b)) for a, b in gaps],
+                resources=None
+                if line.resources is None
+                else self._curves(
+                    line.resources,
+                    battery_min_fraction=limits.battery_min_fraction,
+                    recorder_max_fraction=limits.recorder_max_fraction,
+                ),
+            )
+            yield about, (self._action(f"a{next(numbers)}", action) for action in line.actions)
+
+    def targets(self) -> Iterator[TargetItem]:
+        """Yield every target once, with outcome and reason."""
+        return (self.target(outcome) for outcome in self._judged.outcomes)
+
+    def _totals(self) -> TotalsOut:
+        judged, timeline = self._judged, self._judged.timeline
+        outcomes = Counter(outcome.outcome for outcome in judged.outcomes)
+        modes = Counter(a.mode for s in timeline.satellites for a in s.actions)
+        capacities = [s.resources.recorder_capacity_mbit for s in judged.scenario.satellites]
+        downlinked_mbit: float | None = None
+        if judged.problem.use_resources and None not in capacities:
+            downlinked_mbit = sum(
+                share * (capacity or 0.0)
+                for share, capacity in zip(timeline.downlinked, capacities, strict=True)
+            )
+        bound = judged.bound.value if judged.bound else None
+        gap = None
+        if bound is not None:
+            gap = (bound - timeline.reward) / bound if bound > 0.0 else 0.0
+        use_resources = judged.problem.use_resources
+        return TotalsOut(
+            reward=timeline.reward,
+            bound=bound,
+            gap=gap,
+            bound_proof=judged.bound.proof if judged.bound else None,
+            collects=modes["collect"],
+            contacts=modes["contact"],
+            targets={name: outcomes[name] for name in get_args(Outcome)},
+            downlinked_mbit=downlinked_mbit,
+            downlinked_fraction=sum(timeline.downlinked) if use_resources else None,
+            battery_min_fraction=timeline.battery_min,
+            recorder_max_fraction=timeline.recorder_max,
+        )
+
+    def _action(self, action_id: str, action: JudgedAction) -> ActionOut:
+        table, row = self.problem.opportunities, action.opportunity
+        target_id = station_id = off_nadir_deg = azimuth_deg = None
+        if row is not None:
+            own = table.off_nadir_deg[row], table.azimuth_deg[row]
+            off_nadir_deg, azimuth_deg = self._seen.get(action.position, own)
+            place = int(table.place[row])
+            if action.mode == "collect":
+                target_id = self.scenario.targets[place].id
+            else:
+                station_id = self.scenario.ground_stations[place].id
+        return ActionOut(
+            id=action_id,
+            mode=action.mode,
+            start=self.instant(action.start_s),
+            end=self.instant(action.end_s),
+            target_id=target_id,
+            station_id=station_id,
+            opportunity_id=self.opportunity_id(row),
+            off_nadir_deg=_rounded(off_nadir_deg, 4),
+            azimuth_deg=_rounded(azimuth_deg, 4),
+            slew=None if action.slew is None else _slew(action.slew),
+            reward=action.reward,
+            battery_fraction_end=_rounded(action.battery_end, 9),
+            recorder_fraction_end=_rounded(action.recorder_end, 9),
+        )
+
+    def _curves(self, line: Resourceline, **limits: float) -> ResourceCurvesOut:
+        return ResourceCurvesOut(
+            time=[self.instant(float(t)) for t in line.time_s],
+            battery_fraction=[round(float(v), 9) for v in line.battery],
+            recorder_fraction=[round(float(v), 9) for v in line.recorder],
+            **limits,
+        )
+
+
+def _slew(slew: Slew) -> SlewOut:
+    return SlewOut(
+        angle_deg=round(slew.angle_deg, 6),
+        needed_s=round(slew.needed_s, 6),
+        available_s=round(slew.available_s, 3),
+    )
+
+
+def _seen_at_own_starts(judged: Judged) -> dict[int | None, tuple[float, float]]:
+    """Return off-nadir angle and azimuth at the middle of each collect with a start of its own.
+
+    By position in the plan; all else is in the table of opportunities.
+    """
+    table, problem = judged.opportunities.opportunities, judged.problem
+    moved = [
+        (position, row, action)
+        for position, action in enumerate(judged.solution.plan.actions)
+        for row in [problem.scenario_row(action.opportunity)]
+        if abs(action.start_s - table.start_s[row]) > TIME_TOLERANCE_S
+    ]
+    if not moved or not problem.continuous_starts:
+        return {}
+    positions, rows, actions = zip(*moved, strict=True)
+    middle_s = np.array([0.5 * (a.start_s + a.end_s) for a in actions])
+    seen = view_at(judged.scenario, table, np.array(rows, dtype=np.int64), middle_s)
+    angles = zip(seen.off_nadir_deg.tolist(), seen.azimuth_deg.tolist(), strict=True)
+    return dict(zip(positions, angles, strict=True))
+
+
+def _rounded(value: float | None, digits: int) -> float | None:
+    return None if value is None else round(float(value), digits)

@@ -1,0 +1,118 @@
+"""Answers of jobs: written block by block, and read so."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
+from datetime import datetime
+from typing import Any, Final
+
+import sqlalchemy as sa
+from sqlalchemy.orm import Session
+
+from service.answers.blocks import TIMELINE, Block, Entry, Kind, contents_of
+from service.db.clock import utc_now
+from service.db.rows import JobBlockRow, JobResultRow
+
+_AT_ONCE: Final = 1 << 17
+"""Characters that are read or written in one statement."""
+
+
+def save(
+    session: Session, job_id: str, blocks: Sequence[Block], figures: Mapping[str, Any] | None
+) -> None:
+    """Store the answer of a job."""
+    session.execute(
+        sa.insert(JobResultRow).values(
+            job_id=job_id,
+            figures=sa.null() if figures is None else dict(figures),
+            created_at=utc_now(),
+        )
+    )
+    for some in _batches(contents_of(blocks)):
+        rows = [
+            {
+                "job_id": job_id,
+                "position": entry.position,
+                "kind": entry.kind,
+                "first": entry.first,
+                "num_items": entry.num_items,
+                "size": entry.size,
+                "tally": dict(entry.tally) or None,
+                "text": blocks[entry.position].text,
+            }
+            for entry in some
+        ]
+        session.execute(sa.insert(JobBlockRow), rows)
+
+
+def answered_at(session: Session, job_id: str) -> datetime | None:
+    """Return when a job's answer was stored, or None where it has none (yet)."""
+    return session.scalar(sa.select(JobResultRow.created_at).where(JobResultRow.job_id == job_id))
+
+
+def contents(session: Session, job_id: str, *kinds: Kind) -> list[Entry]:
+    """Return the table of contents of a job's answer, as far as it is of these kinds."""
+    row = JobBlockRow
+    columns = (row.position, row.kind, row.first, row.num_items, row.size, row.tally)
+    wanted = sa.select(*columns).where(row.job_id == job_id, row.kind.in_(kinds))
+    return [
+        Entry(
+            position=found.position,
+            kind=found.kind,
+            first=found.first,
+            num_items=found.num_items,
+            size=found.size,
+            tally=found.tally or {},
+        )
+        for found in session.execute(wanted.order_by(row.position))
+    ]
+
+
+def texts(
+    reading: Callable[[], AbstractContextManager[Session]], job_id: str, entries: Iterable[Entry]
+) -> Iterator[tuple[Entry, str]]:
+    """Yield blocks with their texts, a few at a time.
+
+    Each few are read in a transaction of their own: who is slow to take them keeps no connection
+    from others, and answers never change.
+    """
+    for some in _batches(entries):
+        wanted = sa.select(JobBlockRow.position, JobBlockRow.text).where(
+            JobBlockRow.job_id == job_id,
+            JobBlockRow.position.in_([entry.position for entry in some]),
+        )
+        with reading() as session:
+            found = {row.position: row.text for row in session.execute(wanted)}
+        for entry in some:
+            yield entry, found.pop(entry.position)
+
+
+def timeline_of(session: Session, job_id: str) -> str | None:
+    """Return a job's timeline document as a whole, or None where there is none (yet)."""
+    return _whole(session, job_id, *TIMELINE)
+
+
+def proof_of(session: Session, job_id: str) -> str | None:
+    """Return what proves a job's bound as JSON text, or None where there is none."""
+    return _whole(session, job_id, "proof")
+
+
+def _whole(session: Session, job_id: str, *kinds: Kind) -> str | None:
+    wanted = sa.select(JobBlockRow.text).where(
+        JobBlockRow.job_id == job_id, JobBlockRow.kind.in_(kinds)
+    )
+    return "".join(session.scalars(wanted.order_by(JobBlockRow.position))) or None
+
+
+def _batches(entries: Iterable[Entry]) -> Iterator[list[Entry]]:
+    batch: list[Entry] = []
+    size = 0
+    for entry in entries:
+        if batch and size + entry.size > _AT_ONCE:
+            yield batch
+            batch, size = [], 0
+        batch.append(entry)
+        size += entry.size
+    if batch:
+        yield batch

@@ -1,0 +1,188 @@
+"""What if: the question of a job with a change, compiled once to see that it can be asked."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, replace
+
+from pydantic import ValidationError
+
+from planner_core.budget import Budget
+from planner_core.build import ScenarioOpportunities, build_problem, compute_opportunities
+from planner_core.domain import Agility, Resources, Scenario
+from planner_core.errors import InvalidScenario
+from planner_core.pins import PinnedAction, Pins
+from planner_core.problem.plan import Plan
+from planner_core.reasons.what_if import Change, what_if
+from service.answers.rebuilt import stored_plan
+from service.scenarios.background import Background
+from service.scenarios.change_pointers import Places, pointing_into, pointing_into_relax
+from service.scenarios.freezing import FrozenScenario, freeze_file
+from service.scenarios.opportunities import Described
+from service.scenarios.pin_inputs import pinned_action, pins_in
+from service.scenarios.relaxing import relaxed_file
+from service.scenarios.scenario_limits import ScenarioLimits
+from service.scenarios.translate import read_file, scenario_from_file, sha256_of
+from service.wire.base import read
+from service.wire.changes import ChangeIn
+from service.wire.scenarios import ScenarioFile
+from service.wire.timelines import TimelineOut
+
+_KEPT = 8
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Variation:
+    """A changed question, ready to be stored, and its opportunities as they are stored."""
+
+    frozen: FrozenScenario
+    opportunity_block: bytes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Asked:
+    """A job's question (a canonical scenario file), its timeline if it has one, and the change."""
+
+    content: str
+    timeline: str | None
+    change: ChangeIn
+    limits: ScenarioLimits
+
+    @property
+    def key(self) -> str:
+        """What tells two of these apart."""
+        change = self.change.model_dump_json(exclude_unset=True)
+        return sha256_of(f"{sha256_of(self.content)}{sha256_of(self.timeline or '')}{change}")
+
+
+class Variations:
+    """Works out changed questions beside the requests."""
+
+    def __init__(self) -> None:
+        told = "The change is being worked out."
+        self._background = Background("variations", kept=_KEPT, told=told)
+
+    def get(self, asked: Asked, described: Described) -> Variation:
+        """Return the changed question; 503 ``still_computing`` where that takes long.
+
+        Raises
+        ------
+        PlannerError
+            The change is impossible; with a pointer into it.
+        """
+        return self._background.get(asked.key, lambda budget: vary(asked, described, budget))
+
+    def close(self) -> None:
+        """Stop the work under way."""
+        self._background.close()
+
+
+def vary(asked: Asked, described: Described, budget: Budget) -> Variation:
+    """Return the changed question; errors as above."""
+    change = asked.change
+    file = relaxed_file(read_file(json.loads(asked.content)), change.relax)
+    scenario = scenario_from_file(file)
+    # Whether the satellites can be carried so far is known only after this.
+    with pointing_into_relax():
+        _freeze(file, asked)
+        computed = _opportunities(scenario, described, budget)
+    force = tuple(pinned_action(action) for action in change.force)
+    forbid = tuple(pinned_action(action) for action in change.forbid)
+    _check_names(scenario, change, force, forbid)
+    timeline = None if asked.timeline is None else read(TimelineOut, asked.timeline)
+    dropped = _dropped(asked, timeline)
+    with pointing_into(change, Places.of(scenario.pins, forbid, force, len(dropped))):
+        problem = build_problem(scenario, computed, budget)
+        plan = Plan() if timeline is None else stored_plan(timeline, scenario, problem)
+        wanted = Change(force=force, forbid=(*forbid, *dropped))
+        changed = what_if(scenario, wanted, problem, plan)
+        build_problem(changed, computed, budget)
+    return Variation(
+        frozen=_freeze(_with_pins(file, changed.pins), asked),
+        opportunity_block=computed.to_bytes(),
+    )
+
+
+def _freeze(file: ScenarioFile, asked: Asked) -> FrozenScenario:
+    unnamed = file.model_copy(update={"name": None})
+    return freeze_file(unnamed, asked.limits)
+
+
+def _opportunities(
+    scenario: Scenario, described: Described, budget: Budget
+) -> ScenarioOpportunities:
+    """Return those that are known already, where the change has nothing to do with geometry."""
+    if _geometry(scenario) == _geometry(described.scenario):
+        return described.computed
+    return compute_opportunities(scenario, budget)
+
+
+def _geometry(scenario: Scenario) -> Scenario:
+    """Return the scenario with everything made equal that no opportunity depends on."""
+    some = Resources.paper(1.0)
+    return replace(
+        scenario,
+        pins=Pins(),
+        satellites=tuple(
+            replace(
+                satellite,
+                agility=Agility(),
+                resources=replace(some, eclipse_aware=satellite.resources.eclipse_aware),
+            )
+            for satellite in scenario.satellites
+        ),
+        targets=tuple(replace(target, reward=1.0) for target in scenario.targets),
+    )
+
+
+def _dropped(asked: Asked, timeline: TimelineOut | None) -> list[PinnedAction]:
+    """Return the actions of the plan that are to be left out."""
+    if not asked.change.relax.drop_actions:
+        return []
+    actions = {
+        action.id: PinnedAction(
+            satellite_id=satellite.id,
+            target_id=action.target_id,
+            station_id=action.station_id,
+            start=action.start,
+        )
+        for satellite in (timeline.satellites if timeline else ())
+        for action in satellite.actions
+        if action.mode != "sunpoint"
+    }
+    found = []
+    for number, own_id in enumerate(asked.change.relax.drop_actions):
+        if own_id not in actions:
+            raise InvalidScenario(
+                "unknown_action",
+                f"The plan has no collect or contact {own_id!r}.",
+                pointer=f"/relax/drop_actions/{number}",
+            )
+        found.append(actions[own_id])
+    return found
+
+
+def _check_names(
+    scenario: Scenario,
+    change: ChangeIn,
+    force: tuple[PinnedAction, ...],
+    forbid: tuple[PinnedAction, ...],
+) -> None:
+    with pointing_into(change, Places.of_body(force, forbid)):
+        Pins(keep=force, skip=forbid).check(
+            [satellite.id for satellite in scenario.satellites],
+            {target.id for target in scenario.targets},
+            [station.id for station in scenario.ground_stations],
+            has_contacts=scenario.use_resources,
+        )
+
+
+def _with_pins(file: ScenarioFile, pins: Pins) -> ScenarioFile:
+    if not pins:
+        return file
+    try:
+        return file.model_copy(update={"pins": pins_in(pins)})
+    except ValidationError:
+        raise InvalidScenario(
+            "value_out_of_range", "The scenario would have too many pins.", pointer="/force"
+        ) from None

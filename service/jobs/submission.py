@@ -1,0 +1,101 @@
+"""Jobs on their way into the queue: a row and its first dispatch, both or neither."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import sqlalchemy as sa
+from sqlalchemy.orm import Session
+
+from service.db.clock import utc_now
+from service.db.ids import new_id
+from service.db.rows import ComparisonRow, ComparisonRunRow, JobRow
+from service.jobs.queue import JobQueue
+from service.process import tracing
+from service.process.logs import request_id
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JobSpec:
+    """What one job is to do, all defaults filled in."""
+
+    scenario_id: str
+    solver: str
+    params: Mapping[str, Any]
+    seed: int
+    time_s: float
+    memory_mb: int
+    priority: int
+    label: str | None
+    owner: str
+    rerun_of: str | None = None
+    what_if_of: str | None = None
+    change: Mapping[str, Any] | None = None
+
+
+def spec_again(job: JobRow, owner: str) -> JobSpec:
+    """Return the spec of the same frozen question once more, for whoever asks it now."""
+    return JobSpec(
+        scenario_id=job.scenario_id,
+        solver=job.solver,
+        params=job.params,
+        seed=job.seed,
+        time_s=job.limits["time_s"],
+        memory_mb=job.limits["memory_mb"],
+        priority=job.priority,
+        label=job.label,
+        owner=owner,
+        rerun_of=job.id,
+    )
+
+
+def submit(session: Session, queue: JobQueue, spec: JobSpec) -> JobRow:
+    """Store a job and queue it, both or neither."""
+    job_id = new_id()
+    session.execute(
+        sa.insert(JobRow).values(
+            id=job_id,
+            scenario_id=spec.scenario_id,
+            tenant=spec.owner,
+            state="queued",
+            solver=spec.solver,
+            params=dict(spec.params),
+            seed=spec.seed,
+            limits={"time_s": spec.time_s, "memory_mb": spec.memory_mb},
+            priority=spec.priority,
+            label=spec.label,
+            rerun_of=spec.rerun_of,
+            what_if_of=spec.what_if_of,
+            change=sa.null() if spec.change is None else dict(spec.change),
+            request_id=request_id.get(),
+            traceparent=tracing.note_queued(job_id),
+            created_at=utc_now(),
+            dispatched_at=utc_now(),
+        )
+    )
+    queue.enqueue(session, job_id, 1, priority=spec.priority, tenant=spec.owner)
+    return session.get_one(JobRow, job_id)
+
+
+def submit_comparison(
+    session: Session, queue: JobQueue, specs: Sequence[JobSpec], *, label: str | None
+) -> ComparisonRow:
+    """Store a comparison and queue a job for each spec, all or none. All plan one scenario."""
+    own_id = new_id()
+    row = {
+        "id": own_id,
+        "scenario_id": specs[0].scenario_id,
+        "tenant": specs[0].owner,
+        "label": label,
+        "created_at": utc_now(),
+    }
+    session.execute(sa.insert(ComparisonRow).values(**row))
+    jobs = [submit(session, queue, spec) for spec in specs]
+    runs = [
+        {"comparison_id": own_id, "position": position, "job_id": job.id}
+        for position, job in enumerate(jobs)
+    ]
+    session.execute(sa.insert(ComparisonRunRow), runs)
+    return session.get_one(ComparisonRow, own_id)

@@ -1,0 +1,93 @@
+"""What is wrong with a body or a file, as problems: from pydantic's findings to JSON pointers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from pydantic import ValidationError
+
+from planner_core.errors import Fault
+from service.problems.kinds import ServiceError
+
+
+def refuse(faults: Sequence[Fault], *, code: str | None = None) -> ServiceError:
+    """Return the error for a body with these faults; its code is theirs where they agree."""
+    codes = {fault.code for fault in faults}
+    common = codes.pop() if len(codes) == 1 else "invalid_request"
+    first = faults[0]
+    where = f"line {first.row}: " if first.row else f"{first.pointer}: " if first.pointer else ""
+    detail = f"{where}{first.detail}"
+    if len(faults) > 1:
+        detail = f"{len(faults)} errors; the first: {detail}"
+    return ServiceError(code or common, detail, faults=tuple(faults))
+
+
+def faults_of(errors: Iterable[Any], body: object) -> list[Fault]:
+    """Return what pydantic found, with JSON pointers into ``body``."""
+    return [
+        Fault(code=_code(e["type"]), detail=_sentence(e), pointer=_pointer(e["loc"], body))
+        for e in errors
+    ]
+
+
+def faults_of_validation(error: ValidationError, body: object) -> list[Fault]:
+    """Return the faults of a document that was validated outside FastAPI."""
+    found = ({**e, "loc": ("body", *e["loc"])} for e in error.errors(include_url=False))
+    return faults_of(found, body)
+
+
+_CODES = {
+    "missing": "missing_field",
+    "extra_forbidden": "unknown_field",
+    "json_invalid": "malformed_json",
+    "literal_error": "unknown_value",
+    "enum": "unknown_value",
+    "finite_number": "not_finite",
+    "greater_than": "value_out_of_range",
+    "greater_than_equal": "value_out_of_range",
+    "less_than": "value_out_of_range",
+    "less_than_equal": "value_out_of_range",
+    "too_short": "value_out_of_range",
+    "too_long": "value_out_of_range",
+    "string_too_short": "value_out_of_range",
+    "string_too_long": "value_out_of_range",
+    "too_many_fields": "too_many_fields",
+    "naive_time": "naive_time",
+    "invalid_time": "invalid_time",
+}
+
+
+def _code(pydantic_type: str) -> str:
+    return _CODES.get(pydantic_type, "invalid_value")
+
+
+def _sentence(error: Mapping[str, Any]) -> str:
+    message = str(error["msg"])
+    place, name = error["loc"][0], error["loc"][-1]
+    if error["type"] == "json_invalid":
+        return f"{error['ctx']['error']} at character {name}."
+    if place in ("query", "header", "path"):
+        return f"{place} parameter {name}: {message}."
+    if error["type"] == "extra_forbidden":
+        return f"There is no field {name!r}."
+    return message if message.endswith(".") else f"{message}."
+
+
+def _pointer(loc: Sequence[str | int], body: object) -> str | None:
+    # A pydantic location also names the branches of unions, which are no places in the
+    # document: only the parts that lead somewhere in the body are kept, and the last one,
+    # which may be a field that is missing.
+    if loc[0] != "body":
+        return None
+    parts: list[str] = []
+    here: object = body
+    for number, part in enumerate(loc[1:], start=2):
+        if isinstance(here, dict) and (part in here or number == len(loc)):
+            here = here.get(part)
+        elif isinstance(here, list) and isinstance(part, int) and part < len(here):
+            here = here[part]
+        else:
+            continue
+        parts.append(str(part).replace("~", "~0").replace("/", "~1"))
+    return "".join("/" + part for part in parts)

@@ -1,0 +1,139 @@
+"""Traces (OpenTelemetry): from the request that sends a job, over its row, to what its worker does.
+
+Off unless asked for: OpenTelemetry's interface, which the web framework brings along, then does
+nothing, and its implementation (the extra ``otel``) is not even loaded.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, MutableMapping
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, Final
+
+from opentelemetry import trace
+from opentelemetry.trace import Span, SpanKind, Status, StatusCode
+from opentelemetry.trace.propagation.tracecontext import TraceContextTextMapPropagator
+
+import planner_core
+from service.process.logs import request_id
+
+if TYPE_CHECKING:
+    from opentelemetry.sdk.trace import TracerProvider
+
+    from service.settings import Settings
+
+_ENDPOINTS: Final = ("OTEL_EXPORTER_OTLP_TRACES_ENDPOINT", "OTEL_EXPORTER_OTLP_ENDPOINT")
+_UNTRACED: Final = ("/health/", "/metrics")
+
+_tracer: Final = trace.get_tracer("slewline", planner_core.__version__)
+_propagator: Final = TraceContextTextMapPropagator()
+
+
+class CannotTrace(Exception):
+    """Traces are asked for and not possible; the message says what to do."""
+
+
+def is_asked_for(settings: Settings) -> bool:
+    """Return whether traces shall be sent: by the setting, else where a collector is named."""
+    if settings.otel is not None:
+        return settings.otel
+    if os.environ.get("OTEL_SDK_DISABLED", "").lower() == "true":
+        return False
+    return any(os.environ.get(name) for name in _ENDPOINTS)
+
+
+def start_tracing(settings: Settings, role: str) -> TracerProvider | None:
+    """Send this process's spans as the standard ``OTEL_`` variables say, if that is asked for.
+
+    Parameters
+    ----------
+    role
+        What the process does: its service's name is ``slewline-<role>`` unless
+        ``OTEL_SERVICE_NAME`` gives another.
+
+    Returns
+    -------
+    What must be shut down before the process ends, or None where nothing is sent.
+
+    Raises
+    ------
+    CannotTrace
+        Where the extra ``otel`` is not installed.
+    """
+    if not is_asked_for(settings):
+        return None
+    try:
+        from opentelemetry.exporter.otlp.proto.http.trace_exporter import OTLPSpanExporter
+        from opentelemetry.sdk.resources import Resource
+        from opentelemetry.sdk.trace import TracerProvider
+        from opentelemetry.sdk.trace.export import BatchSpanProcessor
+    except ImportError as error:
+        raise CannotTrace(
+            "Traces are asked for (SLEWLINE_OTEL or OTEL_EXPORTER_OTLP_ENDPOINT), and what sends "
+            "them is not installed: pip install 'slewline[otel]', or set SLEWLINE_OTEL=false."
+        ) from error
+    named = os.environ.get("OTEL_SERVICE_NAME") or f"slewline-{role}"
+    resource = Resource.create({"service.name": named, "service.version": planner_core.__version__})
+    provider = TracerProvider(resource=resource)
+    provider.add_span_processor(BatchSpanProcessor(OTLPSpanExporter()))
+    trace.set_tracer_provider(provider)
+    return provider
+
+
+def is_untraced(scope: MutableMapping[str, Any]) -> bool:
+    """Return whether a request is one of those that only ask whether we are well."""
+    return scope["type"] == "http" and str(scope["path"]).startswith(_UNTRACED)
+
+
+def note_queued(job_id: str) -> str | None:
+    """Trace that a job is queued; return what its row must keep for ``running``, or None."""
+    attributes = {"slewline.job_id": job_id}
+    if (request := request_id.get()) is not None:
+        attributes["slewline.request_id"] = request
+    carrier: dict[str, str] = {}
+    with _tracer.start_as_current_span("queue job", kind=SpanKind.PRODUCER, attributes=attributes):
+        _propagator.inject(carrier)
+    return carrier.get("traceparent")
+
+
+@contextmanager
+def running(traceparent: str | None, **attributes: str | int) -> Iterator[JobSpan]:
+    """Trace the run of a job as part of the trace that it was queued in."""
+    parent = None if traceparent is None else _propagator.extract({"traceparent": traceparent})
+    with _tracer.start_as_current_span(
+        "run job",
+        context=parent,
+        kind=SpanKind.CONSUMER,
+        attributes={f"slewline.{name}": value for name, value in attributes.items()},
+    ) as span:
+        job = JobSpan(span)
+        try:
+            yield job
+        finally:
+            job.leave_phase()
+
+
+class JobSpan:
+    """The span of a run, with one within it for each phase, as the solver's process tells them."""
+
+    def __init__(self, span: Span):
+        self._span = span
+        self._phase: Span | None = None
+
+    def enter_phase(self, name: str) -> None:
+        """Begin a phase; it ends with the next one, or with the run."""
+        self.leave_phase()
+        self._phase = _tracer.start_span(name)
+
+    def leave_phase(self) -> None:
+        """End the phase."""
+        if self._phase is not None:
+            self._phase.end()
+            self._phase = None
+
+    def note_end(self, state: str, *, failed: bool = False) -> None:
+        """Tell how the run ended."""
+        self._span.set_attribute("slewline.state", state)
+        if failed:
+            self._span.set_status(Status(StatusCode.ERROR))

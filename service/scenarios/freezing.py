@@ -1,0 +1,217 @@
+"""Freezing scenarios: ids looked up, content made canonical, stored once."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from typing import Any, TypeVar
+
+import sqlalchemy as sa
+from sqlalchemy.exc import IntegrityError
+from sqlalchemy.orm import Session
+
+from planner_core.build import check_element_age, check_propagation, orbit_warnings
+from planner_core.errors import InvalidScenario, PlannerError
+from service.db.ids import new_id
+from service.db.rows import GroundStationRow, SatelliteRow, ScenarioRow, TargetCatalogRow, TargetRow
+from service.db.session import Database
+from service.scenarios.scenario_limits import ScenarioLimits
+from service.scenarios.translate import (
+    canonical_of_file,
+    horizon_from,
+    scenario_from_file,
+    sha256_of,
+)
+from service.stores import satellite_store
+from service.wire.scenarios import (
+    FileGroundStation,
+    FileSatellite,
+    FileTarget,
+    Question,
+    ScenarioFile,
+    ScenarioIn,
+)
+
+R = TypeVar("R", SatelliteRow, TargetCatalogRow, GroundStationRow)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FrozenScenario:
+    """A question that can be stored.
+
+    Attributes
+    ----------
+    content
+        The canonical scenario file.
+    summary
+        What the API shows of it.
+    """
+
+    name: str | None
+    content: str
+    sha256: str
+    summary: dict[str, Any]
+
+
+def freeze(database: Database, body: ScenarioIn, limits: ScenarioLimits) -> FrozenScenario:
+    """Return the frozen form of a question over what is stored. Stores nothing.
+
+    Raises
+    ------
+    InvalidScenario
+        ``unknown_satellite``, ``unknown_target_catalog``, ``unknown_ground_station``,
+        ``duplicate_satellite_id``, ``duplicate_target_catalog_id``, ``duplicate_target_id``,
+        ``duplicate_ground_station_id``, ``horizon_inverted``, ``horizon_too_long``,
+        ``scenario_too_large``; with a pointer into the body.
+    PropagationFailed
+        SGP4 cannot carry a satellite through the horizon.
+    """
+    with database.reading() as session:
+        num_targets = _num_targets(session, body.target_catalog_ids)
+        limits.check(horizon_from(body.horizon), len(body.satellite_ids), num_targets)
+        file = _expanded(session, body)
+    with _named_by_ids():
+        return freeze_file(file, limits)
+
+
+def freeze_file(file: ScenarioFile, limits: ScenarioLimits) -> FrozenScenario:
+    """Return the frozen form of a file that `translate.read_file` has made; errors as above."""
+    limits.check(horizon_from(file.horizon), len(file.satellites), len(file.targets))
+    scenario = scenario_from_file(file)
+    check_propagation(scenario)
+    check_element_age(scenario)
+    content = canonical_of_file(file)
+    return FrozenScenario(
+        name=file.name,
+        content=content,
+        sha256=sha256_of(content),
+        summary=_summary(file, orbit_warnings(scenario)),
+    )
+
+
+def save(session: Session, frozen: FrozenScenario) -> tuple[ScenarioRow, bool]:
+    """Return the stored scenario of this content, and whether it is new."""
+    same = sa.select(ScenarioRow).where(ScenarioRow.sha256 == frozen.sha256)
+    stored = session.scalar(same)
+    if stored is not None:
+        return stored, False
+    own_id = new_id()
+    row = {
+        "id": own_id,
+        "sha256": frozen.sha256,
+        "name": frozen.name,
+        "summary": frozen.summary,
+        "content": frozen.content,
+        "created_at": datetime.now(UTC),
+    }
+    # Somebody else may store the same content at this moment; then both get that one.
+    with suppress(IntegrityError), session.begin_nested():
+        session.execute(sa.insert(ScenarioRow).values(**row))
+    kept = session.scalars(same).one()
+    return kept, kept.id == own_id
+
+
+@contextmanager
+def _named_by_ids() -> Iterator[None]:
+    """Let errors point into lists of ids, where the file would hold the things themselves."""
+    try:
+        yield
+    except PlannerError as error:
+        pointer = re.sub(r"^/satellites/(\d+).*", r"/satellite_ids/\1", error.fault.pointer or "")
+        error.fault = replace(error.fault, pointer=pointer)
+        raise
+
+
+def _num_targets(session: Session, catalog_ids: Sequence[str]) -> int:
+    """Return how many targets catalogues hold, without reading them."""
+    total = sa.func.coalesce(sa.func.sum(TargetCatalogRow.num_targets), 0)
+    wanted = sa.select(total).where(TargetCatalogRow.id.in_(set(catalog_ids)))
+    return int(session.scalars(wanted).one())
+
+
+def _expanded(session: Session, body: ScenarioIn) -> ScenarioFile:
+    shared = {name: getattr(body, name) for name in Question.model_fields}
+    return ScenarioFile(
+        **shared,
+        satellites=_satellites(session, body.satellite_ids),
+        targets=_targets(session, body.target_catalog_ids),
+        ground_stations=_ground_stations(session, body.ground_station_ids),
+    )
+
+
+def _satellites(session: Session, ids: Sequence[str]) -> list[FileSatellite]:
+    rows = _find(session, SatelliteRow, "satellite", ids)
+    elements = satellite_store.in_force(session, ids)
+    return [
+        FileSatellite.model_validate(
+            {
+                "id": row.id,
+                "name": row.name,
+                "agility": row.agility,
+                "sensor": row.sensor,
+                "resources": row.resources,
+                **elements[row.id].orbit,
+            }
+        )
+        for row in rows
+    ]
+
+
+def _targets(session: Session, catalog_ids: Sequence[str]) -> list[FileTarget]:
+    _find(session, TargetCatalogRow, "target_catalog", catalog_ids)
+    targets: list[FileTarget] = []
+    seen: set[str] = set()
+    for position, catalog_id in enumerate(catalog_ids):
+        of_catalog = sa.select(TargetRow).where(TargetRow.catalog_id == catalog_id)
+        for row in session.scalars(of_catalog.order_by(TargetRow.position)):
+            if row.target_id in seen:
+                raise InvalidScenario(
+                    "duplicate_target_id",
+                    f"Target {row.target_id!r} is in an earlier catalogue too.",
+                    pointer=f"/target_catalog_ids/{position}",
+                )
+            seen.add(row.target_id)
+            targets.append(FileTarget(**row.body, catalog_id=catalog_id))
+    return targets
+
+
+def _ground_stations(session: Session, ids: Sequence[str]) -> list[FileGroundStation]:
+    rows = _find(session, GroundStationRow, "ground_station", ids)
+    return [FileGroundStation(id=row.id, **row.body) for row in rows]
+
+
+def _find(session: Session, table: type[R], what: str, ids: Sequence[str]) -> list[R]:
+    """Return the rows of these ids, in their order; none may be missing or named twice."""
+    query = sa.select(table).where(table.id.in_(set(ids)), table.deleted_at.is_(None))
+    rows = {row.id: row for row in session.scalars(query)}
+    for position, own_id in enumerate(ids):
+        pointer = f"/{what}_ids/{position}"
+        words = what.replace("_", " ")
+        if own_id not in rows:
+            raise InvalidScenario(
+                f"unknown_{what}", f"There is no {words} {own_id!r}.", pointer=pointer
+            )
+        if own_id in ids[:position]:
+            raise InvalidScenario(
+                f"duplicate_{what}_id", f"The {words} {own_id!r} is named twice.", pointer=pointer
+            )
+    return [rows[own_id] for own_id in ids]
+
+
+def _summary(file: ScenarioFile, warnings: Iterable[str]) -> dict[str, Any]:
+    shown = file.model_dump(mode="json", include=set(Question.model_fields) - {"name"})
+    catalogs = dict.fromkeys(t.catalog_id for t in file.targets if t.catalog_id is not None)
+    return shown | {
+        "satellite_ids": [satellite.id for satellite in file.satellites],
+        "target_catalog_ids": list(catalogs),
+        "ground_station_ids": [station.id for station in file.ground_stations],
+        "counts": {
+            "satellites": len(file.satellites),
+            "targets": len(file.targets),
+            "ground_stations": len(file.ground_stations),
+        },
+        "warnings": list(warnings),
+    }

@@ -1,0 +1,158 @@
+"""What all shapes share: closed for who writes, open for who reads; instants, names, ids."""
+
+from __future__ import annotations
+
+import re
+from datetime import UTC, datetime, timedelta
+from typing import Annotated, Any, Final, Generic, Self, TypeVar
+
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PlainSerializer,
+    PrivateAttr,
+    StringConstraints,
+    ValidationInfo,
+    ValidatorFunctionWrapHandler,
+    WithJsonSchema,
+    WrapValidator,
+    model_validator,
+)
+from pydantic_core import PydanticCustomError
+
+from service.wire.instants import instant_text
+
+T = TypeVar("T")
+M = TypeVar("M", bound=BaseModel)
+
+Json = dict[str, Any]
+
+_READING: Final = "reading"
+_MOST_FIELDS: Final = 1000
+_RFC3339 = re.compile(
+    r"(\d{4}-\d\d-\d\d)[Tt ](\d\d:\d\d:\d\d)(?:\.(\d{1,9})\d*)?([Zz]|[+-]\d\d:\d\d)?"
+)
+
+
+def parse_instant(value: object) -> datetime:
+    """Return the UTC instant of an RFC 3339 text, to the nearest millisecond.
+
+    >>> parse_instant("2026-01-01T02:00:00+02:00").isoformat()
+    '2026-01-01T00:00:00+00:00'
+    """
+    if isinstance(value, datetime):
+        return value
+    match = _RFC3339.fullmatch(value) if isinstance(value, str) else None
+    if match is None:
+        raise PydanticCustomError(
+            "invalid_time", "An instant is RFC 3339, for example 2026-01-31T12:00:00.000Z"
+        )
+    day, clock, fraction, offset = match.groups()
+    if offset is None:
+        raise PydanticCustomError(
+            "naive_time", "The instant has no time zone: end it in Z or in an offset from UTC"
+        )
+    zone = "+00:00" if offset in "Zz" else offset
+    try:
+        whole = datetime.fromisoformat(f"{day}T{clock}{zone}").astimezone(UTC)
+        return whole + timedelta(milliseconds=round(float(f"0.{fraction or 0}") * 1000.0))
+    except (ValueError, OverflowError):
+        raise PydanticCustomError("invalid_time", "There is no such instant") from None
+
+
+Instant = Annotated[
+    datetime,
+    BeforeValidator(parse_instant),
+    PlainSerializer(instant_text, return_type=str, when_used="json"),
+    WithJsonSchema(
+        {"type": "string", "format": "date-time", "examples": ["2026-01-31T12:00:00.000Z"]}
+    ),
+]
+
+Name = Annotated[
+    str,
+    StringConstraints(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$"),
+    Field(description="For people; up to 200 printable characters."),
+]
+
+
+Id = Annotated[str, StringConstraints(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")]
+
+
+def _open(value: object, known: ValidatorFunctionWrapHandler, info: ValidationInfo) -> object:
+    return value if info.context == _READING and isinstance(value, str) else known(value)
+
+
+Open = Annotated[T, WrapValidator(_open)]
+"""One of some words. Readers take any: a newer service may have more of them."""
+
+
+def _for_readers(schema: Json) -> None:
+    """Let the OpenAPI document say what readers may count on: more fields may come."""
+    schema.pop("additionalProperties", None)
+
+
+class Wire(BaseModel):
+    """Base of all that is sent."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, json_schema_extra=_for_readers)
+
+    def __getitem__(self, name: str) -> Any:
+        """Return a field by its name in JSON."""
+        return getattr(self, name)
+
+
+class Stored(Wire):
+    """Base of what has an ETag, which names its state and stands in a header."""
+
+    _etag: str | None = PrivateAttr(None)
+
+    @property
+    def etag(self) -> str | None:
+        """What names its state, for who has read it on its own."""
+        return self._etag
+
+    def with_etag(self, etag: str | None) -> Self:
+        """Return the same as it was answered under this ETag."""
+        copy = self.model_copy()
+        copy._etag = etag
+        return copy
+
+
+class Listed(Wire, Generic[T]):
+    """One page of a list."""
+
+    items: tuple[T, ...]
+    next: str | None = Field(description="Cursor of the next page; null on the last one.")
+
+
+def dumped(model: BaseModel, include: set[str] | None = None) -> Json:
+    """Return a model as JSON has it, or some of its fields."""
+    return model.model_dump(mode="json", include=include)
+
+
+def read(model: type[M], text: str | bytes) -> M:
+    """Return what an answer says: fields and words that are not known here do no harm."""
+    return model.model_validate_json(text, extra="ignore", context=_READING)
+
+
+class Body(Wire):
+    """Base of everything a client sends: unknown fields, "5" for 5, and NaN are refused."""
+
+    model_config = ConfigDict(
+        strict=True, allow_inf_nan=False, validate_default=False, json_schema_extra=None
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _is_no_dump(cls, value: object) -> object:
+        # Each field too many would be told of, which takes a hundred times its own memory.
+        if isinstance(value, dict) and len(value) > _MOST_FIELDS:
+            raise PydanticCustomError(
+                "too_many_fields",
+                "The object has {num_fields} fields; {most} are the most",
+                {"num_fields": len(value), "most": _MOST_FIELDS},
+            )
+        return value

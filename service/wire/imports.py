@@ -1,0 +1,28 @@
+"""What imports of files answer."""
+
+from __future__ import annotations
+
+from typing import Generic, TypeVar
+
+from pydantic import Field
+
+from service.wire.base import Wire
+
+T = TypeVar("T")
+
+
+class RejectedRow(Wire):
+    """A record that was not stored, and why."""
+
+    row: int | None = Field(description="Line of the file, from 1; null in JSON and XML.")
+    code: str
+    detail: str
+
+
+class Imported(Wire, Generic[T]):
+    """What an import stored, and what it did not."""
+
+    accepted: int
+    rejected: int
+    items: tuple[T, ...]
+    errors: tuple[RejectedRow, ...]

@@ -1,0 +1,108 @@
+"""Places on the ground: targets in their catalogues, and ground stations."""
+
+from __future__ import annotations
+
+from typing import Annotated, Final, Literal
+
+from pydantic import Field
+
+from service.wire.base import Body, Id, Instant, Name, Open, Stored, Wire
+from service.wire.satellites import LightIn, NonNegative, Positive, SensorType
+
+Latitude = Annotated[float, Field(ge=-90, le=90, description="Geodetic (WGS84), north positive.")]
+Longitude = Annotated[
+    float, Field(ge=-180, le=360, description="East positive; both 190 and -170 are taken.")
+]
+Altitude = Annotated[float, Field(ge=-500, le=10000, description="Above the WGS84 ellipsoid.")]
+MAX_TARGETS: Final = 100_000
+
+
+class GroundStationIn(Body):
+    """A ground station."""
+
+    name: Name
+    lat_deg: Latitude
+    lon_deg: Longitude
+    alt_m: Altitude = 0.0
+    min_elevation_deg: float = Field(5.0, ge=0, lt=90)
+    min_contact_s: NonNegative = Field(0.0, description="Shorter passes are no contacts.")
+    elevation_mask: list[Annotated[list[float], Field(min_length=2, max_length=2)]] = Field(
+        [],
+        max_length=720,
+        description="Knots [azimuth_deg, elevation_deg] of the horizon, azimuth ascending from "
+        "north over east, linear between them and round the compass. The higher of mask and "
+        "min_elevation_deg holds.",
+    )
+    antennas: int = Field(1, ge=1, le=100, description="Satellites served at a time.")
+
+
+class GroundStationOut(GroundStationIn, Stored):
+    """A ground station."""
+
+    id: str
+    created_at: Instant
+
+
+class ImportedStation(Wire):
+    """The station that a record belongs to."""
+
+    id: str
+    name: str
+    row: int | None = Field(description="Line of the file, for CSV.")
+    status: Open[Literal["created", "unchanged"]] = Field(
+        description="`unchanged`: the same station is stored already."
+    )
+
+
+class TargetIn(LightIn):
+    """A point on the ground to be imaged once, by any satellite.
+
+    Its limits narrow those of the sensor: a collect meets both.
+    """
+
+    id: Id = Field(description="Your own; unique in the catalogue.")
+    lat_deg: Latitude
+    lon_deg: Longitude
+    alt_m: Altitude = 0.0
+    reward: NonNegative = 1.0
+    collect_s: Positive = Field(30.0, description="How long one image takes.")
+    off_nadir_min_deg: float | None = Field(
+        None, ge=0, le=90, description="Narrows the sensor's limit."
+    )
+    off_nadir_max_deg: float | None = Field(
+        None, ge=0, le=90, description="Narrows the sensor's limit."
+    )
+    min_elevation_deg: float | None = Field(
+        None, ge=0, lt=90, description="Narrows the sensor's limit."
+    )
+    release: Instant | None = Field(None, description="No collect of it starts earlier.")
+    due: Instant | None = Field(None, description="No collect of it ends later.")
+    sensor_type: SensorType | None = Field(
+        None,
+        description="Only satellites whose sensor has this very type collect it; null for any.",
+    )
+
+
+class TargetCatalogIn(Body):
+    """A catalogue of targets."""
+
+    name: Name
+    targets: list[TargetIn] = Field(min_length=1, max_length=MAX_TARGETS)
+
+
+class TargetCatalogOut(Stored):
+    """A catalogue; its targets have their own address."""
+
+    id: str
+    name: str
+    num_targets: int
+    created_at: Instant
+    links: dict[str, str]
+
+
+class CreatedCatalog(TargetCatalogOut):
+    """A new catalogue."""
+
+    ignored_columns: tuple[str, ...] = Field(
+        description="Columns of a CSV file that mean nothing here."
+    )

@@ -1,0 +1,211 @@
+"""Satellites: how they turn, what they see, their resources and orbits."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, Discriminator, Field, StringConstraints, Tag, model_validator
+from pydantic_core import PydanticCustomError
+
+from service.wire.base import Body, Instant, Json, Name, Open, Stored, Wire
+from service.wire.imports import RejectedRow
+
+NonNegative = Annotated[float, Field(ge=0)]
+Positive = Annotated[float, Field(gt=0)]
+Fraction = Annotated[float, Field(ge=0, le=1)]
+SunElevation = Annotated[float | None, Field(ge=-90, le=90)]
+LocalTime = Annotated[float | None, Field(ge=0, le=24)]
+SensorType = Annotated[
+    str, StringConstraints(min_length=1, max_length=100, pattern=r"^[^\x00-\x1f\x7f]*$")
+]
+Nadir = Literal["geodetic", "geocentric"]
+LookSide = Literal["left", "right", "any"]
+OrbitDirection = Literal["ascending", "descending", "any"]
+
+
+class AgilityIn(Body):
+    """How fast the satellite turns; the paper's 1 deg/s by default."""
+
+    slew_rate_deg_s: Positive = 1.0
+    acceleration_deg_s2: Positive | None = Field(
+        None, description="Limit of acceleration and braking; null for none."
+    )
+    settle_s: NonNegative = Field(0.0, description="Wait after each slew.")
+
+
+class LightIn(Body):
+    """When and from where an image may be taken: limits that sensor and target both have."""
+
+    look_side: Open[LookSide] = Field("any", description="Of the direction of flight.")
+    sun_elevation_min_deg: SunElevation = Field(None, description="Of the sun at the target.")
+    sun_elevation_max_deg: SunElevation = Field(None, description="Of the sun at the target.")
+    local_time_from_h: LocalTime = Field(
+        None,
+        description="Local apparent solar time at the target, in hours from midnight; with "
+        "local_time_to_h. A span from 22 to 2 runs over midnight.",
+    )
+    local_time_to_h: LocalTime = None
+    orbit_direction: Open[OrbitDirection] = Field(
+        "any", description="Ascending while the satellite moves north."
+    )
+
+
+class SensorIn(LightIn):
+    """The limits of the imager."""
+
+    off_nadir_min_deg: float = Field(5.0, ge=0, le=90)
+    off_nadir_max_deg: float = Field(55.0, ge=0, le=90)
+    nadir: Open[Nadir] = Field(
+        "geodetic", description="Perpendicular to the ellipsoid, or towards the Earth's centre."
+    )
+    min_elevation_deg: float = Field(0.0, ge=0, lt=90, description="At the target.")
+    sensor_type: SensorType | None = Field(
+        None,
+        description="A name of your own, such as visible or infrared, that targets may ask for.",
+    )
+
+
+class ResourcesIn(Body):
+    """Battery and recorder. All rates are magnitudes."""
+
+    battery_capacity_wh: Positive
+    battery_min_fraction: Fraction = 0.3
+    initial_battery_fraction: Fraction = 1.0
+    sunpoint_power_w: NonNegative = Field(description="Net charge while sun-pointing.")
+    collect_power_w: NonNegative = Field(description="Net draw during a collect.")
+    contact_power_w: NonNegative = Field(description="Net draw during a contact.")
+    recorder_capacity_mbit: Positive
+    recorder_max_fraction: Fraction = 0.75
+    initial_recorder_fraction: Fraction = 0.0
+    collect_rate_mbit_s: NonNegative = Field(description="What a collect writes.")
+    downlink_rate_mbit_s: NonNegative = Field(description="What a contact takes down.")
+    telemetry_rate_mbit_s: NonNegative = Field(description="What telemetry writes at all times.")
+    eclipse_aware: bool = Field(False, description="Charge only in sunlight.")
+
+
+Preset = Literal["paper", "paper_code"]
+
+
+class PresetResourcesIn(Body):
+    """A preset with other fractions than its own."""
+
+    preset: Preset
+    battery_min_fraction: Fraction = 0.3
+    initial_battery_fraction: Fraction = 1.0
+    recorder_max_fraction: Fraction = 0.75
+    initial_recorder_fraction: Fraction = 0.0
+    eclipse_aware: bool = Field(False, description="Charge only in sunlight.")
+
+
+def _form_of_resources(value: object) -> str:
+    if isinstance(value, PresetResourcesIn) or (isinstance(value, dict) and "preset" in value):
+        return "changed_preset"
+    return "object" if isinstance(value, (dict, ResourcesIn)) else "preset"
+
+
+def _shortest(
+    resources: Preset | PresetResourcesIn | ResourcesIn,
+) -> Preset | PresetResourcesIn | ResourcesIn:
+    """Return a preset that changes nothing by its name alone: one question has one hash."""
+    if not isinstance(resources, PresetResourcesIn):
+        return resources
+    plain = PresetResourcesIn(preset=resources.preset)
+    return resources.preset if resources == plain else resources
+
+
+ResourcesField = Annotated[
+    Annotated[Preset, Tag("preset")]
+    | Annotated[PresetResourcesIn, Tag("changed_preset")]
+    | Annotated[ResourcesIn, Tag("object")],
+    Discriminator(_form_of_resources),
+    AfterValidator(_shortest),
+]
+
+
+def _finite(omm: dict[str, Any]) -> dict[str, Any]:
+    # Python's JSON reader lets NaN and Infinity through; the schema of an OMM is open.
+    try:
+        json.dumps(omm, allow_nan=False)
+    except ValueError:
+        raise PydanticCustomError("finite_number", "NaN and infinity are no JSON") from None
+    return omm
+
+
+class OrbitIn(Body):
+    """An element set for SGP4: either ``tle`` or ``omm``."""
+
+    tle: list[str] | None = Field(
+        None, min_length=2, max_length=2, description="Line 1 and line 2 of a two-line element set."
+    )
+    omm: Annotated[dict[str, Any], AfterValidator(_finite)] | None = Field(
+        None, description="The keywords of a CCSDS OMM with mean elements for SGP4."
+    )
+
+    @model_validator(mode="after")
+    def _one_form(self) -> OrbitIn:
+        if (self.tle is None) == (self.omm is None):
+            raise PydanticCustomError("one_orbit", "Give the orbit either as tle or as omm")
+        return self
+
+
+class SatelliteIn(OrbitIn):
+    """A satellite. Everything but its name and orbit defaults to the paper's spacecraft."""
+
+    name: Name
+    agility: AgilityIn = AgilityIn()
+    sensor: SensorIn = SensorIn()
+    resources: ResourcesField = Field(
+        "paper",
+        description="The satellite's own figures, or a preset: the paper's normalised spacecraft "
+        "with the rates of its text (paper) or of the authors' code (paper_code); with fractions "
+        'of your own as {"preset": "paper", "battery_min_fraction": 0.2}.',
+    )
+
+
+class ElementsOut(Stored):
+    """One element set of a satellite."""
+
+    id: str
+    epoch: Instant
+    tle: tuple[str, ...] | None
+    omm: Json | None
+    created_at: Instant
+
+
+class SatelliteOut(Stored):
+    """A satellite with the element set in force, the one of the newest epoch."""
+
+    id: str
+    name: str
+    norad_cat_id: int
+    epoch: Instant
+    tle: tuple[str, ...] | None
+    omm: Json | None
+    agility: AgilityIn
+    sensor: SensorIn
+    resources: ResourcesField
+    created_at: Instant
+    links: dict[str, str]
+
+
+class RecordWarning(RejectedRow):
+    """What was put right while reading a record."""
+
+
+ImportStatus = Literal["created", "elements_added", "unchanged"]
+
+
+class ImportedSatellite(Wire):
+    """The satellite that a record belongs to."""
+
+    id: str
+    name: str
+    norad_cat_id: int
+    epoch: Instant
+    row: int | None = Field(description="Line of the file where the record starts.")
+    status: Open[ImportStatus] = Field(
+        description="`elements_added`: the catalogue number was known, the epoch was not; "
+        "`unchanged`: both were."
+    )
+    warnings: tuple[RecordWarning, ...]

@@ -1,0 +1,162 @@
+"""Scenarios: frozen questions, the files they are, and the opportunities they offer."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import FailFast, Field
+
+from service.wire.base import Body, Id, Instant, Name, Open, Stored, Wire
+from service.wire.pins import PinsIn
+from service.wire.places import GroundStationIn, TargetIn
+from service.wire.satellites import Nadir, Positive, SatelliteIn
+
+Dynamics = Literal["physical", "paper"]
+CollectAlignment = Literal["access", "horizon"]
+Kind = Literal["collect", "contact"]
+
+
+class HorizonIn(Body):
+    """The span to plan."""
+
+    start: Instant
+    end: Instant
+
+
+class Question(Body):
+    """What scenarios and scenario files share."""
+
+    name: Name | None = None
+    horizon: HorizonIn
+    use_resources: bool = Field(
+        True, description="False: no contacts, no sun-pointing, no battery and recorder limits."
+    )
+    dynamics: Open[Dynamics] = Field(
+        "physical", description="How battery and recorder are integrated."
+    )
+    collect_spacing_s: Positive | None = Field(
+        None, description="Several collects per access, this far apart; null for one, centred."
+    )
+    collect_alignment: Open[CollectAlignment] = Field(
+        "access",
+        description="Whether those start from each access's own start on, or at multiples of "
+        "collect_spacing_s from the horizon's start.",
+    )
+    continuous_starts: bool = Field(
+        False, description="A solver may place a collect anywhere inside its access."
+    )
+    allow_old_elements: bool = Field(
+        False,
+        description="Plan with element sets that are more than 30 days from their epoch "
+        "(low orbits), which is refused otherwise.",
+    )
+    pins: PinsIn = PinsIn()
+
+
+class ScenarioIn(Question):
+    """A planning question over what is stored."""
+
+    satellite_ids: list[Id] = Field(min_length=1, max_length=10_000)
+    target_catalog_ids: list[Id] = Field(min_length=1, max_length=1000)
+    ground_station_ids: list[Id] = Field([], max_length=10_000)
+
+
+class FileSatellite(SatelliteIn):
+    """A satellite of a scenario file."""
+
+    id: Id | None = Field(None, description="Its name by default, made unique.")
+
+
+class FileGroundStation(GroundStationIn):
+    """A ground station of a scenario file."""
+
+    id: Id | None = Field(None, description="Its name by default, made unique.")
+
+
+class FileTarget(TargetIn):
+    """A target of a scenario file."""
+
+    catalog_id: Id | None = Field(None, description="The catalogue it came from.")
+
+
+class ScenarioFile(Question):
+    """A self-contained scenario, as ``GET /v1/scenarios/{id}?expand=true`` answers it."""
+
+    # The first thing that is wrong is told: of a whole file of them each would take memory.
+    satellites: Annotated[list[FileSatellite], FailFast()] = Field(min_length=1, max_length=10_000)
+    targets: Annotated[list[FileTarget], FailFast()] = Field(min_length=1, max_length=1_000_000)
+    ground_stations: Annotated[list[FileGroundStation], FailFast()] = Field([], max_length=10_000)
+
+
+class HorizonOut(Wire):
+    """The span to plan."""
+
+    start: Instant
+    end: Instant
+
+
+class Counts(Wire):
+    """How much the scenario holds."""
+
+    satellites: int
+    targets: int
+    ground_stations: int
+
+
+class ScenarioOut(Stored):
+    """A frozen question. Later edits of what it names change nothing in it."""
+
+    id: str
+    sha256: str = Field(description="Of the canonical content, the name left out.")
+    name: str | None
+    horizon: HorizonOut
+    satellite_ids: tuple[str, ...]
+    target_catalog_ids: tuple[str, ...]
+    ground_station_ids: tuple[str, ...]
+    use_resources: bool
+    dynamics: Open[Dynamics]
+    collect_spacing_s: float | None
+    collect_alignment: Open[CollectAlignment] = "access"
+    continuous_starts: bool
+    allow_old_elements: bool
+    pins: PinsIn = PinsIn()
+    counts: Counts
+    warnings: tuple[str, ...] = Field(description="About the age of orbits, for people.")
+    created_at: Instant
+    links: dict[str, str]
+
+
+class ViewOut(Wire):
+    """What satellite and place see of each other at one instant."""
+
+    off_nadir_deg: float
+    elevation_deg: float
+    azimuth_deg: float
+    range_km: float
+    sun_elevation_deg: float
+    eclipse: bool
+
+
+class OpportunityOut(Wire):
+    """A collect or a contact that a plan may take. Angles and range hold at its middle."""
+
+    id: str
+    satellite_id: str
+    kind: Open[Kind]
+    target_id: str | None = Field(description="Of a collect.")
+    station_id: str | None = Field(description="Of a contact.")
+    start: Instant
+    end: Instant
+    access_start: Instant = Field(
+        description="The opportunity lies within its access, cut to the release and due times."
+    )
+    access_end: Instant
+    off_nadir_deg: float = Field(description="At the satellite, from the nadir named below.")
+    elevation_deg: float = Field(description="At the target or station.")
+    azimuth_deg: float = Field(description="Of the satellite, from north over east.")
+    sun_elevation_deg: float = Field(description="At the target or station.")
+    range_km: float = Field(description="From the satellite to the target or station.")
+    eclipse: bool = Field(description="The satellite is in the Earth's shadow.")
+    nadir: Open[Nadir] = Field(description="What off-nadir angles are measured from.")
+    at_start: ViewOut | None = Field(None, description="With `edges=true`.")
+    at_end: ViewOut | None = Field(None, description="With `edges=true`.")

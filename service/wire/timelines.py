@@ -1,0 +1,295 @@
+"""What jobs find: timelines and their proofs, what became of each target, and differences."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from service.wire.base import Instant, Json, Open, Wire
+from service.wire.satellites import Nadir
+from service.wire.scenarios import HorizonOut
+
+Mode = Literal["collect", "contact", "sunpoint"]
+Outcome = Literal["downlinked", "collected", "unscheduled", "excluded"]
+
+
+class SolverUsed(Wire):
+    """What made the plan: the same once more gives the same `plan_sha256`."""
+
+    name: str
+    version: str
+    params: Json
+    seed: int
+
+
+class RuntimeOut(Wire):
+    """Seconds of each phase of the job."""
+
+    access: float
+    compile: float
+    solve: float
+    verify: float
+
+
+class ViolationOut(Wire):
+    """A rule that the plan breaks."""
+
+    code: str = Field(
+        description="`slew`, `overlap`, `window`, `battery`, `recorder`, `duplicate`, `station`; "
+        "more may be added. A plan whose only violations are `duplicate` is valid."
+    )
+    satellite_id: str
+    at: Instant
+    needed: float = Field(description="What the rule asks for, in seconds or as a fraction.")
+    available: float = Field(description="What the plan leaves, in the same unit.")
+    actions: tuple[str, ...] = Field(description="Ids of the actions in question.")
+    detail: str
+
+
+class TotalsOut(Wire):
+    """The plan in numbers, as the referee found them."""
+
+    reward: float
+    bound: float | None = Field(description="Proven: no plan of the scenario can earn more.")
+    gap: float | None = Field(description="`(bound - reward) / bound`.")
+    bound_proof: str | None = Field(
+        description="`milp`, `lagrangian`, `dp` or `totals`; more may be added."
+    )
+    collects: int
+    contacts: int
+    targets: dict[Open[Outcome], int] = Field(
+        description="How many came to what; together all of the scenario."
+    )
+    downlinked_mbit: float | None = Field(
+        description="Null where a recorder has no capacity in megabits."
+    )
+    downlinked_fraction: float | None = Field(description="In recorder capacities.")
+    battery_min_fraction: float | None = Field(description="The lowest charge of any satellite.")
+    recorder_max_fraction: float | None = Field(description="The highest fill of any recorder.")
+
+
+class SlewOut(Wire):
+    """The turn before an action."""
+
+    angle_deg: float
+    needed_s: float = Field(description="Settling included.")
+    available_s: float
+
+
+class ActionOut(Wire):
+    """One thing that a satellite does."""
+
+    id: str
+    mode: Open[Mode]
+    start: Instant
+    end: Instant
+    target_id: str | None
+    station_id: str | None
+    opportunity_id: str | None
+    off_nadir_deg: float | None = Field(description="At the middle of the action.")
+    azimuth_deg: float | None
+    slew: SlewOut | None
+    reward: float
+    battery_fraction_end: float | None
+    recorder_fraction_end: float | None
+
+
+class ResourceCurvesOut(Wire):
+    """Battery and recorder over time, straight between the instants, with their limits."""
+
+    time: tuple[Instant, ...]
+    battery_fraction: tuple[float, ...]
+    recorder_fraction: tuple[float, ...]
+    battery_min_fraction: float
+    recorder_max_fraction: float
+
+
+class SatelliteTimelineOut(Wire):
+    """What one satellite does, in order."""
+
+    id: str
+    name: str
+    actions: tuple[ActionOut, ...]
+    eclipses: tuple[HorizonOut, ...] = Field((), description="Spans in the Earth's shadow.")
+    resources: ResourceCurvesOut | None = Field(description="Null without resources.")
+
+
+class ModelsOut(Wire):
+    """The physics behind the accesses."""
+
+    propagation: str = "SGP4"
+    gravity: str = Field("WGS72", description="Of the element sets.")
+    earth_orientation: str = "IERS daily dUT1 and polar motion"
+    nadir: dict[str, Open[Nadir]] = Field({}, description="By satellite.")
+
+
+class TimelineHead(Wire):
+    """A timeline but for its satellites."""
+
+    schema_version: str
+    job: str
+    scenario_sha256: str
+    plan_sha256: str
+    solver: SolverUsed
+    horizon: HorizonOut
+    dynamics: str
+    use_resources: bool
+    termination: str
+    runtime_s: RuntimeOut
+    validity: Open[Literal["valid", "violations"]]
+    violations: tuple[ViolationOut, ...]
+    totals: TotalsOut
+    warnings: tuple[str, ...]
+    models: ModelsOut
+
+
+class TimelineOut(TimelineHead):
+    """A plan, judged by the referee."""
+
+    satellites: tuple[SatelliteTimelineOut, ...]
+
+
+class ReasonOut(Wire):
+    """Why a target is not collected."""
+
+    code: str
+    certainty: str = Field(description="`proven`, `verified` or `heuristic`; more may be added.")
+    blocking_actions: tuple[str, ...] = Field((), description="Ids of the actions in its way.")
+    opportunity_id: str | None = Field(None, description="The one that comes closest.")
+    at: Instant | None = None
+    reward_delta: float | None = Field(
+        None, description="What the plan would earn more with it in place of those actions."
+    )
+    change: Json | None = Field(
+        None, description="The cheapest that would let it in, as `relax` of a what-if takes it."
+    )
+    detail: str = ""
+
+
+class TargetItem(Wire):
+    """What became of one target."""
+
+    target_id: str
+    target_catalog_id: str | None = None
+    outcome: Open[Outcome]
+    action_id: str | None = None
+    satellite_id: str | None = None
+    reason: ReasonOut | None = Field(None, description="Why it is not collected.")
+
+
+class AttemptOut(Wire):
+    """One opportunity of the target, tried in the plan by the referee."""
+
+    opportunity_id: str
+    satellite_id: str
+    start: Instant
+    end: Instant
+    violations: tuple[ViolationOut, ...] = Field(
+        description="What the plan with it breaks, and did not break before."
+    )
+    displaces: tuple[str, ...] = Field(
+        description="Ids of the actions that have to go for it; of a pinned opportunity's rivals "
+        "where `ruled_out`."
+    )
+    fits_instead: bool = Field(description="The plan with it and without those is valid.")
+    reward_delta: float | None = Field(description="What that plan earns more.")
+    ruled_out: bool = Field(description="A pin rules it out.")
+
+
+class ExplanationOut(TargetItem):
+    """What became of a target, and what of each of its opportunities."""
+
+    opportunities: tuple[AttemptOut, ...] = Field(
+        description="In order of time; none of a target that is collected."
+    )
+    access_changes: tuple[Json, ...] = Field(
+        description="For a target without access: changes that would give it one, each by itself "
+        "and in the form that `relax` of a what-if takes."
+    )
+
+
+Difference = Literal["scenario", "horizon", "satellites", "use_resources", "dynamics"]
+
+
+class PlannedOut(Wire):
+    """A collect or a contact."""
+
+    satellite_id: str
+    mode: Open[Literal["collect", "contact"]]
+    target_id: str | None
+    station_id: str | None
+    start: Instant
+    end: Instant
+
+
+class MovedOut(Wire):
+    """The same target, or the same satellite's contact of a station, at another time."""
+
+    before: PlannedOut
+    after: PlannedOut
+
+
+class TotalDiff(Wire):
+    """A figure of both plans, which differs; null where there is none."""
+
+    before: float | None
+    after: float | None
+    delta: float | None = Field(description="After less before; null where one is missing.")
+
+
+class DiffOut(Wire):
+    """From the first job's plan to the second's; nothing of it for the same plan."""
+
+    before: str = Field(description="The first job.")
+    after: str = Field(description="The second one.")
+    is_empty: bool = Field(description="Whether actions and totals are the same.")
+    questions_differ_in: tuple[Open[Difference], ...] = Field(
+        description="Where the jobs did not plan the same: `scenario` with anything else that is "
+        "listed, or alone where pins, settings or targets differ."
+    )
+    added: tuple[PlannedOut, ...]
+    removed: tuple[PlannedOut, ...]
+    moved: tuple[MovedOut, ...]
+    totals: dict[str, TotalDiff] = Field(
+        description="`reward`, `collects`, `contacts`, `targets` (imaged and counted), what is "
+        "downlinked, the lowest battery and the fullest recorder; only those that differ."
+    )
+
+
+class MultipliersOut(Wire):
+    """Multipliers of targets, and of sets of opportunities of which a plan has at most one."""
+
+    prices: tuple[float, ...]
+    cuts: tuple[tuple[tuple[int, ...], ...], ...]
+    cut_prices: tuple[float, ...]
+
+
+class RefutationOut(Wire):
+    """What shows that no plan earns as much: multipliers, and what a branch leaves to show."""
+
+    steps: tuple[MultipliersOut, ...]
+    branch: tuple[int, RefutationOut, RefutationOut] | None = Field(
+        None, description="An opportunity; the case that it is taken, and that it is not."
+    )
+
+
+class ProofOut(Wire):
+    """What proves a bound: planner_core checks it without any search."""
+
+    version: int
+    proof: str = Field(description="The argument: `milp`, `lagrangian`, `dp` or `totals`.")
+    value: float = Field(description="The bound.")
+    prices: tuple[float, ...] | None = Field(
+        None, description="A multiplier for each target, in the order of the scenario."
+    )
+    elementary: bool | None = Field(
+        None, description="Whether the prices are for paths that take a target once in each pass."
+    )
+    unit: float | None = Field(
+        None,
+        description="With battery and recorder: the unit in which worth is counted, rounded up.",
+    )
+    amount: float | None = Field(None, description="What `refutation` shows to be out of reach.")
+    refutation: RefutationOut | None = None
+    log: str | None = Field(None, description="Of the solver that has proven it, where one has.")

@@ -1,0 +1,28 @@
+"""How many examples the property tests try.
+
+``full`` tries all that a test asks for, ``quick`` a fifth of them; ``SLEWLINE_TEST_PROFILE``
+chooses. Examples are drawn anew in each run, so many quick runs see what one full run sees.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+
+from hypothesis import HealthCheck, settings
+
+# How long an example takes says more of the machine than of the code.
+settings.register_profile(
+    "full", max_examples=100, deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.register_profile("quick", settings.get_profile("full"), max_examples=20)
+
+
+def load_profile() -> None:
+    """Take the profile that the environment names; ``quick`` without a name."""
+    settings.load_profile(os.environ.get("SLEWLINE_TEST_PROFILE", "quick"))
+
+
+def examples(number: int) -> settings:
+    """Return the settings of a test that tries so many examples in a full run."""
+    return settings(max_examples=math.ceil(number * settings().max_examples / 100))

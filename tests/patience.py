@@ -1,0 +1,21 @@
+"""How long tests wait for what must come.
+
+Whoever waits asks again and again, and goes on at once when it has come. So this costs time
+only where something is broken, and is far beyond what anything takes on a busy machine.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Final
+
+PATIENCE_S: Final = 300.0
+
+
+def wait_until(condition: Callable[[], object], what: object = "it never happened") -> None:
+    """Return when the condition holds."""
+    deadline_s = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < deadline_s, what
+        time.sleep(0.02)

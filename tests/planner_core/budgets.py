@@ -1,0 +1,31 @@
+"""Budgets that end with what a search has done: on a slow machine as on a fast one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from planner_core.budget import Budget, Progress
+
+
+def expiring(is_enough: Callable[[Progress], bool]) -> Budget:
+    """Return a budget whose time is over with the first report that is enough."""
+    budget = Budget()
+
+    def look_at(progress: Progress) -> None:
+        if is_enough(progress):
+            budget.expire()
+
+    budget.report = look_at
+    return budget
+
+
+def bounds_told(number: int) -> Callable[[Progress], bool]:
+    """Return what says when so many different bounds have been told."""
+    told: set[float] = set()
+
+    def look_at(progress: Progress) -> bool:
+        if progress.bound is not None:
+            told.add(progress.bound)
+        return len(told) >= number
+
+    return look_at

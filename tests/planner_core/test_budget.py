@@ -1,0 +1,94 @@
+"""What a part of the work may spend."""
+
+from __future__ import annotations
+
+import pytest
+
+from planner_core.budget import Budget, Progress, Termination
+from planner_core.certified.drivers import resources
+from planner_core.certified.incumbent import Incumbent
+from planner_core.certified.solver import Certified
+from planner_core.problem import Problem
+from planner_core.solvers.base import Solution
+from planner_core.solvers.milp import Milp
+from tests.planner_core.flat_earth import flat_problem
+from tests.planner_core.problems import random_problem
+
+
+def test_a_part_works_on_as_many_threads_and_stops_with_the_whole() -> None:
+    whole = Budget(num_threads=3)
+    part = whole.part()
+    assert part.num_threads == 3
+    assert part.remaining_s() is None
+    assert not part.is_spent()
+    whole.cancel()
+    assert part.is_spent()
+    assert part.is_cancelled
+    assert part.stop[0] == 1
+    assert part.termination() is Termination.CANCELLED
+
+
+def test_who_cancels_a_part_cancels_the_whole() -> None:
+    whole = Budget()
+    whole.part().cancel()
+    assert whole.is_cancelled
+    assert whole.is_spent()
+
+
+def test_a_part_has_its_share_of_the_time_and_no_more_than_the_whole() -> None:
+    whole = Budget(1000.0)
+    part = whole.part(0.25)
+    assert part.remaining_s() == pytest.approx(250.0, abs=1.0)
+    assert part.part(0.5).remaining_s() == pytest.approx(125.0, abs=1.0)
+    none = whole.part(0.0)
+    assert none.is_spent()
+    assert not whole.is_spent()
+    assert none.termination() is Termination.TIME_LIMIT
+    whole.expire()
+    assert part.remaining_s() == 0.0
+    assert part.is_spent()
+
+
+def test_a_part_reports_what_it_is_told_to() -> None:
+    seen: list[Progress] = []
+    whole = Budget(report=seen.append)
+    whole.part(report=lambda _: None).report(Progress(phase="solve", fraction=0.1))
+    assert seen == []
+    whole.part().report(Progress(phase="solve", fraction=0.2))
+    assert [p.fraction for p in seen] == [0.2]
+
+
+def test_fleets_with_continuous_starts_and_resources_work_on_all_threads(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    problem = flat_problem(2, num_targets=10, num_contacts=2, use_resources=True, spacing_s=60.0)
+    given: list[int] = []
+    solve = resources.solve_with_resources
+
+    def watched(problem: Problem, budget: Budget, seed: int, gap: float) -> Solution:
+        given.append(budget.num_threads)
+        return solve(problem, budget, seed, gap)
+
+    monkeypatch.setattr("planner_core.certified.solver.solve_with_resources", watched)
+    Certified().solve(problem, Budget(num_threads=2), 0)
+    assert given == [2]
+
+
+def test_a_job_that_is_cancelled_in_its_last_part_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = random_problem(3, num_collects=40, num_targets=20, num_contacts=4)
+    ended: list[Termination] = []
+    solve = Milp.solve
+
+    def cancelled(self: Milp, problem: Problem, budget: Budget, seed: int) -> Solution:
+        budget.cancel()
+        solution = solve(self, problem, budget, seed)
+        ended.append(solution.termination)
+        return solution
+
+    monkeypatch.setattr(Milp, "solve", cancelled)
+    monkeypatch.setattr(Incumbent, "is_within", lambda *_: False)
+    budget = Budget()
+    solution = Certified().solve(problem, budget, 0)
+    assert budget.is_cancelled
+    assert ended == [Termination.CANCELLED]
+    assert solution.termination is Termination.CANCELLED

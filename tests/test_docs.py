@@ -1,0 +1,28 @@
+"""What the pages about the code name is there."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+_ROOT = Path(__file__).resolve().parents[1]
+_CORE = _ROOT / "planner_core"
+# Pages say where in the core something is; inside ``certified`` they leave that out.
+_FOLDERS = (_ROOT, _CORE, _CORE / "certified", _CORE / "certified" / "lns")
+
+
+@pytest.mark.parametrize("page", ["architecture.md", "glossary.md"])
+def test_every_module_and_folder_that_a_page_names_exists(page: str) -> None:
+    text = (_ROOT / "docs" / page).read_text()
+    named = set(re.findall(r"`((?:\w+/)*\w+(?:\.py|/))`", text))
+    assert len(named) > 20
+    missing = [name for name in named if not any((f / name).exists() for f in _FOLDERS)]
+    assert missing == []
+
+
+def test_the_index_names_every_page() -> None:
+    index = (_ROOT / "docs" / "README.md").read_text()
+    pages = [p for p in (_ROOT / "docs").glob("*.md") if p.name != "README.md"]
+    assert [p.name for p in pages if f"({p.name})" not in index] == []
