@@ -66,12 +66,19 @@ class BundleType(types.Type):
         return sum(_words(member) for member in self.members)
 
 
+def _inside(member: Any) -> tuple[types.Type, ...] | None:
+    """Return the types of what a bundle or a tuple holds; None for anything else."""
+    if isinstance(member, BundleType):
+        return member.members
+    held: Any = member
+    return tuple(held.types) if isinstance(member, types.BaseTuple) else None
+
+
 def _words(member: types.Type) -> int:
     """Return a data pointer and a shape for an array, else one word for each scalar."""
-    if isinstance(member, BundleType):
-        return member.num_words
-    if isinstance(member, types.BaseTuple):
-        return sum(_words(inner) for inner in member.types)
+    inside = _inside(member)
+    if inside is not None:
+        return sum(map(_words, inside))
     if not isinstance(member, types.Array):
         return 1
     if member.layout != "C":
@@ -129,9 +136,10 @@ def _read(context: Any, builder: Any, member: types.Type, base: Any, word: int) 
     """Return the value that lies at ``word``."""
     if isinstance(member, BundleType):
         return _at(builder, base, word, _I8)
-    if isinstance(member, types.BaseTuple):
+    inside = _inside(member)
+    if inside is not None:
         items = []
-        for inner in member.types:
+        for inner in inside:
             items.append(_read(context, builder, inner, base, word))
             word += _words(inner)
         return context.make_tuple(builder, member, items)
@@ -174,8 +182,8 @@ def _unbox(bundle_type: BundleType, instance: Any, c: Any) -> NativeValue:
 
 def _lay(c: Any, base: Any, word: int, member: types.Type, item: Any, is_error: Any) -> None:
     """Write a Python object to ``word``, and what it holds behind one another."""
-    if isinstance(member, BundleType | types.BaseTuple):
-        inside = member.members if isinstance(member, BundleType) else member.types
+    inside = _inside(member)
+    if inside is not None:
         for place, inner in enumerate(inside):
             _lay(c, base, word, inner, c.pyapi.tuple_getitem(item, place), is_error)
             word += _words(inner)

@@ -25,7 +25,7 @@ except ImportError:  # Windows
 
 F = TypeVar("F", bound=Callable[..., object])
 
-_MARKS: Final = (b"@kernel", b"@borrowing", b"@inlined")
+_MARKS: Final = (b"@kernel", b"@borrowing", b"@inlined", b"@unbox")  # how they are called, too
 
 
 def sources_fingerprint() -> str:
@@ -83,6 +83,14 @@ _DISPATCHERS: Final[list[Any]] = []
 def compiled_kernels() -> list[Any]:
     """Return Numba's dispatchers of all kernels that are compiled on their own, as imported."""
     return list(_DISPATCHERS)
+
+
+def stored_signatures() -> dict[str, list[str]]:
+    """Return with which arguments each of these is compiled on disk, by its full name."""
+    return {
+        f"{each.py_func.__module__}.{each.py_func.__qualname__}": each._cache.signatures()
+        for each in _DISPATCHERS
+    }
 
 
 def kernel(function: F) -> F:
@@ -148,6 +156,10 @@ class _SharedCache(FunctionCache):
         if found is None and self._wait():
             found = super().load_overload(signature, target_context)
         return found
+
+    def signatures(self) -> list[str]:
+        """Return with which arguments the kernel is on disk."""
+        return [str(signature) for signature, *_ in self._cache_file._load_index()]
 
     def let_others(self) -> None:
         """Let processes go on that wait for this kernel."""

@@ -24,7 +24,10 @@ from numba.core import event
 
 from planner_core.budget import Budget
 from planner_core.build import build_problem, compute_opportunities
+from planner_core.certified.lns.alternating import TurnSearch
+from planner_core.certified.multipliers.energy import EnergyPrices
 from planner_core.domain import (
+    Agility,
     GroundStation,
     Horizon,
     OrbitElements,
@@ -35,19 +38,25 @@ from planner_core.domain import (
 )
 from planner_core.errors import InvalidScenario
 from planner_core.jit import kernel_folder
-from planner_core.pins import BlockedInterval, Pins
+from planner_core.pins import BlockedInterval, PinnedAction, Pins
+from planner_core.precedence.arcs import arc_network_of
+from planner_core.precedence.relation import excluded_by
+from planner_core.problem import Problem
 from planner_core.run import plan_scenario
 from planner_core.solvers.base import Solver
 from planner_core.solvers.registry import (
     SOLVERS,
     Certified,
     Graph,
+    Mcts,
+    Milp,
     Rule,
 )
 from service.jobs.compilation_line import CompilationLine
 
 _START: Final = datetime(2026, 1, 1, tzinfo=UTC)
 _FEW: Final = 40  # targets
+_SLOW_DEG_S: Final = 0.05  # it tracks a target ten times as fast
 
 
 def main() -> None:
@@ -78,14 +87,19 @@ def make_ready(parts: Iterable[str]) -> None:
         min(len(parts), os.cpu_count() or 1), context, _tell_compiled, (told,)
     ) as processes:
         left = {processes.submit(_run, part) for part in parts}
-        while left:
-            done, left = wait(left, timeout=0.2, return_when=FIRST_COMPLETED)
-            for future in done:
-                future.result()
-            while not told.empty():
-                line.compiled(told.get())
-            line.show()
+        try:
+            while left:
+                done, left = wait(left, timeout=0.2, return_when=FIRST_COMPLETED)
+                for future in done:
+                    future.result()
+                while not told.empty():
+                    line.compiled(told.get())
+                line.show()
+        except BaseException:  # no other part begins
+            processes.shutdown(wait=False, cancel_futures=True)
+            raise
     line.end()
+    kernel_folder().mkdir(parents=True, exist_ok=True)
     _marker(parts).touch()
 
 
@@ -150,9 +164,7 @@ def _search(solver: str) -> Callable[[], None]:
     """Return the search of a solver alone: what judges its plan is warmed once, by the rule."""
 
     def search() -> None:
-        budget, scenario = Budget(), _over_the_globe()
-        problem = build_problem(scenario, compute_opportunities(scenario, budget), budget)
-        SOLVERS[solver]().solve(problem, budget, 0)
+        SOLVERS[solver]().solve(_built(_over_the_globe()), Budget(), 0)
 
     return search
 
@@ -168,6 +180,11 @@ def _spaced() -> None:
 def _continuous() -> None:
     crowd = replace(_crowd(), continuous_starts=True)
     _plan(crowd, Rule(), Certified(moves_per_task=1.0))
+    problem = _built(crowd)
+    image = Rule().solve(problem, Budget(), 0).plan.actions[0].opportunity
+    target = problem.target_ids[problem.opportunities.place[image]]
+    kept = Pins(keep=(PinnedAction(satellite_id="warm-up", target_id=target),))
+    _plan(replace(crowd, pins=kept), Rule())
 
 
 def _continuous_with_resources() -> None:
@@ -184,6 +201,28 @@ def _fleet_with_resources() -> None:
     _plan(replace(crowd, satellites=_two(crowd.satellites[0])), Certified(gap=0.1))
 
 
+def _shortage() -> None:
+    """Run the searches that small missions are settled without."""
+    problem = _built(_over_the_globe())
+    plan = Rule().solve(problem, Budget(), 0).plan
+    TurnSearch(problem, plan, problem.typical_worth, Budget(), 0).turn(1)
+    prices = EnergyPrices(problem, np.zeros(len(problem.target_ids)), 1, 0)
+    prices.improve(1, Budget().stop)
+    Mcts(worthless="sunpoint").solve(problem, Budget(), 0)
+
+
+def _slow() -> None:
+    """Have a satellite that gains by way of tasks what it cannot reach directly."""
+    crowd = _crowd()
+    slow = replace(crowd.satellites[0], agility=Agility(slew_rate_deg_s=_SLOW_DEG_S))
+    problem = _built(replace(crowd, satellites=(slow,)))
+    Graph().solve(problem, Budget(), 0)
+    Milp(formulation="pairwise").solve(problem, Budget(), 0)
+    arc_network_of(problem)
+    for each in (problem, _built(_few())):
+        excluded_by(each.satellites[0], 0)
+
+
 ESSENTIAL: Final[dict[str, Callable[[], None]]] = {
     # Judging and the tree search take longest; two processes begin with one each.
     "rule": _judge,
@@ -198,6 +237,8 @@ PARTS: Final[dict[str, Callable[[], None]]] = {
     "spaced": _spaced,
     "fleet": _fleet,
     "fleet with resources": _fleet_with_resources,
+    "shortage": _shortage,
+    "slow": _slow,
 }
 
 
@@ -205,6 +246,11 @@ def _plan(scenario: Scenario, *solvers: Solver) -> None:
     opportunities = None
     for solver in solvers:
         opportunities = plan_scenario(scenario, solver, 0, Budget(), opportunities).opportunities
+
+
+def _built(scenario: Scenario) -> Problem:
+    budget = Budget()
+    return build_problem(scenario, compute_opportunities(scenario, budget), budget)
 
 
 def _two(satellite: Satellite) -> tuple[Satellite, Satellite]:
