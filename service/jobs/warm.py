@@ -104,7 +104,10 @@ def make_ready(parts: Iterable[str]) -> None:
 
 
 def _run(part: str) -> None:
-    PARTS[part]()
+    try:
+        PARTS[part]()
+    except Exception as error:  # not all errors can be sent to another process
+        raise RuntimeError(f"The kernels of {part!r} cannot be compiled: {error}") from error
 
 
 def _marker(parts: Iterable[str]) -> Path:
@@ -181,10 +184,11 @@ def _continuous() -> None:
     crowd = replace(_crowd(), continuous_starts=True)
     _plan(crowd, Rule(), Certified(moves_per_task=1.0))
     problem = _built(crowd)
-    image = Rule().solve(problem, Budget(), 0).plan.actions[0].opportunity
-    target = problem.target_ids[problem.opportunities.place[image]]
-    kept = Pins(keep=(PinnedAction(satellite_id="warm-up", target_id=target),))
-    _plan(replace(crowd, pins=kept), Rule())
+    image = Rule().solve(problem, Budget(), 0).plan.actions[0]
+    target = problem.target_ids[problem.opportunities.place[image.opportunity]]
+    start = crowd.horizon.start + timedelta(seconds=image.start_s)
+    kept = PinnedAction(satellite_id="warm-up", target_id=target, start=start)
+    _plan(replace(crowd, pins=Pins(keep=(kept,))), Rule())
 
 
 def _continuous_with_resources() -> None:

@@ -21,7 +21,7 @@ print(json.dumps(stored_signatures()))
 def _run(*arguments: str, folder: Path) -> str:
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder)}
     return subprocess.run(
-        [sys.executable, *arguments], env=environment, check=True, capture_output=True, text=True
+        [sys.executable, *arguments], env=environment, check=True, stdout=subprocess.PIPE, text=True
     ).stdout
 
 
