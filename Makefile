@@ -6,7 +6,7 @@ BIN := .venv/bin
 PRODUCT := .venv/.product
 TOOLS := .venv/.tools
 WARM := .venv/.warm
-KERNELS := $(shell grep -rlE '^@(kernel|borrowing|inlined)' planner_core --include=*.py)
+KERNELS := $(shell grep -rlE '^@(kernel|borrowing|inlined|unbox)' planner_core --include=*.py)
 LOCK := $(UV) pip compile --universal --python-version 3.11 --generate-hashes \
 	--no-emit-index-url
 PIP := $(BIN)/python -m pip -qq --disable-pip-version-check
@@ -54,14 +54,14 @@ $(TOOLS): $(PRODUCT) requirements-dev.lock
 
 # An edited kernel is compiled here, once, and not by each worker on its own.
 $(WARM): $(PRODUCT) $(KERNELS)
-	@echo "Compiling the planning kernels (once) ..."
 	@$(BIN)/python -m service.jobs.warm
 	@touch $@
 
-demo: $(WARM)
+# The demonstration compiles what it needs itself, and no more.
+demo: $(PRODUCT)
 	@$(BIN)/slewline demo
 
-serve: $(WARM)
+serve: $(PRODUCT)
 	@$(BIN)/slewline demo --serve
 
 # A process for each core, each with a module at a time; see docs/testing.md.
