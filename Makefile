@@ -6,19 +6,19 @@ BIN := .venv/bin
 PRODUCT := .venv/.product
 TOOLS := .venv/.tools
 WARM := .venv/.warm
-KERNELS := $(shell grep -rlE '^@(kernel|borrowing|inlined)' planner_core --include=*.py)
+KERNELS := $(shell grep -rlE '^@(kernel|borrowing|inlined|unbox)' planner_core --include=*.py)
 LOCK := $(UV) pip compile --universal --python-version 3.11 --generate-hashes \
 	--no-emit-index-url
 PIP := $(BIN)/python -m pip -qq --disable-pip-version-check
 
-.PHONY: help setup demo serve test test-full chaos fuzz browser screenshots check check-types \
+.PHONY: help setup demo serve test chaos fuzz browser screenshots check check-types \
 	check-rest format lock dist paper paper-quick clean
 
 help:
 	@echo "make demo     plan a real-size mission through the service's own API, and end"
 	@echo "make serve    the same, and keep serving"
-	@echo "make test     every check, and every test that is not of real size"
-	@echo "make test-full  those too, and five times the examples"
+	@echo "make test     every check and every test; with SLEWLINE_TEST_PROFILE=full"
+	@echo "              also runs of real size, and five times the examples"
 	@echo "make chaos    500 jobs while processes are killed and databases fail (needs Debian and root)"
 	@echo "make fuzz     files made by coverage-guided fuzzing, against every parser (Linux)"
 	@echo "make browser  the dashboard in a real browser (needs Chromium, or Debian and root)"
@@ -54,25 +54,19 @@ $(TOOLS): $(PRODUCT) requirements-dev.lock
 
 # An edited kernel is compiled here, once, and not by each worker on its own.
 $(WARM): $(PRODUCT) $(KERNELS)
-	@echo "Compiling the planning kernels (once) ..."
 	@$(BIN)/python -m service.jobs.warm
 	@touch $@
 
-demo: $(WARM)
+# The demonstration compiles what it needs itself, and no more.
+demo: $(PRODUCT)
 	@$(BIN)/slewline demo
 
-serve: $(WARM)
+serve: $(PRODUCT)
 	@$(BIN)/slewline demo --serve
 
 # A process for each core, each with a module at a time; see docs/testing.md.
-ALL_TESTS := $(BIN)/python -m pytest -n logical
-
 test: check
-	$(ALL_TESTS)
-
-test-full: export SLEWLINE_TEST_PROFILE := full
-test-full: check
-	$(ALL_TESTS) -m ""
+	$(BIN)/python -m pytest -n logical $(if $(filter full,$(SLEWLINE_TEST_PROFILE)),-m "")
 
 # On a SQLite file, then on a PostgreSQL server that is killed as well.
 chaos: export SLEWLINE_TEST_CHAOS_JOBS ?= 500

@@ -115,18 +115,24 @@ def check(scenario: Document, timeline: Document, targets: list[Document]) -> No
         ("station", g["id"]): g for g in scenario["ground_stations"]
     }
     earned: dict[str, float] = {}
+    quality_tolerance = _steepest(scenario) * ANGLE_TOLERANCE_DEG
     for satellite, line in zip(scenario["satellites"], timeline["satellites"], strict=True):
         record = record_of(satellite)
         tasks = [a for a in line["actions"] if a["mode"] != "sunpoint"]
         for action in tasks:
             _check_geometry(record, satellite, places, action)
-            if action["mode"] == "collect" and action["target_id"] not in earned:
-                earned[action["target_id"]] = places[action["target_id"]].get("reward", 1.0)
+            if action["mode"] == "collect":
+                reward = places[action["target_id"]].get("reward", 1.0)
+                worth = reward * _quality(record, scenario, places, action)
+                assert abs(action["worth"] - worth) <= reward * quality_tolerance
+                before = earned.get(action["target_id"], 0.0)
+                earned[action["target_id"]] = max(before, worth)
         _check_turns(record, satellite, places, tasks)
         if scenario["use_resources"] and scenario["dynamics"] == "physical":
             _check_resources(satellite, timeline, line)
     _check_stations(timeline)
-    assert timeline["totals"]["reward"] == sum(earned.values())
+    difference = abs(timeline["totals"]["reward"] - sum(earned.values()))
+    assert difference <= quality_tolerance * sum(t.get("reward", 1.0) for t in places.values())
     assert timeline["totals"]["bound"] >= timeline["totals"]["reward"]
     assert sorted(t["target_id"] for t in targets) == sorted(t["id"] for t in scenario["targets"])
     seen = {t["target_id"] for t in targets if t["outcome"] in ("collected", "downlinked")}
@@ -138,6 +144,31 @@ def _place_of(places: dict[Any, Document], action: Document) -> Document:
     if action["mode"] == "collect":
         return places[action["target_id"]]
     return places["station", action["station_id"]]
+
+
+def _curve(scenario: Document) -> list[list[float]]:
+    assert not scenario.get("quality", {}).get("sun_elevation_deg")
+    curve: list[list[float]] = scenario.get("quality", {}).get("off_nadir_deg", [])
+    return curve or [[0.0, 1.0]]
+
+
+def _steepest(scenario: Document) -> float:
+    """Return the most that quality changes in a degree."""
+    knots = itertools.pairwise(_curve(scenario))
+    return max((abs(v - u) / (b - a) for (a, u), (b, v) in knots), default=0.0)
+
+
+def _quality(
+    record: Satrec, scenario: Document, places: dict[Any, Document], action: Document
+) -> float:
+    """Return the quality of an image by its off-nadir angle at the middle."""
+    start, end = instant(action["start"]), instant(action["end"])
+    angle, _ = view(record, places[action["target_id"]], start + (end - start) / 2)
+    curve = _curve(scenario)
+    for (a, u), (b, v) in itertools.pairwise(curve):
+        if a <= angle <= b:
+            return u + (v - u) * (angle - a) / (b - a)
+    return curve[0][1] if angle < curve[0][0] else curve[-1][1]
 
 
 def _check_geometry(

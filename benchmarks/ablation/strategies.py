@@ -7,7 +7,6 @@ all variants: strategies are only left out, or begun at another time.
 from __future__ import annotations
 
 import importlib
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import reduce
@@ -80,32 +79,6 @@ class _Idle:
         """Do nothing."""
 
 
-def _calm_windows(*args: Any) -> Any:
-    """Return the window search of a fleet without urgency, its last argument."""
-    from planner_core.certified.lns.search import WindowSearch
-
-    return WindowSearch(*args[:4])
-
-
-def _in_turns(search: Any, choices: Any, num_moves: int) -> None:
-    """Let windows and choices take turns on one satellite, where choices moved alone."""
-    from planner_core.certified.lns.alternating import TurnSearch
-
-    turns = search.__dict__.get("turns")
-    if turns is None:
-        unit = search.unit or max(search.bound.value / 2000.0, 1e-12)
-        turns = search.turns = TurnSearch(
-            search.problem, search.plan, unit, search.budget, search.seed
-        )
-    for _ in range(num_moves):
-        if search.is_done:
-            return
-        turns.turn(1)
-        search.offer(turns.plan)
-    choices.adopt(search.plan)
-    search.report("plans")
-
-
 def _off(module: str, name: str, value: Callable[..., Any] = _nothing) -> tuple[Patch, ...]:
     return (Patch(module=module, name=name, value=value),)
 
@@ -121,23 +94,12 @@ _FLEET: Final = {"fleet-4x2000": 12.0, "fleet-2x500": 10.0}
 _STATIONS: Final = {"fleet-stations-4x2000": 60.0}
 
 STRATEGIES: Final[Mapping[str, Change]] = {
-    "shaking": Change(patches=_set(f"{DRIVERS}.fleet", "_PATIENCE", math.inf), families=_FLEET),
-    "urgency": Change(
-        patches=_off(f"{DRIVERS}.fleet", "WindowSearch", _calm_windows), families=_FLEET
-    ),
     "cuts after a fleet": Change(patches=_off(f"{DRIVERS}.fleet", "close_in"), families=_FLEET),
-    "refinement": Change(
-        patches=_off(f"{DRIVERS}.resources", "ResourceSearch.refine"), families=_RESOURCES
-    ),
     "exhaust": Change(
         patches=_off(f"{DRIVERS}.resources", "ResourceSearch.exhaust"), families=_RESOURCES
     ),
-    "choice moves": Change(
+    "turns of windows and choices": Change(
         patches=_off(f"{DRIVERS}.resources", "ResourceSearch.search"), families=_RESOURCES
-    ),
-    "choice moves alone, not in turns with windows": Change(
-        patches=_off(f"{DRIVERS}.resources", "ResourceSearch.search", _in_turns),
-        families=_RESOURCES,
     ),
     "program search": Change(
         patches=_off(f"{DRIVERS}.resources", "ProgramSearch", _Idle), families=_STATIONS

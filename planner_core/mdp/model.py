@@ -8,6 +8,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from planner_core.bundles import bundle
 from planner_core.jit import inlined
 from planner_core.mdp.actions import may_wait, next_action
 from planner_core.mdp.track import NO_TASK, Track, take
@@ -17,6 +18,7 @@ WAIT: Final = -1
 """The sun-point action: wait for the first opportunity one could take, and let it pass."""
 
 
+@bundle
 class Guidance(NamedTuple):
     """Table 2: what guides a search. It is never a plan's reward.
 

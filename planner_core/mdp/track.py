@@ -28,6 +28,7 @@ from typing import Final, NamedTuple, TypedDict
 
 import numpy as np
 
+from planner_core.bundles import bundle
 from planner_core.jit import borrowing, inlined
 from planner_core.problem import (
     CONTACT,
@@ -51,6 +52,7 @@ _MAX_LABELS: Final = 8
 _MAX_AHEAD: Final = 12
 
 
+@bundle
 class Track(NamedTuple):
     """One satellite's problem as plain arrays; shape ``(m,)`` unless said otherwise.
 

@@ -11,6 +11,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from planner_core.bundles import bundle
 from planner_core.jit import borrowing, kernel
 from planner_core.precedence.network import part_ends
 from planner_core.precedence.relation import (
@@ -224,6 +225,7 @@ def reversed_arcs(arcs: Arcs) -> Arcs:
     return Arcs(first, come_from)
 
 
+@bundle
 class ArcNetwork(NamedTuple):
     """The nodes of ``Network`` with stored arcs, for labels that look at each pair many times.
 

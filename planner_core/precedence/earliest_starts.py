@@ -13,6 +13,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from planner_core.bundles import bundle
 from planner_core.jit import borrowing, kernel
 from planner_core.precedence.time_windows import Spans, View
 from planner_core.problem import (
@@ -31,6 +32,7 @@ EARLY_S: Final = 3e-3
 milliseconds and tolerance included."""
 
 
+@bundle
 class Arrivals(NamedTuple):
     """Cells, and what may follow from each.
 

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from planner_core.bundles import bundle
 from planner_core.jit import borrowing, kernel
 from planner_core.precedence.relation import turns_slower_than_it_tracks
 from planner_core.precedence.skyline import (
@@ -31,6 +32,7 @@ from planner_core.problem.slew import TIME_TOLERANCE_S
 from planner_core.problem.transitions import Slews, turns_within
 
 
+@bundle
 class Network(NamedTuple):
     """The tasks of all satellites, one satellite after another, each in order of start.
 

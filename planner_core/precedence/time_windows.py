@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from planner_core.bundles import bundle
 from planner_core.problem import (
     COLLECT,
     Bools,
@@ -23,6 +24,7 @@ from planner_core.problem.pointing import Agile, Path, agile_of
 _LEAST_S = 5e-4  # half a millisecond
 
 
+@bundle
 class Spans(NamedTuple):
     """Tasks in order of their first start; shape ``(n,)`` each.
 
@@ -46,6 +48,7 @@ class Spans(NamedTuple):
     is_kept: Bools
 
 
+@bundle
 class View(NamedTuple):
     """What lines of sight of one satellite follow from.
 

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from planner_core.bundles import bundle
 from planner_core.jit import borrowing, kernel
 from planner_core.problem.slew import (
     INSTANT,
@@ -27,6 +28,7 @@ Ints = npt.NDArray[np.int32]
 Vector = tuple[float, float, float]
 
 
+@bundle
 class Path(NamedTuple):
     """One satellite's path at evenly spaced nodes that cover the horizon.
 
@@ -60,6 +62,7 @@ class Pointing:
     stations_m: Floats
 
 
+@bundle
 class Agile(NamedTuple):
     """How fast a satellite turns; ``acceleration_deg_s2`` may be ``INSTANT``."""
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from planner_core.jit import kernel
+from planner_core.jit import inlined, kernel
 
 Floats = npt.NDArray[np.float64]
 Vector = Floats | tuple[float, float, float]
@@ -19,7 +19,7 @@ INSTANT = 0.0
 """Acceleration value that means "no limit" inside kernels."""
 
 
-@kernel
+@inlined  # of arrays and of tuples
 def angle_between_deg(u: Vector, v: Vector) -> float:
     """Return the angle between two unit vectors; exact for small and for straight angles."""
     cx = u[1] * v[2] - u[2] * v[1]

@@ -14,6 +14,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from planner_core.bundles import bundle
 from planner_core.domain import Agility
 from planner_core.jit import borrowing, kernel
 from planner_core.problem.slew import (
@@ -61,6 +62,7 @@ class Slews(NamedTuple):
     first: int
 
 
+@bundle
 class Transitions(NamedTuple):
     """Tasks of one satellite in order of start, and how it turns from one to the next.
 

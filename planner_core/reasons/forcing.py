@@ -15,6 +15,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from planner_core.bundles import bundle
 from planner_core.jit import borrowing, inlined, kernel
 from planner_core.mdp.track import (
     NO_TASK,
@@ -46,6 +47,7 @@ _MOST_RATE: Final = 5.0  # times the satellite's own: nobody changes more than t
 _NEVER: Final = 1e9
 
 
+@bundle
 class Sequence(NamedTuple):
     """One satellite's part of a plan, for kernels; shape ``(n,)`` unless said otherwise.
 

@@ -12,6 +12,7 @@ from typing import ClassVar, Literal, NamedTuple
 import numpy as np
 
 from planner_core.budget import Budget
+from planner_core.bundles import bundle
 from planner_core.certified.lns.search import polished
 from planner_core.jit import borrowing
 from planner_core.mdp.actions import is_repeated, may_wait, next_action
@@ -75,6 +76,7 @@ def select_action(
     return best, v_best
 
 
+@bundle
 class Rules(NamedTuple):
     """The parameters of the search, as kernels take them."""
 

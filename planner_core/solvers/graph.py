@@ -73,7 +73,13 @@ class Graph:
                 off_path[path] = False
                 narrowed = track._replace(blocked=track.blocked | off_path.astype(np.uint8))
                 rows = rule_plan(
-                    narrowed, turn.collected, True, True, self.contact_above_fraction, NOTHING_TAKEN
+                    narrowed,
+                    turn.collected,
+                    True,
+                    True,
+                    self.contact_above_fraction,
+                    NOTHING_TAKEN,
+                    False,
                 )
                 path = [int(row) for row in rows]
             turn.report(1.0, float(weight[path].sum()))
@@ -100,5 +106,7 @@ def _with_kept(problem: Problem, turn: Turn, path: list[int]) -> list[int]:
     whole = sorted({*path, *kept})
     if all(turn.satellite.transitions.allows(a, b) for a, b in itertools.pairwise(whole)):
         return whole
-    rows = rule_plan(turn.track, turn.collected.copy(), True, True, CONTACT_ABOVE, NOTHING_TAKEN)
+    rows = rule_plan(
+        turn.track, turn.collected.copy(), True, True, CONTACT_ABOVE, NOTHING_TAKEN, False
+    )
     return [int(row) for row in rows if row in kept or not turn.track.is_contact[row]]

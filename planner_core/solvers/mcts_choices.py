@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from planner_core.bundles import bundle
 from planner_core.draws import Uint64s, next_draw
 from planner_core.jit import borrowing, inlined
 from planner_core.mdp.actions import is_repeated, may_wait, next_action
@@ -15,6 +16,7 @@ from planner_core.solvers.mcts_tree import Tree, new_edge
 from planner_core.solvers.walk import CONTACT_ABOVE, naive_select_action
 
 
+@bundle
 class Rules(NamedTuple):
     """The parameters of the search, as kernels take them."""
 

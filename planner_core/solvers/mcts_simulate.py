@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from planner_core.bundles import bundle
 from planner_core.draws import Uint64s
 from planner_core.jit import borrowing
 from planner_core.mdp.actions import may_wait
@@ -33,6 +34,7 @@ from planner_core.solvers.mcts_tree import (
 )
 
 
+@bundle
 class Path(NamedTuple):
     """Room for one simulation; shape ``(depth,)``, ``options`` of ``(breadth + 1,)``."""
 

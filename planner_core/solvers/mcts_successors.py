@@ -10,6 +10,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from planner_core.bundles import bundle
 from planner_core.jit import borrowing, inlined
 from planner_core.mdp.actions import is_repeated, next_action
 from planner_core.mdp.track import Track
@@ -22,6 +23,7 @@ for."""
 UNKNOWN: Final = -1
 
 
+@bundle
 class Successors(NamedTuple):
     """The first tasks that may follow each one directly, of different accesses, in time order.
 

@@ -11,6 +11,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from planner_core.bundles import bundle
 from planner_core.jit import borrowing, kernel
 from planner_core.problem import Floats, Ints
 
@@ -19,6 +20,7 @@ ROLLED_OUT: Final = -2
 """In place of a first edge: the state has been met once, and A(s) is not entered yet."""
 
 
+@bundle
 class Tree(NamedTuple):
     """States and actions of the search, both numbered in order of appearance.
 

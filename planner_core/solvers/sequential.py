@@ -89,7 +89,7 @@ def _order(problem: Problem) -> list[int]:
 def _rest_by_rule(track: Track, collected: Bytes, taken: list[int]) -> list[int]:
     """Return what the rule adds to a search that was cut short, so that no hour stays empty."""
     rows = np.array(taken, dtype=np.int32)
-    return [int(row) for row in rule_plan(track, collected, True, True, CONTACT_ABOVE, rows)]
+    return [int(row) for row in rule_plan(track, collected, True, True, CONTACT_ABOVE, rows, False)]
 
 
 def _is_wasted(problem: Problem, satellite: SatelliteProblem) -> Bytes:

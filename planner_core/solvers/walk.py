@@ -84,7 +84,7 @@ def rule_plan(
     unimaged_only: bool,
     contact_above: float,
     taken: Ints,
-    follows_code: bool = False,
+    follows_code: bool,
 ) -> Ints:
     """Return the rows that RULEBASEDPLANNER takes from the end of ``taken`` to the horizon's.
 

@@ -24,6 +24,7 @@ from planner_core.referee.replay import (
     plan_sha256,
 )
 from planner_core.run import Judged
+from planner_core.worth import quality_of
 from service.wire.base import Json
 from service.wire.jobs import FiguresOut
 from service.wire.scenarios import HorizonOut
@@ -103,10 +104,10 @@ class Wording:
             outcome=found.outcome,
             action_id=None if found.position is None else self.action_ids[found.position],
             satellite_id=None if satellite is None else self.problem.satellites[satellite].id,
-            reason=None if found.reason is None else self._reason(found.reason),
+            reason=None if found.reason is None else self._reason(found.reason, target.reward),
         )
 
-    def _reason(self, found: Reason) -> ReasonOut:
+    def _reason(self, found: Reason, reward: float) -> ReasonOut:
         return ReasonOut(
             code=found.code,
             certainty=found.certainty,
@@ -115,8 +116,14 @@ class Wording:
             at=None if found.at_s is None else self.instant(found.at_s),
             reward_delta=found.reward_delta,
             change=None if found.change is None else self._change(found.change),
-            detail=found.detail,
+            detail=found.detail + self._image_then(found.opportunity, reward),
         )
+
+    def _image_then(self, row: int | None, reward: float) -> str:
+        """Return what the image of a reason would be worth, where that is less than the reward."""
+        if row is None or self.problem.worth[row] >= reward:
+            return ""
+        return f" An image then would be worth {self.problem.worth[row]:.3g} of {reward:g}."
 
     def _change(self, change: Change) -> Json:
         """Return a change in the words of a what-if's ``relax``."""
@@ -134,6 +141,10 @@ class Documents(Wording):
         super().__init__(judged.scenario, judged.problem, judged.timeline)
         self._judged = judged
         self._seen = _seen_at_own_starts(judged)
+        table = self.problem.opportunities
+        self._quality = quality_of(
+            judged.scenario.quality, table.off_nadir_deg, table.sun_elevation_deg
+        )
 
     def head(self, *, job_id: str, scenario_sha256: str, solver: SolverUsed) -> TimelineHead:
         """Return the timeline but for its satellites."""
@@ -218,17 +229,26 @@ class Documents(Wording):
             downlinked_fraction=sum(timeline.downlinked) if use_resources else None,
             battery_min_fraction=timeline.battery_min,
             recorder_max_fraction=timeline.recorder_max,
+            quality_mean=self._quality_mean(),
         )
+
+    def _quality_mean(self) -> float | None:
+        """Return the mean quality of the images that count, one of each target."""
+        judged = self._judged
+        actions = judged.solution.plan.actions
+        rows = [actions[c.position].opportunity for c in judged.timeline.collected.values()]
+        return round(float(self._quality[rows].mean()), 9) if rows else None
 
     def _action(self, action_id: str, action: JudgedAction) -> ActionOut:
         table, row = self.problem.opportunities, action.opportunity
-        target_id = station_id = off_nadir_deg = azimuth_deg = None
+        target_id = station_id = off_nadir_deg = azimuth_deg = worth = quality = None
         if row is not None:
             own = table.off_nadir_deg[row], table.azimuth_deg[row]
             off_nadir_deg, azimuth_deg = self._seen.get(action.position, own)
             place = int(table.place[row])
             if action.mode == "collect":
                 target_id = self.scenario.targets[place].id
+                worth, quality = float(self.problem.worth[row]), self._quality[row]
             else:
                 station_id = self.scenario.ground_stations[place].id
         return ActionOut(
@@ -243,6 +263,8 @@ class Documents(Wording):
             azimuth_deg=_rounded(azimuth_deg, 4),
             slew=None if action.slew is None else _slew(action.slew),
             reward=action.reward,
+            worth=worth,
+            quality=_rounded(quality, 9),
             battery_fraction_end=_rounded(action.battery_end, 9),
             recorder_fraction_end=_rounded(action.recorder_end, 9),
         )

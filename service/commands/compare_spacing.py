@@ -15,7 +15,7 @@ from service.commands.scenario_files import read_scenario, require_folder
 from service.commands.solve import answer_of
 from service.jobs.plan_job import PlanRequest
 from service.jobs.solver_params import params_of, parse_params
-from service.scenarios.translate import canonical, sha256_of
+from service.scenarios.translate import canonical, quality_from, read_file, sha256_of
 
 SPACINGS_S: Final = (60.0, 30.0, 15.0)
 """Those that are tried unless others are named."""
@@ -42,6 +42,7 @@ def compare_spacing(
     ----------
     path
         A self-contained scenario file; what it says of spacing and continuous starts is varied.
+        With ``quality`` its collects do not start anywhere.
     spacings_s
         Seconds between the starts of an access's collects.
     solver, params, seed
@@ -63,12 +64,13 @@ def compare_spacing(
     if out is not None:
         require_folder(out)
     content = read_scenario(path)
+    has_quality = bool(quality_from(read_file(content).quality))
     chosen = params_of(parse_params(solver_class(solver), params))
     print(_line(_HEADER))
     rows: list[tuple[str, ...]] = []
     first: float | None = None
     all_valid = True
-    for starts, change in _variants(spacings_s):
+    for starts, change in _variants(spacings_s, anywhere=not has_quality):
         varied = canonical(content | change)
         request = PlanRequest(
             job_id="local",
@@ -95,14 +97,17 @@ def compare_spacing(
     return 0 if all_valid else 1
 
 
-def _variants(spacings_s: Sequence[float]) -> Iterator[tuple[str, dict[str, Any]]]:
+def _variants(
+    spacings_s: Sequence[float], *, anywhere: bool
+) -> Iterator[tuple[str, dict[str, Any]]]:
     yield "one, centred", {"collect_spacing_s": None, "continuous_starts": False}
     for spacing_s in spacings_s:
         yield (
             f"every {spacing_s:g} s",
             {"collect_spacing_s": spacing_s, "continuous_starts": False},
         )
-    yield "anywhere", {"collect_spacing_s": None, "continuous_starts": True}
+    if anywhere:
+        yield "anywhere", {"collect_spacing_s": None, "continuous_starts": True}
 
 
 def _row(

@@ -18,11 +18,12 @@ import httpx
 
 from service.commands import demo_mission
 from service.commands.summary import HEADER, LEGEND, summary_row, table
+from service.jobs import warm
 from service.settings import Settings
 
 Json = dict[str, Any]
 
-SEARCH_TIME_S: Final = 15.0
+SEARCH_TIME_S: Final = 10.0
 _ACTIVE: Final = ("queued", "running", "cancelling")
 _HOLD_S: Final = 10
 _READY: Final = "Slewline is ready at "
@@ -54,6 +55,7 @@ def run_demo(settings: Settings, *, folder: Path, keep_serving: bool = False) ->
         Where there are no plans to judge.
     """
     signal.signal(signal.SIGTERM, signal.default_int_handler)
+    warm.make_ready(warm.ESSENTIAL)
     folder.mkdir(parents=True, exist_ok=True)
     port = settings.port if keep_serving else 0
     with _service(port, settings.workers, folder / "service.log") as url:

@@ -20,7 +20,7 @@ COLUMNS = (
     "action_id", "satellite_id", "satellite_name", "mode", "start", "end", "duration_s",
     "target_id", "station_id", "opportunity_id", "off_nadir_deg", "azimuth_deg",
     "slew_angle_deg", "slew_needed_s", "slew_available_s", "reward",
-    "battery_fraction_end", "recorder_fraction_end",
+    "battery_fraction_end", "recorder_fraction_end", "worth", "quality",
 )  # fmt: skip
 
 
@@ -63,4 +63,7 @@ def _cells(satellite: Document, action: Document) -> tuple[Any, ...]:
         action["reward"],
         action["battery_fraction_end"],
         action["recorder_fraction_end"],
+        # Answers of the first release do not have them.
+        action.get("worth"),
+        action.get("quality"),
     )

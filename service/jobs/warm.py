@@ -1,21 +1,33 @@
-"""Load the solvers and run their kernels once, so that no job pays for it.
+"""Compile the kernels before they are needed, and load them, so that no job pays for it.
 
-``python -m service.jobs.warm`` fills the cache of compiled kernels on disk.
+``python -m service.jobs.warm`` fills the cache of compiled kernels on disk. Each part plans a
+tiny mission that needs some of them; the essential ones are those of every mission of one
+satellite with resources and one start for each access.
 """
 
 from __future__ import annotations
 
+import multiprocessing
+import os
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from contextlib import suppress
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
+from multiprocessing.queues import SimpleQueue
+from pathlib import Path
 from typing import Final
 
 import numpy as np
+from numba.core import event
 
 from planner_core.budget import Budget
+from planner_core.build import build_problem, compute_opportunities
+from planner_core.certified.lns.alternating import TurnSearch
+from planner_core.certified.multipliers.energy import EnergyPrices
 from planner_core.domain import (
+    Agility,
     GroundStation,
     Horizon,
     OrbitElements,
@@ -25,57 +37,224 @@ from planner_core.domain import (
     Target,
 )
 from planner_core.errors import InvalidScenario
-from planner_core.pins import BlockedInterval, Pins
+from planner_core.jit import kernel_folder
+from planner_core.pins import BlockedInterval, PinnedAction, Pins
+from planner_core.precedence.arcs import arc_network_of
+from planner_core.precedence.relation import excluded_by
+from planner_core.problem import Problem
 from planner_core.run import plan_scenario
 from planner_core.solvers.base import Solver
 from planner_core.solvers.registry import (
     SOLVERS,
     Certified,
     Graph,
+    Mcts,
+    Milp,
     Rule,
 )
+from service.jobs.compilation_line import CompilationLine
 
 _START: Final = datetime(2026, 1, 1, tzinfo=UTC)
 _FEW: Final = 40  # targets
+_SLOW_DEG_S: Final = 0.05  # it tracks a target ten times as fast
 
 
 def main() -> None:
-    """Compile what is not yet compiled, and say how long it took."""
-    began_s = time.monotonic()
-    warm_up()
-    print(f"Kernels are ready ({time.monotonic() - began_s:.1f} s).")
+    """Compile what is not yet compiled."""
+    make_ready(PARTS)
 
 
 def warm_up() -> None:
-    """Plan tiny missions with every solver, so that all kernels are compiled and loaded."""
-    over_the_globe = [(lat, lon) for lat in range(-80, 81, 20) for lon in range(-180, 180, 30)]
-    _plan(_mission(over_the_globe, use_resources=True), [solver() for solver in SOLVERS.values()])
-    # Where a battery is low and a recorder full, reasons are looked for as nowhere else.
-    worn = _mission(over_the_globe, use_resources=True, is_worn=True)
-    _plan(worn, [Rule()])
+    """Run in this process what is compiled or at once needed, so that it is loaded."""
+    for part in PARTS if _marker(PARTS).exists() else ESSENTIAL:
+        PARTS[part]()
+
+
+def make_ready(parts: Iterable[str]) -> None:
+    """Compile some parts in as many processes as there are cores, and tell how far that is.
+
+    Parts are taken in their order. Processes that come upon the same kernel share it: one
+    compiles, the others wait for that one alone.
+    """
+    parts = list(parts)
+    if _marker(parts).exists():
+        return
+    began_s = time.monotonic()
+    context = multiprocessing.get_context("spawn")
+    told = context.SimpleQueue()
+    line = CompilationLine(began_s)
+    with ProcessPoolExecutor(
+        min(len(parts), os.cpu_count() or 1), context, _tell_compiled, (told,)
+    ) as processes:
+        left = {processes.submit(_run, part) for part in parts}
+        try:
+            while left:
+                done, left = wait(left, timeout=0.2, return_when=FIRST_COMPLETED)
+                for future in done:
+                    future.result()
+                while not told.empty():
+                    line.compiled(told.get())
+                line.show()
+        except BaseException:  # no other part begins
+            processes.shutdown(wait=False, cancel_futures=True)
+            raise
+    line.end()
+    kernel_folder().mkdir(parents=True, exist_ok=True)
+    _marker(parts).touch()
+
+
+def _run(part: str) -> None:
+    try:
+        PARTS[part]()
+    except Exception as error:  # not all errors can be sent to another process
+        raise RuntimeError(f"The kernels of {part!r} cannot be compiled: {error}") from error
+
+
+def _marker(parts: Iterable[str]) -> Path:
+    """Return the file that stands where all of some parts are compiled."""
+    name = "all" if set(parts) == set(PARTS) else "essential"
+    return kernel_folder() / f"{name}.ready"
+
+
+def _tell_compiled(told: SimpleQueue[str]) -> None:
+    """Put the name of each kernel that this process compiles into a queue."""
+
+    class Listener(event.Listener):
+        def on_start(self, _: event.Event) -> None:
+            pass
+
+        def on_end(self, happened: event.Event) -> None:
+            told.put(happened.data["dispatcher"].py_func.__qualname__)
+
+    event.register("numba:compile", Listener())
+
+
+# What the warm-up plans -----------------------------------------------------------------------
+
+
+def _over_the_globe(*, is_worn: bool = False) -> Scenario:
+    points = [(lat, lon) for lat in range(-80, 81, 20) for lon in range(-180, 180, 30)]
+    return _mission(points, use_resources=True, is_worn=is_worn)
+
+
+def _crowd(*, use_resources: bool = False) -> Scenario:
+    """Return targets near the pole, in each other's way: proofs need all there is."""
+    random = np.random.default_rng(0)
+    points = zip(random.uniform(60, 85, 120), random.uniform(-180, 180, 120), strict=True)
+    return _mission(points, use_resources=use_resources)
+
+
+def _few() -> Scenario:
+    crowd = _crowd()
+    return replace(crowd, targets=crowd.targets[:_FEW])
+
+
+def _judge() -> None:
+    """Plan by the rule; the referee, the reasons and the quick bound come with it."""
+    _plan(_over_the_globe(), Rule())
+
+
+def _judge_worn() -> None:
+    """Have reasons looked for as only where a battery is low and a recorder full."""
+    worn = _over_the_globe(is_worn=True)
+    _plan(worn, Rule())
     always = BlockedInterval(satellite_id="warm-up", start=worn.horizon.start, end=worn.horizon.end)
     with suppress(InvalidScenario):  # the recorder does not bear that no contact is left
-        _plan(replace(worn, pins=Pins(block=(always,))), [Rule()])
-    # Near the pole targets are in each other's way: proofs need all there is to prove with.
-    random = np.random.default_rng(0)
-    crowd = zip(random.uniform(60, 85, 120), random.uniform(-180, 180, 120), strict=True)
-    crowded = _mission(crowd, use_resources=False)
-    _plan(crowded, [Certified(), Graph(path="longest")])
-    # A choice of starts, free starts and fleets have bounds and searches of their own.
-    few = replace(crowded, targets=crowded.targets[:_FEW])
-    _plan(replace(few, collect_spacing_s=30.0), [Rule(), Certified()])
-    _plan(replace(crowded, continuous_starts=True), [Rule(), Certified(moves_per_task=1.0)])
-    _plan(replace(few, satellites=_two(few.satellites[0])), [Rule(), Certified()])
-    fed = _mission(over_the_globe, use_resources=True)
-    _plan(replace(fed, continuous_starts=True), [Rule(), Certified(gap=0.5)])
-    shared = replace(crowded, satellites=_two(crowded.satellites[0]), use_resources=True)
-    _plan(shared, [Certified(gap=0.1)])
+        _plan(replace(worn, pins=Pins(block=(always,))), Rule())
 
 
-def _plan(scenario: Scenario, solvers: Iterable[Solver]) -> None:
+def _search(solver: str) -> Callable[[], None]:
+    """Return the search of a solver alone: what judges its plan is warmed once, by the rule."""
+
+    def search() -> None:
+        SOLVERS[solver]().solve(_built(_over_the_globe()), Budget(), 0)
+
+    return search
+
+
+def _free() -> None:
+    _plan(_crowd(), Certified(), Graph(path="longest"))
+
+
+def _spaced() -> None:
+    _plan(replace(_few(), collect_spacing_s=30.0), Rule(), Certified())
+
+
+def _continuous() -> None:
+    crowd = replace(_crowd(), continuous_starts=True)
+    _plan(crowd, Rule(), Certified(moves_per_task=1.0))
+    problem = _built(crowd)
+    image = Rule().solve(problem, Budget(), 0).plan.actions[0]
+    target = problem.target_ids[problem.opportunities.place[image.opportunity]]
+    start = crowd.horizon.start + timedelta(seconds=image.start_s)
+    kept = PinnedAction(satellite_id="warm-up", target_id=target, start=start)
+    _plan(replace(crowd, pins=Pins(keep=(kept,))), Rule())
+
+
+def _continuous_with_resources() -> None:
+    _plan(replace(_over_the_globe(), continuous_starts=True), Rule(), Certified(gap=0.5))
+
+
+def _fleet() -> None:
+    few = _few()
+    _plan(replace(few, satellites=_two(few.satellites[0])), Rule(), Certified())
+
+
+def _fleet_with_resources() -> None:
+    crowd = _crowd(use_resources=True)
+    _plan(replace(crowd, satellites=_two(crowd.satellites[0])), Certified(gap=0.1))
+
+
+def _shortage() -> None:
+    """Run the searches that small missions are settled without."""
+    problem = _built(_over_the_globe())
+    plan = Rule().solve(problem, Budget(), 0).plan
+    TurnSearch(problem, plan, problem.typical_worth, Budget(), 0).turn(1)
+    prices = EnergyPrices(problem, np.zeros(len(problem.target_ids)), 1, 0)
+    prices.improve(1, Budget().stop)
+    Mcts(worthless="sunpoint").solve(problem, Budget(), 0)
+
+
+def _slow() -> None:
+    """Have a satellite that gains by way of tasks what it cannot reach directly."""
+    crowd = _crowd()
+    slow = replace(crowd.satellites[0], agility=Agility(slew_rate_deg_s=_SLOW_DEG_S))
+    problem = _built(replace(crowd, satellites=(slow,)))
+    Graph().solve(problem, Budget(), 0)
+    Milp(formulation="pairwise").solve(problem, Budget(), 0)
+    arc_network_of(problem)
+    for each in (problem, _built(_few())):
+        excluded_by(each.satellites[0], 0)
+
+
+ESSENTIAL: Final[dict[str, Callable[[], None]]] = {
+    # Judging and the tree search take longest; two processes begin with one each.
+    "rule": _judge,
+    **{name: _search(name) for name in ("mcts", "certified", "milp", "forward_search", "graph")},
+    "worn": _judge_worn,
+}
+PARTS: Final[dict[str, Callable[[], None]]] = {
+    **ESSENTIAL,
+    "free": _free,
+    "continuous": _continuous,
+    "continuous with resources": _continuous_with_resources,
+    "spaced": _spaced,
+    "fleet": _fleet,
+    "fleet with resources": _fleet_with_resources,
+    "shortage": _shortage,
+    "slow": _slow,
+}
+
+
+def _plan(scenario: Scenario, *solvers: Solver) -> None:
     opportunities = None
     for solver in solvers:
         opportunities = plan_scenario(scenario, solver, 0, Budget(), opportunities).opportunities
+
+
+def _built(scenario: Scenario) -> Problem:
+    budget = Budget()
+    return build_problem(scenario, compute_opportunities(scenario, budget), budget)
 
 
 def _two(satellite: Satellite) -> tuple[Satellite, Satellite]:

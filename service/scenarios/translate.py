@@ -21,6 +21,7 @@ from planner_core.domain import (
     GroundStation,
     Horizon,
     OrbitElements,
+    Quality,
     Resources,
     Satellite,
     Scenario,
@@ -39,6 +40,7 @@ from service.wire.scenarios import (
     FileSatellite,
     FileTarget,
     HorizonIn,
+    QualityIn,
     ScenarioFile,
 )
 
@@ -125,8 +127,9 @@ def canonical_of_file(file: ScenarioFile) -> str:
         _without_unset(target, "catalog_id", "release", "due", "sensor_type")
     if document["collect_alignment"] == "access":
         del document["collect_alignment"]
-    if not any(document["pins"].values()):
-        del document["pins"]
+    for part in ("pins", "quality"):
+        if not any(document[part].values()):
+            del document[part]
     return json.dumps(document, sort_keys=True, separators=(",", ":"), allow_nan=False)
 
 
@@ -149,6 +152,7 @@ def scenario_from_file(file: ScenarioFile) -> Scenario:
         collect_spacing_s=file.collect_spacing_s,
         collect_alignment=file.collect_alignment,
         continuous_starts=file.continuous_starts,
+        quality=quality_from(file.quality),
         allow_old_elements=file.allow_old_elements,
         pins=pins_from(file.pins),
     )
@@ -192,6 +196,14 @@ def horizon_from(body: HorizonIn) -> Horizon:
             "horizon_inverted", "The end must be later than the start.", pointer="/horizon/end"
         )
     return Horizon(start=body.start, end=body.end)
+
+
+def quality_from(body: QualityIn) -> Quality:
+    """Return the curves; `InvalidScenario` with a pointer to the knot that cannot be."""
+    return Quality(
+        off_nadir_deg=tuple((angle_deg, value) for angle_deg, value in body.off_nadir_deg),
+        sun_elevation_deg=tuple((angle_deg, value) for angle_deg, value in body.sun_elevation_deg),
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

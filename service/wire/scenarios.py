@@ -23,6 +23,31 @@ class HorizonIn(Body):
     end: Instant
 
 
+Curve = Annotated[
+    list[Annotated[list[float], Field(min_length=2, max_length=2)]], Field(max_length=100)
+]
+
+
+class QualityIn(Body):
+    """What part of its target's reward an image earns: the product of all curves.
+
+    A curve is a list of knots, an angle and a value from 0 to 1, angles ascending; linear between
+    them and constant beyond. It is read at the middle of the collect.
+    """
+
+    off_nadir_deg: Curve = Field(
+        [],
+        description="Knots [off_nadir_deg, value], from 0 to 90; none for 1 everywhere.",
+        examples=[[[0, 1], [45, 0.6]]],
+    )
+    sun_elevation_deg: Curve = Field(
+        [],
+        description="Knots [sun_elevation_deg, value], at the target, from -90 to 90; none for 1 "
+        "everywhere.",
+        examples=[[[10, 0.5], [40, 1]]],
+    )
+
+
 class Question(Body):
     """What scenarios and scenario files share."""
 
@@ -43,8 +68,10 @@ class Question(Body):
         "collect_spacing_s from the horizon's start.",
     )
     continuous_starts: bool = Field(
-        False, description="A solver may place a collect anywhere inside its access."
+        False,
+        description="A solver may place a collect anywhere inside its access; not with `quality`.",
     )
+    quality: QualityIn = QualityIn()
     allow_old_elements: bool = Field(
         False,
         description="Plan with element sets that are more than 30 days from their epoch "
@@ -118,6 +145,7 @@ class ScenarioOut(Stored):
     collect_spacing_s: float | None
     collect_alignment: Open[CollectAlignment] = "access"
     continuous_starts: bool
+    quality: QualityIn = QualityIn()
     allow_old_elements: bool
     pins: PinsIn = PinsIn()
     counts: Counts

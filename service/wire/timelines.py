@@ -67,6 +67,9 @@ class TotalsOut(Wire):
     downlinked_fraction: float | None = Field(description="In recorder capacities.")
     battery_min_fraction: float | None = Field(description="The lowest charge of any satellite.")
     recorder_max_fraction: float | None = Field(description="The highest fill of any recorder.")
+    quality_mean: float | None = Field(
+        None, description="Of the images that earn, one of each target; null where there is none."
+    )
 
 
 class SlewOut(Wire):
@@ -90,7 +93,13 @@ class ActionOut(Wire):
     off_nadir_deg: float | None = Field(description="At the middle of the action.")
     azimuth_deg: float | None
     slew: SlewOut | None
-    reward: float
+    reward: float = Field(description="What the plan earns with it.")
+    worth: float | None = Field(
+        None, description="Of a collect: what its image is worth by itself, reward times quality."
+    )
+    quality: float | None = Field(
+        None, description="Of a collect: what part of its target's reward its image is worth."
+    )
     battery_fraction_end: float | None
     recorder_fraction_end: float | None
 

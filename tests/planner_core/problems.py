@@ -235,6 +235,7 @@ def varied_problem(
     num_targets: int = 5,
     num_collects: int = 8,
     num_contacts: int = 2,
+    has_quality: bool = False,
 ) -> Problem:
     """Return a problem with resources: rewards or none, eclipses or none, tight or scarce ones."""
     rng = np.random.default_rng(seed)
@@ -243,6 +244,7 @@ def varied_problem(
         dynamics=dynamics,
         num_satellites=num_satellites,
         has_rewards=bool(rng.integers(2)),
+        has_quality=has_quality,
         sunlight=ECLIPSES if rng.integers(2) else None,
         resources=scarce if rng.integers(3) == 0 else TIGHT,
         num_targets=num_targets,

@@ -24,13 +24,15 @@ SEEDS = st.integers(0, 10**6)
     use_resources=st.booleans(),
     num_satellites=st.integers(1, 2),
     has_rewards=st.booleans(),
+    has_quality=st.booleans(),
 )
 def test_no_plan_beats_the_bound(
-    seed: int, use_resources: bool, num_satellites: int, has_rewards: bool
+    seed: int, use_resources: bool, num_satellites: int, has_rewards: bool, has_quality: bool
 ) -> None:
     problem = random_problem(
-        seed, use_resources=use_resources, num_satellites=num_satellites, has_rewards=has_rewards
-    )
+        seed, use_resources=use_resources, num_satellites=num_satellites, has_rewards=has_rewards,
+        has_quality=has_quality,
+    )  # fmt: skip
     best = best_reward(problem)
     assert lagrangian_bound(problem, reward=0.0).value >= best - 1e-9
     rng = np.random.default_rng(seed)

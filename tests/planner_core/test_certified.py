@@ -126,6 +126,29 @@ def test_with_a_choice_of_starts_it_equals_brute_force(
     assert_proven(problem, solution, best_reward(problem))
 
 
+@examples(500)
+@given(
+    seed=SEEDS, num_satellites=st.integers(1, 3), agility=AGILITY, has_rewards=st.booleans(),
+    max_turn_deg=st.sampled_from([0.0, 25.0]), num_offers=st.sampled_from([1, 1, 3]),
+)  # fmt: skip
+def test_with_a_worth_of_each_collect_it_equals_brute_force(
+    seed: int,
+    num_satellites: int,
+    agility: Agility,
+    has_rewards: bool,
+    max_turn_deg: float,
+    num_offers: int,
+) -> None:
+    problem = random_problem(
+        seed, use_resources=False, num_satellites=num_satellites, num_collects=11 // num_offers,
+        num_offers=num_offers, num_targets=4, span_s=300.0, agility=agility,
+        max_turn_deg=max_turn_deg, has_rewards=has_rewards, has_quality=True,
+    )  # fmt: skip
+    solution = Certified().solve(problem, Budget(), 0)
+    assert solution.termination is Termination.OPTIMAL
+    assert_proven(problem, solution, best_reward(problem))
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_crowded_starts_are_planned_within_a_true_bound(seed: int) -> None:
     """Too large to be closed: what the prices of passes prove checks out, whatever the plan."""

@@ -26,11 +26,11 @@ _problem = partial(varied_problem, scarce=STARVED)
 
 @pytest.mark.parametrize("dynamics", ["physical", "paper"])
 @examples(500)
-@given(seed=SEEDS, num_satellites=st.integers(1, 3))
+@given(seed=SEEDS, num_satellites=st.integers(1, 3), has_quality=st.booleans())
 def test_bound_and_plan_enclose_the_optimum(
-    dynamics: Literal["physical", "paper"], seed: int, num_satellites: int
+    dynamics: Literal["physical", "paper"], seed: int, num_satellites: int, has_quality: bool
 ) -> None:
-    problem = _problem(seed, dynamics, num_satellites)
+    problem = _problem(seed, dynamics, num_satellites, has_quality=has_quality)
     best = best_reward(problem)
     solution = Certified().solve(problem, Budget(), 0)
     timeline = replay(problem, solution.plan)

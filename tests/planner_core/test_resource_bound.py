@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from planner_core.certified.proofs.documents import is_proven
 from planner_core.certified.proofs.resource_bound import quick_bound, relaxations, resource_value
+from planner_core.problem import CONTACT
 from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import TIGHT, Task, make_problem, random_problem, varied_problem
@@ -34,12 +35,12 @@ _problem = partial(varied_problem, scarce=BATTERY_ONLY)
 
 @pytest.mark.parametrize("dynamics", ["physical", "paper"])
 @examples(500)
-@example(seed=0, num_satellites=1)
-@given(seed=SEEDS, num_satellites=st.integers(1, 3))
+@example(seed=0, num_satellites=1, has_quality=False)
+@given(seed=SEEDS, num_satellites=st.integers(1, 3), has_quality=st.booleans())
 def test_no_plan_beats_the_bound(
-    dynamics: Literal["physical", "paper"], seed: int, num_satellites: int
+    dynamics: Literal["physical", "paper"], seed: int, num_satellites: int, has_quality: bool
 ) -> None:
-    problem = _problem(seed, dynamics, num_satellites)
+    problem = _problem(seed, dynamics, num_satellites, has_quality=has_quality)
     best = best_reward(problem)
     assert quick_bound(problem, reward=0.0).value >= best - 1e-9
     rng = np.random.default_rng(seed)
@@ -91,7 +92,9 @@ def test_a_price_of_data_changes_nothing_but_the_time(
     dynamics: Literal["physical", "paper"], seed: int, near: float | None
 ) -> None:
     problem = _problem(seed, dynamics, num_collects=20, num_targets=15, num_contacts=4)
-    worth = np.random.default_rng(seed).integers(0, 30, len(problem.target_ids)).astype(np.int32)
+    num_rows = len(problem.opportunities)
+    worth = np.random.default_rng(seed).integers(0, 30, num_rows).astype(np.int32)
+    worth[problem.opportunities.kind == CONTACT] = 0
     stop = np.zeros(1, dtype=np.uint8)
     for relaxation in relaxations(problem, 2):
         most, _ = replace(relaxation, data_price=0.0).most(worth, 0, stop)

@@ -105,6 +105,36 @@ def test_an_action_outside_its_access_or_moved_without_leave_is_a_window_violati
     assert codes(replay(problem, short)) == ["window"]
 
 
+@pytest.mark.parametrize(
+    ("quality", "earns"),
+    [((0.4, 0.9), 1), ((0.9, 0.4), 0), ((0.5, 0.5), 0), ((0.0, 0.0), 0)],
+)
+def test_the_best_image_of_a_target_counts_and_of_equal_ones_the_first(
+    quality: tuple[float, float], earns: int
+) -> None:
+    tasks = [replace(collect(0, 200.0 * i), quality=q) for i, q in enumerate(quality)]
+    problem = make_problem(tasks, num_targets=1, use_resources=False, rewards=[3.0])
+    timeline = judge(problem, 0, 1)
+    assert timeline.is_valid
+    assert codes(timeline) == ["duplicate"]
+    assert timeline.collected[0].position == earns
+    assert timeline.reward == timeline.collected[0].worth == 3.0 * max(quality)
+    (line,) = timeline.satellites
+    assert line.actions[earns].reward == timeline.reward
+    assert line.actions[1 - earns].reward == 0.0
+
+
+def test_a_better_image_that_breaks_a_rule_does_not_count() -> None:
+    tasks = [replace(collect(0, 0.0), quality=0.4), replace(collect(0, 200.0), quality=0.9)]
+    problem = make_problem(
+        [*tasks, collect(1, 195.0, 40.0)], num_targets=2, use_resources=False, rewards=[3.0, 0.0]
+    )
+    timeline = judge(problem, 0, 1, 2)
+    assert codes(timeline) == ["overlap"]
+    assert timeline.collected[0].position == 0
+    assert timeline.reward == pytest.approx(1.2)
+
+
 def test_a_station_with_one_antenna_serves_one_satellite_at_a_time() -> None:
     tasks = [contact(0.0, 100.0), contact(50.0, 150.0, satellite=1), contact(100.0, 180.0)]
     one = make_problem(tasks, num_targets=0, num_satellites=2)

@@ -49,6 +49,17 @@ def test_more_starts_never_earn_less(
     assert printed[3].startswith("every 20 s")
 
 
+def test_with_quality_nothing_starts_anywhere(
+    scenario: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    quality = {"off_nadir_deg": [[0, 1], [50, 0.2]]}
+    scenario.write_text(json.dumps(json.loads(scenario.read_text()) | {"quality": quality}))
+    assert main(["compare-spacing", str(scenario), "--spacing-s", "30"]) == OK
+    _, centred, every = capsys.readouterr().out.splitlines()
+    assert centred.startswith("one, centred")
+    assert every.startswith("every 30 s")
+
+
 def test_what_is_wrong_is_told_by_its_place(
     scenario: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import asdict, replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from planner_core.budget import Budget
-from planner_core.build import build_problem, compute_opportunities
+from planner_core.build import ScenarioOpportunities, build_problem, compute_opportunities
 from planner_core.certified.proofs import documents as proofs
 from planner_core.certified.proofs.bound import Bound
 from planner_core.solvers.registry import SOLVERS
@@ -46,6 +48,7 @@ NEAR = {"certified": {"gap": 0.05}, "milp": {"gap": 0.05, "cut_rounds": 5}}
 """What exact solvers are content with; that they need not prove the last image saves minutes."""
 
 
+QUALITY = {"off_nadir_deg": [[0, 1], [30, 0.95], [50, 0.8]]}
 CHOSEN = [
     *(pytest.param(solver, NEAR.get(solver, {}), id=solver) for solver in sorted(SOLVERS)),
     *(pytest.param(s, {}, id=f"{s} to the end", marks=pytest.mark.full_size) for s in NEAR),
@@ -58,6 +61,7 @@ CHOSEN = [
     [
         {}, {"dynamics": "paper"}, {"use_resources": False}, {"collect_spacing_s": 30.0},
         {"continuous_starts": True}, {"continuous_starts": True, "use_resources": False},
+        {"collect_spacing_s": 30.0, "quality": QUALITY},
     ],
     ids=str,
 )  # fmt: skip
@@ -84,6 +88,59 @@ def test_angles_are_those_of_an_action_with_its_own_start() -> None:
         middle = start + (end - start) / 2
         off_nadir_deg, _ = independent.view(record, places[action["target_id"]], middle)
         assert action["off_nadir_deg"] == pytest.approx(off_nadir_deg, abs=0.02)
+
+
+def test_every_collect_tells_its_worth_and_its_quality() -> None:
+    curves = {"off_nadir_deg": [[10, 1], [50, 0.3]], "sun_elevation_deg": [[0, 0.2], [60, 1]]}
+    targets = [target | {"reward": 1.0 + i % 3} for i, target in enumerate(drawn_targets(150))]
+    answer = run(paper_mission(targets, quality=curves), "rule")
+    assert answer.opportunity_block is not None
+    table = ScenarioOpportunities.from_bytes(answer.opportunity_block).opportunities
+    timeline = json.loads(answer.timeline)
+    actions = timeline["satellites"][0]["actions"]
+    reward = {target["id"]: target["reward"] for target in targets}
+    quality = {}
+    for action in actions:
+        if action["mode"] != "collect":
+            assert (action["worth"], action["quality"]) == (None, None)
+            continue
+        row = int(action["opportunity_id"].removeprefix("o"))
+        by_angle = np.interp(table.off_nadir_deg[row], [10, 50], [1, 0.3])
+        by_light = np.interp(table.sun_elevation_deg[row], [0, 60], [0.2, 1])
+        assert action["quality"] == pytest.approx(by_angle * by_light, abs=1e-9)
+        worth = reward[action["target_id"]] * by_angle * by_light
+        assert action["worth"] == pytest.approx(worth, abs=1e-9)
+        if action["reward"]:
+            assert action["reward"] == action["worth"]
+            quality[action["target_id"]] = action["quality"]
+    assert len(set(quality.values())) > 20
+    totals = timeline["totals"]
+    assert totals["quality_mean"] == pytest.approx(np.mean(list(quality.values())), abs=1e-8)
+    assert totals["reward"] == pytest.approx(sum(a["reward"] for a in actions))
+
+
+def test_what_is_left_out_tells_what_an_image_would_be_worth() -> None:
+    targets = [target | {"reward": 2.0} for target in drawn_targets(300)]
+    scenario = paper_mission(targets, quality=QUALITY)
+    answer = run(scenario, "rule")
+    assert answer.opportunity_block is not None
+    table = ScenarioOpportunities.from_bytes(answer.opportunity_block).opportunities
+    knots = np.array(QUALITY["off_nadir_deg"]).T
+    told = 0
+    for target in json.loads(answer.targets):
+        reason = target["reason"]
+        row = reason and reason["opportunity_id"]
+        worth = re.search(
+            r"An image then would be worth ([0-9.]+) of 2\.$", (reason or {}).get("detail", "")
+        )
+        assert (worth is not None) == (row is not None)
+        if row is not None and worth is not None:
+            quality = np.interp(table.off_nadir_deg[int(row.removeprefix("o"))], *knots)
+            assert float(worth[1]) == pytest.approx(2.0 * quality, rel=0.01)
+            told += 1
+    assert told > 20
+    plain = run(paper_mission(targets), "rule")
+    assert "would be worth" not in plain.targets
 
 
 def test_stored_opportunities_give_the_same_plan_as_computed_ones() -> None:

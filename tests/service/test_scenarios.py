@@ -122,6 +122,19 @@ def test_the_file_of_a_scenario_is_the_same_question_without_the_service(
     assert client.get(body["links"]["file"], headers=known).status_code == 304
 
 
+def test_quality_is_frozen_with_the_question(client: httpx.Client) -> None:
+    asked = question(client)
+    plain = post(client, PATH, asked)
+    assert plain["quality"] == {"off_nadir_deg": [], "sun_elevation_deg": []}
+    curves = {"off_nadir_deg": [[0, 1], [45, 0.6]]}
+    body = post(client, PATH, asked | {"quality": curves})
+    assert body["sha256"] != plain["sha256"]
+    assert body["quality"] == curves | {"sun_elevation_deg": []}
+    file = client.get(body["links"]["file"]).json()
+    assert file["quality"] == body["quality"]
+    assert "quality" not in client.get(plain["links"]["file"]).json()
+
+
 def test_later_edits_change_nothing_in_a_scenario(client: httpx.Client) -> None:
     asked = question(client)
     body = post(client, PATH, asked)
@@ -176,6 +189,16 @@ def test_later_edits_change_nothing_in_a_scenario(client: httpx.Client) -> None:
         ({"dynamics": "magic"}, "unknown_value", "/dynamics"),
         ({"use_resources": "yes"}, "invalid_value", "/use_resources"),
         ({"satellites": []}, "unknown_field", "/satellites"),
+        (
+            {"quality": {"off_nadir_deg": [[0, 1], [20, 0.9], [20, 0.5]]}},
+            "value_out_of_range",
+            "/quality/off_nadir_deg/2",
+        ),
+        (
+            {"quality": {"sun_elevation_deg": [[10, 0.5], [40, 1]]}, "continuous_starts": True},
+            "value_out_of_range",
+            "/continuous_starts",
+        ),
     ],
 )
 def test_a_bad_question_is_named_by_its_pointer(

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner_core.domain import Resources
+from planner_core.domain import Quality, Resources
 from planner_core.errors import InvalidScenario, PlannerError
 from service.scenarios.translate import canonical, scenario_from_content, sha256_of
 from tests.service.factories import ground_station, satellite, target, tle
@@ -86,6 +86,8 @@ def test_the_canonical_form_is_its_own_canonical_form() -> None:
         {"targets": [target(release=None, due=None, sensor_type=None)]},
         {"satellites": [satellite(sensor={"sensor_type": None})]},
         {"collect_alignment": "access"},
+        {"quality": {}},
+        {"quality": {"off_nadir_deg": [], "sun_elevation_deg": []}},
     ],
 )
 def test_the_same_question_has_the_same_hash(same: dict[str, Any]) -> None:
@@ -107,6 +109,7 @@ def test_the_same_question_has_the_same_hash(same: dict[str, Any]) -> None:
         {"satellites": [satellite(sensor={"sensor_type": "infrared"})]},
         {"collect_spacing_s": 5.0, "collect_alignment": "horizon"},
         {"ground_stations": [ground_station()]},
+        {"quality": {"off_nadir_deg": [[0, 1]]}},
     ],
 )
 def test_another_question_has_another_hash(other: dict[str, Any]) -> None:
@@ -120,6 +123,14 @@ def test_questions_frozen_by_earlier_versions_keep_their_hash() -> None:
         "ec8499406a946db350eb7b5ce64364c2a4fe4aa70ce8da18c9db220a82c98b7b",
         "de5abf2e2c8e4fa0d0fe1596b38f289a0e2a6ada3a6cfcccb4502d0b22b0dfdf",
     ]
+
+
+def test_curves_survive_their_file() -> None:
+    text = canonical(file(quality={"sun_elevation_deg": [[10, 0.5], [40, 1]]}))
+    assert canonical(json.loads(text)) == text
+    curve = ((10.0, 0.5), (40.0, 1.0))
+    made = scenario_from_content(json.loads(text))
+    assert made.quality == Quality(sun_elevation_deg=curve)
 
 
 def test_times_types_and_alignment_survive_their_file() -> None:
@@ -153,6 +164,32 @@ def test_times_types_and_alignment_survive_their_file() -> None:
         ),
         ({"collect_alignment": "horizon"}, "value_out_of_range", "/collect_alignment"),
         ({"collect_alignment": "grid"}, "unknown_value", "/collect_alignment"),
+        (
+            {"quality": {"off_nadir_deg": [[0, 1], [20, 0.9], [20, 0.5]]}},
+            "value_out_of_range",
+            "/quality/off_nadir_deg/2",
+        ),
+        (
+            {"quality": {"sun_elevation_deg": [[10, 1.5]]}},
+            "value_out_of_range",
+            "/quality/sun_elevation_deg/0",
+        ),
+        (
+            {"quality": {"off_nadir_deg": [[0, 1], [20]]}},
+            None,
+            "/quality/off_nadir_deg/1",
+        ),
+        (
+            {"quality": {"off_nadir_deg": [[0, 1], [20, "0.5"]]}},
+            None,
+            "/quality/off_nadir_deg/1/1",
+        ),
+        ({"quality": {"haze": [[0, 1]]}}, "unknown_field", "/quality/haze"),
+        (
+            {"quality": {"off_nadir_deg": [[0, 1]]}, "continuous_starts": True},
+            "value_out_of_range",
+            "/continuous_starts",
+        ),
         ({"satellite_ids": []}, "unknown_field", "/satellite_ids"),
         ({"satellites": []}, "value_out_of_range", "/satellites"),
         ({"satellites": [satellite(tle=[*tle()[:1], "2"])]}, None, "/satellites/0/tle/1"),

@@ -49,8 +49,8 @@ NOW = "2026-03-01T00:00:00.000Z"
 ACTION = {
     "id": "a1", "mode": "collect", "start": NOW, "end": NOW, "target_id": "t1", "station_id": None,
     "opportunity_id": "o1", "off_nadir_deg": 10.0, "azimuth_deg": 90.0,
-    "slew": {"angle_deg": 1.0, "needed_s": 1.0, "available_s": 2.0}, "reward": 1.0,
-    "battery_fraction_end": None, "recorder_fraction_end": None,
+    "slew": {"angle_deg": 1.0, "needed_s": 1.0, "available_s": 2.0}, "reward": 0.8,
+    "worth": 0.8, "quality": 0.8, "battery_fraction_end": None, "recorder_fraction_end": None,
 }  # fmt: skip
 JOB = {
     "id": "j1", "state": "running", "scenario": {"id": "s1", "sha256": "0"}, "solver": "rule",

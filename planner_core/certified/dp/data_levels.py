@@ -6,6 +6,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from planner_core.bundles import bundle
 from planner_core.certified.dp.resource_network import Network
 from planner_core.jit import kernel
 from planner_core.problem import Floats, Ints
@@ -14,6 +15,7 @@ _MAX_LEVELS: Final = 1200
 _ROUNDING: Final = 1e-6  # of a level: tasks of "the same" length differ by as much
 
 
+@bundle
 class DataLevels(NamedTuple):
     """The data columns of a ``Network`` in levels from 0; shape ``(m,)``."""
 

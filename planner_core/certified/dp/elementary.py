@@ -20,6 +20,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from planner_core.bundles import bundle
 from planner_core.jit import borrowing, kernel
 from planner_core.precedence.arcs import ArcNetwork, arc_network_of
 from planner_core.problem import (
@@ -120,6 +121,7 @@ def _memory(group: Ints, first: Ints, last: Ints, is_twice: Bools) -> Memory:
     return Memory(group, bit, begins, low, high, start_bit[:count].copy(), num_started)
 
 
+@bundle
 class Labels(NamedTuple):
     """The labels of all nodes, and how their values came about; shape ``(n,)``.
 

@@ -11,6 +11,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from planner_core.bundles import bundle
 from planner_core.certified.dp.resource_network import Network, may_be_next
 from planner_core.jit import inlined, kernel
 from planner_core.problem import Floats, Ints, Longs
@@ -19,6 +20,7 @@ _ROUNDING: Final = 1e-6  # of a level: costs "of the same" length differ by as m
 _MAX_LEVELS: Final = 1500  # at a time
 
 
+@bundle
 class EnergyLevels(NamedTuple):
     """The energy columns of a ``Network`` in levels; shape ``(m,)``.
 

@@ -165,7 +165,7 @@ def _forget(
     own_low[:k], own_high[:k] = top + 1, -1
 
 
-@kernel
+@inlined  # of integers and of floats
 def _longer(values: np.ndarray, length: int) -> np.ndarray:
     longer = np.empty(length, dtype=values.dtype)
     longer[: len(values)] = values

@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planner_core.bundles import bundle
 from planner_core.jit import inlined, kernel
 from planner_core.mdp.track import STRICT, compile_track
 from planner_core.precedence.arcs import Arcs, reversed_arcs
@@ -36,6 +37,7 @@ from planner_core.problem.slew import TIME_TOLERANCE_S
 _SLACK = 1e-9  # of capacity; above the referee's rounding, far below any task
 
 
+@bundle
 class Network(NamedTuple):
     """Tasks and arcs of one satellite, relaxed by a hair; shape ``(m,)`` unless said otherwise.
 

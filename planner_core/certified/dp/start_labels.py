@@ -25,6 +25,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from planner_core.bundles import bundle
 from planner_core.jit import borrowing, kernel
 from planner_core.precedence.earliest_starts import (
     EARLY_S,
@@ -59,6 +60,7 @@ _SOONER_S: Final = 0.02
 _PER_TASK_S: Final = 60.0  # what a second is worth where labels are merged
 
 
+@bundle
 class Cells(NamedTuple):
     """One satellite's tasks cut into cells, ready for labels.
 
@@ -92,6 +94,7 @@ class Cells(NamedTuple):
     spare_s: float
 
 
+@bundle
 class Labels(NamedTuple):
     """Labels of all cells, ``most`` to a cell; of each cell the first ``used``."""
 

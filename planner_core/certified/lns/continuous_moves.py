@@ -13,6 +13,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from planner_core.bundles import bundle
 from planner_core.certified.lns.route import (
     FIXED,
     FREE,
@@ -39,6 +40,7 @@ _ATTEMPTS: Final = 30
 _DONE: Final = -2
 
 
+@bundle
 class Scratch(NamedTuple):
     """Room for the labels of one move.
 

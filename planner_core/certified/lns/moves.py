@@ -14,6 +14,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from planner_core.bundles import bundle
 from planner_core.draws import Uint64s, next_draw
 from planner_core.jit import borrowing
 from planner_core.precedence.network import Network, slews_in
@@ -59,6 +60,7 @@ _NOWHERE: Final = -2
 _EMPTY: Final = np.uint64(0)
 
 
+@bundle
 class Ground(NamedTuple):
     """What moves do not change. Shape ``(n,)``, for the nodes of the network, unless said.
 
@@ -96,6 +98,7 @@ class Ground(NamedTuple):
     is_alike: bool
 
 
+@bundle
 class Taken(NamedTuple):
     """The plan: which nodes it takes, and for each target the node that images it, or ``FREE``."""
 
@@ -103,6 +106,7 @@ class Taken(NamedTuple):
     holder: Ints
 
 
+@bundle
 class Room(NamedTuple):
     """Working memory of a window; shape ``(MAX_NODES + 1,)`` for nodes, which count from its first.
 

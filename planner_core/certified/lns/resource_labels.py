@@ -11,6 +11,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from planner_core.bundles import bundle
 from planner_core.certified.dp.resource_network import Network, may_be_next
 from planner_core.jit import borrowing
 from planner_core.problem import (
@@ -36,6 +37,7 @@ _SLOTS: Final = MAX_NODES * LABELS
 _AT_START: Final = -1
 
 
+@bundle
 class Ground(NamedTuple):
     """What moves do not change; one satellite's tasks, shape ``(m,)``, unless said.
 
@@ -75,6 +77,7 @@ class Ground(NamedTuple):
     is_shut: Bools
 
 
+@bundle
 class Room(NamedTuple):
     """Working memory of a window: labels, those that idle, and the tasks that begin to.
 

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planner_core.bundles import bundle
 from planner_core.jit import borrowing
 from planner_core.precedence.time_windows import Spans, View
 from planner_core.problem import Floats, Ints
@@ -24,6 +25,7 @@ FIXED = -3
 """Another satellite must keep it."""
 
 
+@bundle
 class Route(NamedTuple):
     """A sequence in arrays with room for more; the first ``size[0]`` entries count.
 

@@ -22,7 +22,7 @@ from service.commands.cli import main
 from service.scenarios.translate import canonical, sha256_of
 from tests.service.client.trouble import Answer, proxy_before
 
-ENDLESS = ["--solver", "mcts", "--param", "num_simulations=20000", "--time-s", "600"]
+ENDLESS = ["--solver", "mcts", "--param", "num_simulations=100000", "--time-s", "600"]
 
 
 @pytest.fixture(autouse=True)

@@ -19,11 +19,14 @@ from planner_core.problem import Problem
 from planner_core.referee.replay import plan_sha256, replay
 from service.answers.answered import Answered
 from service.answers.reading import READERS, Reading, UnreadableTimeline, plan_in
+from service.answers.rebuilt import view_of
 from service.commands.bodies import FAILED, OK, WRONG_INPUT
 from service.commands.cli import main
 from service.exports import table
 from service.scenarios.records import guarded, unguarded
 from service.scenarios.translate import canonical, scenario_from_content
+from service.wire.base import read as read_wire
+from service.wire.timelines import TimelineOut
 from tests.missions import Document, drawn_targets, paper_mission
 from tests.service.exports.conftest import FINISHED_AT, Mission
 from tests.service.test_plan_job import run
@@ -111,6 +114,7 @@ def test_exports_come_back_as_the_same_plan(
         ("rule", {"collect_spacing_s": 5.0}),
         ("milp", {"use_resources": False, "collect_spacing_s": 20.0}),
         ("rule", {"continuous_starts": True}),
+        ("rule", {"quality": {"off_nadir_deg": [[0, 1], [50, 0.3]]}}),
     ],
     ids=str,
 )
@@ -125,6 +129,25 @@ def test_plans_of_every_kind_of_scenario_come_back(solver: str, flags: dict[str,
         assert plan_sha256(problem, reading.plan) == answered.head["plan_sha256"]
         assert replay(problem, reading.plan).is_valid
         assert replay(problem, reading.plan).reward == answered.head["totals"]["reward"]
+
+
+def test_answers_of_the_first_release_are_read_and_exported(
+    mission: Mission, answered: Answered
+) -> None:
+    """Stored before images had a worth and a quality of their own."""
+    stored = mission.document
+    del stored["totals"]["quality_mean"]
+    actions = [action for satellite in stored["satellites"] for action in satellite["actions"]]
+    for action in actions:
+        del action["worth"], action["quality"]
+    timeline = read_wire(TimelineOut, json.dumps(stored))
+    assert timeline.totals.quality_mean is None
+    assert {(a.worth, a.quality) for s in timeline.satellites for a in s.actions} == {(None, None)}
+    assert view_of(timeline) == view_of(read_wire(TimelineOut, mission.timeline))
+    old = Answered.of(json.dumps(stored), mission.targets, mission.content, FINISHED_AT)
+    now = rows_of(answered)
+    assert rows_of(old) == [row | {"worth": "", "quality": ""} for row in now]
+    assert any(row["worth"] for row in now)
 
 
 def test_an_empty_plan_is_a_header(mission: Mission, answered: Answered, problem: Problem) -> None:

@@ -125,6 +125,20 @@ def test_fractions_of_a_preset_are_frozen_and_can_be_solved_without_the_service(
     assert timeline["totals"]["battery_min_fraction"] >= 0.6
 
 
+def test_the_quality_of_a_question_stays_when_something_else_changes(mission: Mission) -> None:
+    quality = {"off_nadir_deg": [[5, 1], [55, 0.3]]}
+    job = mission.plan(small_mission(quality=quality))
+    varied = mission.ended(mission.what_if(job, forbid=[ODD]))
+    file = mission.http.get(f"{varied['links']['scenario']}?expand=true").json()
+    assert file["quality"] == quality | {"sun_elevation_deg": []}
+    totals = mission.timeline(varied)["totals"]
+    assert 0.3 < totals["quality_mean"] < 1.0
+    imaged = totals["targets"]["collected"] + totals["targets"]["downlinked"]
+    assert totals["reward"] == pytest.approx(totals["quality_mean"] * imaged, rel=1e-6)
+    diff = mission.http.get(f"/v1/jobs/{job['id']}/diff/{varied['id']}").json()
+    assert diff["questions_differ_in"] == ["scenario"]
+
+
 def test_a_change_of_nothing_new_is_the_same_scenario(mission: Mission, planned: Document) -> None:
     change = {"satellite_id": "PAPER", "slew_rate_deg_s": 1.0, "battery_min_fraction": 0.3}
     job = mission.ended(mission.what_if(planned, relax=change))

@@ -1,0 +1,61 @@
+"""The line that tells how far compilation is."""
+
+from __future__ import annotations
+
+import inspect
+import sys
+import time
+from typing import Final, TextIO
+
+from planner_core.jit import compiled_kernels
+
+_EVERY_S: Final = 10.0  # where lines cannot be overwritten
+_TOO_FEW: Final = 0.1  # share of the kernels from which no time can be told yet
+
+
+class CompilationLine:
+    """Counts kernels by their source lines, which is about what they take to compile.
+
+    Nothing is printed before the first kernel: where all are on disk, there is nothing to tell.
+    """
+
+    def __init__(self, began_s: float, out: TextIO = sys.stdout) -> None:
+        self._began_s, self._shown_s, self._out = began_s, 0.0, out
+        self._left = {
+            kernel.py_func.__qualname__: len(inspect.getsourcelines(kernel.py_func)[0])
+            for kernel in compiled_kernels()
+        }
+        self._total = sum(self._left.values())
+        self._done = 0
+        self._is_open = False
+
+    def compiled(self, name: str) -> None:
+        """Count a kernel."""
+        if not self._is_open:
+            self._is_open = True
+            print("Compiling the planning kernels (once) ...", file=self._out, flush=True)
+        self._done += self._left.pop(name, 0)
+
+    def show(self) -> None:
+        """Print how far it is: always in a terminal, now and then elsewhere."""
+        now_s = time.monotonic()
+        is_terminal = self._out.isatty()
+        if self._done < _TOO_FEW * self._total or now_s - self._shown_s < (
+            0.5 if is_terminal else _EVERY_S
+        ):
+            return
+        self._shown_s = now_s
+        share = min(self._done / self._total, 0.99)
+        left_s = (now_s - self._began_s) * (1.0 - share) / share
+        text = f"  {share:3.0%}, about {left_s:.0f} s left"
+        print(f"\r{text:<40}" if is_terminal else text, end="" if is_terminal else "\n",
+              file=self._out, flush=True)  # fmt: skip
+
+    def end(self) -> None:
+        """Say how long it took."""
+        if self._done:
+            begin = "\r" if self._out.isatty() else ""
+            took_s = time.monotonic() - self._began_s
+            print(
+                f"{begin}Kernels are ready ({took_s:.1f} s).".ljust(40), file=self._out, flush=True
+            )
