@@ -16,7 +16,7 @@ from planner_core.certified.mip.solution_pool import PlanPool
 from planner_core.certified.multipliers.incremental import IncrementalPrices
 from planner_core.certified.proofs.documents import from_json, is_proven, to_json
 from planner_core.domain import Agility
-from planner_core.precedence.network import network_of
+from planner_core.precedence.network import heaviest_paths, network_of
 from planner_core.precedence.relation import direct_precedence
 from planner_core.problem import Problem
 from planner_core.problem.plan import Plan
@@ -114,6 +114,29 @@ def test_a_large_fleet_is_planned_in_one_stream(monkeypatch: pytest.MonkeyPatch)
     assert solution.proven.prices is not None
     assert is_proven(problem, from_json(to_json(solution.proven)))
     assert timeline.reward <= solution.proven.value <= 1.1 * timeline.reward
+
+
+def test_a_large_fleet_searches_among_what_costs_the_bound_little() -> None:
+    problem = fleet(4)
+    search = FleetSearch(Incumbent(problem, Budget(), 0.0), 0)
+    search.price(80)
+    network = network_of(problem)
+    worth, price = problem.worth[network.row], np.append(search.prices, 0.0)[network.place]
+    n = len(worth)
+    ends = np.empty(len(network.first) - 1, dtype=np.int32)
+
+    def bound(held: int | None) -> float:
+        """Return what paths are worth of which one holds a task, whatever it costs."""
+        weight = np.maximum(worth - price, 0.0)
+        if held is not None:
+            weight[held] = 1e6
+        value = heaviest_paths(network, weight, np.empty(n), np.empty(n, dtype=np.int32), ends)
+        return value if held is None else value - 1e6 + worth[held] - price[held]
+
+    is_near = search.near_best()[network.row]
+    expected = [bound(None) - bound(a) <= 0.2 * worth[a] + 1e-6 for a in range(n)]
+    assert is_near.tolist() == expected
+    assert 0 < np.count_nonzero(is_near) < n
 
 
 def test_prices_make_a_better_start() -> None:

@@ -1,9 +1,10 @@
 """Many satellites without resources: incremental prices, and a search that heeds them.
 
 A high price says that a target is easily had: several satellites would take it. A first plan at
-these prices gives each satellite about its share. Then the window search tries for what has a
-price and is not imaged, and what its streams come to is merged. What is small enough goes on to
-cutting planes and HiGHS, as a single satellite does.
+these prices gives each satellite about its share. The window search goes on from there, and what
+its streams come to is merged. What is small enough goes on to cutting planes and HiGHS, as a single
+satellite does. For a large fleet there is time for few moves: its search begins them where a target
+has a price and is not imaged, and takes only tasks that cost the bound little.
 """
 
 from __future__ import annotations
@@ -30,13 +31,15 @@ from planner_core.certified.multipliers.incremental import IncrementalPrices
 from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.proofs.certificate import Multipliers
 from planner_core.certified.proofs.lagrangian import default_steps
-from planner_core.precedence.network import network_of
-from planner_core.problem import COLLECT, Floats, Problem
+from planner_core.precedence.network import heaviest_through, network_of
+from planner_core.problem import COLLECT, Bools, Floats, Problem
 from planner_core.problem.plan import Plan
 from planner_core.solvers.base import Solution
 from planner_core.solvers.rule import Rule
+from planner_core.worth import weights
 
 _PREFERENCE: Final = 0.1  # of a large fleet, for targets that are hard to have
+_NEAR: Final = 0.2  # of a reward, that a task of a large fleet's search may cost the bound
 _EPOCHS_AT_A_TIME: Final = 10
 _EPOCHS_TO_START: Final = 80  # until a first plan is worth making
 _SMALL: Final = 60_000  # opportunities for which cutting planes are tried
@@ -57,6 +60,10 @@ class FleetSearch:
         most = np.append(self.problem.best_worth, 0.0)
         num_epochs = int(np.clip(default_steps(len(self._network.row)), *_EPOCHS))
         self._dual = IncrementalPrices(self._network, self._worth, most, num_epochs, seed)
+
+    @property
+    def _is_small(self) -> bool:
+        return len(self.problem.opportunities) <= _SMALL
 
     @property
     def prices(self) -> Floats:
@@ -89,14 +96,17 @@ class FleetSearch:
     def search(self, moves_per_task: float) -> None:
         """Search windows, in several streams where the fleet is small, as far as that leads."""
         num_accesses = num_choices(self.problem)
-        num_streams = _STREAMS if len(self.problem.opportunities) <= _SMALL else 1
+        num_streams = _STREAMS if self._is_small else 1
+        offered = None if self._is_small else self.near_best()
         streams = [self.windows(number) for number in range(num_streams)]
         left = int(moves_per_task * num_accesses)
         pool = PlanPool(self.problem, self.budget, self._seed)
         with ThreadPoolExecutor(self.budget.num_threads) as threads:
             while left > 0 and not self.budget.is_spent():
                 num_moves = min(left, _MOVES_AT_A_TIME)
-                going = [threads.submit(s.make_moves, num_moves, self.budget) for s in streams]
+                going = [
+                    threads.submit(s.make_moves, num_moves, self.budget, offered) for s in streams
+                ]
                 for one in going:
                     one.result()
                 left -= num_moves
@@ -115,14 +125,26 @@ class FleetSearch:
             pool.add(stream.plan.with_kept(self.problem))
         pool.merge()
 
+    def near_best(self) -> Bools:
+        """Return the opportunities that a plan may hold without the bound falling much.
+
+        Shape ``(num_opportunities,)``.
+        """
+        price = self._dual.prices[self._network.place]
+        total, through = heaviest_through(self._network, weights(self._worth, price))
+        cost = total - through + np.maximum(price - self._worth, 0.0)
+        is_near = np.zeros(len(self.problem.opportunities), dtype=np.bool_)
+        is_near[self._network.row] = cost <= _NEAR * self._worth
+        return is_near
+
     def windows(self, number: int) -> WindowSearch:
         """Return a window search from a start of its own, the first from the best plan."""
-        preference = None
-        if len(self.problem.opportunities) > _SMALL:
-            share = np.minimum(self.prices / np.maximum(self.problem.best_worth, 1e-300), 1.0)
-            preference = 1.0 + _PREFERENCE * (0.5 - share)
+        preference = urgency = None
+        if not self._is_small:
+            urgency = np.minimum(self.prices / np.maximum(self.problem.best_worth, 1e-300), 1.0)
+            preference = 1.0 + _PREFERENCE * (0.5 - urgency)
         seed = self._seed + number
-        windows = WindowSearch(self.problem, seed, self._network, preference)
+        windows = WindowSearch(self.problem, seed, self._network, preference, urgency)
         windows.adopt(self.best.plan if number == 0 else self._priced_plan(seed))
         return windows
 

@@ -53,7 +53,6 @@ MAX_WORDS: Final = 16
 
 _FEWEST_TASKS: Final = 3
 _MORE_TASKS: Final = 12
-_TRIALS: Final = 8  # draws of a target that is not imaged
 _FOR_FREE_TARGET: Final = 0.7  # of all moves
 _TIE: Final = 0.01  # of a target's worth; a window's together stay below one task
 _SMALL_TIE: Final = 1e-5
@@ -74,6 +73,11 @@ class Ground(NamedTuple):
     preference
         By how much the search prefers a target to others of its worth, as a factor.
         Shape ``(num_targets + 1,)``.
+    urgency
+        How likely a move begins at a target that is not imaged, where one is drawn.
+        Shape ``(num_targets + 1,)``.
+    num_trials
+        How many draws there are for such a target.
     is_kept
         What every plan must take.
     is_locked
@@ -86,6 +90,8 @@ class Ground(NamedTuple):
     is_transitive: Bools
     worth: Floats
     preference: Floats
+    urgency: Floats
+    num_trials: int
     is_kept: Bools
     is_locked: Bools
     kept_worth: float
@@ -222,13 +228,15 @@ def _follows(network: Network, slews: Slews, a: int, b: int) -> bool:
 def _pivot(ground: Ground, taken: Taken, offered: Bools, draws: Uint64s) -> int:
     """Return a node at random, mostly one of a target that is not imaged."""
     n = len(ground.network.place)
-    num_trials = _TRIALS if next_draw(draws) < _FOR_FREE_TARGET else 1
+    num_trials = ground.num_trials if next_draw(draws) < _FOR_FREE_TARGET else 1
     pivot = 0
     for _ in range(num_trials):
         pivot = int(next_draw(draws) * n)
         target = ground.network.place[pivot]
         if offered[pivot] and taken.holder[target] == FREE and ground.worth[pivot] > 0.0:
-            break
+            urgency = ground.urgency[target]
+            if urgency >= 1.0 or next_draw(draws) < urgency:
+                break
     return pivot
 
 

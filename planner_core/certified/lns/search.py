@@ -29,6 +29,8 @@ from planner_core.problem.plan import Plan
 from planner_core.solvers.base import Solution
 
 _MOVES_AT_A_TIME: Final = 500
+_TRIALS: Final = 8
+_TRIALS_FOR_URGENT: Final = 200
 
 
 class WindowSearch:
@@ -45,6 +47,9 @@ class WindowSearch:
         By how much targets not yet imaged are preferred to others of the same reward, as a
         factor for each; a plan is never given up for one that earns less. Shape
         ``(num_targets,)``.
+    urgency
+        How much targets not yet imaged are worth trying for, from 0 to 1; all the same by
+        default. Shape ``(num_targets,)``.
     """
 
     def __init__(
@@ -53,11 +58,12 @@ class WindowSearch:
         seed: int,
         network: Network | None = None,
         preference: Floats | None = None,
+        urgency: Floats | None = None,
     ) -> None:
         self.problem = problem
         network = network or network_of(problem)
         self._row = network.row
-        self._ground = _ground_of(problem, network, preference)
+        self._ground = _ground_of(problem, network, preference, urgency)
         self._draws = draws_of(seed)
         self._room = room_for(len(problem.target_ids))
         self._every = np.ones(len(self._row), dtype=np.bool_)
@@ -143,7 +149,9 @@ def polished(
     return replace(solution, plan=plan)
 
 
-def _ground_of(problem: Problem, network: Network, preference: Floats | None) -> Ground:
+def _ground_of(
+    problem: Problem, network: Network, preference: Floats | None, urgency: Floats | None
+) -> Ground:
     is_transitive = np.array([is_transitive_on(s) for s in problem.satellites], dtype=np.bool_)
     num_targets = len(problem.target_ids)
     worth = problem.worth[network.row]
@@ -155,6 +163,8 @@ def _ground_of(problem: Problem, network: Network, preference: Floats | None) ->
         is_transitive=is_transitive[network.satellite],
         worth=worth,
         preference=np.ones(num_targets + 1) if preference is None else np.append(preference, 1.0),
+        urgency=np.ones(num_targets + 1) if urgency is None else np.append(urgency, 0.0),
+        num_trials=_TRIALS if urgency is None else _TRIALS_FOR_URGENT,
         is_kept=is_kept,
         is_locked=is_locked,
         kept_worth=1.0 + float(problem.best_worth.sum()),
