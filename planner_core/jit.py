@@ -21,7 +21,7 @@ from planner_core.sources import PACKAGE, fingerprint
 try:
     import fcntl
 except ImportError:  # Windows
-    fcntl = None  # type: ignore[assignment]
+    fcntl = None  # type: ignore[assignment]  # asked for before use
 
 F = TypeVar("F", bound=Callable[..., object])
 

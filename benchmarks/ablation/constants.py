@@ -104,7 +104,7 @@ def _is_number(value: Any) -> bool:
 
 def _is_own(module: ModuleType, name: str) -> bool:
     """Return whether a module makes a constant itself, and did not import it."""
-    source = module.__loader__.get_source(module.__name__)  # type: ignore[union-attr]
+    source = module.__loader__.get_source(module.__name__)  # type: ignore[union-attr]  # ours have one
     return re.search(rf"^{name}\b[^=\n]*=", source, re.MULTILINE) is not None
 
 

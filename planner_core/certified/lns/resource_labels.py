@@ -1,6 +1,6 @@
 """The best stretch of one satellite's tasks under battery and recorder, between two that stay.
 
-Paths are those of ``bounds.resource_network``. Each task keeps a few labels: what was gained, the
+Paths are those of ``dp.resource_network``. Each task keeps a few labels: what was gained, the
 energy and the data that are left. What comes after the stretch says how much energy it wants, and
 how much data it bears.
 """

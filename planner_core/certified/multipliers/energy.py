@@ -1,8 +1,8 @@
 """Prices of targets where batteries are what limits a fleet, changed after each answer.
 
-The scheme is that of ``bounds.incremental``: satellites in turn answer the prices of the moment,
-prices move after each answer, and their mean is put to all satellites now and then. Recorders are
-left out, which makes an answer so quick that hundreds of rounds can be had. What the mean proves
+The scheme is that of ``multipliers.incremental``: satellites in turn answer the prices of the
+moment, prices move after each answer, and their mean is put to all satellites now and then.
+Recorders are left out, which makes an answer so quick that hundreds of rounds can be had. What the mean proves
 with recorders is for ``resource_bound`` to say.
 """
 
