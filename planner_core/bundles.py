@@ -55,7 +55,8 @@ class BundleType(types.Type):
     def places(self) -> dict[str, tuple[int, types.Type]]:
         """The word at which each member begins, and its type."""
         found, word = {}, 0
-        for name, member in zip(self.of._fields, self.members, strict=True):  # type: ignore[attr-defined]  # it is a named tuple
+        of: Any = self.of  # a named tuple's class, which types do not tell
+        for name, member in zip(of._fields, self.members, strict=True):
             found[name] = word, member
             word += _words(member)
         return found

@@ -2,8 +2,8 @@
 
 The scheme is that of ``multipliers.incremental``: satellites in turn answer the prices of the
 moment, prices move after each answer, and their mean is put to all satellites now and then.
-Recorders are left out, which makes an answer so quick that hundreds of rounds can be had. What the mean proves
-with recorders is for ``resource_bound`` to say.
+Recorders are left out, which makes an answer so quick that hundreds of rounds can be had. What the
+mean proves with recorders is for ``resource_bound`` to say.
 """
 
 from __future__ import annotations
