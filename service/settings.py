@@ -54,6 +54,7 @@ class Settings(BaseSettings):
     solver_threads: int | None = Field(None, ge=1, le=64)
     queue_poll_s: float = Field(0.1, gt=0)
     max_queued: int = Field(10_000, ge=1)
+    max_queued_per_tenant: int = Field(1000, ge=1)
     max_running_per_tenant: int = Field(64, ge=1)
     webhook_private_addresses: bool = False
     idempotency_hours: float = Field(24.0, gt=0, le=8760)
