@@ -49,7 +49,7 @@ def create_comparison(body: ComparisonIn, call: CallDep, once: OnceDep) -> Compa
     time_s, memory_mb = intake.limits_of(body.limits, call.settings)
     inline = intake.frozen(call.database, call.settings, body)
     with once.transaction() as session:
-        intake.require_room(session, call.settings, len(body.runs))
+        intake.require_room(session, call, len(body.runs))
         scenario_id = intake.stored_scenario(session, call.audit, body, inline)
         specs = [
             submission.JobSpec(
@@ -81,7 +81,7 @@ def list_comparisons(call: CallDep, paging: PagingDep) -> Listed[ComparisonOut]:
     if call.caller.visible_owner is not None:
         query = query.where(ComparisonRow.tenant == call.caller.visible_owner)
     with call.database.reading() as session:
-        page = newest_first(session, query, ComparisonRow.id, paging)
+        page = newest_first(session, query, ComparisonRow.id, paging, store.weight())
         return Listed(items=_shown(session, page.rows), next=page.next)
 
 

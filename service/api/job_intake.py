@@ -14,6 +14,7 @@ from planner_core.solvers.registry import solver_class
 from service.access.audit import Audit
 from service.answers import store as answer_store
 from service.api import ask_again
+from service.api.deps import Call
 from service.api.job_shapes import headers_of, shown
 from service.db.rows import JobRow
 from service.db.session import Database
@@ -23,6 +24,7 @@ from service.problems.faults import refuse
 from service.problems.kinds import ServiceError
 from service.scenarios import freezing as scenario_store
 from service.scenarios.freezing import FrozenScenario
+from service.scenarios.pin_inputs import refuse_duplicate_pins
 from service.scenarios.translate import inside, read_file
 from service.settings import Settings
 from service.stores import job_store as store
@@ -57,6 +59,7 @@ def frozen(database: Database, settings: Settings, body: QuestionIn) -> FrozenSc
         if isinstance(scenario, ScenarioIn):
             return scenario_store.freeze(database, scenario, limits)
         if isinstance(scenario, ScenarioFile):
+            refuse_duplicate_pins(scenario.pins)
             file = read_file(scenario.model_dump(mode="json"))
             return scenario_store.freeze_file(file, limits)
     return None
@@ -91,14 +94,18 @@ def limits_of(limits: LimitsIn, settings: Settings) -> tuple[float, int]:
     return time_s, memory_mb
 
 
-def require_room(session: Session, settings: Settings, num_jobs: int = 1) -> None:
-    """Refuse more jobs than the queue may hold."""
-    if store.num_waiting(session) + num_jobs > settings.max_queued:
-        raise ServiceError(
-            "queue_full",
-            f"At most {settings.max_queued} jobs may wait, and there is no room for {num_jobs}.",
-            headers={"Retry-After": str(_QUEUE_FULL_S)},
-        )
+def require_room(session: Session, call: Call, num_jobs: int = 1) -> None:
+    """Refuse more jobs than the queue may hold, in all and of one owner."""
+    settings = call.settings
+    most = (settings.max_queued, settings.max_queued_per_tenant)
+    waiting = store.num_waiting(session, call.caller.owner)
+    for limit, number, whose in zip(most, waiting, ("", " of one owner"), strict=True):
+        if number + num_jobs > limit:
+            raise ServiceError(
+                "queue_full",
+                f"At most {limit} jobs{whose} may wait, and there is no room for {num_jobs}.",
+                headers={"Retry-After": str(_QUEUE_FULL_S)},
+            )
 
 
 def find_job(session: Session, job_id: str) -> JobRow:

@@ -16,7 +16,7 @@ from service.api.etags import matches
 from service.api.idempotency import OnceDep
 from service.api.job_shapes import etag_of_job, shown
 from service.api.job_wait import wait_for_change
-from service.api.paging import PagingDep, newest_first
+from service.api.paging import PagingDep, newest_first, size_of
 from service.db.rows import JobRow
 from service.jobs import lease, submission
 from service.jobs.queue import JobQueue
@@ -42,7 +42,7 @@ def create_job(body: JobIn, call: CallDep, once: OnceDep) -> JobOut:
     time_s, memory_mb = intake.limits_of(body.limits, call.settings)
     inline = intake.frozen(call.database, call.settings, body)
     with once.transaction() as session:
-        intake.require_room(session, call.settings)
+        intake.require_room(session, call)
         spec = submission.JobSpec(
             scenario_id=intake.stored_scenario(session, call.audit, body, inline),
             solver=body.solver,
@@ -77,7 +77,7 @@ def list_jobs(
         tenant=call.caller.visible_owner,
     )
     with call.database.reading() as session:
-        page = newest_first(session, query, JobRow.id, paging)
+        page = newest_first(session, query, JobRow.id, paging, size_of(JobRow.change))
         hashes = store.scenario_hashes(session, page.rows)
     return Listed(items=[shown(job, hashes[job.scenario_id]) for job in page.rows], next=page.next)
 
@@ -141,7 +141,7 @@ def rerun_job(job_id: str, call: CallDep, once: OnceDep) -> JobOut:
     queue = intake.queue_of(call.request)
     with once.transaction() as session:
         spec = submission.spec_again(intake.find_job(session, job_id), call.caller.owner)
-        intake.require_room(session, call.settings)
+        intake.require_room(session, call)
         job = submission.submit(session, queue, spec)
         call.audit.record(session, "create", "job", job.id)
         return once.keep(session, intake.accepted(session, call.response, job))

@@ -37,6 +37,7 @@ def create_what_if(job_id: str, body: WhatIfIn, call: CallDep, once: OnceDep) ->
     """
     queue = intake.queue_of(call.request)
     with call.database.reading() as session:
+        intake.require_room(session, call)  # before there is any work
         job = intake.find_job(session, job_id)
         timeline = intake.find_timeline(session, job) if body.needs_plan else None
         scenario = session.get_one(ScenarioRow, job.scenario_id)
@@ -53,7 +54,7 @@ def create_what_if(job_id: str, body: WhatIfIn, call: CallDep, once: OnceDep) ->
     described = reader.get(call.database, job.scenario_id, sha256)
     varied = cast(Variations, call.request.app.state.variations).get(asked, described)
     with once.transaction() as session:
-        intake.require_room(session, call.settings)
+        intake.require_room(session, call)
         row, is_new = scenario_store.save(session, varied.frozen)
         if is_new:
             call.audit.record(session, "create", "scenario", row.id)

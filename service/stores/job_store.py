@@ -20,10 +20,12 @@ def has_scenario(session: Session, scenario_id: str) -> bool:
     return session.scalar(wanted) is not None
 
 
-def num_waiting(session: Session) -> int:
-    """Return how many jobs wait for a worker."""
-    waiting = sa.select(sa.func.count()).select_from(JobRow).where(JobRow.state == "queued")
-    return session.execute(waiting).scalar_one()
+def num_waiting(session: Session, owner: str) -> tuple[int, int]:
+    """Return how many jobs wait for a worker, and how many of those are this owner's."""
+    own = sa.func.count().filter(JobRow.tenant == owner)
+    waiting = sa.select(sa.func.count(), own).where(JobRow.state == "queued")
+    in_all, of_owner = session.execute(waiting).one()
+    return in_all, of_owner
 
 
 def find(session: Session, job_id: str) -> JobRow | None:
