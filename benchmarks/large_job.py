@@ -62,13 +62,13 @@ class Held:
     def _sample(self) -> None:
         for process in [self._root, *self._root.children(recursive=True)]:
             try:
-                kind = "api" if process == self._root else _kind(process)
+                kind = "api" if process == self._root else process_kind(process)
                 self._most[kind] = max(self._most[kind], process.memory_info().rss / 1e6)
             except psutil.Error:
                 continue  # it has ended
 
 
-def _kind(process: psutil.Process) -> str:
+def process_kind(process: psutil.Process) -> str:
     command = " ".join(process.cmdline())
     if "forkserver" not in command:
         return "worker" if "service.jobs" in command else "other"

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+from typing import Any
+
 import sqlalchemy as sa
 from alembic import op
 
@@ -9,6 +12,14 @@ revision = "0003"
 down_revision = "0002"
 branch_labels = None
 depends_on = None
+
+_RESULT = sa.table(
+    "job_result", *map(sa.column, ("job_id", "timeline")), sa.column("figures", sa.JSON())
+)
+_OF_TOTALS = (
+    "reward", "bound", "gap", "bound_proof", "collects", "contacts", "downlinked_mbit",
+    "downlinked_fraction",
+)  # fmt: skip
 
 
 def upgrade() -> None:
@@ -44,6 +55,26 @@ def upgrade() -> None:
     # No foreign key: SQLite would have to copy the table, and jobs are never deleted.
     op.add_column("job", sa.Column("rerun_of", sa.String(length=36), nullable=True))
     op.add_column("job_result", sa.Column("figures", sa.JSON(), nullable=True))
+    _fill_figures(op.get_bind())
+
+
+def _fill_figures(connection: sa.Connection) -> None:
+    """Repeat the numbers of each answer: of earlier versions, and of this one gone back from."""
+    of_job = _RESULT.c.job_id
+    for job_id in connection.scalars(sa.select(of_job)).all():
+        text = connection.scalar(sa.select(_RESULT.c.timeline).where(of_job == job_id))
+        change = sa.update(_RESULT).where(of_job == job_id)
+        connection.execute(change.values(figures=_figures(json.loads(text))))
+
+
+def _figures(timeline: dict[str, Any]) -> dict[str, Any]:
+    runtime_s, totals = timeline.get("runtime_s", {}), timeline.get("totals", {})
+    return {name: totals.get(name) for name in _OF_TOTALS} | {
+        "solve_s": runtime_s.get("solve"),
+        "runtime_s": round(sum(runtime_s.values()), 6),
+        "validity": timeline.get("validity"),
+        "plan_sha256": timeline.get("plan_sha256"),
+    }
 
 
 def downgrade() -> None:

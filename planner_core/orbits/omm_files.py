@@ -23,6 +23,7 @@ from defusedxml.ElementTree import DefusedXMLParser
 from planner_core.errors import Fault
 from planner_core.orbits.element_ranges import MOST_SETS, too_many_sets
 from planner_core.orbits.omm import REQUIRED_KEYS
+from planner_core.spreadsheets import unguarded
 
 _METADATA = (
     "OBJECT_NAME",
@@ -145,7 +146,8 @@ def _read_records(reader: Any, messages: list[Message]) -> list[Fault]:
             detail = f"Expected {len(header)} columns, got {len(cells)}"
             faults.append(Fault("csv_columns", detail, row=row))
         else:
-            messages.append(Message(fields=dict(zip(header, cells, strict=True)), row=row))
+            values = map(unguarded, cells)
+            messages.append(Message(fields=dict(zip(header, values, strict=True)), row=row))
     return faults
 
 

@@ -18,6 +18,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from planner_core.domain import OrbitElements
 from planner_core.orbits.omm import omm_from_elements
+from planner_core.spreadsheets import guarded
 
 VERSION: Final = "2.0"
 ORIGINATOR: Final = "SLEWLINE"
@@ -52,8 +53,11 @@ def write_json(messages: Sequence[Outgoing]) -> str:
 
 
 def write_csv(messages: Sequence[Outgoing]) -> str:
-    """Return a table of messages; of none, nothing."""
-    rows = [omm_from_elements(message.elements) for message in messages]
+    """Return a table of messages; of none, nothing. Names that look like formulas are guarded."""
+    rows = [
+        {key: guarded(v) if isinstance(v, str) else v for key, v in fields.items()}
+        for fields in (omm_from_elements(message.elements) for message in messages)
+    ]
     text = io.StringIO(newline="")
     if rows:
         table = csv.DictWriter(text, rows[0])

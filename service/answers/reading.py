@@ -23,7 +23,8 @@ from planner_core.problem import (
 )
 from planner_core.problem.plan import Action, Plan
 from planner_core.referee.plan_diff import PlannedAction
-from service.scenarios.records import Checked, Record, Records, check, read_csv, unguarded
+from planner_core.spreadsheets import unguarded
+from service.scenarios.records import Checked, Record, Records, check, read_csv
 from service.wire.base import Body, Id, Instant
 
 _MOST_ACTIONS: Final = 1_000_000

@@ -21,6 +21,7 @@ from service.problems.faults import refuse
 from service.problems.kinds import ServiceError
 from service.settings import Settings
 from service.stores import job_store
+from service.wire.base import is_plain
 
 # What needs no thread is async: FastAPI runs everything else in one, which costs more than the
 # work itself.
@@ -130,9 +131,9 @@ async def check_request(request: Request) -> None:
         for name, times in given.items()
         if times > 1
     ]
-    # PostgreSQL's texts can hold any character but this one.
-    if any("\0" in text for text in (request.scope["path"], *request.query_params.values())):
-        faults.append(Fault(code="invalid_value", detail="No path or parameter holds a NUL."))
+    if not all(map(is_plain, (request.scope["path"], *request.query_params.values()))):
+        detail = "A path or parameter holds characters that no text may hold."
+        faults.append(Fault(code="invalid_value", detail=detail))
     if faults:
         raise refuse(faults)
     if route.body_field is not None and await request.body():

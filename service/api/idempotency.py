@@ -67,14 +67,20 @@ class Once:
                     raise AlreadyAnswered(answer)
             yield session
 
-    def keep(self, session: Session, model: M) -> M:
-        """Return the answer, and store it under the key with the headers set so far."""
+    def keep(self, session: Session, model: M, *, shown_once: frozenset[str] = frozenset()) -> M:
+        """Return the answer, and store it under the key with the headers set so far.
+
+        Parameters
+        ----------
+        shown_once
+            Fields that are kept, and shown to who sends the request again, as null.
+        """
         if self._keyed is not None:
             headers = self._response.headers
             answer = KeptAnswer(
                 status=self._response.status_code or self._status,
                 headers={name: headers[name] for name in _KEPT_HEADERS if name in headers},
-                body=model.model_dump_json(),
+                body=model.model_copy(update=dict.fromkeys(shown_once)).model_dump_json(),
             )
             store.keep(session, self._keyed, answer)
         return model

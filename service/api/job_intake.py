@@ -11,7 +11,6 @@ from sqlalchemy.orm import Session
 
 from planner_core.errors import Fault
 from planner_core.solvers.registry import solver_class
-from service.access.audit import Audit
 from service.answers import store as answer_store
 from service.api import ask_again
 from service.api.deps import Call
@@ -22,12 +21,13 @@ from service.jobs.queue import JobQueue
 from service.jobs.solver_params import params_of, parse_params
 from service.problems.faults import refuse
 from service.problems.kinds import ServiceError
-from service.scenarios import freezing as scenario_store
+from service.scenarios import freezing
 from service.scenarios.freezing import FrozenScenario
 from service.scenarios.pin_inputs import refuse_duplicate_pins
 from service.scenarios.translate import inside, read_file
 from service.settings import Settings
 from service.stores import job_store as store
+from service.stores import scenario_store
 from service.wire.jobs import ACTIVE, JobOut, LimitsIn, QuestionIn
 from service.wire.scenarios import ScenarioFile, ScenarioIn
 
@@ -57,25 +57,25 @@ def frozen(database: Database, settings: Settings, body: QuestionIn) -> FrozenSc
         raise refuse([Fault(code="invalid_value", detail=detail, pointer="/scenario")])
     with inside("/scenario"):
         if isinstance(scenario, ScenarioIn):
-            return scenario_store.freeze(database, scenario, limits)
+            return freezing.freeze(database, scenario, limits)
         if isinstance(scenario, ScenarioFile):
             refuse_duplicate_pins(scenario.pins)
             file = read_file(scenario.model_dump(mode="json"))
-            return scenario_store.freeze_file(file, limits)
+            return freezing.freeze_file(file, limits)
     return None
 
 
 def stored_scenario(
-    session: Session, audit: Audit, body: QuestionIn, inline: FrozenScenario | None
+    session: Session, call: Call, body: QuestionIn, inline: FrozenScenario | None
 ) -> str:
-    """Return the id of the scenario in question; an inline one is stored."""
+    """Return the id of the scenario in question; an inline one is stored for its owner."""
     if inline is not None:
-        row, is_new = scenario_store.save(session, inline)
+        row, is_new = freezing.save(session, inline, call.caller.owner)
         if is_new:
-            audit.record(session, "create", "scenario", row.id)
+            call.audit.record(session, "create", "scenario", row.id)
         return row.id
     assert body.scenario_id is not None
-    if store.has_scenario(session, body.scenario_id):
+    if scenario_store.find(session, body.scenario_id, call.caller.visible_owner) is not None:
         return body.scenario_id
     detail = f"There is no scenario {body.scenario_id!r}."
     raise refuse([Fault(code="unknown_scenario", detail=detail, pointer="/scenario_id")])

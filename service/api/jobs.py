@@ -22,6 +22,7 @@ from service.jobs import lease, submission
 from service.jobs.queue import JobQueue
 from service.problems.kinds import ServiceError
 from service.stores import job_store as store
+from service.stores import scenario_store
 from service.wire.base import Listed
 from service.wire.jobs import JobIn, JobOut, JobState
 
@@ -44,7 +45,7 @@ def create_job(body: JobIn, call: CallDep, once: OnceDep) -> JobOut:
     with once.transaction() as session:
         intake.require_room(session, call)
         spec = submission.JobSpec(
-            scenario_id=intake.stored_scenario(session, call.audit, body, inline),
+            scenario_id=intake.stored_scenario(session, call, body, inline),
             solver=body.solver,
             params=params,
             seed=body.seed,
@@ -142,6 +143,7 @@ def rerun_job(job_id: str, call: CallDep, once: OnceDep) -> JobOut:
     with once.transaction() as session:
         spec = submission.spec_again(intake.find_job(session, job_id), call.caller.owner)
         intake.require_room(session, call)
+        scenario_store.let_see_too(session, spec.scenario_id, call.caller.owner)
         job = submission.submit(session, queue, spec)
         call.audit.record(session, "create", "job", job.id)
         return once.keep(session, intake.accepted(session, call.response, job))

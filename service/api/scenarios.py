@@ -14,8 +14,9 @@ from sqlalchemy.orm import Session
 from planner_core.build import view_at
 from planner_core.orbits.places import View
 from planner_core.problem import COLLECT, CONTACT
+from service.access.callers import Caller
 from service.api.conditional import NOT_MODIFIED, created, unless_known
-from service.api.deps import CallDep, DatabaseDep
+from service.api.deps import CallDep
 from service.api.errors import problem_responses
 from service.api.etags import etag_of, matches
 from service.api.idempotency import OnceDep
@@ -25,6 +26,7 @@ from service.problems.kinds import ServiceError
 from service.scenarios import freezing as store
 from service.scenarios.opportunities import Described, OpportunityReader
 from service.scenarios.stored_question import StoredQuestion
+from service.stores import scenario_store
 from service.wire.base import Listed
 from service.wire.scenarios import (
     Kind,
@@ -61,11 +63,16 @@ def create_scenario(body: ScenarioIn, call: CallDep, once: OnceDep) -> ScenarioO
 
 
 @router.get("")
-def list_scenarios(database: DatabaseDep, paging: PagingDep) -> Listed[ScenarioSummary]:
-    """List the scenarios, newest first, without their pins."""
-    with database.reading() as session:
+def list_scenarios(call: CallDep, paging: PagingDep) -> Listed[ScenarioSummary]:
+    """List the scenarios, newest first, without their pins.
+
+    Those that were sent with a job, or made by a what-if, are their owner's and not listed for
+    others; the scope `admin` sees all.
+    """
+    query = sa.select(ScenarioRow).where(scenario_store.seen_by(call.caller.visible_owner))
+    with call.database.reading() as session:
         weight = size_of(ScenarioRow.summary)
-        page = newest_first(session, sa.select(ScenarioRow), ScenarioRow.id, paging, weight)
+        page = newest_first(session, query, ScenarioRow.id, paging, weight)
     return Listed(items=[_summary(row) for row in page.rows], next=page.next)
 
 
@@ -83,7 +90,7 @@ def get_scenario(
 ) -> ScenarioOut | Response:
     """Return one scenario; with `expand`, as the file that `slewline solve` takes."""
     with call.database.reading() as session:
-        row = _find(session, scenario_id)
+        row = _find(session, scenario_id, call.caller)
         if expand:
             return _file(call.request, row)
         shown = _shown(row)
@@ -116,7 +123,7 @@ def list_opportunities(
     asks to come back.
     """
     with call.database.reading() as session:
-        sha256 = _find(session, scenario_id).sha256
+        sha256 = _find(session, scenario_id, call.caller).sha256
     reader = cast(OpportunityReader, call.request.app.state.opportunities)
     described = reader.get(call.database, scenario_id, sha256)
     rows = _matching(described, target_id, satellite_id, kind)
@@ -193,8 +200,8 @@ def _rounded(value: float) -> float:
     return round(float(value), 6)
 
 
-def _find(session: Session, scenario_id: str) -> ScenarioRow:
-    row = session.get(ScenarioRow, scenario_id)
+def _find(session: Session, scenario_id: str, caller: Caller) -> ScenarioRow:
+    row = scenario_store.find(session, scenario_id, caller.visible_owner)
     if row is None:
         raise ServiceError("not_found", f"There is no scenario {scenario_id!r}.")
     return row

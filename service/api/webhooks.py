@@ -66,7 +66,8 @@ def create_webhook(body: WebhookIn, call: CallDep, once: OnceDep) -> CreatedWebh
         session.flush()
         call.audit.record(session, "create", "webhook", row.id)
         shown = CreatedWebhook(**_shown(row).model_dump(), secret=row.secret)
-        return once.keep(session, created(call.response, shown, f"/v1/webhooks/{row.id}"))
+        shown = created(call.response, shown, f"/v1/webhooks/{row.id}")
+        return once.keep(session, shown, shown_once=frozenset({"secret"}))
 
 
 @router.get("")

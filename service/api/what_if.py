@@ -55,7 +55,7 @@ def create_what_if(job_id: str, body: WhatIfIn, call: CallDep, once: OnceDep) ->
     varied = cast(Variations, call.request.app.state.variations).get(asked, described)
     with once.transaction() as session:
         intake.require_room(session, call)
-        row, is_new = scenario_store.save(session, varied.frozen)
+        row, is_new = scenario_store.save(session, varied.frozen, call.caller.owner)
         if is_new:
             call.audit.record(session, "create", "scenario", row.id)
             opportunity_store.save(session, row.sha256, varied.opportunity_block)

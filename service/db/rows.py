@@ -117,6 +117,15 @@ class ScenarioRow(Row):
     created_at: Mapped[datetime]
 
 
+class ScenarioOwnerRow(Row):
+    """Who may see a scenario that came with a job of its own; without any, everybody may."""
+
+    __tablename__ = "scenario_owner"
+
+    scenario_id: Mapped[str] = mapped_column(sa.ForeignKey("scenario.id"), primary_key=True)
+    owner: Mapped[str] = mapped_column(sa.String(64), primary_key=True)
+
+
 class OpportunitySetRow(Row):
     """The opportunities of a scenario, computed once, as a compressed columnar block."""
 

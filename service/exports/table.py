@@ -13,8 +13,8 @@ from collections.abc import Iterator
 from datetime import datetime
 from typing import Any
 
+from planner_core.spreadsheets import guarded
 from service.answers.answered import Answered, Document, in_chunks
-from service.scenarios.records import guarded
 
 COLUMNS = (
     "action_id", "satellite_id", "satellite_name", "mode", "start", "end", "duration_s",

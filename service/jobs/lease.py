@@ -136,6 +136,11 @@ def hand_back(session: Session, queue: JobQueue, lease: Lease) -> None:
     redispatch(session, queue, _held(lease), lease.job_id)
 
 
+def let_go(session: Session, lease: Lease) -> None:
+    """Let a lease end now: whoever looks next finds a lost run."""
+    _update(session, _held(lease), lease_until=utc_now())
+
+
 def return_unstarted(session: Session, queue: JobQueue, job_id: str, dispatch: int) -> bool:
     """Put a job back whose dispatch was taken from the queue but will never start it."""
     waiting = sa.and_(JobRow.dispatch == dispatch, JobRow.state == "queued")

@@ -42,6 +42,9 @@ TIME_GRACE_S: Final = 5.0
 VERIFY_GRACE_S: Final = 30.0
 """The same once the search is over and the referee works: its plan is worth the wait."""
 
+_UNKNOWN_EXIT: Final = 255
+"""What `multiprocessing` answers where the fork server, which alone would know, is gone."""
+
 _SINGLE_THREADED: Final = (
     "OMP_NUM_THREADS",
     "OPENBLAS_NUM_THREADS",
@@ -62,6 +65,11 @@ class Order(Enum):
 @dataclass(frozen=True, slots=True)
 class Abandoned:
     """The run was ended without an answer: somebody else will do the job."""
+
+
+@dataclass(frozen=True, slots=True)
+class Lost:
+    """The process was taken away with the one it was forked from; the job has no part in that."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -117,7 +125,7 @@ class Runner:
         tick_s: float,
         tick: Callable[[Progress | None], Order],
         on_phase: Callable[[str], None] = lambda _: None,
-    ) -> Ending | Abandoned:
+    ) -> Ending | Abandoned | Lost:
         """Do the work and return how it ended.
 
         Parameters
@@ -173,16 +181,17 @@ class _Run:
         self._cancelled = False
         self._kill_at_s = time.monotonic() + START_S
 
-    def until_end(self) -> Ending | Abandoned:
+    def until_end(self) -> Ending | Abandoned | Lost:
         while True:
             ending = self._listen() or self._check_limits() or self._tick_if_due()
             if ending is not None:
                 return ending
 
-    def _listen(self) -> Ending | None:
+    def _listen(self) -> Ending | Lost | None:
         """Wait a moment for messages and read all there are: an answer may be among them."""
         timeout_s = POLL_S
         while wait([self._pipe], timeout_s):
+            ending: Ending | Lost | None
             try:
                 ending = self._hear(self._pipe.recv())
             except (EOFError, OSError):
@@ -224,11 +233,13 @@ class _Run:
             return self._out_of_time()
         return ending
 
-    def _crashed(self) -> Ending:
+    def _crashed(self) -> Ending | Lost:
         self._process.join(TIME_GRACE_S)
         if self._cancelled:
             return Stopped()
         code = self._process.exitcode
+        if code == _UNKNOWN_EXIT:
+            return Lost()
         how = f"signal {-code}" if code is not None and code < 0 else f"exit status {code}"
         return Refused("solver_crashed", f"The solver's process ended by itself ({how}).")
 

@@ -30,7 +30,7 @@ from service.jobs.plan_job import Parcel, PlanAnswer, PlanRequest
 from service.jobs.queue import DbosConsumer, DbosQueue
 from service.jobs.reconcile import Reconciler
 from service.jobs.renewal import Renewal
-from service.jobs.runner import Abandoned, Limits, Order, Runner, Work
+from service.jobs.runner import Abandoned, Limits, Lost, Order, Runner, Work
 from service.process import tracing
 from service.process.logs import about_job
 from service.process.stopping import StopRequest
@@ -161,7 +161,10 @@ class Worker:
             renewal.end()
         span.enter_phase("store")
         self._conclude(held, request, ending)
-        state = "abandoned" if isinstance(ending, Abandoned) else outcome_of(ending).state
+        if isinstance(ending, Abandoned | Lost):
+            state = type(ending).__name__.lower()
+        else:
+            state = outcome_of(ending).state
         span.note_end(state, failed=isinstance(ending, Refused))
         log.info("a run ended", extra={"run": held.run, "solver": request.solver, "state": state})
 
@@ -177,7 +180,14 @@ class Worker:
             return Order.ABANDON
         return Order.CANCEL if state == "cancelling" else Order.GO_ON
 
-    def _conclude(self, held: Lease, request: PlanRequest, ending: Ending | Abandoned) -> None:
+    def _conclude(
+        self, held: Lease, request: PlanRequest, ending: Ending | Abandoned | Lost
+    ) -> None:
+        if isinstance(ending, Lost):
+            self._persist(lambda session: lease.let_go(session, held))
+            # The next job shall not wait for a new one to fork from while its lease runs.
+            self._runner.warm_up(lambda: not self._is_stopping())
+            return
         if isinstance(ending, Abandoned):
             self._persist(lambda session: lease.hand_back(session, self._queue, held))
             return

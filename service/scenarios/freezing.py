@@ -27,6 +27,7 @@ from service.scenarios.translate import (
     sha256_of,
 )
 from service.stores import satellite_store
+from service.stores import scenario_store as store
 from service.wire.scenarios import (
     FileGroundStation,
     FileSatellite,
@@ -94,13 +95,34 @@ def freeze_file(file: ScenarioFile, limits: ScenarioLimits) -> FrozenScenario:
     )
 
 
-def save(session: Session, frozen: FrozenScenario) -> tuple[ScenarioRow, bool]:
-    """Return the stored scenario of this content, and whether it is new."""
+def save(
+    session: Session, frozen: FrozenScenario, owner: str | None = None
+) -> tuple[ScenarioRow, bool]:
+    """Return the stored scenario of this content, and whether it is new.
+
+    Parameters
+    ----------
+    owner
+        Whose it stays, as long as nobody stores the same for all; None to store it for all.
+    """
     same = sa.select(ScenarioRow).where(ScenarioRow.sha256 == frozen.sha256)
     stored = session.scalar(same)
-    if stored is not None:
+    if stored is None:
+        own_id = new_id()
+        # Somebody else may store the same content at this moment; then both get that one.
+        with suppress(IntegrityError), session.begin_nested():
+            _insert(session, own_id, frozen, owner)
+        stored = session.scalars(same).one()
+        if stored.id == own_id:
+            return stored, True
+    if owner is not None:
+        store.let_see_too(session, stored.id, owner)
         return stored, False
-    own_id = new_id()
+    # Who stores for all what somebody has for himself is not told of that.
+    return stored, store.disown(session, stored.id)
+
+
+def _insert(session: Session, own_id: str, frozen: FrozenScenario, owner: str | None) -> None:
     row = {
         "id": own_id,
         "sha256": frozen.sha256,
@@ -109,11 +131,9 @@ def save(session: Session, frozen: FrozenScenario) -> tuple[ScenarioRow, bool]:
         "content": frozen.content,
         "created_at": datetime.now(UTC),
     }
-    # Somebody else may store the same content at this moment; then both get that one.
-    with suppress(IntegrityError), session.begin_nested():
-        session.execute(sa.insert(ScenarioRow).values(**row))
-    kept = session.scalars(same).one()
-    return kept, kept.id == own_id
+    session.execute(sa.insert(ScenarioRow).values(**row))
+    if owner is not None:
+        store.let_see(session, own_id, owner)
 
 
 @contextmanager

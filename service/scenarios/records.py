@@ -31,7 +31,6 @@ _ALIASES = {
     "long": "lon_deg",
     "longitude": "lon_deg",
 }
-_RISKY = re.compile(r"'*[=+\-@\t\r]")  # what spreadsheets run
 _MISSPELT = 0.75
 _MOST_COLUMNS = 200
 _MOST_FAULTS = 10_000
@@ -243,24 +242,6 @@ def _value(column: str, cell: str) -> object:
         return int(cell)
     # What is no number stays text, which the schema refuses by name.
     return float(cell) if _NUMBER.fullmatch(cell) else cell
-
-
-def guarded(text: str | None) -> str | None:
-    """Return a text that no spreadsheet takes for a formula.
-
-    >>> guarded("=1+1"), guarded("'=1"), guarded("T-1"), guarded(None)
-    ("'=1+1", "''=1", 'T-1', None)
-    """
-    return f"'{text}" if text is not None and _RISKY.match(text) else text
-
-
-def unguarded(cell: str) -> str:
-    """Return the text that `guarded` was given.
-
-    >>> [unguarded(guarded(text)) for text in ("=1", "'=1", "'tis", "T-1")]
-    ['=1', "'=1", "'tis", 'T-1']
-    """
-    return cell[1:] if cell.startswith("'") and _RISKY.match(cell) else cell
 
 
 def read_geojson(data: bytes, known: Collection[str], *, most: int) -> Records:

@@ -14,12 +14,6 @@ from service.db.rows import JobRow, ScenarioRow
 _VERSION: Final = sa.select(JobRow.version).where(JobRow.id == sa.bindparam("job_id"))
 
 
-def has_scenario(session: Session, scenario_id: str) -> bool:
-    """Return whether there is a scenario of this id."""
-    wanted = sa.select(ScenarioRow.id).where(ScenarioRow.id == scenario_id)
-    return session.scalar(wanted) is not None
-
-
 def num_waiting(session: Session, owner: str) -> tuple[int, int]:
     """Return how many jobs wait for a worker, and how many of those are this owner's."""
     own = sa.func.count().filter(JobRow.tenant == owner)

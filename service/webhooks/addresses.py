@@ -21,8 +21,14 @@ Address = ipaddress.IPv4Address | ipaddress.IPv6Address
 
 _TRY_OTHERS_AFTER_S: Final = 3.0
 _THIS_MACHINE: Final = ("localhost", "localhost.localdomain", "ip6-localhost")
-# An address of the internet that leads to the IPv4 address in its last four bytes (RFC 6052).
-_NAT64: Final = ipaddress.IPv6Network("64:ff9b::/96")
+# Of these, some networks' gateways make IPv4 addresses: translation (RFC 6052, 8215), site-local
+# (RFC 3879), IPv4-compatible (RFC 4291), IPv4-translated (RFC 2765).
+_NOT_PUBLIC: Final = tuple(
+    map(
+        ipaddress.IPv6Network,
+        ("64:ff9b::/96", "64:ff9b:1::/48", "fec0::/10", "::/96", "::ffff:0:0:0/96"),
+    )
+)
 
 
 class AddressRefused(Exception):
@@ -37,10 +43,10 @@ def is_public(address: Address) -> bool:
     """
     if isinstance(address, ipaddress.IPv6Address):
         inner = address.ipv4_mapped or address.sixtofour
-        if address in _NAT64:
-            inner = ipaddress.IPv4Address(int(address) & 0xFFFFFFFF)
         if inner is not None:
             return is_public(inner)
+        if any(address in network for network in _NOT_PUBLIC):
+            return False
     return address.is_global and not address.is_multicast
 
 

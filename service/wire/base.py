@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from datetime import UTC, datetime, timedelta
 from typing import Annotated, Any, Final, Generic, Self, TypeVar
 
@@ -31,6 +32,7 @@ Json = dict[str, Any]
 
 _READING: Final = "reading"
 _MOST_FIELDS: Final = 1000
+_LARGEST: Final = sys.float_info.max
 _RFC3339 = re.compile(
     r"(\d{4}-\d\d-\d\d)[Tt ](\d\d:\d\d:\d\d)(?:\.(\d{1,9})\d*)?([Zz]|[+-]\d\d:\d\d)?"
 )
@@ -71,14 +73,57 @@ Instant = Annotated[
     ),
 ]
 
+TEXT: Final = r"^[^\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufffe\uffff]*$"
+"""Every text: without what ends lines, turns the direction of what stands beside it on a page,
+or has no place in XML. Halves of surrogate pairs are no texts at all."""
+_PLAIN: Final = re.compile(TEXT.replace(r"\ufffe", r"\ud800-\udfff\ufffe"))
+
 Name = Annotated[
     str,
-    StringConstraints(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$"),
+    StringConstraints(min_length=1, max_length=200, pattern=TEXT),
     Field(description="For people; up to 200 printable characters."),
 ]
+Id = Annotated[str, StringConstraints(min_length=1, max_length=200, pattern=TEXT)]
+
+MOST: Final = 1e9
+"""Of every amount, so that sums and products of amounts stay finite and exact."""
+LEAST: Final = 1e-6
+"""Of what is divided by."""
+SHORTEST_S: Final = 1e-3
+"""One step of the clock that instants are told in."""
+
+NonNegative = Annotated[float, Field(ge=0, le=MOST)]
+Positive = Annotated[float, Field(ge=LEAST, le=MOST)]
+Duration = Annotated[float, Field(ge=SHORTEST_S, le=MOST)]
 
 
-Id = Annotated[str, StringConstraints(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")]
+def is_plain(text: str) -> bool:
+    r"""Return whether a text is one that may be sent, stored and exported.
+
+    >>> [is_plain(text) for text in ("EYE-1 é", "a\u0085b", "a\u202eb", "\ud800")]
+    [True, False, False, False]
+    """
+    return _PLAIN.fullmatch(text) is not None
+
+
+def require_plain(value: T) -> T:
+    """Refuse texts, and numbers beyond any float, that stand somewhere in free JSON."""
+    waiting: list[object] = [value]
+    while waiting:
+        part = waiting.pop()
+        if isinstance(part, dict):
+            waiting += [*part, *part.values()]
+        elif isinstance(part, list):
+            waiting += part
+        elif isinstance(part, str) and not is_plain(part):
+            raise PydanticCustomError("plain_text", "A text holds characters that none may hold")
+        elif isinstance(part, int | float) and not abs(part) <= _LARGEST:
+            raise PydanticCustomError("finite_number", "A number is infinite or beyond 1.8e308")
+    return value
+
+
+Free = Annotated[T, BeforeValidator(require_plain)]
+"""JSON whose fields are not declared; checked all the same for what no text or number may be."""
 
 
 def _open(value: object, known: ValidatorFunctionWrapHandler, info: ValidationInfo) -> object:

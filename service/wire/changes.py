@@ -7,7 +7,7 @@ from typing import Annotated, Any, Final
 from pydantic import ConfigDict, Discriminator, Field, JsonValue, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
-from service.wire.base import Body, Id, Instant
+from service.wire.base import Body, Id, Instant, require_plain
 from service.wire.pins import PinnedActionIn
 from service.wire.satellites import AgilityIn, ResourcesIn, SensorIn
 
@@ -53,6 +53,11 @@ class RelaxIn(Body):
     opportunity_id: Id | None = Field(
         None, description="What a reason's `change` speaks of; by itself it changes nothing."
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _holds_plain_values(cls, value: object) -> object:
+        return require_plain(value)
 
     @property
     def settings(self) -> dict[str, JsonValue]:

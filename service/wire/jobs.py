@@ -6,7 +6,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from service.wire.base import Body, Id, Instant, Json, Name, Open, Stored, Wire
+from service.wire.base import Body, Free, Id, Instant, Json, Name, Open, Stored, Wire
 from service.wire.changes import ChangeIn
 from service.wire.scenarios import ScenarioFile, ScenarioIn
 
@@ -57,8 +57,10 @@ class QuestionIn(Body):
 class SolverIn(Body):
     """A solver and how it is to search."""
 
-    solver: str = Field(description="A name of `GET /v1/solvers`.")
-    params: dict[str, Any] = Field({}, description="The solver's own; the others are defaults.")
+    solver: Id = Field(description="A name of `GET /v1/solvers`.")
+    params: Free[dict[str, Any]] = Field(
+        {}, description="The solver's own; the others are defaults."
+    )
     seed: int = Field(0, ge=0, lt=2**63, description="Same seed, same plan.")
 
 
@@ -69,8 +71,8 @@ class JobIn(QuestionIn, SolverIn):
 class WhatIfIn(ChangeIn):
     """A change to the question of a job. What is left out is as in that job."""
 
-    solver: str | None = Field(None, description="A name of `GET /v1/solvers`.")
-    params: dict[str, Any] | None = Field(
+    solver: Id | None = Field(None, description="A name of `GET /v1/solvers`.")
+    params: Free[dict[str, Any] | None] = Field(
         None, description="The solver's own; the others are its defaults."
     )
     seed: int | None = Field(None, ge=0, lt=2**63)

@@ -6,8 +6,18 @@ from typing import Annotated, Final, Literal
 
 from pydantic import Field
 
-from service.wire.base import Body, Id, Instant, Name, Open, Stored, Wire
-from service.wire.satellites import LightIn, NonNegative, Positive, SensorType
+from service.wire.base import (
+    Body,
+    Duration,
+    Id,
+    Instant,
+    Name,
+    NonNegative,
+    Open,
+    Stored,
+    Wire,
+)
+from service.wire.satellites import LightIn, SensorType
 
 Latitude = Annotated[float, Field(ge=-90, le=90, description="Geodetic (WGS84), north positive.")]
 Longitude = Annotated[
@@ -65,7 +75,7 @@ class TargetIn(LightIn):
     lon_deg: Longitude
     alt_m: Altitude = 0.0
     reward: NonNegative = 1.0
-    collect_s: Positive = Field(30.0, description="How long one image takes.")
+    collect_s: Duration = Field(30.0, description="How long one image takes.")
     off_nadir_min_deg: float | None = Field(
         None, ge=0, le=90, description="Narrows the sensor's limit."
     )

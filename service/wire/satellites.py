@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
-import json
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Discriminator, Field, StringConstraints, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
-from service.wire.base import Body, Instant, Json, Name, Open, Stored, Wire
+from service.wire.base import (
+    TEXT,
+    Body,
+    Free,
+    Instant,
+    Json,
+    Name,
+    NonNegative,
+    Open,
+    Positive,
+    Stored,
+    Wire,
+)
 from service.wire.imports import RejectedRow
 
-NonNegative = Annotated[float, Field(ge=0)]
-Positive = Annotated[float, Field(gt=0)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
 SunElevation = Annotated[float | None, Field(ge=-90, le=90)]
 LocalTime = Annotated[float | None, Field(ge=0, le=24)]
-SensorType = Annotated[
-    str, StringConstraints(min_length=1, max_length=100, pattern=r"^[^\x00-\x1f\x7f]*$")
-]
+SensorType = Annotated[str, StringConstraints(min_length=1, max_length=100, pattern=TEXT)]
 Nadir = Literal["geodetic", "geocentric"]
 LookSide = Literal["left", "right", "any"]
 OrbitDirection = Literal["ascending", "descending", "any"]
@@ -123,22 +130,13 @@ ResourcesField = Annotated[
 ]
 
 
-def _finite(omm: dict[str, Any]) -> dict[str, Any]:
-    # Python's JSON reader lets NaN and Infinity through; the schema of an OMM is open.
-    try:
-        json.dumps(omm, allow_nan=False)
-    except ValueError:
-        raise PydanticCustomError("finite_number", "NaN and infinity are no JSON") from None
-    return omm
-
-
 class OrbitIn(Body):
     """An element set for SGP4: either ``tle`` or ``omm``."""
 
     tle: list[str] | None = Field(
         None, min_length=2, max_length=2, description="Line 1 and line 2 of a two-line element set."
     )
-    omm: Annotated[dict[str, Any], AfterValidator(_finite)] | None = Field(
+    omm: Free[dict[str, Any]] | None = Field(
         None, description="The keywords of a CCSDS OMM with mean elements for SGP4."
     )
 

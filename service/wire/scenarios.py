@@ -6,10 +6,10 @@ from typing import Annotated, Literal
 
 from pydantic import FailFast, Field
 
-from service.wire.base import Body, Id, Instant, Name, Open, Stored, Wire
+from service.wire.base import Body, Duration, Id, Instant, Name, Open, Stored, Wire
 from service.wire.pins import PinsIn
 from service.wire.places import GroundStationIn, TargetIn
-from service.wire.satellites import Nadir, Positive, SatelliteIn
+from service.wire.satellites import Nadir, SatelliteIn
 
 Dynamics = Literal["physical", "paper"]
 CollectAlignment = Literal["access", "horizon"]
@@ -59,7 +59,7 @@ class Question(Body):
     dynamics: Open[Dynamics] = Field(
         "physical", description="How battery and recorder are integrated."
     )
-    collect_spacing_s: Positive | None = Field(
+    collect_spacing_s: Duration | None = Field(
         None, description="Several collects per access, this far apart; null for one, centred."
     )
     collect_alignment: Open[CollectAlignment] = Field(

@@ -52,7 +52,10 @@ class WebhookOut(Stored):
 class CreatedWebhook(WebhookOut):
     """The same with its secret, which is shown this once."""
 
-    secret: str = Field(description="For the receiver: verify `webhook-signature` with it.")
+    secret: str | None = Field(
+        description="For the receiver: verify `webhook-signature` with it. Null in an answer that "
+        "was given before, under the same `Idempotency-Key`."
+    )
 
 
 class DeliveryOut(Wire):

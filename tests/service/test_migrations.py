@@ -22,9 +22,12 @@ from service.answers.blocks import (
     proof_blocks,
     target_blocks,
 )
+from service.answers.rendering import figures_of
 from service.db.migrate import config_on
+from service.db.rows import JobResultRow
 from service.db.session import Database
 from tests.service.jobs.conftest import SERVER_URL, create_database
+from tests.service.jobs.work import EMPTY
 from tests.service.test_blocks import target, timeline_of
 
 Change = Callable[[Config, str], None]
@@ -105,3 +108,19 @@ def test_going_back_restores_every_text(database: Database) -> None:
     with database.engine.begin() as connection:
         rows = connection.exec_driver_sql(f"SELECT job_id, {', '.join(OLD)} FROM job_result")
         assert {row.job_id: {name: getattr(row, name) for name in OLD} for row in rows} == ANSWERS
+
+
+@pytest.mark.parametrize("revision", ["0009", "0002"])
+def test_going_back_and_forth_loses_no_figures(database: Database, revision: str) -> None:
+    timeline = {**EMPTY, "satellites": []}
+    figures = figures_of(timeline)
+    with database.transaction() as session:
+        session.execute(sa.text("DELETE FROM job_result"))
+    text = json.dumps(timeline)
+    with database.engine.begin() as connection:
+        of_job = {"job_id": "small", "created_at": AT, "targets": "[]", "proof": None}
+        store(connection, "job_result", **of_job, timeline=text, figures=figures)
+    move(database, command.downgrade, revision)
+    move(database, command.upgrade, "head")
+    with database.reading() as session:
+        assert session.scalar(sa.select(JobResultRow.figures)) == figures

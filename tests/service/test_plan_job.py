@@ -26,6 +26,7 @@ def run(
     solver: str,
     block: bytes | None = None,
     bound: str | None = None,
+    budget: Budget | None = None,
     **params: Any,
 ) -> PlanAnswer:
     content = canonical(scenario)
@@ -41,7 +42,7 @@ def run(
         opportunity_block=Parcel(block),
         bound=bound,
     )
-    return run_plan_job(request, Budget())
+    return run_plan_job(request, budget or Budget())
 
 
 NEAR = {"certified": {"gap": 0.05}, "milp": {"gap": 0.05, "cut_rounds": 5}}

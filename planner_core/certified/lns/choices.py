@@ -29,6 +29,7 @@ from planner_core.solvers.sequential import blocked_rows
 
 _SETTLED: Final = 0.2  # share of the targets collected once that each round settles as well
 _OPENED: Final = 0.3  # the largest share of the collected targets that a move opens
+_MOST_UNITS: Final = 2500
 _MOST_ROWS: Final = 1200  # open ones, in a move
 _LARGER_STEP: Final = 0.03
 
@@ -63,7 +64,8 @@ class SatelliteChoices:
             network=network,
             levels=data_levels(network, 2, is_optimistic=False),
             target=target,
-            weight=np.round(worth / unit).astype(np.int32),
+            # Far above the bound, of which there are at most so many: such a task is in no plan.
+            weight=np.minimum(np.round(worth / unit), _MOST_UNITS).astype(np.int32),
         )
 
     def best(self, allowed: Bools, goal: int, stop: Bytes) -> tuple[int, Ints]:

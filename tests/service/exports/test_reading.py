@@ -17,13 +17,13 @@ from planner_core.build import build_problem, compute_opportunities
 from planner_core.domain import Scenario
 from planner_core.problem import Problem
 from planner_core.referee.replay import plan_sha256, replay
+from planner_core.spreadsheets import guarded, unguarded
 from service.answers.answered import Answered
 from service.answers.reading import READERS, Reading, UnreadableTimeline, plan_in
 from service.answers.rebuilt import view_of
 from service.commands.bodies import FAILED, OK, WRONG_INPUT
 from service.commands.cli import main
 from service.exports import table
-from service.scenarios.records import guarded, unguarded
 from service.scenarios.translate import canonical, scenario_from_content
 from service.wire.base import read as read_wire
 from service.wire.timelines import TimelineOut

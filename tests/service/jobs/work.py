@@ -77,6 +77,14 @@ def run(request: PlanRequest, budget: Budget) -> PlanAnswer:
             assert worker is not None
             worker.kill()
             time.sleep(300)
+        case "kill_fork_server":
+            starts = Path(request.params["log"]).read_text()
+            if starts.count(request.job_id) >= int(request.params.get("survives", 9)):
+                return answer(request, "horizon_complete")
+            fork_server = psutil.Process().parent()
+            assert fork_server is not None
+            fork_server.kill()
+            time.sleep(300)
         case "refuse":
             raise InvalidScenario("no_such_orbit", "The orbit is not one.", pointer="/satellites")
         case "bug":
