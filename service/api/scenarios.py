@@ -14,6 +14,7 @@ from sqlalchemy.orm import Session
 from planner_core.build import view_at
 from planner_core.orbits.places import View
 from planner_core.problem import COLLECT, CONTACT
+from service.api import job_intake as intake
 from service.api.conditional import NOT_MODIFIED, created, unless_known
 from service.api.deps import CallDep, DatabaseDep
 from service.api.errors import problem_responses
@@ -51,7 +52,7 @@ def create_scenario(body: ScenarioIn, call: CallDep, once: OnceDep) -> ScenarioO
 
     The same content again, under whatever name, answers 200 with the scenario that is there.
     """
-    frozen = store.freeze(call.database, body, call.settings.scenario_limits)
+    frozen = intake.freeze(call, body)
     with once.transaction() as session:
         row, is_new = store.save(session, frozen)
         if is_new:
