@@ -35,6 +35,7 @@ from service.api import (
     what_if,
 )
 from service.api.body_limit import BodyLimit
+from service.api.bulkhead import Admitted, Bulkhead
 from service.api.deps import check_request
 from service.api.errors import install_error_handlers
 from service.api.guard import Guard
@@ -81,7 +82,13 @@ ROUTERS = (
 )
 
 
-def create_app(settings: Settings, queue: JobQueue | None = None) -> FastAPI:
+def create_app(
+    settings: Settings,
+    queue: JobQueue | None = None,
+    *,
+    heavy: str | None = None,
+    is_heavy: bool = False,
+) -> FastAPI:
     """Return the application. The database must have been migrated.
 
     Parameters
@@ -90,6 +97,10 @@ def create_app(settings: Settings, queue: JobQueue | None = None) -> FastAPI:
         The configuration of this process.
     queue
         Where jobs are sent; without one the service takes none.
+    heavy
+        Socket file of a process that is given what is heavy; without one it is done here.
+    is_heavy
+        This is that process: who calls it has been let in by another one.
     """
     app = FastAPI(
         title="Slewline",
@@ -124,6 +135,11 @@ def create_app(settings: Settings, queue: JobQueue | None = None) -> FastAPI:
     install_replay(app)
     openapi.install_openapi(app)
     # The last one added is the outermost.
+    if is_heavy:
+        app.add_middleware(Admitted)
+        return app
+    if heavy is not None:
+        app.add_middleware(Bulkhead, address=heavy)
     app.add_middleware(Polls, state=app.state)
     app.add_middleware(BodyLimit, max_bytes=int(settings.max_body_mb * 1_000_000))
     app.add_middleware(Guard, settings=settings)

@@ -16,6 +16,7 @@ import uvicorn
 from service.access import key_store
 from service.db.migrate import upgrade
 from service.db.session import Database
+from service.heavy import running_heavy
 from service.jobs.queue import DbosQueue, migrate_queue
 from service.jobs.supervisor import Supervisor
 from service.main import create_app
@@ -106,7 +107,8 @@ def serve(settings: Settings, *, with_workers: bool) -> int:
         configure_logging()
         stack.enter_context(_traced(settings))
         prepare_database(settings)
-        api = stack.enter_context(_running_api(settings, listener))
+        heavy = stack.enter_context(running_heavy(settings))
+        api = stack.enter_context(_running_api(settings, listener, heavy))
         health = "live"
         if with_workers and settings.workers:
             stack.enter_context(_running_workers(settings))
@@ -133,10 +135,12 @@ def _traced(settings: Settings) -> Iterator[None]:
 
 
 @contextmanager
-def _running_api(settings: Settings, listener: socket.socket) -> Iterator[threading.Thread]:
+def _running_api(
+    settings: Settings, listener: socket.socket, heavy: str
+) -> Iterator[threading.Thread]:
     queue = DbosQueue(settings.database_url, settings.database_timeout_s)
     config = uvicorn.Config(
-        create_app(settings, queue),
+        create_app(settings, queue, heavy=heavy),
         log_config=None,
         access_log=False,
         timeout_graceful_shutdown=_LAST_ANSWERS_WITHIN_S,

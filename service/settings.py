@@ -53,6 +53,7 @@ class Settings(BaseSettings):
     max_memory_mb: int = Field(16_384, ge=64)
     solver_threads: int | None = Field(None, ge=1, le=64)
     queue_poll_s: float = Field(0.1, gt=0)
+    heavy_memory_mb: int = Field(2048, ge=256)
     max_queued: int = Field(10_000, ge=1)
     max_queued_per_tenant: int = Field(1000, ge=1)
     max_running_per_tenant: int = Field(64, ge=1)

@@ -13,6 +13,8 @@ from service.api.errors import problem
 
 MOST_VALUES: Final = 1_000_000
 """Objects and lists in one JSON body. An empty one is two bytes, and eighty once it is read."""
+MOST_COMMAS: Final = 5_000_000
+"""Between its values: a number takes two bytes, and thirty once it is read."""
 
 
 class BodyLimit:
@@ -44,10 +46,10 @@ class BodyLimit:
             await response(scope, receive, send)
             return
         is_json = "json" in headers.get("content-type", "").lower()
-        num_bytes = num_values = 0
+        num_bytes = num_values = num_commas = 0
 
         async def receive_within_limit() -> Message:
-            nonlocal num_bytes, num_values
+            nonlocal num_bytes, num_values, num_commas
             message = await receive()
             part = message.get("body", b"")
             num_bytes += len(part)
@@ -58,6 +60,9 @@ class BodyLimit:
                 if num_values > MOST_VALUES:
                     detail = f"The body has more than {MOST_VALUES} objects and lists."
                     raise HTTPException(413, detail)
+                num_commas += part.count(b",")
+                if num_commas > MOST_COMMAS:
+                    raise HTTPException(413, f"The body has more than {MOST_COMMAS} values.")
             return message
 
         await self.app(scope, receive_within_limit, send)

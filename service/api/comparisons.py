@@ -47,7 +47,7 @@ def create_comparison(body: ComparisonIn, call: CallDep, once: OnceDep) -> Compa
         with inside(f"/runs/{position}"):
             params.append(intake.all_params(run.solver, run.params))
     time_s, memory_mb = intake.limits_of(body.limits, call.settings)
-    inline = intake.frozen(call.database, call.settings, body)
+    inline = intake.frozen(call, body)
     with once.transaction() as session:
         intake.require_room(session, call, len(body.runs))
         scenario_id = intake.stored_scenario(session, call, body, inline)

@@ -12,11 +12,10 @@ from sqlalchemy.orm import Session
 from planner_core.errors import Fault
 from planner_core.solvers.registry import solver_class
 from service.answers import store as answer_store
-from service.api import ask_again
+from service.api import ask_again, bulkhead
 from service.api.deps import Call
 from service.api.job_shapes import headers_of, shown
 from service.db.rows import JobRow
-from service.db.session import Database
 from service.jobs.queue import JobQueue
 from service.jobs.solver_params import params_of, parse_params
 from service.problems.faults import refuse
@@ -47,9 +46,9 @@ def all_params(solver: str, params: Mapping[str, Any]) -> dict[str, Any]:
     return params_of(parse_params(solver_class(solver), params))
 
 
-def frozen(database: Database, settings: Settings, body: QuestionIn) -> FrozenScenario | None:
+def frozen(call: Call, body: QuestionIn) -> FrozenScenario | None:
     """Return the inline scenario of a body, ready to be stored; None where it names one."""
-    scenario, limits = body.scenario, settings.scenario_limits
+    scenario, limits = body.scenario, call.settings.scenario_limits
     if (scenario is None) == (body.scenario_id is None):
         detail = "Give either scenario_id or scenario."
         if scenario is None:
@@ -57,12 +56,20 @@ def frozen(database: Database, settings: Settings, body: QuestionIn) -> FrozenSc
         raise refuse([Fault(code="invalid_value", detail=detail, pointer="/scenario")])
     with inside("/scenario"):
         if isinstance(scenario, ScenarioIn):
-            return freezing.freeze(database, scenario, limits)
+            return freeze(call, scenario)
         if isinstance(scenario, ScenarioFile):
             refuse_duplicate_pins(scenario.pins)
             file = read_file(scenario.model_dump(mode="json"))
             return freezing.freeze_file(file, limits)
     return None
+
+
+def freeze(call: Call, body: ScenarioIn) -> FrozenScenario:
+    """Return a question over what is stored, ready to be stored: here, where it is not large."""
+    with call.database.reading() as session:
+        num_targets = freezing.num_targets(session, body.target_catalog_ids)
+    bulkhead.require_light(call.request, num_targets, len(body.satellite_ids))
+    return freezing.freeze(call.database, body, call.settings.scenario_limits)
 
 
 def stored_scenario(

@@ -41,7 +41,7 @@ def create_job(body: JobIn, call: CallDep, once: OnceDep) -> JobOut:
     queue = intake.queue_of(call.request)
     params = intake.all_params(body.solver, body.params)
     time_s, memory_mb = intake.limits_of(body.limits, call.settings)
-    inline = intake.frozen(call.database, call.settings, body)
+    inline = intake.frozen(call, body)
     with once.transaction() as session:
         intake.require_room(session, call)
         spec = submission.JobSpec(

@@ -15,6 +15,7 @@ from planner_core.build import view_at
 from planner_core.orbits.places import View
 from planner_core.problem import COLLECT, CONTACT
 from service.access.callers import Caller
+from service.api import job_intake as intake
 from service.api.conditional import NOT_MODIFIED, created, unless_known
 from service.api.deps import CallDep
 from service.api.errors import problem_responses
@@ -53,7 +54,7 @@ def create_scenario(body: ScenarioIn, call: CallDep, once: OnceDep) -> ScenarioO
 
     The same content again, under whatever name, answers 200 with the scenario that is there.
     """
-    frozen = store.freeze(call.database, body, call.settings.scenario_limits)
+    frozen = intake.freeze(call, body)
     with once.transaction() as session:
         row, is_new = store.save(session, frozen)
         if is_new:

@@ -72,8 +72,8 @@ def freeze(database: Database, body: ScenarioIn, limits: ScenarioLimits) -> Froz
         SGP4 cannot carry a satellite through the horizon.
     """
     with database.reading() as session:
-        num_targets = _num_targets(session, body.target_catalog_ids)
-        limits.check(horizon_from(body.horizon), len(body.satellite_ids), num_targets)
+        number = num_targets(session, body.target_catalog_ids)
+        limits.check(horizon_from(body.horizon), len(body.satellite_ids), number)
         file = _expanded(session, body)
     refuse_duplicate_pins(file.pins)
     with _named_by_ids():
@@ -147,7 +147,7 @@ def _named_by_ids() -> Iterator[None]:
         raise
 
 
-def _num_targets(session: Session, catalog_ids: Sequence[str]) -> int:
+def num_targets(session: Session, catalog_ids: Sequence[str]) -> int:
     """Return how many targets catalogues hold, without reading them."""
     total = sa.func.coalesce(sa.func.sum(TargetCatalogRow.num_targets), 0)
     wanted = sa.select(total).where(TargetCatalogRow.id.in_(set(catalog_ids)))
