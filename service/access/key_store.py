@@ -60,6 +60,12 @@ def has_key(session: Session, key_id: str) -> bool:
     return session.scalar(sa.select(ApiKeyRow.id).where(ApiKeyRow.id == key_id)) is not None
 
 
+def has_ended(session: Session, key_id: str) -> bool:
+    """Return whether a stored key is revoked or expired by now."""
+    ended = sa.select(ApiKeyRow.id).where(ApiKeyRow.id == key_id, ~_is_good())
+    return session.scalar(ended) is not None
+
+
 def has_good_key(session: Session) -> bool:
     """Return whether anybody holds a key that is good now."""
     return session.scalar(sa.select(ApiKeyRow.id).where(_is_good()).limit(1)) is not None

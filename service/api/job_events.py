@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import logging
+import time
 from collections.abc import AsyncIterator
 from typing import Annotated, Final
 
 from fastapi import APIRouter, Depends, Header, Response
 from fastapi.responses import StreamingResponse
 from sqlalchemy.exc import SQLAlchemyError
+from starlette.concurrency import run_in_threadpool
 
-from service.api.deps import DatabaseDep, own_job_only
+from service.access import key_store
+from service.access.callers import Caller
+from service.api.deps import CallerDep, DatabaseDep, own_job_only
 from service.api.errors import problem_responses
 from service.api.job_shapes import etag_of_job, shown
 from service.api.job_wait import wait_for_change
@@ -22,6 +26,7 @@ router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[Depends(own_j
 log = logging.getLogger(__name__)
 
 SIGN_OF_LIFE_S: Final = 10.0
+_LOOK_AT_KEY_EVERY_S: Final = 2.0
 _NOTHING_SEEN: Final = "0"
 
 
@@ -37,6 +42,7 @@ _NOTHING_SEEN: Final = "0"
 async def job_events(
     job_id: str,
     database: DatabaseDep,
+    caller: CallerDep,
     last_event_id: Annotated[
         str, Header(alias="Last-Event-ID", description="The last event that was seen.")
     ] = "",
@@ -45,7 +51,8 @@ async def job_events(
 
     Each event's data is what `GET /v1/jobs/{id}` answers. With `Last-Event-ID` the first
     event comes when the job is no longer what that event told. The stream also ends where the
-    database fails: ask again with `Last-Event-ID`.
+    database fails: ask again with `Last-Event-ID`. It ends for good with the key it was asked
+    for with.
     """
     job, _ = await wait_for_change(database, job_id, None, 0.0, _never)
     seen = last_event_id or _NOTHING_SEEN
@@ -53,16 +60,22 @@ async def job_events(
         # What browsers do after a stream has ended is to ask for it again, for ever.
         return Response(status_code=204)
     return StreamingResponse(
-        _events(database, job_id, f'"{seen}"'),
+        _events(database, _Listener(database, caller), job_id, f'"{seen}"'),
         media_type="text/event-stream",
         headers={"Cache-Control": "no-store"},
     )
 
 
-async def _events(database: Database, job_id: str, seen: str) -> AsyncIterator[str]:
+async def _events(
+    database: Database, listener: _Listener, job_id: str, seen: str
+) -> AsyncIterator[str]:
     while True:
         try:
-            job, sha256 = await wait_for_change(database, job_id, seen, SIGN_OF_LIFE_S, _never)
+            job, sha256 = await wait_for_change(
+                database, job_id, seen, SIGN_OF_LIFE_S, listener.has_lost_its_key
+            )
+            if await listener.has_lost_its_key():
+                return
         except SQLAlchemyError as error:
             why = why_unavailable(error)
             if why is None:
@@ -83,3 +96,24 @@ async def _events(database: Database, job_id: str, seen: str) -> AsyncIterator[s
 async def _never() -> bool:
     # The framework ends the stream of a client that has gone.
     return False
+
+
+class _Listener:
+    """Who reads a stream, and whether the key that it was asked for with is still good."""
+
+    def __init__(self, database: Database, caller: Caller):
+        self._database = database
+        self._key_id = caller.key_id
+        self._next_s = time.monotonic() + _LOOK_AT_KEY_EVERY_S
+        self._has_lost_its_key = False
+
+    async def has_lost_its_key(self) -> bool:
+        """Return whether it is revoked or expired, looking every other second."""
+        if self._key_id is not None and time.monotonic() >= self._next_s:
+            self._next_s = time.monotonic() + _LOOK_AT_KEY_EVERY_S
+            self._has_lost_its_key = await run_in_threadpool(self._look, self._key_id)
+        return self._has_lost_its_key
+
+    def _look(self, key_id: str) -> bool:
+        with self._database.reading() as session:
+            return key_store.has_ended(session, key_id)
