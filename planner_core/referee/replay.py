@@ -57,6 +57,8 @@ class Violation:
         What the rule asks for and what the plan leaves: seconds, or fractions of capacity.
     blamed
         Positions in ``plan.actions`` of the actions that break it; those earn nothing.
+    inherited
+        Whether it held at the start already, and no action has a part in it.
     """
 
     code: ViolationCode
@@ -66,6 +68,7 @@ class Violation:
     available: float
     detail: str
     blamed: tuple[int, ...]
+    inherited: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -153,6 +156,14 @@ class Timeline:
     def is_valid(self) -> bool:
         """Whether nothing is broken; imaging a target twice is allowed, it earns nothing."""
         return all(v.code == "duplicate" for v in self.violations)
+
+    @property
+    def validity(self) -> Literal["valid", "inherited", "violations"]:
+        """What is to be said of it: inherited violations are no fault of the plan."""
+        if self.is_valid:
+            return "valid"
+        own = (v for v in self.violations if v.code != "duplicate" and not v.inherited)
+        return "violations" if any(own) else "inherited"
 
 
 def plan_sha256(problem: Problem, plan: Plan) -> str:
@@ -363,6 +374,7 @@ def _limits(
             if is_broken(after) or (problem.dynamics == "physical" and is_broken(before))
         ]
         for start_s, end_s, worst in _excursions(problem, profile.points, code, limit):
+            partners = tuple(p for b, a, p in blamed if b <= end_s and a >= start_s)
             found.append(
                 Violation(
                     code="battery" if code == "battery" else "recorder",
@@ -372,7 +384,8 @@ def _limits(
                     available=worst,
                     detail=f"The {code} reaches {worst:.4f} of its capacity; "
                     f"the limit is {limit:.4f}.",
-                    blamed=tuple(p for b, a, p in blamed if b <= end_s and a >= start_s),
+                    blamed=partners,
+                    inherited=start_s == profile.points[0].time_s and not partners,
                 )
             )
     return found

@@ -93,6 +93,7 @@ class Wording:
             available=found.available,
             actions=[ids[p] for p in found.blamed if p in ids],
             detail=found.detail,
+            inherited=found.inherited,
         )
 
     def target(self, found: TargetOutcome) -> TargetItem:
@@ -161,7 +162,7 @@ class Documents(Wording):
             use_resources=judged.problem.use_resources,
             termination=judged.solution.termination.value,
             runtime_s=RuntimeOut(**{p: round(getattr(judged.runtime_s, p), 6) for p in phases}),
-            validity="valid" if judged.timeline.is_valid else "violations",
+            validity=judged.timeline.validity,
             violations=[self.violation(v) for v in judged.timeline.violations],
             totals=self._totals(),
             warnings=judged.opportunities.warnings,

@@ -50,9 +50,9 @@ def check_file(scenario_path: Path, timeline_path: Path) -> int:
     problem = build_problem(scenario, compute_opportunities(scenario, budget), budget)
     reading = plan_in(records, scenario, problem)
     verdict = replay(problem, reading.plan)
-    is_valid = verdict.is_valid and not reading.impossible
+    validity = "violations" if reading.impossible else verdict.validity
     own_hash = plan_sha256(problem, reading.plan)
-    print(table([_HEADER, _row(problem, reading, verdict, is_valid=is_valid)]))
+    print(table([_HEADER, _row(problem, reading, verdict, validity)]))
     print(f"plan {own_hash}")
     for line in _complaints(scenario, reading, verdict):
         print(line)
@@ -60,20 +60,18 @@ def check_file(scenario_path: Path, timeline_path: Path) -> int:
         claimed = json.loads(data)
         for line in _differences(claimed, sha256_of(content), own_hash, verdict.reward):
             print(line)
-    return 0 if is_valid else 1
+    return 0 if validity != "violations" else 1
 
 
 _HEADER = ("validity", "reward", "collects", "contacts", "battery", "recorder")
 
 
-def _row(
-    problem: Problem, reading: Reading, verdict: Timeline, *, is_valid: bool
-) -> tuple[str, ...]:
+def _row(problem: Problem, reading: Reading, verdict: Timeline, validity: str) -> tuple[str, ...]:
     kinds = Counter(int(problem.opportunities.kind[a.opportunity]) for a in reading.plan.actions)
     collects = kinds[COLLECT]
     lowest, highest = verdict.battery_min, verdict.recorder_max
     return (
-        "valid" if is_valid else "violations",
+        validity,
         f"{verdict.reward:g}",
         str(collects),
         str(kinds.total() - collects),

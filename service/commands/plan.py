@@ -81,7 +81,7 @@ def plan(
     print(summary(timeline.model_dump()))
     if out is not None:
         job.download(out)
-    return 0 if timeline.validity == "valid" else 1
+    return 0 if timeline.validity != "violations" else 1
 
 
 def _followed(job: Job) -> Job:

@@ -68,7 +68,7 @@ def solve_file(
     if out is not None:
         out.write_text(json.dumps(timeline, indent=1) + "\n", encoding="utf-8")
     print(summary(timeline))
-    return 0 if timeline["validity"] == "valid" else 1
+    return 0 if timeline["validity"] != "violations" else 1
 
 
 def answer_of(request: PlanRequest, budget: Budget) -> PlanAnswer:

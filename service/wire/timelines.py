@@ -45,6 +45,7 @@ class ViolationOut(Wire):
     available: float = Field(description="What the plan leaves, in the same unit.")
     actions: tuple[str, ...] = Field(description="Ids of the actions in question.")
     detail: str
+    inherited: bool = Field(False, description="It held at the start; no action has a part in it.")
 
 
 class TotalsOut(Wire):
@@ -146,7 +147,10 @@ class TimelineHead(Wire):
     use_resources: bool
     termination: str
     runtime_s: RuntimeOut
-    validity: Open[Literal["valid", "violations"]]
+    validity: Open[Literal["valid", "inherited", "violations"]] = Field(
+        description="`inherited`: what is broken was so at the horizon's start, and no action has "
+        "a part in it."
+    )
     violations: tuple[ViolationOut, ...]
     totals: TotalsOut
     warnings: tuple[str, ...]

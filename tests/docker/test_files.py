@@ -124,3 +124,38 @@ def test_nothing_starts_before_what_it_needs(compose: dict[str, Any]) -> None:
     compile(services["api"]["healthcheck"]["test"][-1], "healthcheck", "exec")
     assert services["worker"]["stop_grace_period"] == "1m"
     assert set(compose["volumes"]) == {"database"}
+
+
+def test_every_container_has_a_memory_limit_that_its_jobs_fit_into(compose: dict[str, Any]) -> None:
+    limits = {name: service["mem_limit"] for name, service in compose["services"].items()}
+    assert set(limits) == {"database", *OURS}
+    defaults = {name: re.fullmatch(r"\$\{\w+:-(\d+)g\}", limit) for name, limit in limits.items()}
+    assert all(defaults.values())
+    worker = defaults["worker"]
+    assert worker is not None
+    asked = compose["services"]["worker"]["environment"]["SLEWLINE_MAX_MEMORY_MB"]
+    (most_mb,) = re.findall(r":-(\d+)\}", asked)
+    assert int(most_mb) + 500 <= 1000 * int(worker[1])
+
+
+def test_base_images_can_be_fixed_by_digest(compose: dict[str, Any]) -> None:
+    stages = [rest.split()[0] for word, rest in instructions() if word == "FROM"]
+    assert stages == ["${PYTHON_IMAGE}"] * 2
+    (build,) = {
+        service["build"]["args"]["PYTHON_IMAGE"]
+        for name, service in compose["services"].items()
+        if name in OURS
+    }
+    (default,) = (rest for word, rest in instructions() if word == "ARG")
+    assert variables(build) == {"PYTHON_IMAGE": f":-{default.partition('=')[2]}"}
+    assert set(variables(compose["services"]["database"]["image"])) == {"POSTGRES_IMAGE"}
+    told = (DOCKER / "example.env").read_text()
+    assert "#POSTGRES_IMAGE=" in told
+    assert "#PYTHON_IMAGE=" in told
+
+
+def test_the_api_is_told_whose_forwarded_addresses_it_may_believe(compose: dict[str, Any]) -> None:
+    assert variables(compose["services"]["api"]["environment"]["FORWARDED_ALLOW_IPS"]) == {
+        "FORWARDED_ALLOW_IPS": ":-127.0.0.1"
+    }
+    assert "#FORWARDED_ALLOW_IPS=" in (DOCKER / "example.env").read_text()

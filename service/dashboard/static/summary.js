@@ -72,12 +72,14 @@ function showViolations(plan, selection) {
     ),
   );
   const heads = ["Violation", "Satellite", "At (UTC)", "Needed", "Available", "What"];
-  const title = plan.timeline.validity === "valid" ? "Remarks" : "This plan breaks limits";
+  const { validity } = plan.timeline;
+  const titles = { valid: "Remarks", inherited: "Limits were broken before this plan began" };
+  const title = titles[/** @type {keyof titles} */ (validity)] ?? "This plan breaks limits";
   fill(
     byId("violations"),
     h(
       "div",
-      { class: plan.timeline.validity === "valid" ? "notice warn" : "notice bad", role: "alert" },
+      { class: validity in titles ? "notice warn" : "notice bad", role: "alert" },
       h(
         "div",
         { class: "scroll" },
