@@ -98,7 +98,7 @@ RESOURCES = {"battery_capacity_wh": 100}
         ({"name": "a\x00b"}, "invalid_value", "/name"),
         ({"name": "\ud800"}, "invalid_value", "/name"),
         ({"na\ud800me": 1}, "invalid_value", ""),
-        ({"tle": None, "omm": {"EPOCH": "\ud800"}}, "omm_missing_key", "/omm/MEAN_MOTION"),
+        ({"tle": None, "omm": {"EPOCH": "\ud800"}}, "invalid_value", "/omm"),
         ({"tle": None}, "invalid_value", ""),
         ({"omm": {}}, "invalid_value", ""),
         ({"tle": None, "omm": {}}, "omm_missing_key", "/omm/EPOCH"),

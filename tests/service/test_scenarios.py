@@ -235,7 +235,7 @@ def test_a_scenario_that_is_too_large_is_refused_before_it_is_read(
 
 
 def test_a_spacing_that_makes_too_many_opportunities_is_refused(client: httpx.Client) -> None:
-    asked = question(client, collect_spacing_s=1e-6)
+    asked = question(client, collect_spacing_s=1e-3)
     asked["target_catalog_ids"] = [catalog(client, *(target(id=f"t{n}") for n in range(2000)))]
     path = post(client, PATH, asked)["links"]["opportunities"]
     assert_problem(client.get(path), 422, "too_many_opportunities")
