@@ -28,6 +28,7 @@ from planner_core.orbits.earth_orientation import shipped
 from planner_core.orbits.eclipse import always_sunlit, sunlight
 from planner_core.orbits.ephemeris import Ephemeris, propagate
 from planner_core.orbits.places import Places, View, view
+from planner_core.orbits.sun import sun_path
 from planner_core.pinning.pinned_problem import pinned_problem
 from planner_core.problem import (
     ACCESS_FOUND,
@@ -173,7 +174,10 @@ def compute_opportunities(scenario: Scenario, budget: Budget) -> ScenarioOpportu
         # Propagated again rather than kept: a month of a constellation's paths is a gigabyte.
         path = propagate(satellite, scenario.horizon)
         for kind in kinds:
-            described.fill(index, kind, path, places[kind], satellite.sensor.nadir)
+            described.fill(
+                index, kind, path, places[kind], satellite.sensor.nadir,
+                with_rates=satellite.agility.tracks,
+            )  # fmt: skip
     _go_on(budget, 1.0)
     return ScenarioOpportunities(
         opportunities=described.table(),
@@ -280,6 +284,7 @@ def build_problem(scenario: Scenario, computed: ScenarioOpportunities, budget: B
         A pin is impossible.
     """
     satellites = []
+    sun = sun_path(scenario.horizon)
     for index, satellite in enumerate(scenario.satellites):
         _go_on(budget, index / len(scenario.satellites), "compile")
         sees_shadow = scenario.use_resources and satellite.resources.eclipse_aware
@@ -293,6 +298,7 @@ def build_problem(scenario: Scenario, computed: ScenarioOpportunities, budget: B
                 agility=satellite.agility,
                 resources=satellite.resources,
                 sunlight=computed.sunlight[index] if sees_shadow else everywhere,
+                sun=sun,
             )
         )
     _go_on(budget, 1.0, "compile")

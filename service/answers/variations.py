@@ -26,7 +26,7 @@ from service.scenarios.translate import read_file, scenario_from_file, sha256_of
 from service.wire.base import read
 from service.wire.changes import ChangeIn
 from service.wire.scenarios import ScenarioFile
-from service.wire.timelines import TimelineOut
+from service.wire.timelines import IDLE_MODES, TimelineOut
 
 _KEPT = 8
 
@@ -126,13 +126,18 @@ def _geometry(scenario: Scenario) -> Scenario:
         satellites=tuple(
             replace(
                 satellite,
-                agility=Agility(),
+                agility=_slew_model_of(satellite.agility),
                 resources=replace(some, eclipse_aware=satellite.resources.eclipse_aware),
             )
             for satellite in scenario.satellites
         ),
         targets=tuple(replace(target, reward=1.0) for target in scenario.targets),
     )
+
+
+def _slew_model_of(agility: Agility) -> Agility:
+    """Return what opportunities know of how a satellite turns: whether in motion."""
+    return Agility(slew_model="moving", acceleration_deg_s2=1.0) if agility.tracks else Agility()
 
 
 def _dropped(asked: Asked, timeline: TimelineOut | None) -> list[PinnedAction]:
@@ -148,7 +153,7 @@ def _dropped(asked: Asked, timeline: TimelineOut | None) -> list[PinnedAction]:
         )
         for satellite in (timeline.satellites if timeline else ())
         for action in satellite.actions
-        if action.mode != "sunpoint"
+        if action.mode not in IDLE_MODES
     }
     found = []
     for number, own_id in enumerate(asked.change.relax.drop_actions):

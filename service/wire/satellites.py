@@ -23,10 +23,14 @@ from service.wire.base import (
 from service.wire.imports import RejectedRow
 
 Fraction = Annotated[float, Field(ge=0, le=1)]
+SunExclusion = Annotated[float | None, Field(ge=0, le=180)]
+PanelAngle = Annotated[float, Field(ge=0, le=180)]
 SunElevation = Annotated[float | None, Field(ge=-90, le=90)]
 LocalTime = Annotated[float | None, Field(ge=0, le=24)]
 SensorType = Annotated[str, StringConstraints(min_length=1, max_length=100, pattern=TEXT)]
 Nadir = Literal["geodetic", "geocentric"]
+SunPointing = Literal["free", "slew"]
+SlewModel = Literal["rest", "moving"]
 LookSide = Literal["left", "right", "any"]
 OrbitDirection = Literal["ascending", "descending", "any"]
 
@@ -39,6 +43,15 @@ class AgilityIn(Body):
         None, description="Limit of acceleration and braking; null for none."
     )
     settle_s: NonNegative = Field(0.0, description="Wait after each slew.")
+    slew_model: SlewModel = Field(
+        "rest",
+        description="rest: turns begin and end at rest. moving: at the rates at which lines of "
+        "sight move, which needs acceleration_deg_s2.",
+    )
+    sun_exclusion_deg: SunExclusion = Field(
+        None,
+        description="Least angle between boresight and sun in turns, which a flight checks.",
+    )
 
 
 class LightIn(Body):
@@ -67,6 +80,9 @@ class SensorIn(LightIn):
         "geodetic", description="Perpendicular to the ellipsoid, or towards the Earth's centre."
     )
     min_elevation_deg: float = Field(0.0, ge=0, lt=90, description="At the target.")
+    sun_exclusion_deg: SunExclusion = Field(
+        None, description="Least angle between the line of sight and the sun; null for no limit."
+    )
     sensor_type: SensorType | None = Field(
         None,
         description="A name of your own, such as visible or infrared, that targets may ask for.",
@@ -79,7 +95,12 @@ class ResourcesIn(Body):
     battery_capacity_wh: Positive
     battery_min_fraction: Fraction = 0.3
     initial_battery_fraction: Fraction = 1.0
-    sunpoint_power_w: NonNegative = Field(description="Net charge while sun-pointing.")
+    sunpoint_power_w: NonNegative = Field(
+        description="Charge while sun-pointing, before idle_power_w."
+    )
+    idle_power_w: NonNegative = Field(
+        0.0, description="Drawn at all times, in shadow too; the modes' powers come on top of it."
+    )
     collect_power_w: NonNegative = Field(description="Net draw during a collect.")
     contact_power_w: NonNegative = Field(description="Net draw during a contact.")
     recorder_capacity_mbit: Positive
@@ -89,6 +110,14 @@ class ResourcesIn(Body):
     downlink_rate_mbit_s: NonNegative = Field(description="What a contact takes down.")
     telemetry_rate_mbit_s: NonNegative = Field(description="What telemetry writes at all times.")
     eclipse_aware: bool = Field(False, description="Charge only in sunlight.")
+    sun_pointing: SunPointing = Field(
+        "free",
+        description="free: charges in all idle time. slew: only between a turn to the sun and one "
+        "back.",
+    )
+    panel_angle_deg: PanelAngle = Field(
+        180.0, description="Between the normal of the panels and the boresight."
+    )
 
 
 Preset = Literal["paper", "paper_code"]
@@ -103,6 +132,14 @@ class PresetResourcesIn(Body):
     recorder_max_fraction: Fraction = 0.75
     initial_recorder_fraction: Fraction = 0.0
     eclipse_aware: bool = Field(False, description="Charge only in sunlight.")
+    sun_pointing: SunPointing = Field(
+        "free",
+        description="free: charges in all idle time. slew: only between a turn to the sun and one "
+        "back.",
+    )
+    panel_angle_deg: PanelAngle = Field(
+        180.0, description="Between the normal of the panels and the boresight."
+    )
 
 
 def _form_of_resources(value: object) -> str:

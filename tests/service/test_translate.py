@@ -288,3 +288,56 @@ def test_a_preset_takes_fractions_of_its_own_and_one_question_has_one_hash() -> 
     assert (fault.code, fault.pointer) == (
         "unknown_field", "/satellites/0/resources/collect_power_w",
     )  # fmt: skip
+
+
+def test_turns_to_the_sun_are_asked_for_and_questions_without_keep_their_hash() -> None:
+    plain, same, slewing = file(), file(), file()
+    same["satellites"][0]["resources"] = {
+        "preset": "paper", "sun_pointing": "free", "panel_angle_deg": 180.0,
+    }  # fmt: skip
+    assert canonical(same) == canonical(plain)
+    slewing["satellites"][0]["resources"] = {
+        "preset": "paper", "sun_pointing": "slew", "panel_angle_deg": 90.0,
+    }  # fmt: skip
+    text = canonical(slewing)
+    assert text != canonical(plain)
+    assert canonical(json.loads(text)) == text
+    (made,) = scenario_from_content(slewing).satellites
+    assert (made.resources.sun_pointing, made.resources.panel_angle_deg) == ("slew", 90.0)
+    slewing["dynamics"] = "paper"
+    with pytest.raises(InvalidScenario) as refused:
+        scenario_from_content(slewing)
+    assert refused.value.fault.pointer == "/dynamics"
+
+
+def test_a_load_at_all_times_is_a_fraction_of_the_battery() -> None:
+    own = {
+        "battery_capacity_wh": 100.0, "sunpoint_power_w": 36.0, "collect_power_w": 72.0,
+        "contact_power_w": 18.0, "recorder_capacity_mbit": 4000.0, "collect_rate_mbit_s": 400.0,
+        "downlink_rate_mbit_s": 200.0, "telemetry_rate_mbit_s": 0.004,
+    }  # fmt: skip
+    without = canonical(file(satellites=[satellite(resources=own)]))
+    assert "idle_power_w" not in without
+    assert "sun_pointing" not in without
+    loaded = file(satellites=[satellite(resources=own | {"idle_power_w": 7.2})])
+    assert '"idle_power_w":7.2' in canonical(loaded)
+    (made,) = scenario_from_content(loaded).satellites
+    assert made.resources.idle_drain_per_s == pytest.approx(2e-5)
+
+
+def test_turns_in_motion_and_angles_to_the_sun_keep_the_hash_of_questions_without() -> None:
+    plain, same, other = file(), file(), file()
+    same["satellites"][0]["agility"] = {"slew_model": "rest", "sun_exclusion_deg": None}
+    same["satellites"][0]["sensor"] = {"sun_exclusion_deg": None}
+    assert canonical(same) == canonical(plain)
+    other["satellites"][0]["agility"] = {"slew_model": "moving", "acceleration_deg_s2": 0.5}
+    other["satellites"][0]["sensor"] = {"sun_exclusion_deg": 30.0}
+    text = canonical(other)
+    assert canonical(json.loads(text)) == text
+    (made,) = scenario_from_content(other).satellites
+    assert made.agility.tracks
+    assert made.sensor.sun_exclusion_deg == 30.0
+    del other["satellites"][0]["agility"]["acceleration_deg_s2"]
+    with pytest.raises(InvalidScenario) as refused:
+        scenario_from_content(other)
+    assert refused.value.fault.pointer == "/satellites/0/agility/slew_model"
