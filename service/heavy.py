@@ -35,6 +35,7 @@ log = logging.getLogger(__name__)
 
 _LOOK_EVERY_S: Final = 0.1
 _STOP_WITHIN_S: Final = 5.0
+_NICENESS: Final = 10
 
 
 @contextmanager
@@ -93,6 +94,7 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--fd", type=int, required=True)
     die_with_parent(signal.SIGTERM)
+    os.nice(_NICENESS)  # whatever is light goes first
     settings = Settings()
     configure_logging()
     provider = start_tracing(settings, "api")
