@@ -43,20 +43,22 @@ class BundleType(types.Type):
     def __init__(self, of: type, members: tuple[types.Type, ...]):
         self.of = of
         self.members = members
-        spelt = hashlib.sha256(repr(members).encode()).hexdigest()[:8]
+        names: Any = of  # a named tuple's class, which types do not tell
+        # Kept on disk with what was compiled: members of other names are another bundle.
+        self.names: tuple[str, ...] = names._fields
+        spelt = hashlib.sha256(repr((self.names, members)).encode()).hexdigest()[:8]
         super().__init__(name=f"{of.__name__}.{spelt}")
 
     @property
-    def key(self) -> tuple[type, tuple[types.Type, ...]]:
+    def key(self) -> tuple[type, tuple[str, ...], tuple[types.Type, ...]]:
         """What makes two such types the same."""
-        return self.of, self.members
+        return self.of, self.names, self.members
 
     @cached_property
     def places(self) -> dict[str, tuple[int, types.Type]]:
         """The word at which each member begins, and its type."""
         found, word = {}, 0
-        of: Any = self.of  # a named tuple's class, which types do not tell
-        for name, member in zip(of._fields, self.members, strict=True):
+        for name, member in zip(self.names, self.members, strict=True):
             found[name] = word, member
             word += _words(member)
         return found

@@ -25,7 +25,7 @@ from numba.core import event
 from planner_core.budget import Budget
 from planner_core.build import build_problem, compute_opportunities
 from planner_core.certified.lns.alternating import TurnSearch
-from planner_core.certified.multipliers.energy import EnergyPrices
+from planner_core.certified.multipliers.energy import EnergyPaths, ascent_on_energy
 from planner_core.domain import (
     Agility,
     GroundStation,
@@ -37,7 +37,8 @@ from planner_core.domain import (
     Target,
 )
 from planner_core.errors import InvalidScenario
-from planner_core.jit import kernel_folder
+from planner_core.jit import all_stamps
+from planner_core.kernel_cache import kernel_folder
 from planner_core.pins import BlockedInterval, PinnedAction, Pins
 from planner_core.precedence.arcs import arc_network_of
 from planner_core.precedence.relation import excluded_by
@@ -66,7 +67,7 @@ def main() -> None:
 
 def warm_up() -> None:
     """Run in this process what is compiled or at once needed, so that it is loaded."""
-    for part in PARTS if _marker(PARTS).exists() else ESSENTIAL:
+    for part in PARTS if _is_ready(PARTS) else ESSENTIAL:
         PARTS[part]()
 
 
@@ -77,7 +78,7 @@ def make_ready(parts: Iterable[str]) -> None:
     compiles, the others wait for that one alone.
     """
     parts = list(parts)
-    if _marker(parts).exists():
+    if _is_ready(parts):
         return
     began_s = time.monotonic()
     context = multiprocessing.get_context("spawn")
@@ -100,7 +101,7 @@ def make_ready(parts: Iterable[str]) -> None:
             raise
     line.end()
     kernel_folder().mkdir(parents=True, exist_ok=True)
-    _marker(parts).touch()
+    _marker(parts).write_text(all_stamps())
 
 
 def _run(part: str) -> None:
@@ -110,8 +111,14 @@ def _run(part: str) -> None:
         raise RuntimeError(f"The kernels of {part!r} cannot be compiled: {error}") from error
 
 
+def _is_ready(parts: Iterable[str]) -> bool:
+    """Return whether all of some parts are compiled, as their sources are now."""
+    marker = _marker(parts)
+    return marker.is_file() and marker.read_text() == all_stamps()
+
+
 def _marker(parts: Iterable[str]) -> Path:
-    """Return the file that stands where all of some parts are compiled."""
+    """Return the file that tells which kernels were compiled when some parts were."""
     name = "all" if set(parts) == set(PARTS) else "essential"
     return kernel_folder() / f"{name}.ready"
 
@@ -210,8 +217,8 @@ def _shortage() -> None:
     problem = _built(_over_the_globe())
     plan = Rule().solve(problem, Budget(), 0).plan
     TurnSearch(problem, plan, problem.typical_worth, Budget(), 0).turn(1)
-    prices = EnergyPrices(problem, np.zeros(len(problem.target_ids)), 1, 0)
-    prices.improve(1, Budget().stop)
+    paths, nothing = EnergyPaths(problem), np.zeros(len(problem.target_ids))
+    ascent_on_energy(problem, paths, nothing, 1, 0).improve(1, Budget().stop)
     Mcts(worthless="sunpoint").solve(problem, Budget(), 0)
 
 
