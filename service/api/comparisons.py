@@ -50,7 +50,7 @@ def create_comparison(body: ComparisonIn, call: CallDep, once: OnceDep) -> Compa
     inline = intake.frozen(call, body)
     with once.transaction() as session:
         intake.require_room(session, call, len(body.runs))
-        scenario_id = intake.stored_scenario(session, call.audit, body, inline)
+        scenario_id = intake.stored_scenario(session, call, body, inline)
         specs = [
             submission.JobSpec(
                 scenario_id=scenario_id,

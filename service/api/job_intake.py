@@ -11,12 +11,11 @@ from sqlalchemy.orm import Session
 
 from planner_core.errors import Fault
 from planner_core.solvers.registry import solver_class
-from service.access.audit import Audit
 from service.answers import store as answer_store
 from service.api import ask_again, bulkhead
 from service.api.deps import Call
 from service.api.job_shapes import headers_of, shown
-from service.db.rows import JobRow
+from service.db.rows import JobRow, ScenarioRow
 from service.jobs.queue import JobQueue
 from service.jobs.solver_params import params_of, parse_params
 from service.problems.faults import refuse
@@ -72,15 +71,21 @@ def freeze(call: Call, body: ScenarioIn) -> FrozenScenario:
     return scenario_store.freeze(call.database, body, call.settings.scenario_limits)
 
 
+def save(session: Session, call: Call, frozen: FrozenScenario) -> tuple[ScenarioRow, bool]:
+    """Return the stored scenario of this content, and whether it is new, and then the caller's."""
+    row, is_new = scenario_store.save(session, frozen)
+    if is_new:
+        call.count_stored(session, num_rows=1, num_bytes=len(frozen.content))
+        call.audit.record(session, "create", "scenario", row.id)
+    return row, is_new
+
+
 def stored_scenario(
-    session: Session, audit: Audit, body: QuestionIn, inline: FrozenScenario | None
+    session: Session, call: Call, body: QuestionIn, inline: FrozenScenario | None
 ) -> str:
     """Return the id of the scenario in question; an inline one is stored."""
     if inline is not None:
-        row, is_new = scenario_store.save(session, inline)
-        if is_new:
-            audit.record(session, "create", "scenario", row.id)
-        return row.id
+        return save(session, call, inline)[0].id
     assert body.scenario_id is not None
     if store.has_scenario(session, body.scenario_id):
         return body.scenario_id
@@ -102,8 +107,9 @@ def limits_of(limits: LimitsIn, settings: Settings) -> tuple[float, int]:
 
 
 def require_room(session: Session, call: Call, num_jobs: int = 1) -> None:
-    """Refuse more jobs than the queue may hold, in all and of one owner."""
+    """Refuse more jobs than the queue may hold, in all and of one owner, or whose owner is full."""
     settings = call.settings
+    call.count_stored(session)
     most = (settings.max_queued, settings.max_queued_per_tenant)
     waiting = store.num_waiting(session, call.caller.owner)
     for limit, number, whose in zip(most, waiting, ("", " of one owner"), strict=True):

@@ -44,7 +44,7 @@ def create_job(body: JobIn, call: CallDep, once: OnceDep) -> JobOut:
     with once.transaction() as session:
         intake.require_room(session, call)
         spec = submission.JobSpec(
-            scenario_id=intake.stored_scenario(session, call.audit, body, inline),
+            scenario_id=intake.stored_scenario(session, call, body, inline),
             solver=body.solver,
             params=params,
             seed=body.seed,
