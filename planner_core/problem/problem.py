@@ -69,6 +69,9 @@ class Opportunities:
         Span of its access, as far as it lies between its target's release and due times.
     los_start, los_end
         Line of sight at ``start_s`` and at ``end_s``.
+    los_rate_start, los_rate_end
+        How they move there: angular velocity in deg/s, inertial, without the part along the line
+        itself. Zero where the satellite's ``slew_model`` does not ask for it.
     off_nadir_deg, elevation_deg, azimuth_deg, range_m
         At the satellite; at the ground; at the ground from north over east; between both.
     sun_elevation_deg, in_eclipse
@@ -85,6 +88,8 @@ class Opportunities:
     access_end_s: Floats
     los_start: Floats
     los_end: Floats
+    los_rate_start: Singles
+    los_rate_end: Singles
     off_nadir_deg: Singles
     elevation_deg: Singles
     azimuth_deg: Singles
@@ -318,6 +323,11 @@ class Problem:
         images = rows[self.opportunities.kind[rows] == COLLECT]
         return worth_of(self.opportunities.place[images], self.worth[images])
 
+    @property
+    def turns_in_motion(self) -> bool:
+        """Whether some satellite turns between moving lines of sight."""
+        return any(satellite.agility.tracks for satellite in self.satellites)
+
     @cached_property
     def offers_choice(self) -> bool:
         """Return whether some access offers several collects."""
@@ -377,6 +387,9 @@ def build_satellite_problem(
     start_s, end_s = opportunities.start_s[rows], opportunities.end_s[rows]
     looks = np.ascontiguousarray(opportunities.los_start[rows])
     looked = np.ascontiguousarray(opportunities.los_end[rows])
+    own = rows if agility.tracks else rows[:0]
+    moves = opportunities.los_rate_start[own].astype(np.float64)
+    moved = opportunities.los_rate_end[own].astype(np.float64)
     return SatelliteProblem(
         id=id,
         name=name,
@@ -392,13 +405,26 @@ def build_satellite_problem(
             end_s=end_s,
             looks=looks,
             looked=looked,
+            moves=moves,
+            moved=moved,
             slews=slews_of(agility),
+            acceleration_deg_s2=float(agility.acceleration_deg_s2 or 0.0)
+            if agility.tracks
+            else 0.0,
         ),
         sunlight=sunlight,
         event_s=start_s if events is None else events[0],
         event=np.arange(len(rows), dtype=np.int32) if events is None else events[1],
         sun=sun,
         turns=sun_turns(
-            resources, agility, sun, start_s=start_s, end_s=end_s, looks=looks, looked=looked
+            resources,
+            agility,
+            sun,
+            start_s=start_s,
+            end_s=end_s,
+            looks=looks,
+            looked=looked,
+            moves=moves,
+            moved=moved,
         ),
     )

@@ -75,6 +75,32 @@ def assert_same_windows(sensor: Sensor, target: Target, span_h: float = 24.0) ->
     return len(expected)
 
 
+def test_a_collect_keeps_clear_of_the_sun() -> None:
+    """Over the year's end the sun stands in the south: seen from the north it glares behind."""
+    path = propagate(satellite(orbit(inclination_deg=97.4)), hours(24.0))
+    place = Places.of([NORTH])
+    sensor = replace(WIDE, sun_exclusion_deg=75.0)
+
+    def angle_deg(t: Floats) -> Floats:
+        position, _ = path.state_itrf(t)
+        sight = place.position_m[0] - position
+        sight /= np.linalg.norm(sight, axis=1)[:, None]
+        return np.asarray(np.degrees(np.arccos(np.einsum("ij,ij->i", sight, path.sun_itrf(t)))))
+
+    def holds(t: Floats) -> Bools:
+        seen = view(path, place.at(np.zeros(len(t), dtype=np.int32)), t, sensor.nadir)
+        in_sight = (seen.elevation_deg >= 0.0) & (seen.off_nadir_deg <= sensor.off_nadir_max_deg)
+        return np.asarray(in_sight & (angle_deg(t) >= 75.0))
+
+    expected = [w for w in windows_by_scan(holds, path.duration_s) if w[1] - w[0] > 0.01]
+    found = find_accesses(path, place, Limits.of_targets(sensor, [NORTH]))
+    whole = find_accesses(path, place, Limits.of_targets(WIDE, [NORTH]))
+    assert len(found) == len(expected)
+    assert found.start_s == pytest.approx([w[0] for w in expected], abs=0.002)
+    assert found.end_s == pytest.approx([w[1] for w in expected], abs=0.002)
+    assert 0.0 < (found.end_s - found.start_s).sum() < (whole.end_s - whole.start_s).sum()
+
+
 NORTH = Target(id="north", lat_deg=70.0, lon_deg=25.0)
 
 
