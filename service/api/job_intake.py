@@ -40,6 +40,17 @@ def queue_of(request: Request) -> JobQueue:
     return queue
 
 
+def queue_with_room(call: Call, num_jobs: int = 1) -> JobQueue:
+    """Return the queue; 503 where it is full: before there is any work, and without a lock.
+
+    ``require_room`` has the last word, in the transaction that stores the jobs.
+    """
+    queue = queue_of(call.request)
+    with call.database.reading() as session:
+        require_room(session, call, num_jobs)
+    return queue
+
+
 def all_params(solver: str, params: Mapping[str, Any]) -> dict[str, Any]:
     """Return a solver's parameters, defaults filled in; a planner's error where they are wrong."""
     return params_of(parse_params(solver_class(solver), params))

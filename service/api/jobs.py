@@ -37,7 +37,7 @@ def create_job(body: JobIn, call: CallDep, once: OnceDep) -> JobOut:
 
     Jobs with a higher `priority` start first, those of the same priority in their order.
     """
-    queue = intake.queue_of(call.request)
+    queue = intake.queue_with_room(call)
     params = intake.all_params(body.solver, body.params)
     time_s, memory_mb = intake.limits_of(body.limits, call.settings)
     inline = intake.frozen(call, body)
@@ -139,7 +139,7 @@ def rerun_job(job_id: str, call: CallDep, once: OnceDep) -> JobOut:
     Scenario, solver, params, seed, limits, priority and label are the first one's, to which
     `links.rerun_of` leads. Same seed and same version of the service give the same plan.
     """
-    queue = intake.queue_of(call.request)
+    queue = intake.queue_with_room(call)
     with once.transaction() as session:
         spec = submission.spec_again(intake.find_job(session, job_id), call.caller.owner)
         intake.require_room(session, call)

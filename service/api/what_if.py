@@ -34,9 +34,8 @@ def create_what_if(job_id: str, body: WhatIfIn, call: CallDep, once: OnceDep) ->
     refused with its place in the body; working that out may take a while: 503 with
     `Retry-After` asks to come back.
     """
-    queue = intake.queue_of(call.request)
+    queue = intake.queue_with_room(call)
     with call.database.reading() as session:
-        intake.require_room(session, call)  # before there is any work
         job = intake.find_job(session, job_id)
         timeline = intake.find_timeline(session, job) if body.needs_plan else None
         scenario = session.get_one(ScenarioRow, job.scenario_id)
