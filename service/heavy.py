@@ -35,6 +35,7 @@ log = logging.getLogger(__name__)
 
 _LOOK_EVERY_S: Final = 0.1
 _STOP_WITHIN_S: Final = 5.0
+_NICENESS: Final = 10
 
 
 @contextmanager
@@ -59,7 +60,8 @@ def running_heavy(settings: Settings) -> Iterator[str]:
 def _keep(settings: Settings, listener: socket.socket, stopping: threading.Event) -> None:
     # Requests wait in the listener while there is no process.
     number = listener.fileno()
-    command = [sys.executable, "-m", "service.heavy", "--fd", str(number)]
+    command = [sys.executable, "-m", "service.heavy"]
+    command += ["--fd", str(number), "--parent", str(os.getpid())]
     environment = os.environ | environment_of(settings)
     while not stopping.is_set():
         process = subprocess.Popen(  # noqa: S603 - our own command
@@ -92,13 +94,18 @@ def main() -> None:
     """Serve on an inherited socket until SIGTERM, or until the parent is gone."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--fd", type=int, required=True)
+    parser.add_argument("--parent", type=int, required=True)
+    options = parser.parse_args()
     die_with_parent(signal.SIGTERM)
+    if os.getppid() != options.parent:
+        return  # it ended while this process began
+    os.nice(_NICENESS)  # whatever is light goes first
     settings = Settings()
     configure_logging()
     provider = start_tracing(settings, "api")
     queue = DbosQueue(settings.database_url, settings.database_timeout_s)
     app = create_app(settings, queue, is_heavy=True)
-    listener = socket.socket(fileno=parser.parse_args().fd)
+    listener = socket.socket(fileno=options.fd)
     config = uvicorn.Config(
         app, log_config=None, access_log=False, server_header=False, date_header=False
     )

@@ -40,6 +40,7 @@ from service.api.deps import check_request
 from service.api.errors import install_error_handlers
 from service.api.guard import Guard
 from service.api.idempotency import install_replay
+from service.api.job_wait import Versions
 from service.api.middleware import RequestContext
 from service.api.polls import Polls
 from service.api.security_headers import SecurityHeaders
@@ -128,6 +129,7 @@ def create_app(
     app.state.explainer = Explainer()
     app.state.variations = Variations()
     app.state.queue = queue
+    app.state.versions = Versions(app.state)
     app.state.call_counters = metrics.CallCounters()
     for router in ROUTERS:
         app.include_router(router)

@@ -20,6 +20,7 @@ from service.heavy import running_heavy
 from service.jobs.queue import DbosQueue, migrate_queue
 from service.jobs.supervisor import Supervisor
 from service.main import create_app
+from service.process.connections import Protocol, allow_connections
 from service.process.logs import configure_logging
 from service.process.stopping import StopRequest
 from service.process.tracing import CannotTrace, start_tracing
@@ -102,6 +103,7 @@ def serve(settings: Settings, *, with_workers: bool) -> int:
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stop.ask())
     require_key(settings)
+    allow_connections()
     with ExitStack() as stack:
         listener = stack.enter_context(listen(settings.host, settings.port))
         configure_logging()
@@ -143,6 +145,7 @@ def _running_api(
         create_app(settings, queue, heavy=heavy),
         log_config=None,
         access_log=False,
+        http=Protocol,
         timeout_graceful_shutdown=_LAST_ANSWERS_WITHIN_S,
     )
     server = uvicorn.Server(config)

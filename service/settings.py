@@ -57,6 +57,8 @@ class Settings(BaseSettings):
     max_queued: int = Field(10_000, ge=1)
     max_queued_per_tenant: int = Field(1000, ge=1)
     max_running_per_tenant: int = Field(64, ge=1)
+    max_rows_per_tenant: int = Field(20_000_000, ge=1)
+    max_stored_mb_per_tenant: float = Field(20_000.0, gt=0)
     webhook_private_addresses: bool = False
     idempotency_hours: float = Field(24.0, gt=0, le=8760)
     otel: bool | None = None

@@ -23,7 +23,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.access.callers import Caller
 from service.access.callers import Scope as KeyScope
-from service.api.errors import problem
+from service.api.errors import on_http_exception, problem
 from service.api.slots import Slots
 from service.problems.kinds import ServiceError
 from service.process.logs import request_id
@@ -111,7 +111,7 @@ class Bulkhead:
             answer = problem(request, error.code, error.detail, headers=error.headers)
             await answer(scope, receive, send)
         except HTTPException as error:
-            await problem(request, "body_too_large", error.detail)(scope, receive, send)
+            await on_http_exception(request, error)(scope, receive, send)
         except ClientDisconnect:
             return
 

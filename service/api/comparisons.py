@@ -41,7 +41,7 @@ router = APIRouter(prefix="/v1/comparisons", tags=["comparisons"])
 @router.post("", status_code=202, responses=problem_responses(503))
 def create_comparison(body: ComparisonIn, call: CallDep, once: OnceDep) -> ComparisonOut:
     """Queue a job for each run, all or none; the answer tells where the table grows."""
-    queue = intake.queue_of(call.request)
+    queue = intake.queue_with_room(call, len(body.runs))
     params = []
     for position, run in enumerate(body.runs):
         with inside(f"/runs/{position}"):

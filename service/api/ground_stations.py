@@ -64,6 +64,7 @@ def import_ground_stations(
     good, faults = read_stations(kind, data)
     refuse_if_asked(len(good), faults, on_error)
     with once.transaction() as session:
+        call.count_stored(session, num_rows=len(good), num_bytes=len(data))
         items = _store(session, good)
         new = [item.id for item in items if item.status == "created"]
         call.audit.record(session, "create", "ground_station", *new)

@@ -17,6 +17,7 @@ from service.access.rate_limit import RateLimiter
 from service.access.static_keys import StaticKeys
 from service.api.errors import on_database_error, problem
 from service.api.sites import READING, Sites
+from service.api.slots import Slots
 from service.db.session import Database
 from service.problems.kinds import ServiceError
 from service.settings import Settings
@@ -26,6 +27,10 @@ OPEN: Final = (
     "/new", "/jobs", "/comparisons", "/static",
 )  # fmt: skip
 """What anybody may read, with all below it: the dashboard's pages get their data by calls."""
+
+MOST_AT_ONCE: Final = 512
+MOST_OF_AN_OWNER: Final = 256
+"""Requests under way, streams and waits among them. Connections leave room for others."""
 
 _UNLIMITED: Final = "/health"
 
@@ -58,6 +63,7 @@ class Guard:
         self._keys_required = settings.keys_required
         self._static_keys: StaticKeys = settings.static_keys
         self._sites = Sites(settings.own_hosts, settings.allowed_origins)
+        self._slots = Slots(MOST_AT_ONCE, MOST_OF_AN_OWNER)
         per_s = settings.requests_per_s
         self._limiter = RateLimiter(per_s, settings.rate_limit_burst) if per_s else None
 
@@ -68,7 +74,9 @@ class Guard:
             return
         request = Request(scope)
         try:
-            request.state.caller = await self._admitted(request)
+            caller = request.state.caller = await self._admitted(request)
+            if is_limited(scope["path"]):
+                await self._slots.take(caller.owner)
         except ServiceError as error:
             answer = problem(request, error.code, error.detail, headers=error.headers)
             await answer(scope, receive, send)
@@ -76,7 +84,11 @@ class Guard:
         except SQLAlchemyError as error:
             await on_database_error(request, error)(scope, receive, send)
             return
-        await self.app(scope, receive, send)
+        try:
+            await self.app(scope, receive, send)
+        finally:
+            if is_limited(scope["path"]):
+                self._slots.give_back(caller.owner)
 
     async def _admitted(self, request: Request) -> Caller:
         path = request.scope["path"]

@@ -17,7 +17,7 @@ from service.access.callers import Caller
 from service.api.deps import CallerDep, DatabaseDep, own_job_only
 from service.api.errors import problem_responses
 from service.api.job_shapes import etag_of_job, shown
-from service.api.job_wait import wait_for_change
+from service.api.job_wait import Versions, VersionsDep, wait_for_change
 from service.db.failures import why_unavailable
 from service.db.session import Database
 from service.wire.jobs import ACTIVE, FINAL
@@ -43,6 +43,7 @@ async def job_events(
     job_id: str,
     database: DatabaseDep,
     caller: CallerDep,
+    versions: VersionsDep,
     last_event_id: Annotated[
         str, Header(alias="Last-Event-ID", description="The last event that was seen.")
     ] = "",
@@ -54,25 +55,25 @@ async def job_events(
     database fails: ask again with `Last-Event-ID`. It ends for good with the key it was asked
     for with.
     """
-    job, _ = await wait_for_change(database, job_id, None, 0.0, _never)
+    job, _ = await wait_for_change(database, versions, job_id, None, 0.0, _never)
     seen = last_event_id or _NOTHING_SEEN
     if job.state in FINAL and seen == str(job.version):
         # What browsers do after a stream has ended is to ask for it again, for ever.
         return Response(status_code=204)
     return StreamingResponse(
-        _events(database, _Listener(database, caller), job_id, f'"{seen}"'),
+        _events(database, versions, _Listener(database, caller), job_id, f'"{seen}"'),
         media_type="text/event-stream",
         headers={"Cache-Control": "no-store"},
     )
 
 
 async def _events(
-    database: Database, listener: _Listener, job_id: str, seen: str
+    database: Database, versions: Versions, listener: _Listener, job_id: str, seen: str
 ) -> AsyncIterator[str]:
     while True:
         try:
             job, sha256 = await wait_for_change(
-                database, job_id, seen, SIGN_OF_LIFE_S, listener.has_lost_its_key
+                database, versions, job_id, seen, SIGN_OF_LIFE_S, listener.has_lost_its_key
             )
             if await listener.has_lost_its_key():
                 return

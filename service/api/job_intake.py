@@ -15,7 +15,7 @@ from service.answers import store as answer_store
 from service.api import ask_again, bulkhead
 from service.api.deps import Call
 from service.api.job_shapes import headers_of, shown
-from service.db.rows import JobRow
+from service.db.rows import JobRow, ScenarioRow
 from service.jobs.queue import JobQueue
 from service.jobs.solver_params import params_of, parse_params
 from service.problems.faults import refuse
@@ -38,6 +38,17 @@ def queue_of(request: Request) -> JobQueue:
     queue: JobQueue | None = request.app.state.queue
     if queue is None:
         raise ServiceError("not_live", "This server takes no jobs: it has no queue.")
+    return queue
+
+
+def queue_with_room(call: Call, num_jobs: int = 1) -> JobQueue:
+    """Return the queue; 503 where it is full: before there is any work, and without a lock.
+
+    ``require_room`` has the last word, in the transaction that stores the jobs.
+    """
+    queue = queue_of(call.request)
+    with call.database.reading() as session:
+        require_room(session, call, num_jobs)
     return queue
 
 
@@ -72,15 +83,26 @@ def freeze(call: Call, body: ScenarioIn) -> FrozenScenario:
     return freezing.freeze(call.database, body, call.settings.scenario_limits)
 
 
+def save(
+    session: Session, call: Call, frozen: FrozenScenario, owner: str | None = None
+) -> tuple[ScenarioRow, bool]:
+    """Return the stored scenario of this content, and whether it is new, and then the caller's.
+
+    With an ``owner`` it is seen by that one alone.
+    """
+    row, is_new = freezing.save(session, frozen, owner)
+    if is_new:
+        call.count_stored(session, num_rows=1, num_bytes=len(frozen.content))
+        call.audit.record(session, "create", "scenario", row.id)
+    return row, is_new
+
+
 def stored_scenario(
     session: Session, call: Call, body: QuestionIn, inline: FrozenScenario | None
 ) -> str:
     """Return the id of the scenario in question; an inline one is stored for its owner."""
     if inline is not None:
-        row, is_new = freezing.save(session, inline, call.caller.owner)
-        if is_new:
-            call.audit.record(session, "create", "scenario", row.id)
-        return row.id
+        return save(session, call, inline, call.caller.owner)[0].id
     assert body.scenario_id is not None
     if scenario_store.find(session, body.scenario_id, call.caller.visible_owner) is not None:
         return body.scenario_id
@@ -102,8 +124,9 @@ def limits_of(limits: LimitsIn, settings: Settings) -> tuple[float, int]:
 
 
 def require_room(session: Session, call: Call, num_jobs: int = 1) -> None:
-    """Refuse more jobs than the queue may hold, in all and of one owner."""
+    """Refuse more jobs than the queue may hold, in all and of one owner, or whose owner is full."""
     settings = call.settings
+    call.count_stored(session)
     most = (settings.max_queued, settings.max_queued_per_tenant)
     waiting = store.num_waiting(session, call.caller.owner)
     for limit, number, whose in zip(most, waiting, ("", " of one owner"), strict=True):

@@ -24,7 +24,6 @@ from service.api.idempotency import OnceDep
 from service.api.paging import PagingDep, newest_first, size_of
 from service.db.rows import ScenarioRow
 from service.problems.kinds import ServiceError
-from service.scenarios import freezing as store
 from service.scenarios.opportunities import Described, OpportunityReader
 from service.scenarios.stored_question import StoredQuestion
 from service.stores import scenario_store
@@ -56,9 +55,7 @@ def create_scenario(body: ScenarioIn, call: CallDep, once: OnceDep) -> ScenarioO
     """
     frozen = intake.freeze(call, body)
     with once.transaction() as session:
-        row, is_new = store.save(session, frozen)
-        if is_new:
-            call.audit.record(session, "create", "scenario", row.id)
+        row, is_new = intake.save(session, call, frozen)
         call.response.status_code = 201 if is_new else 200
         return once.keep(session, created(call.response, _shown(row), f"/v1/scenarios/{row.id}"))
 

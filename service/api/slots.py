@@ -47,13 +47,14 @@ class Slots:
     @asynccontextmanager
     async def held(self, owner: str) -> AsyncIterator[None]:
         """Hold a place, after waiting for it where there is none."""
-        await self._take(owner)
+        await self.take(owner)
         try:
             yield
         finally:
-            self._give_back(owner)
+            self.give_back(owner)
 
-    async def _take(self, owner: str) -> None:
+    async def take(self, owner: str) -> None:
+        """Take a place, after waiting for it where there is none; ``held`` gives it back too."""
         if self._has_place(owner):
             self._held[owner] += 1
             return
@@ -68,7 +69,7 @@ class Slots:
             raise _too_busy() from None
         except asyncio.CancelledError:
             if turn.done() and not turn.cancelled():
-                self._give_back(owner)  # it was given the place and has gone
+                self.give_back(owner)  # it was given the place and has gone
             raise
         finally:
             self._queue.pop(turn, None)
@@ -76,9 +77,11 @@ class Slots:
     def _has_place(self, owner: str) -> bool:
         return self._held.total() < self._most and self._held[owner] < self._of_owner
 
-    def _give_back(self, owner: str) -> None:
+    def give_back(self, owner: str) -> None:
+        """Give a place back, to whoever is next."""
         self._held[owner] -= 1
-        self._held += Counter()  # forgets owners that hold none
+        if not self._held[owner]:
+            del self._held[owner]
         for turn, waiting in list(self._queue.items()):
             if not turn.done() and self._has_place(waiting):
                 self._held[waiting] += 1

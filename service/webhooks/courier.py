@@ -102,11 +102,21 @@ class Courier:
         await asyncio.gather(*sending, return_exceptions=True)
 
     async def _take(self, room: int) -> list[Parcel]:
+        if not await asyncio.to_thread(self._is_any_due):
+            return []
         busy = dict(self._busy)
         taken = await self._in_database(
             lambda s: outbox.take(s, busy=busy, limit=room, of_an_owner=_MOST_OF_AN_OWNER)
         )
         return taken or []
+
+    def _is_any_due(self) -> bool:
+        """Look without a transaction: most of the time there is nothing, and writers wait."""
+        try:
+            with self._database.asking() as connection:
+                return outbox.is_any_due(connection)
+        except SQLAlchemyError:
+            return True  # what is wrong is told by who takes it
 
     async def _in_database(self, work: Callable[[Session], T]) -> T | None:
         """Do one transaction; None where the database does not serve: it will be due later."""

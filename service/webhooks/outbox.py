@@ -115,6 +115,14 @@ def num_pending(session: Session, webhook_id: str, event: str | None = None) -> 
     return session.execute(waiting).scalar_one()
 
 
+def is_any_due(connection: sa.Connection) -> bool:
+    """Return whether there is anything to take, whoever is being sent to."""
+    due = sa.select(WebhookDeliveryRow.id).where(
+        WebhookDeliveryRow.state == "pending", WebhookDeliveryRow.due_at <= utc_now()
+    )
+    return connection.execute(due.limit(1)).first() is not None
+
+
 def take(
     session: Session, *, busy: Mapping[str, str], limit: int, of_an_owner: int
 ) -> list[Parcel]:

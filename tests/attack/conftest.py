@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import resource
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -57,15 +58,21 @@ def program(jobs: Jobs) -> StartProgram:
     """Return what runs the program on the database of jobs, with some settings changed."""
 
     @contextmanager
-    def run(**settings: object) -> Iterator[Program]:
+    def run(num_files: int = 0, **settings: object) -> Iterator[Program]:
         url = jobs.settings.database_url
         command = [sys.executable, "-m", "service", "api", "--port", "0", "--database-url", url]
         given = {"require_keys": True} | settings
         variables = {f"SLEWLINE_{name}".upper(): str(value) for name, value in given.items()}
         with (jobs.folder / "api.log").open("ab") as log:
             process = subprocess.Popen(
-                command, env=os.environ | variables, stdout=subprocess.PIPE, stderr=log, text=True
+                command,
+                env=os.environ | variables,
+                stdout=subprocess.PIPE,
+                stderr=log,
+                text=True,
             )
+        if num_files:
+            resource.prlimit(process.pid, resource.RLIMIT_NOFILE, (num_files, num_files))
         assert process.stdout is not None
         try:
             address = process.stdout.readline().split()[-1]
