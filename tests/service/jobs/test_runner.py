@@ -14,7 +14,7 @@ from planner_core.budget import Progress
 from service.jobs import runner as runner_module
 from service.jobs.child import Answered, Ending, Refused, Stopped
 from service.jobs.plan_job import Parcel, PlanRequest
-from service.jobs.runner import Abandoned, Limits, Order, Runner
+from service.jobs.runner import Abandoned, Limits, Lost, Order, Runner
 from tests.service.jobs.work import WORK
 
 
@@ -60,7 +60,7 @@ def run(
     time_s: float = 60.0,
     memory_mb: int = 2048,
     opportunities: Parcel | None = None,
-) -> Ending | Abandoned:
+) -> Ending | Abandoned | Lost:
     request = PlanRequest(
         job_id="j1",
         scenario_sha256="0" * 64,
