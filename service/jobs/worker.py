@@ -255,6 +255,7 @@ def outcome_of(ending: Ending) -> Outcome:
         ),
         blocks=(*answer.blocks, *proof_blocks(answer.proof or "")),
         figures=answer.figures,
+        warnings=answer.warnings,
     )
 
 
