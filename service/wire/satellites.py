@@ -186,6 +186,15 @@ class SatelliteIn(OrbitIn):
     )
 
 
+class SatellitePatch(Body):
+    """What is to be different about a satellite; what is left out or null stays."""
+
+    name: Name | None = None
+    agility: AgilityIn | None = Field(None, description="Only the settings given are changed.")
+    sensor: SensorIn | None = Field(None, description="Only the settings given are changed.")
+    resources: ResourcesField | None = Field(None, description="Replaces them as a whole.")
+
+
 class ElementsOut(Stored):
     """One element set of a satellite."""
 
