@@ -11,7 +11,12 @@ import numpy as np
 
 from planner_core.jit import kernel
 from planner_core.precedence.arcs import Arcs, covering_arcs
-from planner_core.precedence.relation import Precedence, direct_precedence, is_transitive_on
+from planner_core.precedence.relation import (
+    Precedence,
+    comes_before,
+    direct_precedence,
+    is_transitive_on,
+)
 from planner_core.problem import Floats, Ints, SatelliteProblem
 
 
@@ -39,6 +44,40 @@ def chain_to(task: int, before: Ints) -> list[int]:
         chain.append(task)
         task = int(before[task])
     return chain[::-1]
+
+
+def heaviest_chain(satellite: SatelliteProblem, weight: Floats) -> list[int]:
+    """Return the tasks of the heaviest chain, pair by pair; ``weight`` as above.
+
+    For turns in motion, of which a skyline of labels knows no dominance.
+    """
+    before = np.full(len(weight), -1, dtype=np.int32)
+    return chain_to(_heaviest_chain(weight, direct_precedence(satellite), before), before)
+
+
+@kernel
+def _heaviest_chain(weight: Floats, precedence: Precedence, before: Ints) -> int:
+    """Fill in the task before each on its heaviest chain; return the last one's end, or -1."""
+    m = len(weight)
+    value, top = np.zeros(m), np.zeros(m + 1)
+    last = -1
+    for b in range(m):
+        top[b + 1] = top[b]
+        if weight[b] <= 0.0:
+            continue
+        best = 0.0
+        a = b - 1
+        # No task before has more than the top up to there.
+        while a >= 0 and top[a + 1] > best:
+            if value[a] > best and comes_before(precedence, a, b):
+                best = value[a]
+                before[b] = a
+            a -= 1
+        value[b] = best + weight[b]
+        if value[b] > top[b]:
+            top[b + 1] = value[b]
+            last = b
+    return last
 
 
 @kernel

@@ -13,7 +13,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from planner_core.budget import Budget
-from planner_core.precedence.chains import chain_to, chain_with_history
+from planner_core.precedence.chains import chain_to, chain_with_history, heaviest_chain
 from planner_core.precedence.network import first_of_equals, heaviest_paths, network_of
 from planner_core.problem import Floats, Problem, SatelliteProblem
 from planner_core.solvers.base import Constraint, Feasibility, Solution
@@ -90,6 +90,8 @@ class Graph:
 
 def longest_chain(problem: Problem, satellite: SatelliteProblem, weight: Floats) -> list[int]:
     """Return the tasks of the heaviest chain; of equal ones that of the first tasks."""
+    if satellite.transitions.is_moving:
+        return heaviest_chain(satellite, weight)
     network = network_of(problem, [satellite])
     # Tasks of no worth stand in no chain, not even to turn.
     network = network._replace(is_turning=np.zeros_like(network.is_turning))

@@ -6,7 +6,7 @@ from typing import Annotated, Final, Literal
 
 from pydantic import Field
 
-from service.wire.base import Body, Id, Instant, Name, Open, Stored, Wire
+from service.wire.base import Body, Id, Instant, Name, Open, Patch, Stored, Wire
 from service.wire.satellites import LightIn, NonNegative, Positive, SensorType
 
 Latitude = Annotated[float, Field(ge=-90, le=90, description="Geodetic (WGS84), north positive.")]
@@ -36,7 +36,7 @@ class GroundStationIn(Body):
     antennas: int = Field(1, ge=1, le=100, description="Satellites served at a time.")
 
 
-class GroundStationPatch(Body):
+class GroundStationPatch(Patch):
     """What is to be different about a ground station; what is left out or null stays."""
 
     name: Name | None = None

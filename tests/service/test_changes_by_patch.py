@@ -91,3 +91,8 @@ def test_two_stations_of_one_name_stay_two(service: Service) -> None:
     assert [status for _, status in first] == ["created", "created"]
     again = imported(client, "Twin,10,20,1", "Twin,30,40,2")
     assert [status for _, status in again] == ["unchanged", "created"]
+
+
+def test_a_change_of_nothing_is_refused(service: Service) -> None:
+    where = "/v1/satellites/" + post(service.client, "/v1/satellites", satellite())["id"]
+    assert_problem(service.client.patch(where, json={}), 422, "invalid_value")

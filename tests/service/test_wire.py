@@ -30,6 +30,7 @@ from service.wire import (
     jobs,
     operations,
     places,
+    plans,
     satellites,
     scenarios,
     timelines,
@@ -42,8 +43,8 @@ from service.wire.base import Wire, dumped, read
 from tests.service.jobs.mission import small_mission
 
 MODULES = (
-    base, changes, imports, jobs, operations, wire_pins, places, satellites, scenarios, timelines,
-    webhooks,
+    base, changes, imports, jobs, operations, wire_pins, places, plans, satellites, scenarios,
+    timelines, webhooks,
 )  # fmt: skip
 NOW = "2026-03-01T00:00:00.000Z"
 ACTION = {
