@@ -13,9 +13,8 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from planner_core.budget import Budget
-from planner_core.precedence.chains import chain_to, chain_with_history
-from planner_core.precedence.network import first_of_equals, heaviest_paths, network_of
-from planner_core.problem import Floats, Problem, SatelliteProblem
+from planner_core.precedence.chains import chain_with_history, heaviest_chain
+from planner_core.problem import Problem
 from planner_core.solvers.base import Constraint, Feasibility, Solution
 from planner_core.solvers.sequential import Turn, plan_in_turn
 from planner_core.solvers.walk import (
@@ -64,7 +63,7 @@ class Graph:
             is_wanted = (track.is_contact == 0) & (turn.collected[track.place] == 0)
             weight = np.where(is_wanted, problem.worth[turn.satellite.rows], 0.0)
             if self.path == "longest":
-                path = longest_chain(problem, turn.satellite, weight)
+                path = heaviest_chain(turn.satellite, weight)
             else:
                 path = chain_with_history(turn.satellite, weight, track.place)
             path = _with_kept(problem, turn, path)
@@ -86,18 +85,6 @@ class Graph:
             return path
 
         return plan_in_turn(problem, budget, plan_turn)
-
-
-def longest_chain(problem: Problem, satellite: SatelliteProblem, weight: Floats) -> list[int]:
-    """Return the tasks of the heaviest chain; of equal ones that of the first tasks."""
-    network = network_of(problem, [satellite])
-    # Tasks of no worth stand in no chain, not even to turn.
-    network = network._replace(is_turning=np.zeros_like(network.is_turning))
-    value, previous = np.empty(len(weight)), np.empty(len(weight), dtype=np.int32)
-    ends = np.empty(len(network.first) - 1, dtype=np.int32)
-    heaviest_paths(network, weight, value, previous, ends)
-    first_of_equals(network, weight, value, previous, ends)
-    return [task for end in ends.tolist() for task in chain_to(end, previous)]
 
 
 def _with_kept(problem: Problem, turn: Turn, path: list[int]) -> list[int]:
