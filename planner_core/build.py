@@ -28,6 +28,7 @@ from planner_core.orbits.earth_orientation import shipped
 from planner_core.orbits.eclipse import always_sunlit, sunlight
 from planner_core.orbits.ephemeris import Ephemeris, propagate
 from planner_core.orbits.places import Places, View, view
+from planner_core.orbits.sun import sun_path
 from planner_core.pinning.pinned_problem import pinned_problem
 from planner_core.problem import (
     ACCESS_FOUND,
@@ -280,6 +281,7 @@ def build_problem(scenario: Scenario, computed: ScenarioOpportunities, budget: B
         A pin is impossible.
     """
     satellites = []
+    sun = sun_path(scenario.horizon)
     for index, satellite in enumerate(scenario.satellites):
         _go_on(budget, index / len(scenario.satellites), "compile")
         sees_shadow = scenario.use_resources and satellite.resources.eclipse_aware
@@ -293,6 +295,7 @@ def build_problem(scenario: Scenario, computed: ScenarioOpportunities, budget: B
                 agility=satellite.agility,
                 resources=satellite.resources,
                 sunlight=computed.sunlight[index] if sees_shadow else everywhere,
+                sun=sun,
             )
         )
     _go_on(budget, 1.0, "compile")

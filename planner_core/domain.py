@@ -42,6 +42,7 @@ Nadir = Literal["geodetic", "geocentric"]
 LookSide = Literal["left", "right", "any"]
 OrbitDirection = Literal["ascending", "descending", "any"]
 CollectAlignment = Literal["access", "horizon"]
+SunPointing = Literal["free", "slew"]
 
 _LONGEST_SENSOR_TYPE = 100
 
@@ -244,6 +245,13 @@ class Resources:
         What a collect writes, a contact takes down, and telemetry adds at all times.
     recorder_capacity_mbit
         Size of the recorder, or None where only fractions are known (the presets).
+    sun_pointing
+        Whether all idle time counts as pointing at the sun (``free``), or only what is left
+        between a turn to the sun and one back (``slew``).
+    panel_angle_deg
+        Between the normal of the panels and the boresight; the rotation about it is free.
+    idle_drain_per_s
+        Drawn at all times, in shadow too; the modes' rates come on top of it.
     """
 
     battery_min_fraction: float
@@ -258,6 +266,14 @@ class Resources:
     telemetry_per_s: float
     eclipse_aware: bool = False
     recorder_capacity_mbit: float | None = None
+    sun_pointing: SunPointing = "free"
+    panel_angle_deg: float = 180.0
+    idle_drain_per_s: float = 0.0
+
+    @property
+    def knows_free_charge_alone(self) -> bool:
+        """Whether idle time costs nothing and charges throughout, as in the paper."""
+        return self.sun_pointing == "free" and self.idle_drain_per_s == 0.0
 
     @classmethod
     def paper(cls, period_s: float) -> Resources:
@@ -303,10 +319,12 @@ class Resources:
             "collect_fill_per_s",
             "downlink_per_s",
             "telemetry_per_s",
+            "idle_drain_per_s",
         ]
-        _require_finite(self, *rates)
+        _require_finite(self, *rates, "panel_angle_deg")
         for name in rates:
             _require(getattr(self, name) >= 0, name, "must be 0 or more")
+        _require(0 <= self.panel_angle_deg <= 180, "panel_angle_deg", "must be between 0 and 180")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -497,6 +515,14 @@ class Scenario:
             not (self.quality and self.continuous_starts),
             "continuous_starts",
             "an image's quality would change with its start: use collect_spacing_s with quality",
+        )
+        # The authors' events forgo or charge whole spans: there is no time to turn in them.
+        _require(
+            not self.use_resources
+            or self.dynamics == "physical"
+            or all(s.resources.knows_free_charge_alone for s in self.satellites),
+            "dynamics",
+            "paper knows neither turns to the sun nor idle_power_w: use sun_pointing free without",
         )
         for what, ids in (
             ("satellite", [s.id for s in self.satellites]),

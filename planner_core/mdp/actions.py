@@ -104,7 +104,7 @@ def first_affordable(
         return end
     charge_from_s = track.charge_from_s[last] if last >= 0 else 0.0
     return _first_charged(
-        track.charge_to_s, charge_from_s, track.charge_per_s, battery,
+        track.charge_top_s, charge_from_s, track.charge_per_s, battery,
         track.least_cost, track.battery_min + STRICT, first, end,
     )  # fmt: skip
 
@@ -113,13 +113,13 @@ def first_affordable(
 def _is_charged(
     charge_s: float, charge_per_s: float, battery: float, cost: float, least: float
 ) -> bool:
-    """Return whether the battery can pay; the same arithmetic as in ``take``."""
+    """Return whether the battery can pay where idle time draws nothing, as ``take`` has it."""
     return min(1.0, battery + charge_per_s * max(0.0, charge_s)) - cost > least
 
 
 @borrowing
 def _first_charged(
-    charge_to_s: Floats,
+    charge_top_s: Floats,
     charge_from_s: float,
     charge_per_s: float,
     battery: float,
@@ -128,19 +128,20 @@ def _first_charged(
     first: int,
     end: int,
 ) -> int:
-    """Return the first row at whose start the battery can pay ``cost``, or ``end``.
+    """Return a row before which the battery cannot pay ``cost``, or ``end``.
 
-    Charge only grows with time, so that steps that double find a row beyond it, and halving
-    what lies between finds it.
+    That is the first row at whose start it can, where idle time draws nothing and the sun needs
+    no turn; otherwise it can be one before. ``charge_top_s`` only grows with time, so that steps
+    that double find a row beyond it, and halving what lies between finds it.
     """
     before, beyond, stride = first - 1, first, 1
     while beyond < end and not _is_charged(
-        charge_to_s[beyond] - charge_from_s, charge_per_s, battery, cost, least
+        charge_top_s[beyond] - charge_from_s, charge_per_s, battery, cost, least
     ):
         before, beyond, stride = beyond, min(end, beyond + stride), 2 * stride
     while beyond - before > 1:
         middle = (before + beyond) // 2
-        if _is_charged(charge_to_s[middle] - charge_from_s, charge_per_s, battery, cost, least):
+        if _is_charged(charge_top_s[middle] - charge_from_s, charge_per_s, battery, cost, least):
             beyond = middle
         else:
             before = middle

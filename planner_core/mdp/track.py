@@ -9,9 +9,11 @@ recorder are known at two clocks; the next task ``j`` then costs a lump:
 ==================  ============================  =====================================
 column              ``physical``                  ``paper`` (event model)
 ==================  ============================  =====================================
-``charge_from[i]``  sunlit time at the end of i   sunlit time at the start of i
-``charge_to[j]``    sunlit time at the start of   sunlit time at the start of the event
-                    j                             before j (j's own segment is forgone)
+``charge_from[i]``  sunlit time when the sun is   sunlit time at the start of i
+                    reached after i (its end,
+                    where the sun needs no turn)
+``charge_to[j]``    sunlit time when the sun is   sunlit time at the start of the event
+                    left for j                    before j (j's own segment is forgone)
 ``data_from[i]``    end of i                      start of i
 ``data_to[j]``      start of j                    start of j
 ``data_peak[j]``    start of j                    start of the event before j
@@ -30,6 +32,7 @@ import numpy as np
 
 from planner_core.bundles import bundle
 from planner_core.jit import borrowing, inlined
+from planner_core.mdp.idle_energy import idle_energy
 from planner_core.problem import (
     CONTACT,
     Bools,
@@ -64,6 +67,9 @@ class Track(NamedTuple):
     collect takes of the battery and writes. ``fallbacks`` lists the usable contact rows and those
     that must be taken; ``fallback_after[i]`` is the place in it of the first one after row
     ``i - 1`` (shape ``(m + 1,)``).
+    ``charge_top[i]`` is the greatest of ``charge_to_s`` up to row ``i``, as turns from the sun take
+    them out of order. ``battery_full`` is the most the battery holds at the start of a task,
+    ``battery_floor`` what it must stay above at its end (see ``idle_energy``).
     ``fallback_*`` hold, for each of them, up to eight pairs (battery needed, recorder
     allowed) after it, from which the satellite can keep its limits to the end by these rows
     alone; shape ``(num_fallbacks, 8)``.
@@ -80,18 +86,24 @@ class Track(NamedTuple):
     use_resources: bool
     charge_from_s: Floats
     charge_to_s: Floats
+    charge_top_s: Floats
     data_from_s: Floats
     data_to_s: Floats
     data_peak_s: Floats
+    battery_full: Floats
+    battery_floor: Floats
+    battery_floor_least: Floats
     battery_cost: Floats
     recorder_gain: Floats
     data_end_s: float
     charge_per_s: float
+    idle_per_s: float
     telemetry_per_s: float
     battery_min: float
     recorder_max: float
     battery_start: float
     recorder_start: float
+    reserve_start: float
     next_kept: Ints
     next_contact: Ints
     fill_ahead: Floats
@@ -107,18 +119,24 @@ class Track(NamedTuple):
 class _ResourceColumns(TypedDict):
     charge_from_s: Floats
     charge_to_s: Floats
+    charge_top_s: Floats
     data_from_s: Floats
     data_to_s: Floats
     data_peak_s: Floats
+    battery_full: Floats
+    battery_floor: Floats
+    battery_floor_least: Floats
     battery_cost: Floats
     recorder_gain: Floats
     data_end_s: float
     charge_per_s: float
+    idle_per_s: float
     telemetry_per_s: float
     battery_min: float
     recorder_max: float
     battery_start: float
     recorder_start: float
+    reserve_start: float
 
 
 def compile_track(problem: Problem, satellite: SatelliteProblem, blocked: Bytes) -> Track:
@@ -161,7 +179,8 @@ def compile_track(problem: Problem, satellite: SatelliteProblem, blocked: Bytes)
     # Where even contacts alone cannot keep the limits, plan task by task and let the referee
     # say what breaks: there is no plan to protect.
     safe = is_safe(track, NO_TASK, NO_TASK, track.battery_start, track.recorder_start)
-    return track._replace(is_guarded=bool(safe))
+    lasts = track.battery_start > track.battery_min + track.reserve_start
+    return track._replace(is_guarded=bool(safe and (lasts or track.reserve_start == 0.0)))
 
 
 def _next_of(is_such: Bools) -> Ints:
@@ -199,19 +218,25 @@ def _resource_columns(
     r = satellite.resources
     start_s, end_s = satellite.start_s, satellite.end_s
     duration_s = end_s - start_s
-    sunlit = satellite.sunlight.seconds_until
     contact = is_contact == 1
     previous_start_s = satellite.previous_event_s
     telemetry = r.telemetry_per_s * duration_s
     physical = problem.dynamics == "physical"
+    sunlit = satellite.sunlight.seconds_until
+    idle = idle_energy(satellite, problem.horizon_s)
+    charge_to_s = idle.sun_until_s if physical else sunlit(previous_start_s)
     return {
-        "charge_from_s": sunlit(end_s if physical else start_s),
-        "charge_to_s": sunlit(start_s if physical else previous_start_s),
+        "charge_from_s": idle.sun_from_s if physical else sunlit(start_s),
+        "charge_to_s": charge_to_s,
+        "charge_top_s": np.maximum.accumulate(charge_to_s),
         "data_from_s": end_s if physical else start_s,
         "data_to_s": start_s,
         "data_peak_s": start_s if physical else previous_start_s,
+        "battery_full": idle.full,
+        "battery_floor": r.battery_min_fraction + idle.reserve,
+        "battery_floor_least": r.battery_min_fraction + idle.least_reserve,
         "battery_cost": duration_s
-        * np.where(contact, r.contact_drain_per_s, r.collect_drain_per_s),
+        * (np.where(contact, r.contact_drain_per_s, r.collect_drain_per_s) + r.idle_drain_per_s),
         "recorder_gain": duration_s * np.where(contact, -r.downlink_per_s, r.collect_fill_per_s)
         + (telemetry if physical else 0.0),
         "data_end_s": problem.horizon_s
@@ -220,11 +245,13 @@ def _resource_columns(
         if len(satellite.event_s)
         else 0.0,
         "charge_per_s": r.sunpoint_charge_per_s,
+        "idle_per_s": r.idle_drain_per_s,
         "telemetry_per_s": r.telemetry_per_s,
         "battery_min": r.battery_min_fraction,
         "recorder_max": r.recorder_max_fraction,
         "battery_start": r.initial_battery_fraction,
         "recorder_start": r.initial_recorder_fraction,
+        "reserve_start": idle.reserve_start,
     }
 
 
@@ -239,12 +266,14 @@ def take(
     charge_from_s = track.charge_from_s[last] if last >= 0 else 0.0
     data_from_s = track.data_from_s[last] if last >= 0 else 0.0
     charge_s = max(0.0, track.charge_to_s[row] - charge_from_s)
+    waited_s = max(0.0, track.data_to_s[row] - data_from_s)
     peak = recorder + track.telemetry_per_s * max(0.0, track.data_peak_s[row] - data_from_s)
-    battery = min(1.0, battery + track.charge_per_s * charge_s) - track.battery_cost[row]
-    recorder = recorder + track.telemetry_per_s * max(0.0, track.data_to_s[row] - data_from_s)
+    battery = battery + track.charge_per_s * charge_s - track.idle_per_s * waited_s
+    battery = min(track.battery_full[row], battery) - track.battery_cost[row]
+    recorder = recorder + track.telemetry_per_s * waited_s
     recorder = max(0.0, recorder + track.recorder_gain[row])
     is_within = (
-        battery > track.battery_min + STRICT
+        battery > track.battery_floor[row] + STRICT
         and recorder < track.recorder_max - STRICT
         and peak < track.recorder_max - STRICT
     )
@@ -271,8 +300,9 @@ def _ahead(track: Track, first: int, step: int, kept: int) -> int:
 def is_safe(track: Track, last: int, cursor: int, battery: float, recorder: float) -> bool:
     """Return whether limits can be kept to the end from here by idling and contacts alone.
 
-    Idle time only ever charges the battery, so the recorder is what fills up: either it has
-    room for the telemetry to the end, or some contact after row ``cursor`` must be reached.
+    A battery above its floor lasts as long as the satellite idles, so the recorder is what fills
+    up: either it has room for the telemetry to the end, or some contact after row ``cursor`` must
+    be reached.
     Tasks that must be taken count as contacts do, and none of them may be passed by.
     The check is sufficient, not necessary (it looks a limited number of contacts ahead).
     """
@@ -336,11 +366,13 @@ def _fill_fallbacks(track: Track) -> None:
                 if allowed_after < 0.0:
                     continue
                 needed_after = max(
-                    track.fallback_battery[after, label], track.battery_min + 2.0 * STRICT
+                    track.fallback_battery[after, label],
+                    track.battery_floor[following] + 2.0 * STRICT,
                 )
-                if 1.0 - track.battery_cost[following] < needed_after:
+                if track.battery_full[following] - track.battery_cost[following] < needed_after:
                     continue
-                needed = max(0.0, needed_after + track.battery_cost[following] - charge) + _SLACK
+                needed = needed_after + track.battery_cost[following] - charge
+                needed = max(0.0, needed + track.idle_per_s * waited_s) + _SLACK
                 allowed = (
                     min(
                         allowed_after

@@ -8,13 +8,20 @@ sun counts as a point, there is no penumbra and no refraction.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 
-from planner_core.orbits.frames import EARTH_RADIUS_M
+from planner_core.domain import Horizon
+from planner_core.orbits.frames import EARTH_RADIUS_M, julian_date
+from planner_core.problem.sun_turns import SunPath
 
 Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
+
+_PATH_STEP_S = 3600.0
+"""The sun moves by 0.04 deg in it: what lies between two directions is a straight line."""
 
 
 def sun_direction_teme(jd_midnight: float, fraction: Floats) -> Floats:
@@ -42,6 +49,17 @@ def sun_direction_teme(jd_midnight: float, fraction: Floats) -> Floats:
             np.sin(obliquity) * np.sin(longitude),
         ],
         axis=1,
+    )
+
+
+def sun_path(horizon: Horizon) -> SunPath:
+    """Return where the sun stands during a horizon."""
+    num_steps = max(1, math.ceil(horizon.duration_s / _PATH_STEP_S))
+    midnight, start = julian_date(horizon.start)
+    t_s = np.linspace(0.0, horizon.duration_s, num_steps + 1)
+    return SunPath(
+        step_s=horizon.duration_s / num_steps,
+        directions=sun_direction_teme(midnight, start + t_s / 86400.0),
     )
 
 

@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from planner_core.domain import Agility, Dynamics, Resources
 from planner_core.problem.pointing import Pointing, Vector, sight
+from planner_core.problem.sun_turns import SunPath, SunTurns, sun_turns
 from planner_core.problem.transitions import Transitions, slews_of
 from planner_core.worth import best_worths, common_unit, worth_of
 
@@ -144,6 +145,10 @@ class SatelliteProblem:
         search leave out included: the events of ``dynamics: paper``. Ascending.
     event
         For each row its place in ``event_s``. Shape ``(m,)``.
+    sun
+        Where the sun stands. None serves where pointing at it is free.
+    turns
+        Of each row to the sun and back; no time where pointing at the sun is free.
     """
 
     id: str
@@ -159,6 +164,8 @@ class SatelliteProblem:
     sunlight: Sunlight
     event_s: Floats
     event: Ints
+    sun: SunPath | None
+    turns: SunTurns
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -356,6 +363,7 @@ def build_satellite_problem(
     agility: Agility,
     resources: Resources,
     sunlight: Sunlight,
+    sun: SunPath | None = None,
     events: tuple[Floats, Ints] | None = None,
 ) -> SatelliteProblem:
     """Return one satellite's view of the table.
@@ -367,6 +375,8 @@ def build_satellite_problem(
     """
     rows = np.flatnonzero(opportunities.satellite == index).astype(np.int32)
     start_s, end_s = opportunities.start_s[rows], opportunities.end_s[rows]
+    looks = np.ascontiguousarray(opportunities.los_start[rows])
+    looked = np.ascontiguousarray(opportunities.los_end[rows])
     return SatelliteProblem(
         id=id,
         name=name,
@@ -380,11 +390,15 @@ def build_satellite_problem(
         transitions=Transitions(
             start_s=start_s,
             end_s=end_s,
-            looks=np.ascontiguousarray(opportunities.los_start[rows]),
-            looked=np.ascontiguousarray(opportunities.los_end[rows]),
+            looks=looks,
+            looked=looked,
             slews=slews_of(agility),
         ),
         sunlight=sunlight,
         event_s=start_s if events is None else events[0],
         event=np.arange(len(rows), dtype=np.int32) if events is None else events[1],
+        sun=sun,
+        turns=sun_turns(
+            resources, agility, sun, start_s=start_s, end_s=end_s, looks=looks, looked=looked
+        ),
     )

@@ -75,6 +75,7 @@ def with_table(
                 agility=satellite.agility,
                 resources=satellite.resources,
                 sunlight=satellite.sunlight,
+                sun=satellite.sun,
                 events=own,
             )
             for index, (satellite, own) in enumerate(zip(problem.satellites, events, strict=True))

@@ -134,13 +134,15 @@ def _first_break(
         if i == at:
             battery, recorder, is_within = take(track, last, row, battery, recorder)
             if not is_within:
-                return n + 1, BATTERY if battery <= track.battery_min + STRICT else RECORDER
+                is_low = battery <= track.battery_floor[row] + STRICT
+                return n + 1, BATTERY if is_low else RECORDER
             last = row
         if i == n or dropped[c, i]:
             continue
         battery, recorder, is_within = take(track, last, plan.rows[i], battery, recorder)
         if not is_within:
-            return i, BATTERY if battery <= track.battery_min + STRICT else RECORDER
+            is_low = battery <= track.battery_floor[plan.rows[i]] + STRICT
+            return i, BATTERY if is_low else RECORDER
         last = plan.rows[i]
         if i == max(at, end):
             # Nothing changes from here on.

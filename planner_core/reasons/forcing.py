@@ -2,8 +2,9 @@
 
 One satellite's plan is a row of tasks. An opportunity put into it displaces those next to it
 that the satellite cannot turn from or to in time. What that does to battery and recorder later
-on follows at once: from the level right after a task, the lowest battery of all that comes is
-``min(cap, level + drop)`` and the fullest recorder ``max(floor, level + rise)``, with constants
+on follows at once: from the level right after a task, the lowest battery of all that comes (after
+each task, less what idle time may draw from there on) is ``min(cap, level + drop)`` and the fullest
+recorder ``max(floor, level + rise)``, with constants
 worked out once, backward.
 """
 
@@ -152,10 +153,10 @@ def _fill(track: Track, plan: Sequence) -> bool:
             continue
         after = plan.rows[i + 1]
         charge = track.charge_per_s * max(0.0, track.charge_to_s[after] - track.charge_from_s[row])
-        cost, later = track.battery_cost[after], min(0.0, plan.drop[i + 1])
-        plan.cap[i] = min(plan.cap[i + 1], 1.0 - cost + later)
-        plan.drop[i] = charge - cost + later
         waited_s = max(0.0, track.data_to_s[after] - track.data_from_s[row])
+        cost, later = track.battery_cost[after], min(-reserve(track, after), plan.drop[i + 1])
+        plan.cap[i] = min(plan.cap[i + 1], track.battery_full[after] - cost + later)
+        plan.drop[i] = charge - track.idle_per_s * waited_s - cost + later
         peak_s = max(0.0, track.data_peak_s[after] - track.data_from_s[row])
         gain = track.telemetry_per_s * waited_s + track.recorder_gain[after]
         rise = max(0.0, plan.rise[i + 1])
@@ -284,14 +285,21 @@ def _levels(track: Track, plan: Sequence, row: int, first: int, last: int) -> tu
     battery, recorder = plan.battery[first], plan.recorder[first]
     peak = recorder + waited(track, before, track.data_peak_s[row])
     battery, recorder, _ = take(track, before, row, battery, recorder)
-    lowest, highest = battery, max(peak, recorder)
+    lowest, highest = battery - reserve(track, row), max(peak, recorder)
     if last == len(plan.rows):
         return lowest, max(highest, recorder + waited(track, row, track.data_end_s))
     after = plan.rows[last]
     highest = max(highest, recorder + waited(track, row, track.data_peak_s[after]))
     battery, recorder, _ = take(track, row, after, battery, recorder)
-    lowest = min(lowest, battery, plan.cap[last], battery + plan.drop[last])
+    left = battery - reserve(track, after)
+    lowest = min(lowest, left, plan.cap[last], battery + plan.drop[last])
     return lowest, max(highest, recorder, plan.floor[last], recorder + plan.rise[last])
+
+
+@inlined
+def reserve(track: Track, row: int) -> float:
+    """Return how far above its minimum the battery must be after a task."""
+    return float(track.battery_floor[row] - track.battery_min)
 
 
 @inlined

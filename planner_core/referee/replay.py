@@ -13,23 +13,20 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-
 from planner_core.problem import (
     COLLECT,
     CONTACT,
     Floats,
     Problem,
-    line_of_sight,
 )
 from planner_core.problem.plan import Action, Plan
 from planner_core.problem.slew import (
     INSTANT,
     TIME_TOLERANCE_S,
-    Vector,
     angle_between_deg,
     slew_s,
 )
+from planner_core.referee.idle_time import Idle
 from planner_core.referee.pinned_plan import breaches
 from planner_core.referee.resource_profile import (
     Point,
@@ -37,8 +34,9 @@ from planner_core.referee.resource_profile import (
     integrate,
     thin,
 )
+from planner_core.referee.sight import looked, looks
 
-Mode = Literal["collect", "contact", "sunpoint"]
+Mode = Literal["collect", "contact", "sunpoint", "hold"]
 ViolationCode = Literal[
     "window", "overlap", "slew", "station", "duplicate", "battery", "recorder", "pin"
 ]
@@ -79,7 +77,13 @@ class Slew:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JudgedAction:
-    """One action of the timeline. ``opportunity`` and ``position`` are None for sun-pointing."""
+    """One action of the timeline. ``opportunity`` and ``position`` are None in idle time.
+
+    Attributes
+    ----------
+    turn_to_s, turn_back_s
+        Of sun-pointing: the turn to the sun that ends at its start, and the one from its end.
+    """
 
     mode: Mode
     start_s: float
@@ -90,6 +94,8 @@ class JudgedAction:
     reward: float
     battery_end: float | None
     recorder_end: float | None
+    turn_to_s: float | None = None
+    turn_back_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -268,7 +274,7 @@ def _turns(
         action = plan.actions[position]
         slews[position] = None
         if previous is not None and busy_until is not None:
-            angle_deg = angle_between_deg(_looked(problem, previous), _looks(problem, action))
+            angle_deg = angle_between_deg(looked(problem, previous), looks(problem, action))
             needed_s = slew_s(angle_deg, agility.slew_rate_deg_s, acceleration) + agility.settle_s
             available_s = action.start_s - previous.end_s
             slews[position] = Slew(angle_deg=angle_deg, needed_s=needed_s, available_s=available_s)
@@ -289,22 +295,6 @@ def _turns(
         if busy_until is None or action.end_s > busy_until.end_s:
             busy_until = action
     return found, slews
-
-
-def _looks(problem: Problem, action: Action) -> Vector:
-    """Return the line of sight at an action's start."""
-    table, i = problem.opportunities, action.opportunity
-    if abs(action.start_s - table.start_s[i]) <= TIME_TOLERANCE_S:
-        return np.asarray(table.los_start[i])
-    return line_of_sight(problem, i, action.start_s)
-
-
-def _looked(problem: Problem, action: Action) -> Vector:
-    """Return the line of sight at an action's end."""
-    table, i = problem.opportunities, action.opportunity
-    if abs(action.end_s - table.end_s[i]) <= TIME_TOLERANCE_S:
-        return np.asarray(table.los_end[i])
-    return line_of_sight(problem, i, action.end_s)
 
 
 def _stations(problem: Problem, plan: Plan) -> list[Violation]:
@@ -469,21 +459,9 @@ def _satellite_timeline(
 ) -> SatelliteTimeline:
     table = problem.opportunities
     actions: list[JudgedAction] = []
-    free_from_s = 0.0
-    level: Point | None = profile.points[0] if profile else None
-
-    def sun_point(until_s: float, end: Point | None) -> None:
-        if end is not None and until_s > free_from_s + TIME_TOLERANCE_S:
-            actions.append(
-                JudgedAction(mode="sunpoint", start_s=free_from_s, end_s=until_s, opportunity=None,
-                             position=None, slew=None, reward=0.0, battery_end=end.battery,
-                             recorder_end=end.recorder)
-            )  # fmt: skip
-
     for order, position in enumerate(positions):
         action = plan.actions[position]
         level = profile.after[order] if profile else None
-        sun_point(action.start_s, profile.before[order] if profile else None)
         actions.append(
             JudgedAction(
                 mode="contact" if table.kind[action.opportunity] == CONTACT else "collect",
@@ -497,12 +475,31 @@ def _satellite_timeline(
                 recorder_end=level.recorder if level else None,
             )
         )
-        free_from_s = max(free_from_s, action.end_s)
-    sun_point(problem.horizon_s, profile.points[-1] if profile else None)
     if profile is None:
         return SatelliteTimeline(actions=tuple(actions), resources=None)
     time_s, battery, recorder = thin(profile.points)
+    idle = [_idle_action(*pair) for pair in zip(profile.idle, profile.sun_end, strict=True)]
+    # Of a task and what is idle at one instant, as of overlapping tasks, the earlier stands first.
+    actions = list(heapq.merge(actions, idle, key=lambda action: action.start_s))
     return SatelliteTimeline(
         actions=tuple(actions),
         resources=Resourceline(time_s=time_s, battery=battery, recorder=recorder),
+    )
+
+
+def _idle_action(span: Idle, level: Point) -> JudgedAction:
+    """Return a stay at the sun, or a wait where there is no time for one."""
+    is_at_sun = span.is_at_sun
+    return JudgedAction(
+        mode="sunpoint" if is_at_sun else "hold",
+        start_s=span.sun_from_s if is_at_sun else span.start_s,
+        end_s=span.sun_until_s if is_at_sun else span.end_s,
+        opportunity=None,
+        position=None,
+        slew=None,
+        reward=0.0,
+        battery_end=level.battery,
+        recorder_end=level.recorder,
+        turn_to_s=span.turn_to_s if is_at_sun else None,
+        turn_back_s=span.turn_back_s if is_at_sun else None,
     )

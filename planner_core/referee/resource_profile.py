@@ -20,6 +20,7 @@ from planner_core.problem import (
     SatelliteProblem,
 )
 from planner_core.problem.plan import Action
+from planner_core.referee.idle_time import Idle, idle_spans
 
 
 class Point(NamedTuple):
@@ -42,11 +43,17 @@ class Profile:
         In order of time; limits need to be tested at these only.
     before, after
         The state in which each action starts, and the one that it leaves.
+    idle
+        What the satellite does between its actions, in order.
+    sun_end
+        The state in which it leaves the sun in each of these spans.
     """
 
     points: tuple[Point, ...]
     before: tuple[Point, ...]
     after: tuple[Point, ...]
+    idle: tuple[Idle, ...]
+    sun_end: tuple[Point, ...]
 
 
 def integrate(problem: Problem, satellite: SatelliteProblem, actions: Sequence[Action]) -> Profile:
@@ -59,7 +66,11 @@ def integrate(problem: Problem, satellite: SatelliteProblem, actions: Sequence[A
 def _integrate_physical(
     problem: Problem, satellite: SatelliteProblem, actions: Sequence[Action]
 ) -> Profile:
-    """Integrate over all time: each mode at its power and rate, sun-pointing in between."""
+    """Integrate over all time: each mode at its power and rate, and the sun in between.
+
+    Panels charge in sunlight during the part of each idle span that is spent at the sun;
+    turns and waiting charge nothing.
+    """
     r = satellite.resources
     horizon_s = problem.horizon_s
     kind = problem.opportunities.kind
@@ -67,29 +78,36 @@ def _integrate_physical(
     def clip(t_s: float) -> float:
         return min(max(t_s, 0.0), horizon_s)
 
-    change: dict[float, list[int]] = {0.0: [0, 0, 0], horizon_s: [0, 0, 0]}
+    change: dict[float, list[int]] = {0.0: [0] * 4, horizon_s: [0] * 4}
+
+    def note(start_s: float, end_s: float, column: int) -> None:
+        change.setdefault(clip(start_s), [0] * 4)[column] += 1
+        change.setdefault(clip(end_s), [0] * 4)[column] -= 1
+
     for action in actions:
-        column = 1 if kind[action.opportunity] == CONTACT else 0
-        change.setdefault(clip(action.start_s), [0, 0, 0])[column] += 1
-        change.setdefault(clip(action.end_s), [0, 0, 0])[column] -= 1
+        note(action.start_s, action.end_s, 1 if kind[action.opportunity] == CONTACT else 0)
     for enter_s, exit_s in zip(satellite.sunlight.enter_s, satellite.sunlight.exit_s, strict=True):
-        change.setdefault(clip(float(enter_s)), [0, 0, 0])[2] += 1
-        change.setdefault(clip(float(exit_s)), [0, 0, 0])[2] -= 1
+        note(float(enter_s), float(exit_s), 2)
+    idle = idle_spans(problem, satellite, actions)
+    for span in idle:
+        note(span.sun_from_s, span.sun_until_s, 3)
 
     point = Point(0.0, r.initial_battery_fraction, r.initial_recorder_fraction,
                   r.initial_recorder_fraction, 0.0)  # fmt: skip
     points = [point]
     at = {0.0: point}
-    collects = contacts = sunlit = 0
+    collects = contacts = sunlit = at_sun = 0
     times = sorted(change)
     for t_s, until_s in itertools.pairwise(times):
         collects += change[t_s][0]
         contacts += change[t_s][1]
         sunlit += change[t_s][2]
+        at_sun += change[t_s][3]
         if collects or contacts:
             power = -collects * r.collect_drain_per_s - contacts * r.contact_drain_per_s
         else:
-            power = r.sunpoint_charge_per_s if sunlit else 0.0
+            power = r.sunpoint_charge_per_s if sunlit and at_sun else 0.0
+        power -= r.idle_drain_per_s
         fill = r.telemetry_per_s + collects * r.collect_fill_per_s
         drain = contacts * r.downlink_per_s
         while point.time_s < until_s:
@@ -100,6 +118,8 @@ def _integrate_physical(
         points=tuple(points),
         before=tuple(at[clip(a.start_s)] for a in actions),
         after=tuple(at[clip(a.end_s)] for a in actions),
+        idle=idle,
+        sun_end=tuple(at[clip(span.sun_until_s)] for span in idle),
     )
 
 
@@ -163,7 +183,15 @@ def _integrate_events(
             telemetry = 0.0
         previous_sunlit_s = float(sunlit_s[event])
         points.append(point)
-    return Profile(points=tuple(points), before=tuple(before), after=tuple(after))
+    idle = idle_spans(problem, satellite, actions)
+    level_at = {action.start_s: level for action, level in zip(actions, before, strict=True)}
+    return Profile(
+        points=tuple(points),
+        before=tuple(before),
+        after=tuple(after),
+        idle=idle,
+        sun_end=tuple(level_at.get(span.end_s, point) for span in idle),
+    )
 
 
 def _book(

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +25,7 @@ from planner_core.problem.plan import Action, Plan
 from planner_core.referee.plan_diff import PlannedAction
 from service.scenarios.records import Checked, Record, Records, check, read_csv, unguarded
 from service.wire.base import Body, Id, Instant
+from service.wire.timelines import IDLE_MODES, Mode
 
 _MOST_ACTIONS: Final = 1_000_000
 _PLACES: Final = {"collect": "target", "contact": "station"}
@@ -35,7 +36,7 @@ class ActionIn(Body):
     """What an action says of itself that cannot be worked out."""
 
     satellite_id: Id
-    mode: Literal["collect", "contact", "sunpoint"]
+    mode: Mode
     start: Instant
     end: Instant
     target_id: Id | None = None
@@ -153,7 +154,7 @@ def plan_in(records: Records, scenario: Scenario, problem: Problem) -> Reading:
     found: list[tuple[Action, str]] = []
     impossible: list[tuple[str, str]] = []
     for one in checked:
-        if one.body.mode == "sunpoint":
+        if one.body.mode in IDLE_MODES:
             continue
         task = one.body.planned()
         action = finder.action(task)
@@ -193,7 +194,7 @@ class Finder:
     def require_known(self, action: ActionIn) -> None:
         """Raise where the scenario knows nothing of what an action names."""
         self._require("satellite", action.satellite_id)
-        if action.mode != "sunpoint":
+        if action.mode not in IDLE_MODES:
             self._require(_PLACES[action.mode], action.place_id)
         if action.end < action.start:
             raise InvalidScenario("invalid_time", "It ends before it starts.", pointer="/end")

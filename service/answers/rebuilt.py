@@ -16,7 +16,7 @@ from planner_core.referee.plan_diff import PlannedAction, PlanView
 from planner_core.referee.replay import Timeline, replay
 from service.answers.reading import Finder
 from service.scenarios.opportunities import Described
-from service.wire.timelines import TimelineOut
+from service.wire.timelines import IDLE_MODES, TimelineOut
 
 _FIGURES: Final = (
     "reward", "collects", "contacts", "downlinked_mbit", "downlinked_fraction",
@@ -80,7 +80,7 @@ def planned(timeline: TimelineOut) -> Iterator[PlannedAction]:
     """Yield the collects and contacts of a stored timeline."""
     for satellite in timeline.satellites:
         for action in satellite.actions:
-            if action.mode != "sunpoint":
+            if action.mode not in IDLE_MODES:
                 yield PlannedAction(
                     start=action.start,
                     end=action.end,

@@ -262,6 +262,8 @@ class Documents(Wording):
             off_nadir_deg=_rounded(off_nadir_deg, 4),
             azimuth_deg=_rounded(azimuth_deg, 4),
             slew=None if action.slew is None else _slew(action.slew),
+            turn_to_s=_rounded(action.turn_to_s, 3),
+            turn_back_s=_rounded(action.turn_back_s, 3),
             reward=action.reward,
             worth=worth,
             quality=_rounded(quality, 9),

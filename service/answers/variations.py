@@ -26,7 +26,7 @@ from service.scenarios.translate import read_file, scenario_from_file, sha256_of
 from service.wire.base import read
 from service.wire.changes import ChangeIn
 from service.wire.scenarios import ScenarioFile
-from service.wire.timelines import TimelineOut
+from service.wire.timelines import IDLE_MODES, TimelineOut
 
 _KEPT = 8
 
@@ -148,7 +148,7 @@ def _dropped(asked: Asked, timeline: TimelineOut | None) -> list[PinnedAction]:
         )
         for satellite in (timeline.satellites if timeline else ())
         for action in satellite.actions
-        if action.mode != "sunpoint"
+        if action.mode not in IDLE_MODES
     }
     found = []
     for number, own_id in enumerate(asked.change.relax.drop_actions):

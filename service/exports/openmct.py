@@ -17,7 +17,9 @@ _MODES: Final = {
     "collect": ("collects", "#1b7f4b", "#ffffff"),
     "contact": ("contacts", "#1f5fa8", "#ffffff"),
     "sunpoint": ("sun-pointing", "#f2c14e", "#000000"),
+    "hold": ("holding", "#b9c0c6", "#000000"),
 }
+_IDLE_NAMES: Final = {"sunpoint": "sun", "hold": "hold"}
 _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 _MILLISECOND: Final = timedelta(milliseconds=1)
 
@@ -61,8 +63,8 @@ def _parts(answered: Answered) -> Iterator[str]:
 
 
 def _name(action: Document, stations: dict[str, str]) -> str:
-    if action["mode"] == "sunpoint":
-        return "sun"
+    if action["mode"] in _IDLE_NAMES:
+        return _IDLE_NAMES[action["mode"]]
     return str(action["target_id"] or stations[action["station_id"]])
 
 

@@ -25,7 +25,7 @@ from numba.core import event
 from planner_core.budget import Budget
 from planner_core.build import build_problem, compute_opportunities
 from planner_core.certified.lns.alternating import TurnSearch
-from planner_core.certified.multipliers.energy import EnergyPrices
+from planner_core.certified.multipliers.energy import EnergyPaths, ascent_on_energy
 from planner_core.domain import (
     Agility,
     GroundStation,
@@ -217,8 +217,8 @@ def _shortage() -> None:
     problem = _built(_over_the_globe())
     plan = Rule().solve(problem, Budget(), 0).plan
     TurnSearch(problem, plan, problem.typical_worth, Budget(), 0).turn(1)
-    prices = EnergyPrices(problem, np.zeros(len(problem.target_ids)), 1, 0)
-    prices.improve(1, Budget().stop)
+    paths, nothing = EnergyPaths(problem), np.zeros(len(problem.target_ids))
+    ascent_on_energy(problem, paths, nothing, 1, 0).improve(1, Budget().stop)
     Mcts(worthless="sunpoint").solve(problem, Budget(), 0)
 
 

@@ -12,7 +12,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Final
 
 from pydantic import ValidationError
 
@@ -123,6 +123,8 @@ def canonical_of_file(file: ScenarioFile) -> str:
     for satellite in document["satellites"]:
         del satellite["omm" if satellite["omm"] is None else "tle"]
         _without_unset(satellite["sensor"], "sensor_type")
+        if isinstance(satellite["resources"], dict):
+            _without_defaults(satellite["resources"])
     for target in document["targets"]:
         _without_unset(target, "catalog_id", "release", "due", "sensor_type")
     if document["collect_alignment"] == "access":
@@ -138,6 +140,16 @@ def _without_unset(part: dict[str, Any], *names: str) -> None:
     for name in names:
         if part[name] is None:
             del part[name]
+
+
+_YOUNGER: Final = {"sun_pointing": "free", "panel_angle_deg": 180.0, "idle_power_w": 0.0}
+
+
+def _without_defaults(resources: dict[str, Any]) -> None:
+    """Leave out what questions older than the field did not say, where it says the same."""
+    for name, value in _YOUNGER.items():
+        if resources.get(name) == value:
+            del resources[name]
 
 
 def scenario_from_file(file: ScenarioFile) -> Scenario:
@@ -255,6 +267,7 @@ _FIELDS_OF_RATES = {
     "/collect_fill_per_s": "/collect_rate_mbit_s",
     "/downlink_per_s": "/downlink_rate_mbit_s",
     "/telemetry_per_s": "/telemetry_rate_mbit_s",
+    "/idle_drain_per_s": "/idle_power_w",
 }
 
 
@@ -287,6 +300,9 @@ def resources_from(body: Preset | PresetResourcesIn | ResourcesIn, period_s: flo
             telemetry_per_s=body.telemetry_rate_mbit_s / recorder_mbit,
             eclipse_aware=body.eclipse_aware,
             recorder_capacity_mbit=recorder_mbit,
+            sun_pointing=body.sun_pointing,
+            panel_angle_deg=body.panel_angle_deg,
+            idle_drain_per_s=body.idle_power_w / battery_ws,
         )
     except InvalidScenario as error:
         pointer = error.fault.pointer or ""

@@ -14,12 +14,14 @@ from service.wire.imports import RejectedRow
 NonNegative = Annotated[float, Field(ge=0)]
 Positive = Annotated[float, Field(gt=0)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
+PanelAngle = Annotated[float, Field(ge=0, le=180)]
 SunElevation = Annotated[float | None, Field(ge=-90, le=90)]
 LocalTime = Annotated[float | None, Field(ge=0, le=24)]
 SensorType = Annotated[
     str, StringConstraints(min_length=1, max_length=100, pattern=r"^[^\x00-\x1f\x7f]*$")
 ]
 Nadir = Literal["geodetic", "geocentric"]
+SunPointing = Literal["free", "slew"]
 LookSide = Literal["left", "right", "any"]
 OrbitDirection = Literal["ascending", "descending", "any"]
 
@@ -72,7 +74,12 @@ class ResourcesIn(Body):
     battery_capacity_wh: Positive
     battery_min_fraction: Fraction = 0.3
     initial_battery_fraction: Fraction = 1.0
-    sunpoint_power_w: NonNegative = Field(description="Net charge while sun-pointing.")
+    sunpoint_power_w: NonNegative = Field(
+        description="Charge while sun-pointing, before idle_power_w."
+    )
+    idle_power_w: NonNegative = Field(
+        0.0, description="Drawn at all times, in shadow too; the modes' powers come on top of it."
+    )
     collect_power_w: NonNegative = Field(description="Net draw during a collect.")
     contact_power_w: NonNegative = Field(description="Net draw during a contact.")
     recorder_capacity_mbit: Positive
@@ -82,6 +89,14 @@ class ResourcesIn(Body):
     downlink_rate_mbit_s: NonNegative = Field(description="What a contact takes down.")
     telemetry_rate_mbit_s: NonNegative = Field(description="What telemetry writes at all times.")
     eclipse_aware: bool = Field(False, description="Charge only in sunlight.")
+    sun_pointing: SunPointing = Field(
+        "free",
+        description="free: charges in all idle time. slew: only between a turn to the sun and one "
+        "back.",
+    )
+    panel_angle_deg: PanelAngle = Field(
+        180.0, description="Between the normal of the panels and the boresight."
+    )
 
 
 Preset = Literal["paper", "paper_code"]
@@ -96,6 +111,14 @@ class PresetResourcesIn(Body):
     recorder_max_fraction: Fraction = 0.75
     initial_recorder_fraction: Fraction = 0.0
     eclipse_aware: bool = Field(False, description="Charge only in sunlight.")
+    sun_pointing: SunPointing = Field(
+        "free",
+        description="free: charges in all idle time. slew: only between a turn to the sun and one "
+        "back.",
+    )
+    panel_angle_deg: PanelAngle = Field(
+        180.0, description="Between the normal of the panels and the boresight."
+    )
 
 
 def _form_of_resources(value: object) -> str:

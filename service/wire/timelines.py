@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Final, Literal
 
 from pydantic import Field
 
@@ -10,7 +10,8 @@ from service.wire.base import Instant, Json, Open, Wire
 from service.wire.satellites import Nadir
 from service.wire.scenarios import HorizonOut
 
-Mode = Literal["collect", "contact", "sunpoint"]
+Mode = Literal["collect", "contact", "sunpoint", "hold"]
+IDLE_MODES: Final = ("sunpoint", "hold")
 Outcome = Literal["downlinked", "collected", "unscheduled", "excluded"]
 
 
@@ -84,7 +85,10 @@ class ActionOut(Wire):
     """One thing that a satellite does."""
 
     id: str
-    mode: Open[Mode]
+    mode: Open[Mode] = Field(
+        description="In idle time `sunpoint`, at the sun with panels that charge in sunlight, or "
+        "`hold`, where there is no time to turn to it and back."
+    )
     start: Instant
     end: Instant
     target_id: str | None
@@ -93,6 +97,12 @@ class ActionOut(Wire):
     off_nadir_deg: float | None = Field(description="At the middle of the action.")
     azimuth_deg: float | None
     slew: SlewOut | None
+    turn_to_s: float | None = Field(
+        None, description="Of `sunpoint`: the turn to the sun, which ends at its start."
+    )
+    turn_back_s: float | None = Field(
+        None, description="Of `sunpoint`: the turn from the sun, which begins at its end."
+    )
     reward: float = Field(description="What the plan earns with it.")
     worth: float | None = Field(
         None, description="Of a collect: what its image is worth by itself, reward times quality."

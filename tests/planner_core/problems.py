@@ -20,6 +20,7 @@ from planner_core.problem import (
     Sunlight,
     build_satellite_problem,
 )
+from planner_core.problem.sun_turns import SunPath
 
 TIGHT = Resources(
     battery_min_fraction=0.3,
@@ -65,6 +66,7 @@ def make_problem(
     agility: Agility = Agility(),  # noqa: B008 - immutable
     rewards: Sequence[float] | None = None,
     sunlight: Sunlight | None = None,
+    sun: SunPath | None = None,
     antennas: int = 1,
 ) -> Problem:
     """Return a problem whose lines of sight lie in a plane, at the tasks' angles."""
@@ -131,6 +133,7 @@ def make_problem(
                 agility=agility,
                 resources=resources,
                 sunlight=sunlight or whole,
+                sun=sun,
             )
             for index in range(num_satellites)
         ),
@@ -166,6 +169,7 @@ def random_problem(
     max_turn_deg: float = 0.0,
     span_s: float = 940.0,
     sunlight: Sunlight | None = None,
+    sun: SunPath | None = None,
     num_stations: int = 1,
     num_offers: int = 1,
 ) -> Problem:
@@ -220,6 +224,7 @@ def random_problem(
         resources=resources,
         agility=agility,
         sunlight=sunlight,
+        sun=sun,
     )
 
 
@@ -250,4 +255,54 @@ def varied_problem(
         num_targets=num_targets,
         num_collects=num_collects,
         num_contacts=num_contacts,
+    )
+
+
+def sunny_problem(
+    seed: int,
+    *,
+    num_satellites: int = 1,
+    num_collects: int = 8,
+    num_targets: int = 5,
+    num_contacts: int = 2,
+    is_plain: bool = False,
+) -> Problem:
+    """Return a problem with turns to the sun, and power drawn at all times in two of three.
+
+    The sun stands in the plane of the lines of sight or above it, 60 to 250 s of turn away with
+    most agilities; batteries allow for a few images between visits. With ``is_plain`` all
+    images are worth the same.
+    """
+    rng = np.random.default_rng(seed)
+    angle, height = rng.uniform(0.0, 2.0 * np.pi), rng.uniform(-0.5, 0.5)
+    direction = np.array([np.cos(angle), np.sin(angle), height])
+    direction /= np.linalg.norm(direction)
+    agility = (
+        Agility(slew_rate_deg_s=1.5),
+        Agility(slew_rate_deg_s=3.0, acceleration_deg_s2=0.2, settle_s=2.0),
+        Agility(slew_rate_deg_s=1.0, acceleration_deg_s2=0.05, settle_s=5.0),
+    )[int(rng.integers(3))]
+    resources = replace(
+        TIGHT,
+        sun_pointing="slew",
+        panel_angle_deg=float(rng.choice([180.0, 180.0, 90.0])),
+        idle_drain_per_s=float(rng.choice([0.0, 1e-4, 4e-4])),
+        initial_battery_fraction=float(rng.choice([0.5, 0.7, 1.0])),
+        sunpoint_charge_per_s=float(rng.choice([1 / 2500, 1 / 1000, 1 / 300])),
+        collect_drain_per_s=float(rng.choice([1 / 600, 1 / 300, 1 / 200])),
+        recorder_max_fraction=float(rng.choice([0.50037, 0.90037])),
+    )
+    return random_problem(
+        seed,
+        num_satellites=num_satellites,
+        num_collects=num_collects,
+        num_targets=num_targets,
+        num_contacts=num_contacts,
+        has_rewards=not is_plain and bool(rng.integers(2)),
+        resources=resources,
+        agility=agility,
+        max_turn_deg=15.0,
+        sunlight=ECLIPSES if rng.integers(2) else None,
+        sun=SunPath(step_s=1000.0, directions=np.array([direction, direction])),
+        span_s=float(rng.choice([500.0, 940.0])),
     )

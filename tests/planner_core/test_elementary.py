@@ -17,7 +17,7 @@ from planner_core.certified.dp.elementary import (
     memory_of,
 )
 from planner_core.certified.lns.search import improved
-from planner_core.certified.multipliers.elementary import ElementaryPrices
+from planner_core.certified.multipliers.elementary import ascent_on_passes
 from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.proofs.documents import from_json, is_proven, to_json
 from planner_core.certified.proofs.lagrangian import lagrangian_bound, lagrangian_value
@@ -137,19 +137,18 @@ def test_a_target_in_view_for_long_is_paid_once() -> None:
 
 def test_prices_get_better_and_their_proof_survives_being_written_down() -> None:
     problem = spaced_problem(5, num_accesses=60, num_offers=8, span_s=3000.0)
-    network = arc_network_of(problem)
-    memory = memory_of(problem, network)
-    first, again = (ElementaryPrices(problem, network, memory, 0) for _ in range(2))
-    first.improve(1, NEVER)
-    before = first.bound
-    first.improve(20, NEVER)
-    again.improve(21, NEVER)
-    assert first.bound < before
-    assert first.bound == again.bound
-    bound = Bound(value=first.bound, proof="lagrangian", prices=first.prices, is_elementary=True)
+    first, again = (ascent_on_passes(problem, 0) for _ in range(2))
+    first.improve(5, NEVER)
+    before = first.value
+    first.improve(100, NEVER)
+    again.improve(105, NEVER)
+    assert first.value < before
+    assert first.value == again.value
+    proven = first.multipliers
+    bound = Bound(value=first.value, proof="lagrangian", prices=proven, is_elementary=True)
     read = from_json(to_json(bound))
     assert is_proven(problem, read)
-    assert not is_proven(problem, replace(read, value=first.bound - 1.5))
+    assert not is_proven(problem, replace(read, value=first.value - 1.5))
     assert not is_proven(problem, replace(read, is_elementary=False))
 
 

@@ -14,8 +14,9 @@ from hypothesis import strategies as st
 from planner_core.budget import Budget
 from planner_core.certified.dp.energy_labels import EnergyLevels, energy_levels, most_by_energy
 from planner_core.certified.dp.resource_network import Network, network_of
-from planner_core.certified.multipliers.energy import EnergyPrices
-from planner_core.problem import Floats
+from planner_core.certified.multipliers.ascent import Ascent
+from planner_core.certified.multipliers.energy import EnergyPaths, ascent_on_energy
+from planner_core.problem import Floats, Problem
 from planner_core.referee.replay import replay
 from planner_core.solvers.registry import Certified
 from tests.examples import examples
@@ -26,6 +27,12 @@ SEEDS = st.integers(0, 10**6)
 STARVED = replace(TIGHT, battery_min_fraction=0.5, initial_battery_fraction=0.62)
 _problem = partial(varied_problem, scarce=STARVED)
 Dynamics = Literal["physical", "paper"]
+
+
+def ascent(problem: Problem, num_epochs: int, seed: int = 0) -> Ascent:
+    """Return the ascent by energy alone, from nothing."""
+    begin = np.zeros(len(problem.target_ids))
+    return ascent_on_energy(problem, EnergyPaths(problem), begin, num_epochs, seed)
 
 
 def best_by_enumeration(network: Network, levels: EnergyLevels, weight: Floats) -> float:
@@ -71,11 +78,11 @@ def test_the_programme_finds_the_best_path(dynamics: Dynamics, seed: int, per_co
 @given(seed=SEEDS, num_satellites=st.integers(1, 3))
 def test_no_plan_beats_the_prices(dynamics: Dynamics, seed: int, num_satellites: int) -> None:
     problem = _problem(seed, dynamics, num_satellites)
-    search = EnergyPrices(problem, np.zeros(len(problem.target_ids)), 30, seed)
+    search = ascent(problem, 30, seed)
     search.improve(30, Budget().stop)
     assert search.is_settled
     assert search.value >= best_reward(problem) - 1e-6
-    assert np.all((search.prices >= 0.0) & (search.prices <= problem.best_worth))
+    assert np.all((search.multipliers >= 0.0) & (search.multipliers <= problem.best_worth))
 
 
 def test_collects_that_cost_next_to_nothing_need_no_endless_table() -> None:
@@ -83,7 +90,7 @@ def test_collects_that_cost_next_to_nothing_need_no_endless_table() -> None:
     problem = random_problem(3, num_collects=40, num_targets=20, num_satellites=2, resources=frugal)
     levels = energy_levels(network_of(problem, problem.satellites[0]), 24)
     assert levels.width < 2000
-    search = EnergyPrices(problem, np.zeros(len(problem.target_ids)), 20, 0)
+    search = ascent(problem, 20)
     search.improve(20, Budget().stop)
     free = replace(problem, use_resources=False)
     assert search.value >= replay(free, Certified().solve(free, Budget(), 0).plan).reward - 1e-6
@@ -94,13 +101,12 @@ def test_prices_lower_what_satellites_gain_that_share_targets() -> None:
         1, num_collects=120, num_targets=30, num_contacts=6, num_satellites=3, span_s=3000.0
     )
     problem = replace(problem, horizon_s=3100.0)
-    nothing = np.zeros(len(problem.target_ids))
-    search = EnergyPrices(problem, nothing, 100, 0)
+    search = ascent(problem, 100)
     search.improve(5, Budget().stop)
     first = search.value
     search.improve(95, Budget().stop)
     assert search.value < 0.97 * first
-    again = EnergyPrices(problem, nothing, 100, 0)
+    again = ascent(problem, 100)
     again.improve(100, Budget().stop)
     assert again.value == search.value
-    assert np.array_equal(again.prices, search.prices)
+    assert np.array_equal(again.multipliers, search.multipliers)

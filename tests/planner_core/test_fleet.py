@@ -13,7 +13,7 @@ from planner_core.certified.drivers.fleet import FleetSearch, solve_without_reso
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.fleet_start import priced_start
 from planner_core.certified.mip.solution_pool import PlanPool
-from planner_core.certified.multipliers.incremental import IncrementalPrices
+from planner_core.certified.multipliers.paths import ascent_on_paths
 from planner_core.certified.proofs.documents import from_json, is_proven, to_json
 from planner_core.domain import Agility
 from planner_core.precedence.network import heaviest_paths, network_of
@@ -143,14 +143,14 @@ def test_prices_make_a_better_start() -> None:
     gained = 0.0
     for seed in range(10):
         problem = fleet(seed)
-        network, most = network_of(problem), np.append(problem.best_worth, 0.0)
+        network = network_of(problem)
         worth = problem.worth[network.row]
-        dual = IncrementalPrices(network, worth, most, 100, 0)
+        dual = ascent_on_paths(problem, network, 100, 0)
         dual.improve(100, Budget().stop)
-        nothing = np.zeros(len(most), dtype=np.bool_)
+        nothing = np.zeros(len(problem.target_ids) + 1, dtype=np.bool_)
         plans = [
             Plan.of(problem, priced_start(network, worth, prices, nothing, 0))
-            for prices in (dual.prices, np.zeros(len(most)))
+            for prices in (np.append(dual.multipliers, 0.0), np.zeros(len(nothing)))
         ]
         priced, plain = (replay(problem, plan) for plan in plans)
         assert priced.is_valid

@@ -15,7 +15,7 @@ from planner_core.certified.mip import program_search
 from planner_core.certified.mip.contact_sets import FixedContacts
 from planner_core.certified.mip.program_search import ProgramSearch
 from planner_core.certified.mip.solution_pool import PlanPool, rows_of
-from planner_core.certified.multipliers.energy import EnergyPrices
+from planner_core.certified.multipliers.energy import EnergyPaths, ascent_on_energy
 from planner_core.certified.multipliers.resources import PriceSearch
 from planner_core.certified.proofs.resource_bound import relaxations, whole_worth
 from planner_core.domain import Dynamics
@@ -37,13 +37,14 @@ def search_of(
     problem: Problem, start: Plan, seed: int = 0, budget: Budget | None = None
 ) -> tuple[ProgramSearch, PlanPool]:
     budget = budget or Budget()
-    energy = EnergyPrices(problem, np.zeros(len(problem.target_ids)), 30, seed)
+    paths = EnergyPaths(problem)
+    energy = ascent_on_energy(problem, paths, np.zeros(len(problem.target_ids)), 30, seed)
     energy.improve(30, budget.stop)
-    prices = PriceSearch(problem, max(energy.value, 1.0), energy.prices, budget.stop)
+    prices = PriceSearch(problem, max(energy.value, 1.0), energy.multipliers, budget.stop)
     prices.step(0.0)
     pool = PlanPool(problem, budget, seed)
     pool.add(start)
-    return ProgramSearch(problem, pool, prices, energy.usage, budget, seed), pool
+    return ProgramSearch(problem, pool, prices, paths.usage, budget, seed), pool
 
 
 @examples(40)

@@ -287,3 +287,38 @@ def test_a_preset_takes_fractions_of_its_own_and_one_question_has_one_hash() -> 
     assert (fault.code, fault.pointer) == (
         "unknown_field", "/satellites/0/resources/collect_power_w",
     )  # fmt: skip
+
+
+def test_turns_to_the_sun_are_asked_for_and_questions_without_keep_their_hash() -> None:
+    plain, same, slewing = file(), file(), file()
+    same["satellites"][0]["resources"] = {
+        "preset": "paper", "sun_pointing": "free", "panel_angle_deg": 180.0,
+    }  # fmt: skip
+    assert canonical(same) == canonical(plain)
+    slewing["satellites"][0]["resources"] = {
+        "preset": "paper", "sun_pointing": "slew", "panel_angle_deg": 90.0,
+    }  # fmt: skip
+    text = canonical(slewing)
+    assert text != canonical(plain)
+    assert canonical(json.loads(text)) == text
+    (made,) = scenario_from_content(slewing).satellites
+    assert (made.resources.sun_pointing, made.resources.panel_angle_deg) == ("slew", 90.0)
+    slewing["dynamics"] = "paper"
+    with pytest.raises(InvalidScenario) as refused:
+        scenario_from_content(slewing)
+    assert refused.value.fault.pointer == "/dynamics"
+
+
+def test_a_load_at_all_times_is_a_fraction_of_the_battery() -> None:
+    own = {
+        "battery_capacity_wh": 100.0, "sunpoint_power_w": 36.0, "collect_power_w": 72.0,
+        "contact_power_w": 18.0, "recorder_capacity_mbit": 4000.0, "collect_rate_mbit_s": 400.0,
+        "downlink_rate_mbit_s": 200.0, "telemetry_rate_mbit_s": 0.004,
+    }  # fmt: skip
+    without = canonical(file(satellites=[satellite(resources=own)]))
+    assert "idle_power_w" not in without
+    assert "sun_pointing" not in without
+    loaded = file(satellites=[satellite(resources=own | {"idle_power_w": 7.2})])
+    assert '"idle_power_w":7.2' in canonical(loaded)
+    (made,) = scenario_from_content(loaded).satellites
+    assert made.resources.idle_drain_per_s == pytest.approx(2e-5)

@@ -40,14 +40,14 @@ def least_energy(network: Network, weight: Ints, top: int) -> tuple[Singles, Sin
             j = network.near_rows[at]
             end = min(top, reached[j] + weight[j])
             furthest = max(furthest, end)
-            _lower_by_taking(network, j, weight[j], after[j], own[: end + 1])
+            _lower_by_taking(network, j, weight[j], network.near_give[at], after[j], own[: end + 1])
         while furthest > 0 and own[furthest] == np.inf:
             furthest -= 1
         reached[k] = furthest
         end = min(top, furthest + weight[k])
         reach[k] = max(reach[k + 1], end)
         idle[k] = idle[k + 1]
-        _lower_by_taking(network, k, weight[k], own, idle[k, : end + 1])
+        _lower_by_taking(network, k, weight[k], 0.0, own, idle[k, : end + 1])
         while reach[k] > 0 and idle[k, reach[k]] == np.inf:
             reach[k] -= 1
     return idle, after
@@ -55,21 +55,25 @@ def least_energy(network: Network, weight: Ints, top: int) -> tuple[Singles, Sin
 
 @inlined
 def _lower_by_taking(
-    network: Network, row: int, weight: int, after: Singles, values: Singles
+    network: Network, row: int, weight: int, give: float, after: Singles, values: Singles
 ) -> None:
-    """Lower each value to what it takes to do the task and still gain as much with it."""
+    """Lower each value to what it takes to do the task and still gain as much with it.
+
+    ``give`` is what the way to the task gives back.
+    """
     # One step of single precision may be off by this much, so that sums stay on the safe side.
     rounding = 1.3e-7 * (1.0 + abs(network.energy_floor[-1]))
     cap = np.float32(network.energy_cap[row] + rounding)
     cost = np.float32(network.energy_cost[row] - rounding)
     floor = np.float32(network.energy_floor[row] - rounding)
+    given = np.float32(give + rounding if give > 0.0 else 0.0)
     near = min(weight + 1, len(values))
     if floor + cost <= cap:
         for r in range(1, near):
-            values[r] = min(values[r], floor + cost)
+            values[r] = min(values[r], floor + cost - given)
     beyond = values[near:]
     left = after[1 : 1 + len(beyond)]
     for i in range(len(beyond)):
         wanted = max(left[i], floor) + cost
-        wanted = wanted if wanted <= cap else np.float32(np.inf)
+        wanted = wanted - given if wanted <= cap else np.float32(np.inf)
         beyond[i] = min(beyond[i], wanted)

@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from planner_core.bundles import bundle
-from planner_core.certified.dp.resource_network import Network, may_be_next
+from planner_core.certified.dp.resource_network import Network
 from planner_core.jit import inlined, kernel
 from planner_core.problem import Floats, Ints, Longs
 
@@ -30,6 +30,9 @@ class EnergyLevels(NamedTuple):
         The least floor of all rows up to each one.
     width
         How many levels there are from ``lowest`` up that a path can be at.
+    give
+        What the network's arcs to each row give back, as ``straight_rows`` lists them.
+        Shape ``(num_arcs,)``.
     """
 
     cap: Ints
@@ -38,6 +41,7 @@ class EnergyLevels(NamedTuple):
     lowest: Ints
     start: int
     width: int
+    give: Ints
 
 
 def energy_levels(network: Network, per_collect: int) -> EnergyLevels:
@@ -48,9 +52,12 @@ def energy_levels(network: Network, per_collect: int) -> EnergyLevels:
     left = np.minimum(network.energy_floor, network.energy_cap - network.energy_cost)
     span = float((network.energy_cap - np.minimum.accumulate(left)).max(initial=0.0))
     step = max(step, span / _MAX_LEVELS)
-    cap = np.ceil(network.energy_cap / step - _ROUNDING).astype(np.int32)
-    cost = np.floor(network.energy_cost / step + _ROUNDING).astype(np.int32)
-    floor = np.floor(network.energy_floor / step + _ROUNDING).astype(np.int32)
+    if network.straight_give.any():
+        cap, cost, floor, give = _rounded_potentials(network, step)
+    else:
+        cap = _up(network.energy_cap, step)
+        cost, floor = _down(network.energy_cost, step), _down(network.energy_floor, step)
+        give = np.zeros(len(network.straight_give), dtype=np.int32)
     lowest = np.minimum.accumulate(np.minimum(floor, cap - cost)).astype(np.int32)
     return EnergyLevels(
         cap=cap,
@@ -59,7 +66,35 @@ def energy_levels(network: Network, per_collect: int) -> EnergyLevels:
         lowest=lowest,
         start=int(np.ceil(network.energy_start / step - _ROUNDING)),
         width=int((cap - np.minimum(cost, 0) - lowest).max(initial=0)) + 1,
+        give=give,
     )
+
+
+def _up(energy: Floats, step: float) -> Ints:
+    return np.ceil(energy / step - _ROUNDING).astype(np.int32)
+
+
+def _down(energy: Floats, step: float) -> Ints:
+    return np.floor(energy / step + _ROUNDING).astype(np.int32)
+
+
+def _rounded_potentials(network: Network, step: float) -> tuple[Ints, Ints, Ints, Ints]:
+    """Return cap, cost and floor by task, and what arcs give back, from potentials in levels.
+
+    With turns to the sun no two costs are alike, and rounding each in favour of the satellite
+    would lose up to a level with every task and every arc. Where what idle time adds up to is
+    rounded instead, the errors along a path cancel.
+    """
+    before, after = _down(network.energy_from, step), _up(network.energy_to, step)
+    draw = _down(network.energy_cost - network.energy_from + network.energy_to, step)
+    full = _up(network.energy_cap + network.energy_to, step)
+    least = _down(network.energy_floor + network.energy_from, step)
+    k = np.repeat(np.arange(len(draw)), np.diff(network.straight_first))
+    i = network.straight_rows
+    change = network.energy_to[k] - network.energy_from[i] + network.straight_give
+    give = np.where(network.straight_give > 0.0, _up(change, step) - after[k] + before[i], 0)
+    cost = draw + before - after
+    return full - after, cost, least - before, np.maximum(give, 0).astype(np.int32)
 
 
 @kernel
@@ -99,7 +134,7 @@ def most_by_energy(
         _raise_to(values[low:], idle, -low - levels.cost[k])
         for at in range(network.straight_first[k], network.straight_first[k + 1]):
             i = network.straight_rows[at]
-            up = levels.lowest[i] - base - levels.cost[k]
+            up = levels.lowest[i] + levels.give[at] - base - levels.cost[k]
             _raise_to(values[low:], own[i, : num_own[i]], up - low)
         values[:low] = values[low]
         while high > 0 and values[high - 1] == -np.inf:
@@ -153,13 +188,22 @@ def _path_to(
         energy += levels.cost[k]
         before = k - 1
         while before >= 0:
-            x = max(0, energy - levels.lowest[before])
-            if (
-                x < num_own[before]
-                and own[before, x] + weight[k] == gained
-                and may_be_next(network, before, k)
-            ):
+            give = _given_between(network, levels, before, k)
+            x = max(0, energy - max(give, 0) - levels.lowest[before])
+            if give >= 0 and x < num_own[before] and own[before, x] + weight[k] == gained:
+                energy -= give
                 break
             before -= 1
         k = before
     return rows[:length][::-1].copy()
+
+
+@inlined
+def _given_between(network: Network, levels: EnergyLevels, i: int, k: int) -> int:
+    """Return the levels that the way from row ``i`` to ``k`` gives back; -1 where there is none."""
+    if k >= network.idle_from[i]:
+        return 0
+    for at in range(network.straight_first[k], network.straight_first[k + 1]):
+        if network.straight_rows[at] == i:
+            return int(levels.give[at])
+    return -1

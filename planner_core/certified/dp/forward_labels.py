@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from planner_core.certified.dp.data_levels import DataLevels
-from planner_core.certified.dp.resource_network import Network, may_be_next
+from planner_core.certified.dp.resource_network import Network, give_between, may_be_next
 from planner_core.jit import inlined, kernel
 from planner_core.problem import (
     Bytes,
@@ -119,11 +119,15 @@ def most_value(
         lowest, highest = lowest + gained, min(top, highest + gained)
         own = np.full((num_levels, highest - lowest + 1), none)
         labels[k], first_value[k] = own, lowest
-        _take(network, levels, k, gained, idle, 0, low, high, own, lowest, own_low[k], own_high[k])
+        _take(
+            network, levels, k, gained, 0.0, idle, 0, low, high,
+            own, lowest, own_low[k], own_high[k],
+        )  # fmt: skip
         for at in range(network.straight_first[k], network.straight_first[k + 1]):
             i = network.straight_rows[at]
             _take(
-                network, levels, k, gained, labels[i], first_value[i], own_low[i], own_high[i],
+                network, levels, k, gained, network.straight_give[at],
+                labels[i], first_value[i], own_low[i], own_high[i],
                 own, lowest, own_low[k], own_high[k],
             )  # fmt: skip
         _tidy(own, lowest, own_low[k], own_high[k], after_need[k], credit, goal, best_so_far)
@@ -188,17 +192,19 @@ def path_of(network: Network, levels: DataLevels, weight: Ints, labels: Labels, 
     k, level, energy = m, levels.end, -np.inf
     while True:
         is_start = value == 0 and k <= first_kept
-        if is_start and _leads_to(network, levels, k, levels.start, network.energy_start,
+        if is_start and _leads_to(network, levels, k, 0.0, levels.start, network.energy_start,
                                   level, energy):  # fmt: skip
             break
         found = -1
         i = k - 1
         while i >= 0 and found < 0 and not (i + 1 < k and network.is_kept[i + 1]):
             if labels.first[i + 1] > labels.first[i] and may_be_next(network, i, k):
+                give = give_between(network, i, k)
                 for at in range(labels.first[i], labels.first[i + 1]):
                     if labels.value[at] == value and _leads_to(
-                        network, levels, k, labels.level[at], labels.energy[at], level, energy
-                    ):
+                        network, levels, k, give, labels.level[at], labels.energy[at],
+                        level, energy,
+                    ):  # fmt: skip
                         found = at
                         break
             i -= 1
@@ -217,6 +223,7 @@ def _leads_to(
     network: Network,
     levels: DataLevels,
     k: int,
+    give: float,
     level: int,
     energy: float,
     level_after: int,
@@ -230,7 +237,7 @@ def _leads_to(
     to = max(levels.floor[k], level + levels.gain[k], 0)
     return bool(
         to == level_after
-        and min(energy, network.energy_cap[k]) - network.energy_cost[k] == energy_after
+        and min(energy + give, network.energy_cap[k]) - network.energy_cost[k] == energy_after
     )
 
 
@@ -240,6 +247,7 @@ def _take(
     levels: DataLevels,
     row: int,
     gained: int,
+    give: float,
     source: Floats,
     source_first: int,
     source_low: Ints,
@@ -249,7 +257,7 @@ def _take(
     own_low: Ints,
     own_high: Ints,
 ) -> None:
-    """Extend all labels of a source by one task."""
+    """Extend all labels of a source by one task; ``give`` is what the way to it gives back."""
     cap, cost = network.energy_cap[row], network.energy_cost[row]
     floor = network.energy_floor[row]
     most = own_first + own.shape[1] - 1
@@ -265,7 +273,7 @@ def _take(
         before = source[y, low - source_first : high - source_first + 1]
         after = own[to, low + gained - own_first : high + gained - own_first + 1]
         for v in range(len(before)):
-            left = min(before[v], cap) - cost
+            left = min(before[v] + give, cap) - cost
             left = left if left >= floor else -np.inf
             after[v] = max(after[v], left)
         own_low[to] = min(own_low[to], low + gained)

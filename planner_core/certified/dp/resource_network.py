@@ -12,6 +12,11 @@ task ``j`` may be taken from :math:`(E, G)` where :math:`G \le` ``data_before[j]
 
 After ``i`` the satellite goes straight on to one of its near followers, or it idles: from row
 ``idle_from[i]`` on every task may follow, so that it no longer matters which the last one was.
+
+Where the sun needs turns, :math:`C` is taken when the sun is reached after ``i`` and when it is
+left for ``j``. Where that leaves no time at the sun the difference is negative, which would take
+charge away: such arcs give it back, :math:`E' = \min(E +` ``give`` :math:`, ...)`, and from row
+``idle_from[i]`` on there are none of them.
 """
 
 from __future__ import annotations
@@ -42,8 +47,10 @@ class Network(NamedTuple):
     """Tasks and arcs of one satellite, relaxed by a hair; shape ``(m,)`` unless said otherwise.
 
     ``near_rows[near_first[i] : near_first[i + 1]]`` are the rows below ``idle_from[i]`` that
-    may follow ``i``; ``straight_*`` list the same arcs by the later row. ``by_idle`` has all
-    rows in order of ``idle_from``. A path that passes by a row with ``is_kept`` is none.
+    may follow ``i``, ``near_give`` what these arcs give back; ``straight_*`` list the same arcs by
+    the later row. ``by_idle`` has all rows in order of ``idle_from``. A path that passes by a row
+    with ``is_kept`` is none. ``energy_from`` and ``energy_to`` are what idle time adds up to
+    before it begins after a task, and when it ends at one.
     """
 
     place: Ints
@@ -53,8 +60,12 @@ class Network(NamedTuple):
     by_idle: Ints
     near_first: Longs
     near_rows: Ints
+    near_give: Floats
     straight_first: Longs
     straight_rows: Ints
+    straight_give: Floats
+    energy_from: Floats
+    energy_to: Floats
     energy_cap: Floats
     energy_cost: Floats
     energy_floor: Floats
@@ -81,10 +92,19 @@ def _network(problem: Problem, satellite: SatelliteProblem, slack: float) -> Net
     """Return a network; limits are passed by ``slack`` (negative: kept clear of)."""
     track = compile_track(problem, satellite, np.zeros(len(satellite), dtype=np.uint8))
     precedence = direct_precedence(satellite)
-    idle_from, near_first, near_rows = _arcs(precedence)
-    straight_first, straight_rows = reversed_arcs(Arcs(near_first, near_rows))
     charge_from = track.charge_per_s * track.charge_from_s
     charge_to = track.charge_per_s * track.charge_to_s
+    is_free = satellite.resources.sun_pointing == "free"
+    least_to = np.minimum.accumulate(charge_to[::-1])[::-1]
+    charged_from = np.searchsorted(least_to, charge_from) * (not is_free)
+    idle_from, near_first, near_rows = _arcs(precedence, charged_from)
+    straight_first, straight_rows = reversed_arcs(Arcs(near_first, near_rows))
+    near_give = charge_from[_sources(near_first)] - charge_to[near_rows]
+    straight_give = charge_from[straight_rows] - charge_to[_sources(straight_first)]
+    idle_drawn_from = track.idle_per_s * track.data_from_s
+    idle_drawn_to = track.idle_per_s * track.data_to_s
+    energy_from, energy_to = charge_from - idle_drawn_from, charge_to - idle_drawn_to
+    floor = track.battery_floor_least if slack > 0.0 else track.battery_floor
     # A task may begin before another's end by the tolerance, and sunlight counts from there.
     rounding = track.charge_per_s * TIME_TOLERANCE_S if slack > 0.0 else 0.0
     data_from = track.telemetry_per_s * track.data_from_s
@@ -98,11 +118,15 @@ def _network(problem: Problem, satellite: SatelliteProblem, slack: float) -> Net
         by_idle=np.argsort(idle_from, kind="stable").astype(np.int32),
         near_first=near_first,
         near_rows=near_rows,
+        near_give=np.maximum(near_give, 0.0) * (not is_free),
         straight_first=straight_first,
         straight_rows=straight_rows,
-        energy_cap=1.0 - charge_to,
-        energy_cost=track.battery_cost + charge_from - charge_to - rounding,
-        energy_floor=track.battery_min - slack - charge_from,
+        straight_give=np.maximum(straight_give, 0.0) * (not is_free),
+        energy_from=energy_from,
+        energy_to=energy_to,
+        energy_cap=track.battery_full - energy_to,
+        energy_cost=track.battery_cost + energy_from - energy_to - rounding,
+        energy_floor=floor - slack - energy_from,
         data_gain=track.recorder_gain - spent,
         data_floor=-data_from,
         data_before=top - track.telemetry_per_s * track.data_peak_s,
@@ -113,15 +137,22 @@ def _network(problem: Problem, satellite: SatelliteProblem, slack: float) -> Net
     )
 
 
+def _sources(first: Longs) -> Ints:
+    """Return the task that each arc of a list by tasks belongs to."""
+    return np.repeat(np.arange(len(first) - 1, dtype=np.int32), np.diff(first))
+
+
 @kernel
-def _arcs(precedence: Precedence) -> tuple[Ints, Longs, Ints]:
-    """Return from where on everything may follow each task, and what may before that."""
+def _arcs(precedence: Precedence, charged_from: Longs) -> tuple[Ints, Longs, Ints]:
+    """Return from where on everything may follow each task for nothing, and what may before."""
     m = len(precedence.near_from)
     idle_from = np.empty(m, dtype=np.int32)
     first = np.zeros(m + 1, dtype=np.int64)
     for i in range(m):
-        last = precedence.far_from[i]
-        while last > precedence.near_from[i] and comes_before(precedence, i, last - 1):
+        last = max(precedence.far_from[i], charged_from[i])
+        while last > max(precedence.near_from[i], charged_from[i]) and comes_before(
+            precedence, i, last - 1
+        ):
             last -= 1
         idle_from[i] = last
         first[i + 1] = first[i]
@@ -148,6 +179,17 @@ def may_be_next(network: Network, i: int, k: int) -> bool:
     return False
 
 
+@inlined
+def give_between(network: Network, i: int, k: int) -> float:
+    """Return what the arc from row ``i`` to ``k`` gives back; nothing from the start, ``i`` < 0."""
+    if i < 0 or k >= network.idle_from[i]:
+        return 0.0
+    for at in range(network.near_first[i], network.near_first[i + 1]):
+        if network.near_rows[at] == k:
+            return float(network.near_give[at])
+    return 0.0
+
+
 @kernel
 def part_of(network: Network, rows: Ints) -> Network:
     """Return the network of some rows only, ascending; levels stay those of the whole."""
@@ -158,6 +200,7 @@ def part_of(network: Network, rows: Ints) -> Network:
     idle_from = np.searchsorted(rows, network.idle_from[rows]).astype(np.int32)
     first = np.zeros(m + 1, dtype=np.int64)
     near_rows = np.empty(len(network.near_rows), dtype=np.int32)
+    near_give = np.empty(len(network.near_rows))
     num_arcs = 0
     for new in range(m):
         row = rows[new]
@@ -165,10 +208,18 @@ def part_of(network: Network, rows: Ints) -> Network:
             j = new_row[network.near_rows[at]]
             if j >= 0:
                 near_rows[num_arcs] = j
+                near_give[num_arcs] = network.near_give[at]
                 num_arcs += 1
         first[new + 1] = num_arcs
-    near_rows = near_rows[:num_arcs].copy()
+    near_rows, near_give = near_rows[:num_arcs].copy(), near_give[:num_arcs].copy()
     straight_first, straight_rows = reversed_arcs(Arcs(first, near_rows))
+    straight_give = np.empty(num_arcs)
+    filled = straight_first[:-1].copy()
+    for new in range(m):
+        for at in range(first[new], first[new + 1]):
+            j = near_rows[at]
+            straight_give[filled[j]] = near_give[at]
+            filled[j] += 1
     return Network(
         network.place[rows],
         network.is_contact[rows],
@@ -177,8 +228,12 @@ def part_of(network: Network, rows: Ints) -> Network:
         np.argsort(idle_from, kind="mergesort").astype(np.int32),
         first,
         near_rows,
+        near_give,
         straight_first,
         straight_rows,
+        straight_give,
+        network.energy_from[rows],
+        network.energy_to[rows],
         network.energy_cap[rows],
         network.energy_cost[rows],
         network.energy_floor[rows],

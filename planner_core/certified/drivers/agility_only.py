@@ -14,14 +14,15 @@ from typing import Final
 import numpy as np
 
 from planner_core.budget import Budget
-from planner_core.certified.dp.elementary import memory_of
 from planner_core.certified.incumbent import Incumbent, is_optimal
 from planner_core.certified.lns.search import WindowSearch
 from planner_core.certified.mip.model import plan_program
 from planner_core.certified.mip.program import Program
 from planner_core.certified.mip.prover import Prover
 from planner_core.certified.mip.restricted_master import Master
-from planner_core.certified.multipliers.elementary import ElementaryPrices
+from planner_core.certified.multipliers.ascent import Ascent
+from planner_core.certified.multipliers.elementary import ascent_on_passes
+from planner_core.certified.multipliers.paths import ascent_on_paths
 from planner_core.certified.proofs.bound import Bound, accessible, rounded_bound
 from planner_core.certified.proofs.certificate import (
     Certificate,
@@ -30,8 +31,7 @@ from planner_core.certified.proofs.certificate import (
     is_below,
     values_through,
 )
-from planner_core.certified.proofs.lagrangian import default_steps, priced_bound
-from planner_core.precedence.arcs import arc_network_of
+from planner_core.certified.proofs.lagrangian import default_epochs
 from planner_core.precedence.network import network_of
 from planner_core.precedence.relation import is_transitive, num_near_pairs
 from planner_core.problem import (
@@ -57,6 +57,7 @@ _REPORT_EVERY_S: Final = 0.25
 _SHARE: Final = 0.1  # moves for each task, where prices of passes take turns with them
 _PATIENT: Final = 20.0  # moves for each task without a better plan, in such problems
 _ROUNDS: Final = 4  # of such prices
+_EPOCHS_A_ROUND: Final = 5
 _MOST_TASKS: Final = 12_000  # that cutting planes and HiGHS are tried on, in such accesses
 
 
@@ -91,7 +92,7 @@ class FreeSearch:
         self._windows: WindowSearch | None = None
         self._window_rows: Ints = self._rows[:0]
         self._network = network_of(self.problem)
-        self._prices: ElementaryPrices | None = None
+        self._prices: Ascent | None = None
         self._certified = accessible(self.problem).value
         self.through: Floats = np.full(len(self._rows), self._certified)
 
@@ -136,25 +137,18 @@ class FreeSearch:
 
     def price(self) -> None:
         """Search for prices anew over what is open."""
-        _, prices = priced_bound(
-            self._rest,
-            self._network,
-            self.best.reward,
-            default_steps(len(self._rows)),
-            self.budget.stop,
-        )
-        self.step(Multipliers(prices=prices))
+        ascent = ascent_on_paths(self._rest, self._network, default_epochs(len(self._rows)), 0)
+        ascent.run(self.best.reward, self.budget.stop)
+        self.step(Multipliers(prices=ascent.multipliers))
 
     def price_passes(self, num_rounds: int) -> None:
         """Search for prices by which no target is paid twice in one pass over it."""
         if self._prices is None:
-            arcs = arc_network_of(self.problem)
-            memory = memory_of(self.problem, arcs)
-            self._prices = ElementaryPrices(self.problem, arcs, memory, self.seed)
+            self._prices = ascent_on_passes(self.problem, self.seed)
         for _ in range(num_rounds):
             if not self.best.is_done:
-                self._prices.improve(1, self.budget.stop)
-                value, prices = self._prices.bound, self._prices.prices
+                self._prices.improve(_EPOCHS_A_ROUND, self.budget.stop)
+                value, prices = self._prices.value, self._prices.multipliers
                 self.best.lower(
                     Bound(value=value, proof="lagrangian", prices=prices, is_elementary=True)
                 )
@@ -168,7 +162,7 @@ class FreeSearch:
     @property
     def is_priced_out(self) -> bool:
         """Whether prices of targets alone will not bring the bound down any more."""
-        return self._prices is not None and self._prices.is_worn_out
+        return self._prices is not None and self._prices.is_settled
 
     def search(self, moves_per_task: float, rows: Ints) -> bool:
         """Search windows among some of the problem's tasks; return whether that helped."""

@@ -11,8 +11,9 @@ from planner_core.budget import Budget, Termination
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.continuous_search import ContinuousSearch
 from planner_core.certified.lns.insertion_with_resources import filled_with_resources
+from planner_core.certified.multipliers.chains import ascend_on_chains
 from planner_core.certified.proofs.bound import Bound
-from planner_core.certified.proofs.continuous import quick_bound, search_prices
+from planner_core.certified.proofs.continuous import quick_bound
 from planner_core.problem import Problem
 from planner_core.problem.plan import Plan
 from planner_core.solvers.base import Solution
@@ -61,7 +62,7 @@ def _price(best: Incumbent) -> None:
     """Search for multipliers that prove a bound."""
     if best.is_close or best.budget.is_spent():
         return
-    for value, prices in search_prices(best.problem, best.budget.stop):
+    for value, prices in ascend_on_chains(best.problem, best.budget.stop):
         best.lower(Bound(value=value, proof="lagrangian", prices=prices))
         best.report("prices")
         if best.is_done:

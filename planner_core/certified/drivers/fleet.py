@@ -27,10 +27,10 @@ from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.fleet_start import priced_start
 from planner_core.certified.lns.search import WindowSearch, num_choices
 from planner_core.certified.mip.solution_pool import PlanPool
-from planner_core.certified.multipliers.incremental import IncrementalPrices
+from planner_core.certified.multipliers.paths import ascent_on_paths
 from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.proofs.certificate import Multipliers
-from planner_core.certified.proofs.lagrangian import default_steps
+from planner_core.certified.proofs.lagrangian import default_epochs
 from planner_core.precedence.network import heaviest_through, network_of
 from planner_core.problem import COLLECT, Bools, Floats, Problem
 from planner_core.problem.plan import Plan
@@ -43,7 +43,7 @@ _NEAR: Final = 0.2  # of a reward, that a task of a large fleet's search may cos
 _EPOCHS_AT_A_TIME: Final = 10
 _EPOCHS_TO_START: Final = 80  # until a first plan is worth making
 _SMALL: Final = 60_000  # opportunities for which cutting planes are tried
-_EPOCHS: Final = (250, 500)  # at least and at most
+_LEAST_EPOCHS: Final = 250
 _STREAMS: Final = 2  # of a small fleet, that a plan does not hang on one start
 _MOVES_AT_A_TIME: Final = 500
 _MERGED_EVERY: Final = 4  # times of these
@@ -57,9 +57,8 @@ class FleetSearch:
         self._seed = seed
         self._network = network_of(self.problem)
         self._worth = self.problem.worth[self._network.row]
-        most = np.append(self.problem.best_worth, 0.0)
-        num_epochs = int(np.clip(default_steps(len(self._network.row)), *_EPOCHS))
-        self._dual = IncrementalPrices(self._network, self._worth, most, num_epochs, seed)
+        num_epochs = max(_LEAST_EPOCHS, default_epochs(len(self._network.row)))
+        self._dual = ascent_on_paths(self.problem, self._network, num_epochs, seed)
 
     @property
     def _is_small(self) -> bool:
@@ -68,7 +67,7 @@ class FleetSearch:
     @property
     def prices(self) -> Floats:
         """The multipliers that prove the bound. Shape ``(num_targets,)``."""
-        return self._dual.prices[:-1]
+        return self._dual.multipliers
 
     def price(self, num_epochs: float = math.inf) -> None:
         """Search for prices, so long or until more steps are of little use."""
@@ -90,7 +89,7 @@ class FleetSearch:
         table, kept = self.problem.opportunities, self.problem.kept_rows
         taken = np.zeros(len(self.problem.target_ids) + 1, dtype=np.bool_)
         taken[table.place[kept[table.kind[kept] == COLLECT]]] = True
-        rows = priced_start(self._network, self._worth, self._dual.prices, taken, seed)
+        rows = priced_start(self._network, self._worth, np.append(self.prices, 0.0), taken, seed)
         return Plan.of(self.problem, rows).with_kept(self.problem)
 
     def search(self, moves_per_task: float) -> None:
@@ -130,7 +129,7 @@ class FleetSearch:
 
         Shape ``(num_opportunities,)``.
         """
-        price = self._dual.prices[self._network.place]
+        price = np.append(self.prices, 0.0)[self._network.place]
         total, through = heaviest_through(self._network, weights(self._worth, price))
         cost = total - through + np.maximum(price - self._worth, 0.0)
         is_near = np.zeros(len(self.problem.opportunities), dtype=np.bool_)

@@ -25,7 +25,7 @@ from planner_core.certified.lns.choices import ChoiceSearch
 from planner_core.certified.mip.contact_sets import FixedContacts, Relaxation
 from planner_core.certified.mip.program_search import ProgramSearch
 from planner_core.certified.mip.solution_pool import PlanPool
-from planner_core.certified.multipliers.energy import EnergyPrices
+from planner_core.certified.multipliers.energy import EnergyPaths, ascent_on_energy
 from planner_core.certified.multipliers.resources import PriceSearch
 from planner_core.certified.proofs.bound import Bound, rounded_bound
 from planner_core.certified.proofs.lagrangian import lagrangian_bound
@@ -323,13 +323,16 @@ class _FleetPricing:
     def __init__(self, search: ResourceSearch) -> None:
         self._search = search
         self.steps_beside = _BESIDE_PRICES[search.is_fleet]
-        self._energy = EnergyPrices(search.problem, search.prices(), _FLEET_ROUNDS, search.seed)
+        self._paths = EnergyPaths(search.problem)
+        self._energy = ascent_on_energy(
+            search.problem, self._paths, search.prices(), _FLEET_ROUNDS, search.seed
+        )
         self._num_steps = 0
         self.prices: PriceSearch | None = None
 
     @property
     def usage(self) -> Floats:
-        return self._energy.usage
+        return self._paths.usage
 
     @property
     def is_settled(self) -> bool:
@@ -339,13 +342,15 @@ class _FleetPricing:
         """Ask by energy alone some more, or prove something."""
         search, energy = self._search, self._energy
         if not energy.is_settled:
+            # What takes opportunities counts from here on: answers come near the best plans.
+            self._paths.usage[:] = 0.0
             energy.improve(_ROUNDS_AT_A_TIME, search.budget.stop)
             return
         if self.prices is None:
             self.prices = PriceSearch(
                 search.problem,
                 min(search.best.bound.value, energy.value),
-                energy.prices,
+                energy.multipliers,
                 search.budget.stop,
             )
             self.prices.learn(search.best.plan)
@@ -383,12 +388,13 @@ def _first_prices(search: ResourceSearch) -> PriceSearch:
     known by much, the exact programme is not asked at its multipliers either.
     """
     best, known = search.best, search.prices()
-    energy = EnergyPrices(search.problem, known, _ROUNDS_AT_A_TIME, search.seed)
+    paths = EnergyPaths(search.problem)
+    energy = ascent_on_energy(search.problem, paths, known, _ROUNDS_AT_A_TIME, search.seed)
     energy.ask()
     before = energy.value
     energy.improve(_ROUNDS_AT_A_TIME, search.budget.stop)
     value = min(best.bound.value, energy.value)
-    prices = PriceSearch(search.problem, value, energy.prices, search.budget.stop)
+    prices = PriceSearch(search.problem, value, energy.multipliers, search.budget.stop)
     prices.learn(best.plan)
     if energy.value < before - _WORTH_A_STEP * before:
         search.price(prices, 1)

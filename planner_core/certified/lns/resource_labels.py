@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from planner_core.bundles import bundle
-from planner_core.certified.dp.resource_network import Network, may_be_next
+from planner_core.certified.dp.resource_network import Network, give_between, may_be_next
 from planner_core.jit import borrowing
 from planner_core.problem import (
     Bools,
@@ -170,8 +170,9 @@ def best_label(
     # Labels of tasks ahead of one that must be taken lead nowhere.
     earliest, starts_open = low, False
     best, best_energy, best_label = -np.inf, -np.inf, NOWHERE
+    given = give_between(network, left, right) if right < m else 0.0
     if (
-        energy >= need
+        energy + given >= need
         and data <= bears
         and (left < 0 or right >= m or may_be_next(network, left, right))
     ):
@@ -200,18 +201,20 @@ def best_label(
         count = 0
         for i in range(num_idle):
             count = _extend(
-                ground, room, low, k, begin, count,
+                ground, room, low, k, begin, count, 0.0,
                 room.idle_value[i], room.idle_energy[i], room.idle_data[i], room.idle_label[i],
             )  # fmt: skip
         for arc in range(network.straight_first[k], network.straight_first[k + 1]):
-            i = network.straight_rows[arc]
+            i, give = network.straight_rows[arc], network.straight_give[arc]
             if i == left and not starts_open:
-                count = _extend(ground, room, low, k, begin, count, 0.0, energy, data, _AT_START)
+                count = _extend(
+                    ground, room, low, k, begin, count, give, 0.0, energy, data, _AT_START
+                )
             elif i >= earliest:
                 first = (i - low) * LABELS
                 for label in range(first, first + room.num_labels[i - low]):
                     count = _extend(
-                        ground, room, low, k, begin, count,
+                        ground, room, low, k, begin, count, give,
                         room.value[label], room.energy[label], room.data[label], label,
                     )  # fmt: skip
         room.num_labels[at] = count
@@ -223,8 +226,9 @@ def best_label(
             room.next_idle[at] = room.first_idle[to]
             room.first_idle[to] = at
         if count > 0 and (right >= m or may_be_next(network, k, right)):
+            given = give_between(network, k, right) if right < m else 0.0
             for label in range(begin, begin + count):
-                if room.energy[label] < need or room.data[label] > bears:
+                if room.energy[label] + given < need or room.data[label] > bears:
                     continue
                 if room.value[label] > best or (
                     room.value[label] == best and room.energy[label] > best_energy
@@ -236,14 +240,17 @@ def best_label(
 
 @borrowing
 def _extend(
-    ground: Ground, room: Room, low: int, k: int, begin: int, count: int,
+    ground: Ground, room: Room, low: int, k: int, begin: int, count: int, give: float,
     value: float, energy: float, data: float, label: int,
 ) -> int:  # fmt: skip
-    """Take a task after a label; return how many labels the task has then."""
+    """Take a task after a label; return how many labels the task has then.
+
+    ``give`` is what the way to it gives back.
+    """
     network = ground.network
     if data > network.data_before[k]:
         return count
-    energy = min(energy, network.energy_cap[k]) - network.energy_cost[k]
+    energy = min(energy + give, network.energy_cap[k]) - network.energy_cost[k]
     data = max(network.data_floor[k], data + network.data_gain[k])
     if energy < network.energy_floor[k] or data > network.data_after[k]:
         return count

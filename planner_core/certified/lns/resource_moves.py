@@ -11,6 +11,7 @@ from typing import Final
 
 import numpy as np
 
+from planner_core.certified.dp.resource_network import give_between
 from planner_core.certified.lns.moves import FREE, Taken
 from planner_core.certified.lns.resource_labels import (
     LABELS,
@@ -103,11 +104,14 @@ def _state_after(ground: Ground, taken: Taken, last: int) -> tuple[float, float,
     """Return energy and data after the plan's tasks up to one, and whether limits are kept."""
     network = ground.network
     energy, data = network.energy_start, network.data_start
+    before = -1
     for k in range(last + 1):
         if not taken.is_taken[ground.rows[k]]:
             continue
         if data > network.data_before[k]:
             return energy, data, False
+        energy += give_between(network, before, k)
+        before = k
         energy = min(energy, network.energy_cap[k]) - network.energy_cost[k]
         data = max(network.data_floor[k], data + network.data_gain[k])
         if energy < network.energy_floor[k] or data > network.data_after[k]:
@@ -121,9 +125,12 @@ def _wanted_before(ground: Ground, taken: Taken, first: int) -> tuple[float, flo
     network = ground.network
     need, bears = -np.inf, network.data_end
     k = len(ground.rows) - 1
+    after = -1
     while k >= first:
         if taken.is_taken[ground.rows[k]]:
-            need = max(need, network.energy_floor[k]) + network.energy_cost[k]
+            given = give_between(network, k, after) if after >= 0 else 0.0
+            need = max(need - given, network.energy_floor[k]) + network.energy_cost[k]
+            after = k
             if need > network.energy_cap[k]:
                 return np.inf, bears
             bears = min(bears, network.data_after[k])

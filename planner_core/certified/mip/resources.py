@@ -19,16 +19,52 @@ sunlight and telemetry is yet to come. Where it begins the limits allow for that
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from typing import Final
 
 import numpy as np
 
 from planner_core.certified.mip.program import Program, Rows
+from planner_core.mdp.idle_energy import IdleEnergy, idle_energy
+from planner_core.precedence.relation import comes_before, direct_precedence
 from planner_core.problem import (
     CONTACT,
     Floats,
     Ints,
     Problem,
     SatelliteProblem,
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Given:
+    """What is given back where two tasks leave no time at the sun; shape ``(num_pairs,)``.
+
+    Each task pays for its turns to the sun and back, as if it always went there. Of two tasks
+    that follow each other sooner the charge between them would be negative.
+
+    Attributes
+    ----------
+    first, second
+        The tasks.
+    amount
+        Of the battery.
+    """
+
+    first: Ints
+    second: Ints
+    amount: Floats
+
+    def of_part(self, rows: Ints, num_tasks: int) -> Given:
+        """Return the pairs among some of the tasks."""
+        new_row = np.full(num_tasks, -1, dtype=np.int32)
+        new_row[rows] = np.arange(len(rows))
+        first, second = new_row[self.first], new_row[self.second]
+        is_left = (first >= 0) & (second >= 0)
+        return Given(first=first[is_left], second=second[is_left], amount=self.amount[is_left])
+
+
+NOTHING_GIVEN: Final = Given(
+    first=np.empty(0, dtype=np.int32), second=np.empty(0, dtype=np.int32), amount=np.empty(0)
 )
 
 
@@ -52,6 +88,8 @@ class ResourceTerms:
         Highest level until the next task begins.
     recorder_top_first
         Highest level before the first task.
+    given
+        What is given back to pairs of tasks.
     """
 
     energy_cost: Floats
@@ -64,6 +102,7 @@ class ResourceTerms:
     recorder_floor_taken: Floats
     recorder_top: Floats
     recorder_top_first: float
+    given: Given = NOTHING_GIVEN
 
     def of_part(self, rows: Ints) -> ResourceTerms:
         """Return the terms where only some of the tasks may be taken, in ascending order.
@@ -82,8 +121,10 @@ class ResourceTerms:
         )
 
     def _at(self, rows: Ints) -> ResourceTerms:
-        names = [f.name for f in fields(self) if f.name != "recorder_top_first"]
-        return replace(self, **{name: getattr(self, name)[rows] for name in names})
+        others = ("recorder_top_first", "given")
+        names = [f.name for f in fields(self) if f.name not in others]
+        part = {name: getattr(self, name)[rows] for name in names}
+        return replace(self, given=self.given.of_part(rows, len(self.full)), **part)
 
 
 def resource_terms(problem: Problem, satellite: SatelliteProblem) -> ResourceTerms:
@@ -94,30 +135,32 @@ def resource_terms(problem: Problem, satellite: SatelliteProblem) -> ResourceTer
 
 
 def physical_terms(problem: Problem, satellite: SatelliteProblem) -> ResourceTerms:
-    """Return the terms of ``dynamics: physical``: all time outside tasks charges."""
+    """Return the terms of ``dynamics: physical``: time outside tasks charges, but for turns."""
     r = satellite.resources
     start_s, end_s = satellite.start_s, satellite.end_s
     is_contact = satellite.kind == CONTACT
     draw, gain = _task_totals(satellite)
-    sunlit_start_s = satellite.sunlight.seconds_until(start_s)
-    sunlit_end_s = satellite.sunlight.seconds_until(end_s)
-    charged = r.sunpoint_charge_per_s * sunlit_start_s
-    cost = draw + r.sunpoint_charge_per_s * (sunlit_end_s - sunlit_start_s)
-    floor = r.battery_min_fraction - r.sunpoint_charge_per_s * sunlit_end_s
+    idle = idle_energy(satellite, problem.horizon_s)
+    idle_drawn_from, idle_drawn_to = r.idle_drain_per_s * end_s, r.idle_drain_per_s * start_s
+    charged_from = r.sunpoint_charge_per_s * idle.sun_from_s - idle_drawn_from
+    charged_to = r.sunpoint_charge_per_s * idle.sun_until_s - idle_drawn_to
+    cost = draw + r.sunpoint_charge_per_s * (idle.sun_from_s - idle.sun_until_s)
+    cost = cost + (idle_drawn_to - idle_drawn_from)
+    floor = r.battery_min_fraction + idle.reserve - charged_from
     next_s = np.append(start_s[1:], problem.horizon_s)
     emptied = np.where(is_contact, -r.telemetry_per_s * end_s, np.inf)
     return ResourceTerms(
         energy_cost=cost,
         cap_cost=cost,
-        full=1.0 - charged,
-        battery_floor=r.battery_min_fraction
-        - r.sunpoint_charge_per_s * _latest_running(satellite, sunlit_start_s, sunlit_end_s),
+        full=idle.full - charged_to,
+        battery_floor=_floor_of_any(satellite, floor, charged_from, charged_to),
         battery_floor_taken=floor,
         data_gain=gain,
         recorder_floor=np.minimum.accumulate(np.minimum(emptied, 0.0)),
         recorder_floor_taken=np.where(is_contact, emptied, -np.inf),
         recorder_top=r.recorder_max_fraction - r.telemetry_per_s * next_s,
         recorder_top_first=r.recorder_max_fraction - r.telemetry_per_s * float(start_s[0]),
+        given=_given(satellite, idle),
     )
 
 
@@ -152,20 +195,47 @@ def _task_totals(satellite: SatelliteProblem) -> tuple[Floats, Floats]:
     r = satellite.resources
     duration_s = satellite.end_s - satellite.start_s
     is_contact = satellite.kind == CONTACT
-    draw = np.where(is_contact, r.contact_drain_per_s, r.collect_drain_per_s)
+    draw = np.where(is_contact, r.contact_drain_per_s, r.collect_drain_per_s) + r.idle_drain_per_s
     gain = np.where(is_contact, -r.downlink_per_s, r.collect_fill_per_s)
     return duration_s * draw, duration_s * gain
 
 
-def _latest_running(
-    satellite: SatelliteProblem, sunlit_start_s: Floats, sunlit_end_s: Floats
+def _floor_of_any(
+    satellite: SatelliteProblem, floor: Floats, charged_from: Floats, charged_to: Floats
 ) -> Floats:
-    """Return the sunlit time by which whatever may run at each start has ended."""
-    latest = sunlit_start_s.copy()
+    """Return the lowest level after each task, whichever was the last one taken."""
+    r = satellite.resources
+    if not r.knows_free_charge_alone:
+        start = min(r.initial_battery_fraction, r.battery_min_fraction)
+        return np.minimum.accumulate(np.minimum(floor, start))
+    # Idle time only charges: what may still run at each start has the lowest level.
+    latest = charged_to.copy()
     over = np.searchsorted(satellite.start_s, satellite.end_s)
     for row in range(len(satellite)):
-        np.maximum(latest[row : over[row]], sunlit_end_s[row], out=latest[row : over[row]])
-    return latest
+        np.maximum(latest[row : over[row]], charged_from[row], out=latest[row : over[row]])
+    return r.battery_min_fraction - latest
+
+
+def _given(satellite: SatelliteProblem, idle: IdleEnergy) -> Given:
+    """Return what pairs of tasks get back that leave no time at the sun."""
+    if satellite.resources.sun_pointing == "free":
+        return NOTHING_GIVEN
+    precedence = direct_precedence(satellite)
+    lasts_to = np.minimum.accumulate(idle.sun_until_s[::-1])[::-1]
+    until = np.searchsorted(lasts_to, idle.sun_from_s)
+    first, second = [], []
+    for i, (near, far) in enumerate(zip(precedence.near_from, until, strict=True)):
+        later = [j for j in range(near, far) if comes_before(precedence, i, j)]
+        first += [i] * len(later)
+        second += later
+    pairs = np.array([first, second], dtype=np.int32)
+    lost_s = idle.sun_from_s[pairs[0]] - idle.sun_until_s[pairs[1]]
+    is_given = lost_s > 0.0
+    return Given(
+        first=pairs[0][is_given],
+        second=pairs[1][is_given],
+        amount=satellite.resources.sunpoint_charge_per_s * lost_s[is_given],
+    )
 
 
 def add_resources(
@@ -208,8 +278,7 @@ def _add_battery(
         is_integer=False,
     )
     before = np.concatenate([first, level[:-1]])
-    cost = terms.energy_cost
-    program.add_rows(Rows.aligned((level, 1.0), (before, -1.0), (taken, cost), upper=0.0))
+    _add_changes(program, terms, level, before, taken)
     program.add_rows(Rows.aligned((level, 1.0), (taken, terms.cap_cost), upper=terms.full))
     rise = terms.battery_floor_taken - terms.battery_floor
     high = np.flatnonzero(rise > 0.0)
@@ -218,6 +287,44 @@ def _add_battery(
             (level[high], 1.0), (taken[high], -rise[high]), lower=terms.battery_floor[high] + margin
         )
     )
+
+
+def _add_changes(
+    program: Program, terms: ResourceTerms, level: Ints, before: Ints, taken: Ints
+) -> None:
+    """Let each task take its cost, less what it and one other task are given back.
+
+    A task gets back from one before it and from one after it at most. Between two that do not
+    follow each other there is less to get than from those in between, so that it need not be
+    known which are neighbours.
+    """
+    given, m = terms.given, len(taken)
+    back = program.add_columns(np.zeros(len(given.amount)), is_integer=False)
+    own = np.argsort(given.second, kind="stable")
+    num_back = np.bincount(given.second, minlength=m)
+    at = np.repeat(3 * np.arange(1, m + 1), num_back)
+    columns = np.column_stack([level, before, taken]).ravel()
+    values = np.column_stack([np.ones(m), -np.ones(m), terms.energy_cost]).ravel()
+    program.add_rows(
+        Rows.of(
+            np.concatenate([[0], np.cumsum(3 + num_back)]).astype(np.int64),
+            np.insert(columns, at, back[own]),
+            np.insert(values, at, -given.amount[own]),
+            upper=0.0,
+        )
+    )
+    for side in (given.first, given.second):
+        order = np.argsort(side, kind="stable")
+        tasks, counts = np.unique(side, return_counts=True)
+        ends = np.cumsum(counts)
+        program.add_rows(
+            Rows.of(
+                np.concatenate([[0], np.cumsum(counts + 1)]).astype(np.int64),
+                np.insert(back[order], ends, taken[tasks]),
+                np.insert(np.ones(len(side)), ends, -1.0),
+                upper=0.0,
+            )
+        )
 
 
 def _add_recorder(

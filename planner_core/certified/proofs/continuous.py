@@ -12,7 +12,6 @@ Battery, recorder, stations and antennas are left out, which can only raise the 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
@@ -44,17 +43,9 @@ from planner_core.worth import surplus, weights
 
 LABELS: Final = 2
 _WIDTHS_S: Final = (2.5, 25.0)
-_ROUGH_S: Final = 10.0
-_ROUGH: Final = 50  # rounds of the price search over wide cells
-_FINE: Final = 70  # and over narrow ones
 _FOLLOWERS: Final = 8_000_000  # in the tables of all satellites, more or less
-_MOST_FOLLOWERS: Final = 30_000_000  # of 12 bytes each; with more there is no search for prices
-_STEPS: Final = (0.15, 0.08)  # of prices, at first, in rough and fine rounds
-_SHORTER: Final = 0.96
-_KEPT: Final = 0.85  # of the mean of prices, from round to round
 _CLEAR_S: Final = 60.0
 _LONGEST_S: Final = 15_000.0
-_TOLD: Final = 14
 
 
 def quick_bound(problem: Problem) -> Bound:
@@ -188,65 +179,3 @@ def pieces_of(spans: Spans) -> list[Spans]:
         cut = int(inner[np.argmin(still_open)])
         left += [part_of(piece, slice(0, cut)), part_of(piece, slice(cut, None))]
     return pieces
-
-
-class ContinuousPrices:
-    """A search for good prices.
-
-    After each part's chain the prices of the targets that all chains of the moment take more
-    than once rise and the others fall, by steps that shrink from round to round (an incremental
-    subgradient method). The mean of the prices of late is what is good.
-    """
-
-    def __init__(self, dual: ContinuousDual, prices: Floats, step: float, seed: int = 0) -> None:
-        self.dual, self._step = dual, step
-        self._now = dual.clipped(prices)
-        self.prices = self._now
-        self._random = np.random.default_rng(seed)
-        self._taken = [
-            dual.chain(number, self._now, is_exact=False)[1] for number in range(len(dual.parts))
-        ]
-        self._counts = np.zeros(len(prices))
-        for taken in self._taken:
-            np.add.at(self._counts, taken, 1.0)
-
-    def round(self, budget_stop: Bytes) -> None:
-        """Go once over all parts."""
-        most = self.dual.problem.best_worth
-        for number in self._random.permutation(len(self.dual.parts)).tolist():
-            if budget_stop[0]:
-                return
-            _, taken = self.dual.chain(number, self._now, is_exact=False)
-            np.add.at(self._counts, self._taken[number], -1.0)
-            np.add.at(self._counts, taken, 1.0)
-            self._taken[number] = taken
-            share = self._step / len(self.dual.parts)
-            self._now = self.dual.clipped(self._now + share * most * (self._counts - 1.0))
-        self._step *= _SHORTER
-        self.prices = _KEPT * self.prices + (1.0 - _KEPT) * self._now
-
-
-def search_prices(problem: Problem, stop: Bytes) -> Iterator[tuple[float, Floats]]:
-    """Yield after each round of a search for prices the best bound so far and its prices."""
-    width_s = width_for(problem)
-    if num_followers(problem, width_s) > _MOST_FOLLOWERS:
-        return
-    rough_s = max(_ROUGH_S, width_s)
-    best, prices = np.inf, 0.9 * problem.best_worth
-    proving = prices
-    for cell_s, num_rounds, step in ((rough_s, _ROUGH, _STEPS[0]), (width_s, _FINE, _STEPS[1])):
-        dual = None if stop[0] else ContinuousDual.of(problem, cell_s, stop)
-        if dual is None:
-            return
-        search = ContinuousPrices(dual, prices, step)
-        for number in range(1, num_rounds + 1):
-            search.round(stop)
-            if cell_s == width_s and number % _TOLD == 0 and not stop[0]:
-                value, _ = dual.at(search.prices)
-                if value < best:
-                    best, proving = value, search.prices
-            yield best, proving
-            if stop[0]:
-                return
-        prices = search.prices
-        del dual, search

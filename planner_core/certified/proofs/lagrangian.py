@@ -5,26 +5,18 @@ Then no plan earns more than :math:`\sum_i \lambda_i` plus, for each satellite, 
 of tasks in which collect k of :math:`i` is worth :math:`\max(0, v_k - \lambda_i)` (and may be
 followed by others of :math:`i`).
 Battery, recorder and stations are left out, which can only raise the bound. Prices come from
-a subgradient search; whatever they are, the bound holds.
+an ascent; whatever they are, the bound holds.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from planner_core.certified.dp.elementary import memory_of
-from planner_core.certified.multipliers.elementary import ROUND, ElementaryPrices
-from planner_core.certified.multipliers.incremental import incremental_prices
-from planner_core.certified.multipliers.subgradient import improve_prices
+from planner_core.certified.multipliers.elementary import ascent_on_passes
+from planner_core.certified.multipliers.paths import ascent_on_paths
 from planner_core.certified.proofs.bound import Bound, rounded_bound
-from planner_core.precedence.arcs import arc_network_of
-from planner_core.precedence.network import Network, heaviest_paths, network_of
-from planner_core.problem import (
-    Bytes,
-    Floats,
-    Ints,
-    Problem,
-)
+from planner_core.precedence.network import heaviest_paths, network_of
+from planner_core.problem import Floats, Ints, Problem
 from planner_core.worth import surplus, weights
 
 _NODES_TO_SPEND = 6_000_000
@@ -54,49 +46,33 @@ def lagrangian_value(problem: Problem, prices: Floats) -> tuple[float, Ints]:
     return float(total), counts[:-1]
 
 
-def lagrangian_bound(problem: Problem, reward: float, iterations: int | None = None) -> Bound:
-    """Return a bound, tightened by subgradient steps towards ``reward`` (of a known plan).
+def lagrangian_bound(problem: Problem, reward: float, num_epochs: int | None = None) -> Bound:
+    """Return a bound, tightened by an ascent on the prices until it is down to ``reward``.
 
     Parameters
     ----------
-    iterations
-        How many steps; by default as many as a fraction of a second allows, counted from
-        the size of the problem so that the same problem always gets the same bound.
+    reward
+        Of a known plan.
+    num_epochs
+        How long; by default as long as a fraction of a second allows, counted from the size of
+        the problem so that the same problem always gets the same bound.
     """
-    if iterations is None:
-        iterations = default_steps(len(problem.opportunities))
-    if problem.offers_choice and iterations > 0:
-        arcs = arc_network_of(problem)
-        memory = memory_of(problem, arcs)
-        passes = ElementaryPrices(problem, arcs, memory, 0, num_rounds=iterations // ROUND + 1)
-        passes.improve(iterations // ROUND + 1, np.zeros(1, dtype=np.uint8))
-        value = rounded_bound(problem, passes.bound, reward)
-        return Bound(value=value, proof="lagrangian", prices=passes.prices, is_elementary=True)
-    network = network_of(problem)
-    value, prices = priced_bound(problem, network, reward, iterations, np.zeros(1, dtype=np.uint8))
-    return Bound(value=rounded_bound(problem, value, reward), proof="lagrangian", prices=prices)
+    if num_epochs is None:
+        num_epochs = default_epochs(len(problem.opportunities))
+    is_elementary = problem.offers_choice and num_epochs > 0
+    if is_elementary:
+        ascent = ascent_on_passes(problem, 0, num_epochs)
+    else:
+        ascent = ascent_on_paths(problem, network_of(problem), num_epochs, 0)
+    ascent.run(reward, np.zeros(1, dtype=np.uint8))
+    return Bound(
+        value=rounded_bound(problem, ascent.value, reward),
+        proof="lagrangian",
+        prices=ascent.multipliers,
+        is_elementary=is_elementary,
+    )
 
 
-def default_steps(num_nodes: int) -> int:
-    """Return how many subgradient steps a network is worth."""
-    return int(np.clip(_NODES_TO_SPEND / max(1, num_nodes), 100, 1000))
-
-
-def priced_bound(
-    problem: Problem,
-    network: Network,
-    level: float,
-    num_steps: int,
-    stop: Bytes,
-) -> tuple[float, Floats]:
-    """Return the value that prices prove after so many steps towards ``level``, and the prices."""
-    if sum(len(satellite) > 0 for satellite in problem.satellites) > 1:
-        return incremental_prices(problem, network, level, num_steps, stop)
-    best = np.append(problem.best_worth, 0.0)
-    whole = float(best.sum())
-    prices = best * 0.5
-    worth = problem.worth[network.row]
-    value = improve_prices(network, worth, best, prices, level, num_steps, stop)
-    if whole <= value:
-        return whole, problem.best_worth
-    return float(value), prices[:-1]
+def default_epochs(num_nodes: int) -> int:
+    """Return how many epochs of an ascent a network is worth."""
+    return int(np.clip(_NODES_TO_SPEND / max(1, num_nodes), 100, 500))

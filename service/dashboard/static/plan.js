@@ -139,7 +139,9 @@ export class Plan {
       collects: lane("collect"),
       contacts: lane("contact"),
       sunpoints: lane("sunpoint"),
-      slews: new Lane(turning.map(slewOf)),
+      slews: new Lane(
+        [...turning.map(slewOf), ...satellite.actions.flatMap(sunTurnsOf)].sort((a, b) => a.start - b.start),
+      ),
       eclipses: new Lane(
         (satellite.eclipses ?? []).map(({ start, end }) => ({ start: Date.parse(start), end: Date.parse(end), of: null })),
       ),
@@ -182,6 +184,17 @@ export function spanOf(action) {
 function slewOf(action) {
   const end = Date.parse(action.start);
   return { start: end - (action.slew?.needed_s ?? 0) * 1000, end, of: action };
+}
+
+/** The turns to the sun and back. @param {Action} action */
+function sunTurnsOf(action) {
+  const { start, end } = spanOf(action);
+  const [to, back] = [(action.turn_to_s ?? 0) * 1000, (action.turn_back_s ?? 0) * 1000];
+  const turns = [
+    { start: start - to, end: start, of: action },
+    { start: end, end: end + back, of: action },
+  ];
+  return turns.filter((turn) => turn.end > turn.start);
 }
 
 /**

@@ -184,7 +184,7 @@
 /**
  * @typedef {object} Action
  * @property {string} id
- * @property {"collect" | "contact" | "sunpoint"} mode
+ * @property {"collect" | "contact" | "sunpoint" | "hold"} mode
  * @property {string} start
  * @property {string} end
  * @property {string | null} target_id
@@ -193,6 +193,8 @@
  * @property {number | null} off_nadir_deg
  * @property {number | null} azimuth_deg
  * @property {Slew | null} slew
+ * @property {number | null} [turn_to_s]
+ * @property {number | null} [turn_back_s]
  * @property {number} reward
  * @property {number | null} battery_fraction_end
  * @property {number | null} recorder_fraction_end

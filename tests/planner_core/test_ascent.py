@@ -1,4 +1,4 @@
-"""Incremental prices: whatever they are they bound all plans, and they settle near the best."""
+"""The ascent: whatever the multipliers are they bound all plans, and they settle near the best."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner_core.certified.multipliers.incremental import incremental_prices
-from planner_core.certified.multipliers.subgradient import improve_prices
+from planner_core.certified.multipliers.paths import ascent_on_paths
 from planner_core.certified.proofs.bound import Bound, rounded_bound
 from planner_core.certified.proofs.documents import from_json, is_proven, to_json
 from planner_core.certified.proofs.lagrangian import lagrangian_bound, lagrangian_value
@@ -34,15 +33,21 @@ def crowded(seed: int, num_satellites: int) -> Problem:
 
 
 def settled(problem: Problem, num_epochs: int) -> tuple[float, Floats]:
-    """Return what so many epochs prove, and the prices."""
-    return incremental_prices(problem, network_of(problem), 0.0, num_epochs, GO_ON)
+    """Return what so many epochs prove, and the multipliers."""
+    ascent = ascent_on_paths(problem, network_of(problem), num_epochs, 0)
+    ascent.run(0.0, GO_ON)
+    return ascent.value, ascent.multipliers
 
 
 def best_known(problem: Problem) -> float:
-    """Return what many subgradient steps prove."""
-    network, most = network_of(problem), np.append(problem.best_worth, 0.0)
-    worth = problem.worth[network.row]
-    return improve_prices(network, worth, most, 0.5 * most, 0.0, 3000, GO_ON)
+    """Return what many plain subgradient steps prove, each of all satellites at once."""
+    most = problem.best_worth
+    now, best = 0.5 * most, np.inf
+    for number in range(1, 2001):
+        value, counts = lagrangian_value(problem, now)
+        best = min(best, value)
+        now = np.clip(now + 0.3 / np.sqrt(number) * most * (counts - 1.0), 0.0, most)
+    return best
 
 
 @examples(80)

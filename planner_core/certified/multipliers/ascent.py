@@ -1,0 +1,156 @@
+"""The ascent on the multipliers of targets: one for all kinds of subproblem.
+
+A plan's parts share the targets alone. Each part in turn, in random order, answers the multipliers
+of the moment; after every few answers they move: up where the answers of the moment take a target
+more than once, down where none does. Steps get shorter. The mean of the multipliers settles far
+sooner than they do (an incremental subgradient method, Nedic and Bertsekas 2001); it is the mean
+that is put to all parts at once now and then, which is what proves a bound.
+
+What the parts are, and how one answers, is for an oracle to say: longest paths (``paths``), paths
+that remember targets (``elementary``), batteries (``energy``), chains with free starts
+(``chains``). The exact programmes of ``resources`` take seconds for an answer and have too few
+parts for turns: their steps are longer, and follow the value.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+import numpy as np
+
+from planner_core.jit import kernel
+from planner_core.problem import Bytes, Floats, Ints
+
+_NEWEST: Final = 0.15  # share of an epoch's multipliers in the mean
+_MOVES: Final = 24  # of the multipliers in an epoch, at most
+
+
+class Oracle(Protocol):
+    """What answers multipliers: subproblems that share nothing but the targets.
+
+    Multipliers and counts have an entry for each target and a last one for contacts, which stays
+    zero.
+    """
+
+    @property
+    def parts(self) -> Ints:
+        """The parts that have anything to do."""
+
+    def answer(self, parts: Ints, multipliers: Floats, count: Ints) -> None:
+        """Let some parts answer anew.
+
+        Parameters
+        ----------
+        count
+            How many of the latest answers take each target; changed in place.
+        """
+
+    def gain(self, multipliers: Floats) -> float:
+        """Return the most that all parts can gain at these multipliers."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Steps:
+    """How far multipliers move.
+
+    Attributes
+    ----------
+    first, last
+        What a multiplier moves in the first epoch and in the last one, all parts together, for
+        each answer too many; a share of what the target is worth.
+    num_epochs
+        After how many more are of little use.
+    asked_every
+        So many epochs the mean is asked for what it proves.
+    """
+
+    first: float
+    last: float
+    num_epochs: int
+    asked_every: int = 5
+
+
+class Ascent:
+    """Multipliers that get better epoch by epoch; in each every part answers once.
+
+    The same for the same seed, however many epochs are asked for at a time.
+
+    Parameters
+    ----------
+    most
+        The best worth of each target. Shape ``(num_targets,)``.
+    begin
+        The multipliers at first. Shape ``(num_targets,)``.
+
+    Attributes
+    ----------
+    value, multipliers
+        The least bound that was proven so far, and what proves it. Shape ``(num_targets,)``.
+    """
+
+    def __init__(
+        self, oracle: Oracle, most: Floats, begin: Floats, steps: Steps, seed: int
+    ) -> None:
+        self._oracle, self._steps = oracle, steps
+        self._most = np.append(most, 0.0)
+        self._now = np.clip(np.append(begin, 0.0), 0.0, self._most)
+        self._mean = self._now.copy()
+        self._count = np.zeros(len(self._now), dtype=np.int32)
+        self._rng = np.random.default_rng(seed)
+        self._epoch = 0
+        # Each target for its whole worth, and nothing for any task.
+        self.value, self.multipliers = float(most.sum()), most
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether more epochs are of little use."""
+        return self._epoch >= self._steps.num_epochs
+
+    @property
+    def mean(self) -> Floats:
+        """The mean of the multipliers of late. Shape ``(num_targets,)``."""
+        mean: Floats = self._mean[:-1]
+        return mean
+
+    def improve(self, num_epochs: int, stop: Bytes) -> None:
+        """Let all parts answer so many times, and prove a bound now and then."""
+        for _ in range(num_epochs):
+            self._go_round(stop)
+            if stop[0]:
+                return
+            self._epoch += 1
+            self._mean += _NEWEST * (self._now - self._mean)
+            if self._epoch % self._steps.asked_every == 0:
+                self.ask()
+
+    def run(self, level: float, stop: Bytes) -> None:
+        """Go on until more epochs are of little use, or the bound is down to ``level``."""
+        while not (self.is_settled or self.value <= level or stop[0]):
+            self.improve(self._steps.asked_every, stop)
+
+    def _go_round(self, stop: Bytes) -> None:
+        steps, parts = self._steps, self._rng.permutation(self._oracle.parts)
+        num_moves = min(_MOVES, len(parts))
+        shorter = (steps.last / steps.first) ** (self._epoch / max(1, steps.num_epochs))
+        # Before all have answered nothing is known of what is taken twice.
+        length = steps.first * shorter / max(1, num_moves) if self._epoch else 0.0
+        for move in range(num_moves):
+            if stop[0]:
+                return
+            some = parts[len(parts) * move // num_moves : len(parts) * (move + 1) // num_moves]
+            self._oracle.answer(some, self._now, self._count)
+            _move(self._now, self._most, self._count, length)
+
+    def ask(self) -> None:
+        """Note what the mean of the multipliers proves."""
+        value = float(self._mean.sum()) + self._oracle.gain(self._mean)
+        if value < self.value:
+            self.value, self.multipliers = value, self._mean[:-1].copy()
+
+
+@kernel
+def _move(now: Floats, most: Floats, count: Ints, length: float) -> None:
+    """Move multipliers in place, each within 0 and the best worth of its target."""
+    for i in range(len(now)):
+        now[i] = min(max(now[i] + length * most[i] * (count[i] - 1), 0.0), most[i])

@@ -1,0 +1,84 @@
+"""Longest paths by agility alone, as an oracle."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planner_core.certified.multipliers.ascent import Ascent, Steps
+from planner_core.jit import kernel
+from planner_core.precedence.network import Network, heaviest_path, heaviest_paths
+from planner_core.problem import Bools, Floats, Ints, Problem
+
+_FIRST_STEP, _LAST_STEP = 0.5, 5e-4
+_BEGIN = 0.5  # of what targets are worth
+
+
+class Paths:
+    """The longest path of each part of a network at given multipliers."""
+
+    def __init__(self, problem: Problem, network: Network) -> None:
+        n = len(network.row)
+        self._network, self._worth = network, problem.worth[network.row]
+        self.parts: Ints = np.flatnonzero(np.diff(network.first)).astype(np.int32)
+        self._weight, self._value = np.empty(n), np.empty(n)
+        self._previous = np.empty(n, dtype=np.int32)
+        self._ends = np.empty(len(network.first) - 1, dtype=np.int32)
+        self._is_on_path = np.zeros(n, dtype=np.bool_)
+
+    def answer(self, parts: Ints, multipliers: Floats, count: Ints) -> None:
+        """Give some parts new paths."""
+        _answer(
+            self._network, parts, self._worth, multipliers, count, self._is_on_path,
+            self._weight, self._value, self._previous,
+        )  # fmt: skip
+
+    def gain(self, multipliers: Floats) -> float:
+        """Return what the longest paths of all parts are worth."""
+        np.take(multipliers, self._network.place, out=self._weight)
+        np.maximum(self._worth - self._weight, 0.0, out=self._weight)
+        return float(
+            heaviest_paths(self._network, self._weight, self._value, self._previous, self._ends)
+        )
+
+
+def ascent_on_paths(problem: Problem, network: Network, num_epochs: int, seed: int) -> Ascent:
+    """Return the ascent on what longest paths prove."""
+    steps = Steps(first=_FIRST_STEP, last=_LAST_STEP, num_epochs=num_epochs)
+    begin = _BEGIN * problem.best_worth
+    return Ascent(Paths(problem, network), problem.best_worth, begin, steps, seed)
+
+
+@kernel
+def _answer(
+    network: Network,
+    parts: Ints,
+    worth: Floats,
+    multipliers: Floats,
+    count: Ints,
+    is_on_path: Bools,
+    weight: Floats,
+    value: Floats,
+    previous: Ints,
+) -> None:
+    """Give each of some parts a new path, all in place.
+
+    Parameters
+    ----------
+    count, is_on_path
+        How many of the current paths take each place, and which nodes those are.
+    weight, value, previous
+        Room to work in. Shape ``(n,)``.
+    """
+    for part in parts:
+        for a in range(network.first[part], network.first[part + 1]):
+            weight[a] = max(0.0, worth[a] - multipliers[network.place[a]])
+            if is_on_path[a]:
+                is_on_path[a] = False
+                count[network.place[a]] -= 1
+        _, at = heaviest_path(network, part, weight, value, previous)
+        while at >= 0:
+            # What is worth nothing is only passed through.
+            if weight[at] > 0.0:
+                is_on_path[at] = True
+                count[network.place[at]] += 1
+            at = previous[at]

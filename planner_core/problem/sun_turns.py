@@ -1,0 +1,124 @@
+"""Turns from the line of sight of a task to the sun, and back.
+
+Panels charge at the sun. Their normal is fixed to the body at ``panel_angle_deg`` from the
+boresight, and the rotation about the boresight is free: the boresight then stands anywhere on a
+cone about the sun, and the least turn to it is the difference of two angles. At 180 deg the cone
+is a line and the turn is exact; at other angles a visit may arrive at one point of the cone and
+leave from another, which is not counted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from planner_core.domain import Agility, Resources
+from planner_core.jit import kernel
+from planner_core.problem.slew import INSTANT, Vector, angle_between_deg, slew_s
+
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SunPath:
+    """Where the sun stands during the horizon, in the inertial (TEME) frame.
+
+    Attributes
+    ----------
+    step_s
+        From one direction to the next, an hour or so: the sun moves by 1 deg a day.
+    directions
+        Unit vectors, at least two, from the start of the horizon on. Shape ``(n, 3)``.
+    """
+
+    step_s: float
+    directions: Floats
+
+
+class SunTurns(NamedTuple):
+    """Seconds from the end of each task to the sun, and from there to its start; ``(m,)``."""
+
+    out_s: Floats
+    back_s: Floats
+
+
+def sun_turn_s(
+    resources: Resources, agility: Agility, sun: SunPath | None, line_of_sight: Vector, t_s: float
+) -> float:
+    """Return the time to turn between a line of sight and the sun, settling included."""
+    lines = np.array([line_of_sight], dtype=np.float64)
+    return float(_turns_s(resources, agility, sun, lines, np.array([t_s]))[0])
+
+
+def sun_turns(
+    resources: Resources,
+    agility: Agility,
+    sun: SunPath | None,
+    *,
+    start_s: Floats,
+    end_s: Floats,
+    looks: Floats,
+    looked: Floats,
+) -> SunTurns:
+    """Return the turns of many tasks.
+
+    Parameters
+    ----------
+    start_s, end_s
+        Of the tasks. Shape ``(m,)``.
+    looks, looked
+        Lines of sight then. Shape ``(m, 3)``.
+    """
+    return SunTurns(
+        out_s=_turns_s(resources, agility, sun, looked, end_s),
+        back_s=_turns_s(resources, agility, sun, looks, start_s),
+    )
+
+
+def _turns_s(
+    resources: Resources, agility: Agility, sun: SunPath | None, looks: Floats, t_s: Floats
+) -> Floats:
+    """Return the turns between lines of sight, each at its instant, and the sun.
+
+    Raises
+    ------
+    ValueError
+        The problem does not know where the sun is.
+    """
+    if resources.sun_pointing == "free":
+        return np.zeros(len(t_s))
+    if sun is None:
+        raise ValueError("turns to the sun need to know where it is")
+    acceleration = agility.acceleration_deg_s2 or INSTANT
+    turns_s = _least_turns_s(
+        float(sun.step_s), sun.directions, looks, np.asarray(t_s, dtype=np.float64),
+        float(resources.panel_angle_deg), float(agility.slew_rate_deg_s), float(acceleration),
+    )  # fmt: skip
+    return turns_s + agility.settle_s
+
+
+@kernel
+def _least_turns_s(
+    step_s: float,
+    directions: Floats,
+    looks: Floats,
+    t_s: Floats,
+    panel_angle_deg: float,
+    rate_deg_s: float,
+    acceleration_deg_s2: float,
+) -> Floats:
+    turns_s = np.empty(len(t_s))
+    for i in range(len(t_s)):
+        k = min(max(int(t_s[i] / step_s), 0), len(directions) - 2)
+        u = t_s[i] / step_s - k
+        # Not of length 1 between two directions; the angle does not mind.
+        x = (1.0 - u) * directions[k, 0] + u * directions[k + 1, 0]
+        y = (1.0 - u) * directions[k, 1] + u * directions[k + 1, 1]
+        z = (1.0 - u) * directions[k, 2] + u * directions[k + 1, 2]
+        between_deg = angle_between_deg((x, y, z), (looks[i, 0], looks[i, 1], looks[i, 2]))
+        angle_deg = abs(between_deg - panel_angle_deg)
+        turns_s[i] = slew_s(angle_deg, rate_deg_s, acceleration_deg_s2)
+    return turns_s
