@@ -15,7 +15,7 @@ import numpy as np
 from planner_core.budget import Budget
 from planner_core.precedence.chains import chain_with_history, heaviest_chain
 from planner_core.problem import Problem
-from planner_core.solvers.base import Constraint, Feasibility, Solution
+from planner_core.solvers.base import Constraint, Feasibility, Outlook, Solution
 from planner_core.solvers.sequential import Turn, plan_in_turn
 from planner_core.solvers.walk import (
     CONTACT_ABOVE,
@@ -54,6 +54,11 @@ class Graph:
         default=CONTACT_ABOVE,
         metadata=contact_above_metadata("Matters where feasibility is hard."),
     )
+
+    @property
+    def outlook(self) -> Outlook:
+        """Which actions it looks at."""
+        return Outlook(contact_above=self.contact_above_fraction)
 
     def solve(self, problem: Problem, budget: Budget, seed: int) -> Solution:
         """Return the plan; the same one whatever the seed."""
