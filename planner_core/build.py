@@ -174,7 +174,10 @@ def compute_opportunities(scenario: Scenario, budget: Budget) -> ScenarioOpportu
         # Propagated again rather than kept: a month of a constellation's paths is a gigabyte.
         path = propagate(satellite, scenario.horizon)
         for kind in kinds:
-            described.fill(index, kind, path, places[kind], satellite.sensor.nadir)
+            described.fill(
+                index, kind, path, places[kind], satellite.sensor.nadir,
+                with_rates=satellite.agility.tracks,
+            )  # fmt: skip
     _go_on(budget, 1.0)
     return ScenarioOpportunities(
         opportunities=described.table(),

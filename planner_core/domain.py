@@ -43,6 +43,7 @@ LookSide = Literal["left", "right", "any"]
 OrbitDirection = Literal["ascending", "descending", "any"]
 CollectAlignment = Literal["access", "horizon"]
 SunPointing = Literal["free", "slew"]
+SlewModel = Literal["rest", "moving"]
 
 _LONGEST_SENSOR_TYPE = 100
 
@@ -76,6 +77,14 @@ def _check_light(limits: Sensor | Target) -> None:
         (begin is None) == (end is None) and (begin is None or begin != end),
         "local_time_to_h",
         "needs a local_time_from_h that differs from it, and the other way round",
+    )
+
+
+def _check_sun_exclusion(angle_deg: float | None) -> None:
+    _require(
+        angle_deg is None or 0 <= angle_deg <= 180,
+        "sun_exclusion_deg",
+        "must be between 0 and 180, or null for no limit",
     )
 
 
@@ -160,14 +169,26 @@ class OrbitElements:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Agility:
-    """How fast the satellite turns. Defaults are the paper's 1 deg/s at once."""
+    """How fast the satellite turns. Defaults are the paper's 1 deg/s at once.
+
+    Attributes
+    ----------
+    slew_model
+        From rest to rest, or from the moving line of sight of one task to that of another.
+    sun_exclusion_deg
+        Least angle between boresight and sun in turns; None for no limit. Plans do not look at it:
+        a flight does.
+    """
 
     slew_rate_deg_s: float = 1.0
     acceleration_deg_s2: float | None = None
     settle_s: float = 0.0
+    slew_model: SlewModel = "rest"
+    sun_exclusion_deg: float | None = None
 
     def __post_init__(self) -> None:
         _require_finite(self, "slew_rate_deg_s", "acceleration_deg_s2", "settle_s")
+        _check_sun_exclusion(self.sun_exclusion_deg)
         _require(self.slew_rate_deg_s > 0, "slew_rate_deg_s", "must be greater than 0")
         _require(
             self.acceleration_deg_s2 is None or self.acceleration_deg_s2 > 0,
@@ -175,6 +196,16 @@ class Agility:
             "must be greater than 0, or null for an instant start",
         )
         _require(self.settle_s >= 0, "settle_s", "must be 0 or more")
+        _require(
+            self.slew_model == "rest" or self.acceleration_deg_s2 is not None,
+            "slew_model",
+            "moving needs an acceleration_deg_s2",
+        )
+
+    @property
+    def tracks(self) -> bool:
+        """Whether turns begin and end with the rates of tracking."""
+        return self.slew_model == "moving"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -200,6 +231,8 @@ class Sensor:
         Ascending while the satellite moves north.
     sensor_type
         What targets may ask for by this name; None serves only targets that ask for none.
+    sun_exclusion_deg
+        Least angle between the line of sight and the sun. None for no limit.
     """
 
     off_nadir_min_deg: float = 5.0
@@ -213,9 +246,11 @@ class Sensor:
     local_time_to_h: float | None = None
     orbit_direction: OrbitDirection = "any"
     sensor_type: str | None = None
+    sun_exclusion_deg: float | None = None
 
     def __post_init__(self) -> None:
         _require_finite(self, "off_nadir_min_deg", "off_nadir_max_deg", "min_elevation_deg")
+        _check_sun_exclusion(self.sun_exclusion_deg)
         _require(0 <= self.off_nadir_min_deg <= 90, "off_nadir_min_deg", "must be between 0 and 90")
         _require(
             self.off_nadir_min_deg <= self.off_nadir_max_deg <= 90,
@@ -274,6 +309,22 @@ class Resources:
     def knows_free_charge_alone(self) -> bool:
         """Whether idle time costs nothing and charges throughout, as in the paper."""
         return self.sun_pointing == "free" and self.idle_drain_per_s == 0.0
+
+    @classmethod
+    def limitless(cls) -> Resources:
+        """Return what nothing draws on or fills, so that agility alone counts."""
+        return cls(
+            battery_min_fraction=0.0,
+            initial_battery_fraction=1.0,
+            sunpoint_charge_per_s=0.0,
+            collect_drain_per_s=0.0,
+            contact_drain_per_s=0.0,
+            recorder_max_fraction=1.0,
+            initial_recorder_fraction=0.0,
+            collect_fill_per_s=0.0,
+            downlink_per_s=0.0,
+            telemetry_per_s=0.0,
+        )
 
     @classmethod
     def paper(cls, period_s: float) -> Resources:
@@ -515,6 +566,12 @@ class Scenario:
             not (self.quality and self.continuous_starts),
             "continuous_starts",
             "an image's quality would change with its start: use collect_spacing_s with quality",
+        )
+        _require(
+            not (self.continuous_starts and any(s.agility.tracks for s in self.satellites)),
+            "continuous_starts",
+            "how fast lines of sight move is known at the starts of opportunities only: "
+            "use collect_spacing_s with slew_model moving",
         )
         # The authors' events forgo or charge whole spans: there is no time to turn in them.
         _require(

@@ -136,6 +136,7 @@ class Limits:
         own_half_deg, own_meridian = _local_time(
             own.bounds["local_time_from_h"], own.bounds["local_time_to_h"], own.lon_deg
         )
+        sun_exclusion_deg = np.full_like(own.lon_deg, _number(sensor.sun_exclusion_deg))
         rows = [
             # The search leaves an interval at the first limit that never holds in it.
             _at_most(codes.OFF_NADIR, np.where(widest < 90.0, widest, np.nan)),
@@ -143,6 +144,7 @@ class Limits:
             _at_least(codes.OFF_NADIR, np.where(narrowest > 0.0, narrowest, np.nan)),
             _at_most(codes.SUN_ELEVATION, 90.0 - highest("sun_elevation_min_deg")),
             _at_least(codes.SUN_ELEVATION, 90.0 - lowest("sun_elevation_max_deg")),
+            _at_most(codes.SUN_EXCLUSION, 180.0 - sun_exclusion_deg),
             _at_most(codes.LOCAL_TIME, half_deg),
             _at_most(codes.OWN_LOCAL_TIME, own_half_deg),
             _at_most(codes.LOOK_SIDE, wanted("look_side", "left")),

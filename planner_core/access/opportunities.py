@@ -26,6 +26,7 @@ from planner_core.orbits.places import (
     Places,
     View,
     line_of_sight_teme,
+    los_rate_deg_s,
     view,
 )
 from planner_core.problem import COLLECT, Opportunities
@@ -44,6 +45,8 @@ _CHUNK: Final = 16_384  # rows whose intermediate results fit the processor's ca
 _SEEN: Final = (
     "los_start",
     "los_end",
+    "los_rate_start",
+    "los_rate_end",
     "off_nadir_deg",
     "elevation_deg",
     "azimuth_deg",
@@ -210,13 +213,23 @@ class Described:
         self._seen: Columns = {
             name: np.empty((count, 3)) if name.startswith("los") else np.empty(count, np.float32)
             for name in _SEEN
+            if not name.startswith("los_rate")
         }
+        for name in ("los_rate_start", "los_rate_end"):
+            self._seen[name] = np.zeros((count, 3), dtype=np.float32)
         self._seen["in_eclipse"] = np.zeros(count, dtype=np.bool_)
 
     def fill(
-        self, satellite: int, kind: int, ephemeris: Ephemeris, places: Places, nadir: Nadir
+        self,
+        satellite: int,
+        kind: int,
+        ephemeris: Ephemeris,
+        places: Places,
+        nadir: Nadir,
+        *,
+        with_rates: bool = False,
     ) -> None:
-        """Fill in the rows of one satellite and kind."""
+        """Fill in the rows of one satellite and kind, ``with_rates`` of its lines of sight."""
         all_rows = np.flatnonzero(
             (self._rows["satellite"] == satellite) & (self._rows["kind"] == kind)
         )
@@ -226,6 +239,9 @@ class Described:
             start_s, end_s = self._rows["start_s"][rows], self._rows["end_s"][rows]
             self._seen["los_start"][rows] = line_of_sight_teme(ephemeris, there, start_s)
             self._seen["los_end"][rows] = line_of_sight_teme(ephemeris, there, end_s)
+            if with_rates:
+                for name, at_s in (("los_rate_start", start_s), ("los_rate_end", end_s)):
+                    self._seen[name][rows] = los_rate_deg_s(ephemeris, there, at_s)
             seen = view(ephemeris, there, 0.5 * (start_s + end_s), nadir)
             for field in fields(View):
                 self._seen[field.name][rows] = getattr(seen, field.name)

@@ -55,7 +55,7 @@ class Certified:
         """Return the best plan and its bound; the same for the same seed if time suffices."""
         if problem.pointing is not None and not problem.use_resources:
             return solve_continuous(problem, budget, seed, self.gap, self.moves_per_task)
-        if problem.use_resources:
+        if problem.use_resources or problem.turns_in_motion:
             if problem.pointing is not None:
                 solution = solve_with_resources(
                     problem, among_opportunities(budget), seed, self.gap

@@ -26,11 +26,13 @@ column              ``physical``                  ``paper`` (event model)
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from planner_core.bundles import bundle
+from planner_core.domain import Resources
 from planner_core.jit import borrowing, inlined
 from planner_core.mdp.idle_energy import idle_energy
 from planner_core.problem import (
@@ -44,6 +46,7 @@ from planner_core.problem import (
     Transitions,
     may_follow,
 )
+from planner_core.problem.sun_turns import SunTurns
 from planner_core.problem.transitions import near_spans
 
 STRICT: Final = 1e-9
@@ -160,6 +163,14 @@ def compile_track(problem: Problem, satellite: SatelliteProblem, blocked: Bytes)
     return track._replace(is_guarded=bool(safe and (lasts or track.reserve_start == 0.0)))
 
 
+def with_counted_resources(problem: Problem, satellite: SatelliteProblem) -> SatelliteProblem:
+    """Return the satellite with the resources that count: without any it is limited by none."""
+    if problem.use_resources:
+        return satellite
+    none = np.zeros(len(satellite))
+    return replace(satellite, resources=Resources.limitless(), turns=SunTurns(none, none))
+
+
 def _next_of(is_such: Bools) -> Ints:
     """Return, for each row and for the end, the first such row from there on, or ``m``."""
     m = len(is_such)
@@ -192,6 +203,7 @@ def _fill_ahead(
 def _resource_columns(
     problem: Problem, satellite: SatelliteProblem, is_contact: Bytes
 ) -> dict[str, Any]:
+    satellite = with_counted_resources(problem, satellite)
     r = satellite.resources
     start_s, end_s = satellite.start_s, satellite.end_s
     duration_s = end_s - start_s

@@ -35,6 +35,7 @@ OWN_LOCAL_TIME: Final = 4
 LOOK_SIDE: Final = 5
 HEADING: Final = 6
 SUNLIT: Final = 7
+SUN_EXCLUSION: Final = 8
 
 _POSITION: Final = 0
 _VERTICAL: Final = 3
@@ -118,6 +119,10 @@ def limit_value(limit: Limit, cubic: Floats, place: Floats, t: float) -> Value:
     elif code == LOOK_SIDE:
         x = (place[0, 0], place[0, 1], place[0, 2])
         y, dy = _cross(y, dy), _cross(y, _rate_of_rate(cubic, _POSITION, t))
+    elif code == SUN_EXCLUSION:
+        # The sun against the way from the place to the satellite: beyond it, seen from there.
+        y = (y[0] - place[0, 0], y[1] - place[0, 1], y[2] - place[0, 2])
+        x, dx = _at(cubic, _SUN, t), _rate(cubic, _SUN, t)
     elif code == HEADING:
         x = (0.0, 0.0, 1.0)
         y, dy = dy, _rate_of_rate(cubic, _POSITION, t)

@@ -18,6 +18,8 @@ Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int32]
 Bools = npt.NDArray[np.bool_]
 
+_HALF_STEP_S = 0.5
+
 
 class _Point(Protocol):
     @property
@@ -119,6 +121,21 @@ def line_of_sight_teme(ephemeris: Ephemeris, places: Places, t_s: Floats) -> Flo
     """Return unit vectors from the satellite to row ``i``'s place, inertial. ``(n, 3)``."""
     position, _ = ephemeris.state_itrf(t_s)
     return ephemeris.to_teme(frames.unit(places.position_m - position), t_s)
+
+
+def los_rate_deg_s(ephemeris: Ephemeris, places: Places, t_s: Floats) -> Floats:
+    """Return how the lines of sight turn, in deg/s and inertial axes. Shape ``(n, 3)``.
+
+    The rotation from half a second before to half a second after, as far as the horizon goes. Only
+    the direction counts: it says nothing of the roll about the line of sight.
+    """
+    before_s = np.maximum(t_s - _HALF_STEP_S, 0.0)
+    after_s = np.minimum(t_s + _HALF_STEP_S, ephemeris.duration_s)
+    before = line_of_sight_teme(ephemeris, places, before_s)
+    after = line_of_sight_teme(ephemeris, places, after_s)
+    # So small an angle is its sine.
+    turned = np.degrees(np.cross(before, after))
+    return np.asarray(turned / (after_s - before_s)[:, None])
 
 
 def _row_dot(a: Floats, b: Floats) -> Floats:

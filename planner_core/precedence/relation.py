@@ -82,6 +82,9 @@ def transitive_closure(satellite: SatelliteProblem) -> Precedence:
 def is_transitive_on(satellite: SatelliteProblem) -> bool:
     """Return whether the satellite gains by way of tasks nothing that it cannot reach directly."""
     turning = turns_slower_than_it_tracks(satellite.transitions)
+    if satellite.transitions.is_moving:
+        # The time of a turn in motion is an upper value: any task might make up for that.
+        turning = np.ones_like(turning)
     return not turning.any() or not _is_shortcut_missing(direct_precedence(satellite), turning)
 
 

@@ -17,8 +17,8 @@ import numpy.typing as npt
 
 from planner_core.domain import Agility, Dynamics, Resources
 from planner_core.problem.pointing import Pointing, Vector, sight
-from planner_core.problem.sun_turns import SunPath, SunTurns, sun_turns
-from planner_core.problem.transitions import Transitions, slews_of
+from planner_core.problem.sun_turns import SunPath, SunTurns
+from planner_core.problem.transitions import Transitions
 from planner_core.worth import best_worths, common_unit, worth_of
 
 Floats = npt.NDArray[np.float64]
@@ -69,6 +69,9 @@ class Opportunities:
         Span of its access, as far as it lies between its target's release and due times.
     los_start, los_end
         Line of sight at ``start_s`` and at ``end_s``.
+    los_rate_start, los_rate_end
+        How they move there: angular velocity in deg/s, inertial, without the part along the line
+        itself. Zero where the satellite's ``slew_model`` does not ask for it.
     off_nadir_deg, elevation_deg, azimuth_deg, range_m
         At the satellite; at the ground; at the ground from north over east; between both.
     sun_elevation_deg, in_eclipse
@@ -85,6 +88,8 @@ class Opportunities:
     access_end_s: Floats
     los_start: Floats
     los_end: Floats
+    los_rate_start: Singles
+    los_rate_end: Singles
     off_nadir_deg: Singles
     elevation_deg: Singles
     azimuth_deg: Singles
@@ -318,6 +323,11 @@ class Problem:
         images = rows[self.opportunities.kind[rows] == COLLECT]
         return worth_of(self.opportunities.place[images], self.worth[images])
 
+    @property
+    def turns_in_motion(self) -> bool:
+        """Whether some satellite turns between moving lines of sight."""
+        return any(satellite.agility.tracks for satellite in self.satellites)
+
     @cached_property
     def offers_choice(self) -> bool:
         """Return whether some access offers several collects."""
@@ -352,53 +362,3 @@ def line_of_sight(problem: Problem, row: int, t_s: float) -> Vector:
     places = pointing.targets_m if is_collect else pointing.stations_m
     path = pointing.paths[int(table.satellite[row])]
     return sight(path, places, int(table.place[row]), float(t_s))
-
-
-def build_satellite_problem(
-    index: int,
-    opportunities: Opportunities,
-    *,
-    id: str,  # noqa: A002 - the field's own name
-    name: str,
-    agility: Agility,
-    resources: Resources,
-    sunlight: Sunlight,
-    sun: SunPath | None = None,
-    events: tuple[Floats, Ints] | None = None,
-) -> SatelliteProblem:
-    """Return one satellite's view of the table.
-
-    Parameters
-    ----------
-    events
-        ``event_s`` and ``event``, where there are more of them than opportunities.
-    """
-    rows = np.flatnonzero(opportunities.satellite == index).astype(np.int32)
-    start_s, end_s = opportunities.start_s[rows], opportunities.end_s[rows]
-    looks = np.ascontiguousarray(opportunities.los_start[rows])
-    looked = np.ascontiguousarray(opportunities.los_end[rows])
-    return SatelliteProblem(
-        id=id,
-        name=name,
-        agility=agility,
-        resources=resources,
-        rows=rows,
-        kind=opportunities.kind[rows],
-        place=opportunities.place[rows],
-        start_s=start_s,
-        end_s=end_s,
-        transitions=Transitions(
-            start_s=start_s,
-            end_s=end_s,
-            looks=looks,
-            looked=looked,
-            slews=slews_of(agility),
-        ),
-        sunlight=sunlight,
-        event_s=start_s if events is None else events[0],
-        event=np.arange(len(rows), dtype=np.int32) if events is None else events[1],
-        sun=sun,
-        turns=sun_turns(
-            resources, agility, sun, start_s=start_s, end_s=end_s, looks=looks, looked=looked
-        ),
-    )

@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from planner_core.domain import Agility, Resources
 from planner_core.jit import kernel
+from planner_core.problem.moving import moving_turn_s, rotation_deg
 from planner_core.problem.slew import INSTANT, Vector, angle_between_deg, slew_s
 
 Floats = npt.NDArray[np.float64]
@@ -46,11 +47,20 @@ class SunTurns(NamedTuple):
 
 
 def sun_turn_s(
-    resources: Resources, agility: Agility, sun: SunPath | None, line_of_sight: Vector, t_s: float
+    resources: Resources,
+    agility: Agility,
+    sun: SunPath | None,
+    line_of_sight: Vector,
+    t_s: float,
+    moving_deg_s: Vector = (0.0, 0.0, 0.0),
 ) -> float:
-    """Return the time to turn between a line of sight and the sun, settling included."""
+    """Return the time to turn between a line of sight and the sun, settling included.
+
+    ``moving_deg_s`` is how the line of sight moves, where ``slew_model`` asks for it.
+    """
     lines = np.array([line_of_sight], dtype=np.float64)
-    return float(_turns_s(resources, agility, sun, lines, np.array([t_s]))[0])
+    moving = np.array([moving_deg_s], dtype=np.float64)
+    return float(_turns_s(resources, agility, sun, lines, np.array([t_s]), moving)[0])
 
 
 def sun_turns(
@@ -62,6 +72,8 @@ def sun_turns(
     end_s: Floats,
     looks: Floats,
     looked: Floats,
+    moves: Floats,
+    moved: Floats,
 ) -> SunTurns:
     """Return the turns of many tasks.
 
@@ -71,15 +83,23 @@ def sun_turns(
         Of the tasks. Shape ``(m,)``.
     looks, looked
         Lines of sight then. Shape ``(m, 3)``.
+    moves, moved
+        How they move, in deg/s, where ``slew_model`` asks for it. Shape ``(m, 3)``.
     """
     return SunTurns(
-        out_s=_turns_s(resources, agility, sun, looked, end_s),
-        back_s=_turns_s(resources, agility, sun, looks, start_s),
+        out_s=_turns_s(resources, agility, sun, looked, end_s, moved),
+        # Backward in time it is the same turn, with the rate the other way round.
+        back_s=_turns_s(resources, agility, sun, looks, start_s, -moves),
     )
 
 
 def _turns_s(
-    resources: Resources, agility: Agility, sun: SunPath | None, looks: Floats, t_s: Floats
+    resources: Resources,
+    agility: Agility,
+    sun: SunPath | None,
+    looks: Floats,
+    t_s: Floats,
+    moving: Floats,
 ) -> Floats:
     """Return the turns between lines of sight, each at its instant, and the sun.
 
@@ -95,6 +115,7 @@ def _turns_s(
     acceleration = agility.acceleration_deg_s2 or INSTANT
     turns_s = _least_turns_s(
         float(sun.step_s), sun.directions, looks, np.asarray(t_s, dtype=np.float64),
+        moving if agility.tracks else moving[:0],
         float(resources.panel_angle_deg), float(agility.slew_rate_deg_s), float(acceleration),
     )  # fmt: skip
     return turns_s + agility.settle_s
@@ -106,6 +127,7 @@ def _least_turns_s(
     directions: Floats,
     looks: Floats,
     t_s: Floats,
+    moving: Floats,
     panel_angle_deg: float,
     rate_deg_s: float,
     acceleration_deg_s2: float,
@@ -118,7 +140,20 @@ def _least_turns_s(
         x = (1.0 - u) * directions[k, 0] + u * directions[k + 1, 0]
         y = (1.0 - u) * directions[k, 1] + u * directions[k + 1, 1]
         z = (1.0 - u) * directions[k, 2] + u * directions[k + 1, 2]
-        between_deg = angle_between_deg((x, y, z), (looks[i, 0], looks[i, 1], looks[i, 2]))
+        look = looks[i, 0], looks[i, 1], looks[i, 2]
+        between_deg = angle_between_deg((x, y, z), look)
         angle_deg = abs(between_deg - panel_angle_deg)
-        turns_s[i] = slew_s(angle_deg, rate_deg_s, acceleration_deg_s2)
+        if len(moving) == 0:
+            turns_s[i] = slew_s(angle_deg, rate_deg_s, acceleration_deg_s2)
+            continue
+        # About the same axis as the turn to the sun itself, as far as the panels need.
+        whole = rotation_deg(look, (x, y, z))
+        share = (between_deg - panel_angle_deg) / max(between_deg, 1e-9)
+        turns_s[i] = moving_turn_s(
+            (share * whole[0], share * whole[1], share * whole[2]),
+            (moving[i, 0], moving[i, 1], moving[i, 2]),
+            (0.0, 0.0, 0.0),
+            rate_deg_s,
+            acceleration_deg_s2,
+        )
     return turns_s

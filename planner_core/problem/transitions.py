@@ -17,6 +17,7 @@ import numpy.typing as npt
 from planner_core.bundles import bundle
 from planner_core.domain import Agility
 from planner_core.jit import borrowing, kernel
+from planner_core.problem.moving import longest_turn_s, rotation_deg, turns_in
 from planner_core.problem.slew import (
     INSTANT,
     TIME_TOLERANCE_S,
@@ -72,13 +73,29 @@ class Transitions(NamedTuple):
         Shape ``(m,)``.
     looks, looked
         Lines of sight at start and at end, unit vectors. Shape ``(m, 3)``, C order.
+    moves, moved
+        Their angular velocities there, in deg/s. Shape ``(m, 3)``, C order; ``(0, 3)`` where the
+        satellite is taken to turn from rest to rest.
+    slews
+        With such velocities, turns that take no longer than the true ones: no time to
+        accelerate.
+    acceleration_deg_s2
+        The limit of turns between moving lines of sight; ``INSTANT`` where there are none.
     """
 
     start_s: Floats
     end_s: Floats
     looks: Floats
     looked: Floats
+    moves: Floats
+    moved: Floats
     slews: Slews
+    acceleration_deg_s2: float
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether turns begin and end with the rates of tracking."""
+        return self.acceleration_deg_s2 > INSTANT
 
     def allows(self, a: int, b: int) -> bool:
         """Return whether local row ``b`` may follow local row ``a`` directly."""
@@ -87,8 +104,8 @@ class Transitions(NamedTuple):
 
 @lru_cache(maxsize=64)
 def slews_of(agility: Agility) -> Slews:
-    """Return how a satellite turns."""
-    acceleration = agility.acceleration_deg_s2 or INSTANT
+    """Return how a satellite turns from rest to rest; at once, where it is to turn in motion."""
+    acceleration = INSTANT if agility.tracks else agility.acceleration_deg_s2 or INSTANT
     longest_s = float(slew_s(180.0, agility.slew_rate_deg_s, acceleration))
     per_s = (_NUM_ROOMS - 2) / max(longest_s, 1e-3)
     return Slews(
@@ -141,11 +158,24 @@ def may_follow(transitions: Transitions, a: int, b: int) -> bool:
     if b <= a:
         return False
     slews, looks, looked = transitions.slews, transitions.looks, transitions.looked
-    return turns_within(
-        slews,
-        transitions.start_s[b] - transitions.end_s[a] - slews.settle_s + TIME_TOLERANCE_S,
-        (looked[a, 0], looked[a, 1], looked[a, 2]),
-        (looks[b, 0], looks[b, 1], looks[b, 2]),
+    room_s = transitions.start_s[b] - transitions.end_s[a] - slews.settle_s + TIME_TOLERANCE_S
+    before = looked[a, 0], looked[a, 1], looked[a, 2]
+    after = looks[b, 0], looks[b, 1], looks[b, 2]
+    if not turns_within(slews, room_s, before, after):
+        return False
+    if len(transitions.moves) == 0:
+        return True
+    acceleration = transitions.acceleration_deg_s2
+    if room_s >= longest_turn_s(slews.rate_deg_s, acceleration):
+        return True
+    moves, moved = transitions.moves, transitions.moved
+    return turns_in(
+        room_s,
+        rotation_deg(before, after),
+        (moved[a, 0], moved[a, 1], moved[a, 2]),
+        (moves[b, 0], moves[b, 1], moves[b, 2]),
+        slews.rate_deg_s,
+        acceleration,
     )
 
 
@@ -157,5 +187,8 @@ def near_spans(transitions: Transitions) -> tuple[Ints, Ints]:
     start_s, end_s, slews = transitions.start_s, transitions.end_s, transitions.slews
     near_from = np.searchsorted(start_s, end_s - TIME_TOLERANCE_S)
     near_from = np.maximum(near_from, np.arange(1, len(start_s) + 1))
-    far_from = np.searchsorted(start_s, end_s + (slews.longest_s + slews.settle_s))
+    longest_s = slews.longest_s
+    if transitions.is_moving:
+        longest_s = longest_turn_s(slews.rate_deg_s, transitions.acceleration_deg_s2)
+    far_from = np.searchsorted(start_s, end_s + (longest_s + slews.settle_s))
     return near_from.astype(np.int32), np.maximum(far_from, near_from).astype(np.int32)

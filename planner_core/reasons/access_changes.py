@@ -29,7 +29,11 @@ _LIMITS: Final = (
     ("min_elevation_deg", 0.0),
     ("sun_elevation_min_deg", -90.0),
     ("sun_elevation_max_deg", 90.0),
+    ("sun_exclusion_deg", 0.0),
 )
+_OF_SENSORS: Final = frozenset({"sun_exclusion_deg"})
+"""Limits that targets do not have."""
+
 _SWITCHES: Final = (("look_side", "any"), ("orbit_direction", "any"))
 
 OF_TARGETS: Final = frozenset({"collect_s", "release", "due", "sensor_type"})
@@ -139,9 +143,10 @@ def _sooner_or_later(
 def _with_limit(scenario: Scenario, name: str, value: float) -> Scenario:
     """Return the scenario with a limit loosened to ``value`` wherever it is narrower."""
     sign = -1.0 if "_max" in name else 1.0
+    is_target_free = name in _OF_SENSORS
 
     def is_narrower(limits: Sensor | Target) -> bool:
-        own = getattr(limits, name)
+        own = None if is_target_free and isinstance(limits, Target) else getattr(limits, name)
         return own is not None and sign * own > sign * value
 
     return _with(scenario, name, value, is_narrower)
@@ -165,7 +170,8 @@ def _narrowed(
     alone: Scenario, name: str, open_value: float, imaged_by: Callable[[Scenario], int | None]
 ) -> float:
     """Return the tightest value that still suffices, by halving."""
-    own = [getattr(x, name) for x in (*(s.sensor for s in alone.satellites), *alone.targets)]
+    targets = () if name in _OF_SENSORS else alone.targets
+    own = [getattr(x, name) for x in (*(s.sensor for s in alone.satellites), *targets)]
     sign = -1.0 if "_max" in name else 1.0
     tight = max((sign * value for value in own if value is not None), default=sign * open_value)
     low = round(sign * open_value * _STEPS_A_DEG)

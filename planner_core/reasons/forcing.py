@@ -250,7 +250,8 @@ def _force_each(
                 forced.broken[c] = BATTERY
             elif highest >= track.recorder_max - STRICT:
                 forced.broken[c] = RECORDER
-        if first == last:
+        # What a faster turn from and to moving lines of sight would need is not said.
+        if first == last or len(track.transitions.moves) > 0:
             continue
         if track.use_resources:
             lowest, highest = _levels(track, plan, row, k, k)

@@ -9,7 +9,7 @@ from planner_core.problem import Problem, SatelliteProblem
 from planner_core.problem.plan import Action
 from planner_core.problem.slew import TIME_TOLERANCE_S
 from planner_core.problem.sun_turns import sun_turn_s
-from planner_core.referee.sight import looked, looks
+from planner_core.referee.sight import looked, looks, moving_deg_s
 
 
 class Idle(NamedTuple):
@@ -52,7 +52,10 @@ def idle_spans(
         t_s = action.end_s if is_end else action.start_s
         line_of_sight = looked(problem, action) if is_end else looks(problem, action)
         r, agility = satellite.resources, satellite.agility
-        return sun_turn_s(r, agility, satellite.sun, line_of_sight, t_s)
+        x, y, z = moving_deg_s(problem, action, is_end=is_end)
+        # The turn back is the turn to the sun, backward in time.
+        rate = (x, y, z) if is_end else (-x, -y, -z)
+        return sun_turn_s(r, agility, satellite.sun, line_of_sight, t_s, rate)
 
     spans = []
     before: Action | None = None

@@ -20,12 +20,7 @@ from planner_core.problem import (
     Problem,
 )
 from planner_core.problem.plan import Action, Plan
-from planner_core.problem.slew import (
-    INSTANT,
-    TIME_TOLERANCE_S,
-    angle_between_deg,
-    slew_s,
-)
+from planner_core.problem.slew import TIME_TOLERANCE_S
 from planner_core.referee.idle_time import Idle
 from planner_core.referee.pinned_plan import breaches
 from planner_core.referee.resource_profile import (
@@ -34,7 +29,7 @@ from planner_core.referee.resource_profile import (
     integrate,
     thin,
 )
-from planner_core.referee.sight import looked, looks
+from planner_core.referee.sight import turn_between
 
 Mode = Literal["collect", "contact", "sunpoint", "hold"]
 ViolationCode = Literal[
@@ -264,8 +259,6 @@ def _turns(
     problem: Problem, plan: Plan, index: int, positions: Sequence[int]
 ) -> tuple[list[Violation], dict[int, Slew | None]]:
     """Tasks of one satellite neither overlap nor follow faster than it turns: C(a, b)."""
-    agility = problem.satellites[index].agility
-    acceleration = agility.acceleration_deg_s2 or INSTANT
     found: list[Violation] = []
     slews: dict[int, Slew | None] = {}
     previous: Action | None = None
@@ -274,8 +267,7 @@ def _turns(
         action = plan.actions[position]
         slews[position] = None
         if previous is not None and busy_until is not None:
-            angle_deg = angle_between_deg(looked(problem, previous), looks(problem, action))
-            needed_s = slew_s(angle_deg, agility.slew_rate_deg_s, acceleration) + agility.settle_s
+            angle_deg, needed_s = turn_between(problem, index, previous, action)
             available_s = action.start_s - previous.end_s
             slews[position] = Slew(angle_deg=angle_deg, needed_s=needed_s, available_s=available_s)
             gap_s = action.start_s - busy_until.end_s

@@ -99,7 +99,7 @@ class Milp:
         best = Incumbent(problem, budget, self.gap, bound=Bound(value=np.inf, proof="milp"))
         for plan in _starts(problem, budget):
             best.offer(plan)
-        if not problem.use_resources:
+        if not problem.use_resources and not problem.turns_in_motion:
             best.offer(improved(problem, best.plan, self.moves_per_task, budget, seed))
         if len(problem.opportunities) == 0 or budget.is_spent():
             return best.solution()
@@ -146,7 +146,9 @@ def is_free(problem: Problem) -> bool:
 
     Pins fit in by themselves only where turning is transitive.
     """
-    return not problem.use_resources and (not problem.pinned.kept or is_transitive(problem))
+    if problem.use_resources or problem.turns_in_motion:
+        return False
+    return not problem.pinned.kept or is_transitive(problem)
 
 
 def _starts(problem: Problem, budget: Budget) -> list[Plan]:

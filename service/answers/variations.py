@@ -126,13 +126,18 @@ def _geometry(scenario: Scenario) -> Scenario:
         satellites=tuple(
             replace(
                 satellite,
-                agility=Agility(),
+                agility=_slew_model_of(satellite.agility),
                 resources=replace(some, eclipse_aware=satellite.resources.eclipse_aware),
             )
             for satellite in scenario.satellites
         ),
         targets=tuple(replace(target, reward=1.0) for target in scenario.targets),
     )
+
+
+def _slew_model_of(agility: Agility) -> Agility:
+    """Return what opportunities know of how a satellite turns: whether in motion."""
+    return Agility(slew_model="moving", acceleration_deg_s2=1.0) if agility.tracks else Agility()
 
 
 def _dropped(asked: Asked, timeline: TimelineOut | None) -> list[PinnedAction]:

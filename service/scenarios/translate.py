@@ -122,7 +122,10 @@ def canonical_of_file(file: ScenarioFile) -> str:
     document = file.model_dump(mode="json", exclude={"name"})
     for satellite in document["satellites"]:
         del satellite["omm" if satellite["omm"] is None else "tle"]
-        _without_unset(satellite["sensor"], "sensor_type")
+        _without_unset(satellite["sensor"], "sensor_type", "sun_exclusion_deg")
+        _without_unset(satellite["agility"], "sun_exclusion_deg")
+        if satellite["agility"]["slew_model"] == "rest":
+            del satellite["agility"]["slew_model"]
         if isinstance(satellite["resources"], dict):
             _without_defaults(satellite["resources"])
     for target in document["targets"]:

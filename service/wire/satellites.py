@@ -14,6 +14,7 @@ from service.wire.imports import RejectedRow
 NonNegative = Annotated[float, Field(ge=0)]
 Positive = Annotated[float, Field(gt=0)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
+SunExclusion = Annotated[float | None, Field(ge=0, le=180)]
 PanelAngle = Annotated[float, Field(ge=0, le=180)]
 SunElevation = Annotated[float | None, Field(ge=-90, le=90)]
 LocalTime = Annotated[float | None, Field(ge=0, le=24)]
@@ -22,6 +23,7 @@ SensorType = Annotated[
 ]
 Nadir = Literal["geodetic", "geocentric"]
 SunPointing = Literal["free", "slew"]
+SlewModel = Literal["rest", "moving"]
 LookSide = Literal["left", "right", "any"]
 OrbitDirection = Literal["ascending", "descending", "any"]
 
@@ -34,6 +36,15 @@ class AgilityIn(Body):
         None, description="Limit of acceleration and braking; null for none."
     )
     settle_s: NonNegative = Field(0.0, description="Wait after each slew.")
+    slew_model: SlewModel = Field(
+        "rest",
+        description="rest: turns begin and end at rest. moving: at the rates at which lines of "
+        "sight move, which needs acceleration_deg_s2.",
+    )
+    sun_exclusion_deg: SunExclusion = Field(
+        None,
+        description="Least angle between boresight and sun in turns, which a flight checks.",
+    )
 
 
 class LightIn(Body):
@@ -62,6 +73,9 @@ class SensorIn(LightIn):
         "geodetic", description="Perpendicular to the ellipsoid, or towards the Earth's centre."
     )
     min_elevation_deg: float = Field(0.0, ge=0, lt=90, description="At the target.")
+    sun_exclusion_deg: SunExclusion = Field(
+        None, description="Least angle between the line of sight and the sun; null for no limit."
+    )
     sensor_type: SensorType | None = Field(
         None,
         description="A name of your own, such as visible or infrared, that targets may ask for.",

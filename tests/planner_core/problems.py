@@ -84,6 +84,8 @@ def make_problem(
 
     start_s, end_s = column([t.start_s for t in ordered]), column([t.end_s for t in ordered])
     margin = column([t.margin_s for t in ordered])
+    rate = np.zeros((n, 3), dtype=np.float32)
+    rate[:, 2] = column([t.turn_deg for t in ordered]) / np.maximum(end_s - start_s, 1e-3)
     table = Opportunities(
         satellite=np.array([t.satellite for t in ordered], dtype=np.int32),
         kind=np.array([t.kind for t in ordered], dtype=np.int8),
@@ -98,6 +100,8 @@ def make_problem(
         access_end_s=end_s + margin,
         los_start=line_of_sight(angle),
         los_end=line_of_sight(turned),
+        los_rate_start=rate,
+        los_rate_end=rate,
         off_nadir_deg=np.zeros(n, dtype=np.float32),
         elevation_deg=np.full(n, 45.0, dtype=np.float32),
         azimuth_deg=np.zeros(n, dtype=np.float32),
@@ -266,12 +270,14 @@ def sunny_problem(
     num_targets: int = 5,
     num_contacts: int = 2,
     is_plain: bool = False,
+    is_moving: bool = False,
+    use_resources: bool = True,
 ) -> Problem:
     """Return a problem with turns to the sun, and power drawn at all times in two of three.
 
     The sun stands in the plane of the lines of sight or above it, 60 to 250 s of turn away with
     most agilities; batteries allow for a few images between visits. With ``is_plain`` all
-    images are worth the same.
+    images are worth the same; with ``is_moving`` turns begin and end in motion.
     """
     rng = np.random.default_rng(seed)
     angle, height = rng.uniform(0.0, 2.0 * np.pi), rng.uniform(-0.5, 0.5)
@@ -282,6 +288,9 @@ def sunny_problem(
         Agility(slew_rate_deg_s=3.0, acceleration_deg_s2=0.2, settle_s=2.0),
         Agility(slew_rate_deg_s=1.0, acceleration_deg_s2=0.05, settle_s=5.0),
     )[int(rng.integers(3))]
+    if is_moving:
+        acceleration_deg_s2 = agility.acceleration_deg_s2 or 0.3
+        agility = replace(agility, slew_model="moving", acceleration_deg_s2=acceleration_deg_s2)
     resources = replace(
         TIGHT,
         sun_pointing="slew",
@@ -299,6 +308,7 @@ def sunny_problem(
         num_targets=num_targets,
         num_contacts=num_contacts,
         has_rewards=not is_plain and bool(rng.integers(2)),
+        use_resources=use_resources,
         resources=resources,
         agility=agility,
         max_turn_deg=15.0,

@@ -41,6 +41,8 @@ def test_a_bare_tle_makes_the_papers_satellite(client: httpx.Client) -> None:
         "slew_rate_deg_s": 1.0,
         "acceleration_deg_s2": None,
         "settle_s": 0.0,
+        "slew_model": "rest",
+        "sun_exclusion_deg": None,
     }
     assert body["sensor"]["off_nadir_max_deg"] == 55.0
     assert body["resources"] == "paper"

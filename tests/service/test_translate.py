@@ -322,3 +322,21 @@ def test_a_load_at_all_times_is_a_fraction_of_the_battery() -> None:
     assert '"idle_power_w":7.2' in canonical(loaded)
     (made,) = scenario_from_content(loaded).satellites
     assert made.resources.idle_drain_per_s == pytest.approx(2e-5)
+
+
+def test_turns_in_motion_and_angles_to_the_sun_keep_the_hash_of_questions_without() -> None:
+    plain, same, other = file(), file(), file()
+    same["satellites"][0]["agility"] = {"slew_model": "rest", "sun_exclusion_deg": None}
+    same["satellites"][0]["sensor"] = {"sun_exclusion_deg": None}
+    assert canonical(same) == canonical(plain)
+    other["satellites"][0]["agility"] = {"slew_model": "moving", "acceleration_deg_s2": 0.5}
+    other["satellites"][0]["sensor"] = {"sun_exclusion_deg": 30.0}
+    text = canonical(other)
+    assert canonical(json.loads(text)) == text
+    (made,) = scenario_from_content(other).satellites
+    assert made.agility.tracks
+    assert made.sensor.sun_exclusion_deg == 30.0
+    del other["satellites"][0]["agility"]["acceleration_deg_s2"]
+    with pytest.raises(InvalidScenario) as refused:
+        scenario_from_content(other)
+    assert refused.value.fault.pointer == "/satellites/0/agility/slew_model"

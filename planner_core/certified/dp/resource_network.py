@@ -94,7 +94,7 @@ def _network(problem: Problem, satellite: SatelliteProblem, slack: float) -> Net
     precedence = direct_precedence(satellite)
     charge_from = track.charge_per_s * track.charge_from_s
     charge_to = track.charge_per_s * track.charge_to_s
-    is_free = satellite.resources.sun_pointing == "free"
+    is_free = not problem.use_resources or satellite.resources.sun_pointing == "free"
     least_to = np.minimum.accumulate(charge_to[::-1])[::-1]
     charged_from = np.searchsorted(least_to, charge_from) * (not is_free)
     idle_from, near_first, near_rows = _arcs(precedence, charged_from)

@@ -143,7 +143,8 @@ def polished(
     problem: Problem, solution: Solution, moves_per_task: float, budget: Budget
 ) -> Solution:
     """Return a search's answer with its plan improved, where agility alone counts."""
-    if problem.use_resources or moves_per_task == 0.0 or budget.is_spent():
+    knows_turns = not (problem.use_resources or problem.turns_in_motion)
+    if not knows_turns or moves_per_task == 0.0 or budget.is_spent():
         return solution
     plan = improved(problem, solution.plan, moves_per_task, budget, 0)
     return replace(solution, plan=plan)

@@ -1,0 +1,131 @@
+"""The time to turn between two lines of sight that move, within rate and acceleration.
+
+A satellite that images tracks its target, and so ends one task and begins the next with a rate of
+its own. The turn is a burst from the first rate to a cruise rate, a coast, and a burst to the last
+rate. Both bursts take the acceleration limit, and rotations are added as vectors, which makes
+it an upper value, by a few per cent for large angles.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from planner_core.jit import borrowing, kernel
+from planner_core.problem.slew import angle_between_deg
+
+Vector = tuple[float, float, float]
+
+_MOST_STEPS: Final = 60
+_SETTLED: Final = 1e-9  # deg/s
+_HALVINGS: Final = 40
+_MOST_RATES: Final = 5.0  # rate over acceleration: to brake, to turn by way of rest, and to go on
+
+
+@kernel
+def longest_turn_s(rate_deg_s: float, acceleration_deg_s2: float) -> float:
+    """Return a time in which every turn fits, whatever the rates at its ends."""
+    return 180.0 / rate_deg_s + _MOST_RATES * rate_deg_s / acceleration_deg_s2
+
+
+@borrowing
+def rotation_deg(u: Vector, v: Vector) -> Vector:
+    """Return the least rotation that brings one unit vector to another, along its axis."""
+    x = u[1] * v[2] - u[2] * v[1]
+    y = u[2] * v[0] - u[0] * v[2]
+    z = u[0] * v[1] - u[1] * v[0]
+    length = math.sqrt(x * x + y * y + z * z)
+    if length < 1e-15:
+        return 0.0, 0.0, 0.0
+    share = angle_between_deg(u, v) / length
+    return share * x, share * y, share * z
+
+
+@borrowing
+def turns_in(
+    room_s: float, turn: Vector, rate_from: Vector, rate_to: Vector,
+    rate_deg_s: float, acceleration_deg_s2: float,
+) -> bool:  # fmt: skip
+    """Return whether a satellite can turn in some time, with these rates at both ends.
+
+    Parameters
+    ----------
+    turn
+        Rotation from the first line of sight to the second, in degrees.
+    rate_from, rate_to
+        Angular velocities at both ends, in deg/s.
+
+    Notes
+    -----
+    The cruise rate that covers the rotation is a fixed point. Near the least time it may not be
+    found: then there is no turn.
+    """
+    if room_s <= 0.0:
+        return False
+    c = turn[0] / room_s, turn[1] / room_s, turn[2] / room_s
+    before, step_before = c, (0.0, 0.0, 0.0)
+    for k in range(_MOST_STEPS):
+        first_s = _distance(c, rate_from) / acceleration_deg_s2
+        last_s = _distance(c, rate_to) / acceleration_deg_s2
+        cruise_s = room_s - 0.5 * (first_s + last_s)
+        if cruise_s <= 0.0:
+            return False
+        # What is left for the cruise, from the middle of each burst on.
+        step = (
+            (turn[0] - 0.5 * (first_s * rate_from[0] + last_s * rate_to[0])) / cruise_s - c[0],
+            (turn[1] - 0.5 * (first_s * rate_from[1] + last_s * rate_to[1])) / cruise_s - c[1],
+            (turn[2] - 0.5 * (first_s * rate_from[2] + last_s * rate_to[2])) / cruise_s - c[2],
+        )
+        if _distance(step, (0.0, 0.0, 0.0)) < _SETTLED:
+            is_slow = _distance(c, (0.0, 0.0, 0.0)) <= rate_deg_s + _SETTLED
+            return is_slow and first_s + last_s <= room_s + _SETTLED
+        share = _secant(step, step_before) if k > 0 else 0.0
+        after = (
+            c[0] + step[0] - share * (c[0] + step[0] - before[0] - step_before[0]),
+            c[1] + step[1] - share * (c[1] + step[1] - before[1] - step_before[1]),
+            c[2] + step[2] - share * (c[2] + step[2] - before[2] - step_before[2]),
+        )
+        before, step_before, c = c, step, after
+    return False
+
+
+@borrowing
+def _secant(step: Vector, before: Vector) -> float:
+    """Return how much of the last change to take back, so that the next step is least.
+
+    Anderson's acceleration with one step of memory. Near the least time of a turn two cruise
+    rates fall together, and plain steps would hardly come nearer.
+    """
+    x, y, z = step[0] - before[0], step[1] - before[1], step[2] - before[2]
+    size = x * x + y * y + z * z
+    if size <= 0.0:
+        return 0.0
+    return (x * step[0] + y * step[1] + z * step[2]) / size
+
+
+@kernel
+def moving_turn_s(
+    turn: Vector, rate_from: Vector, rate_to: Vector,
+    rate_deg_s: float, acceleration_deg_s2: float,
+) -> float:  # fmt: skip
+    """Return the least time of such a turn, to a microsecond or so; see ``turns_in``.
+
+    >>> round(moving_turn_s((30.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0, 0.5), 3)
+    32.0
+    >>> round(moving_turn_s((30.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 0.0, 0.0), 1.0, 0.5), 3)
+    30.0
+    """
+    low_s, high_s = 0.0, longest_turn_s(rate_deg_s, acceleration_deg_s2)
+    for _ in range(_HALVINGS):
+        middle_s = 0.5 * (low_s + high_s)
+        if turns_in(middle_s, turn, rate_from, rate_to, rate_deg_s, acceleration_deg_s2):
+            high_s = middle_s
+        else:
+            low_s = middle_s
+    return high_s
+
+
+@borrowing
+def _distance(u: Vector, v: Vector) -> float:
+    x, y, z = u[0] - v[0], u[1] - v[1], u[2] - v[2]
+    return math.sqrt(x * x + y * y + z * z)
