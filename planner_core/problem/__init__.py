@@ -25,9 +25,9 @@ from planner_core.problem.problem import (
     Singles,
     Struck,
     Sunlight,
-    build_satellite_problem,
     line_of_sight,
 )
+from planner_core.problem.satellite import build_satellite_problem
 from planner_core.problem.transitions import Transitions, may_follow
 
 __all__ = [

@@ -17,8 +17,8 @@ import numpy.typing as npt
 
 from planner_core.domain import Agility, Dynamics, Resources
 from planner_core.problem.pointing import Pointing, Vector, sight
-from planner_core.problem.sun_turns import SunPath, SunTurns, sun_turns
-from planner_core.problem.transitions import Transitions, slews_of
+from planner_core.problem.sun_turns import SunPath, SunTurns
+from planner_core.problem.transitions import Transitions
 from planner_core.worth import best_worths, common_unit, worth_of
 
 Floats = npt.NDArray[np.float64]
@@ -362,69 +362,3 @@ def line_of_sight(problem: Problem, row: int, t_s: float) -> Vector:
     places = pointing.targets_m if is_collect else pointing.stations_m
     path = pointing.paths[int(table.satellite[row])]
     return sight(path, places, int(table.place[row]), float(t_s))
-
-
-def build_satellite_problem(
-    index: int,
-    opportunities: Opportunities,
-    *,
-    id: str,  # noqa: A002 - the field's own name
-    name: str,
-    agility: Agility,
-    resources: Resources,
-    sunlight: Sunlight,
-    sun: SunPath | None = None,
-    events: tuple[Floats, Ints] | None = None,
-) -> SatelliteProblem:
-    """Return one satellite's view of the table.
-
-    Parameters
-    ----------
-    events
-        ``event_s`` and ``event``, where there are more of them than opportunities.
-    """
-    rows = np.flatnonzero(opportunities.satellite == index).astype(np.int32)
-    start_s, end_s = opportunities.start_s[rows], opportunities.end_s[rows]
-    looks = np.ascontiguousarray(opportunities.los_start[rows])
-    looked = np.ascontiguousarray(opportunities.los_end[rows])
-    own = rows if agility.tracks else rows[:0]
-    moves = opportunities.los_rate_start[own].astype(np.float64)
-    moved = opportunities.los_rate_end[own].astype(np.float64)
-    return SatelliteProblem(
-        id=id,
-        name=name,
-        agility=agility,
-        resources=resources,
-        rows=rows,
-        kind=opportunities.kind[rows],
-        place=opportunities.place[rows],
-        start_s=start_s,
-        end_s=end_s,
-        transitions=Transitions(
-            start_s=start_s,
-            end_s=end_s,
-            looks=looks,
-            looked=looked,
-            moves=moves,
-            moved=moved,
-            slews=slews_of(agility),
-            acceleration_deg_s2=float(agility.acceleration_deg_s2 or 0.0)
-            if agility.tracks
-            else 0.0,
-        ),
-        sunlight=sunlight,
-        event_s=start_s if events is None else events[0],
-        event=np.arange(len(rows), dtype=np.int32) if events is None else events[1],
-        sun=sun,
-        turns=sun_turns(
-            resources,
-            agility,
-            sun,
-            start_s=start_s,
-            end_s=end_s,
-            looks=looks,
-            looked=looked,
-            moves=moves,
-            moved=moved,
-        ),
-    )

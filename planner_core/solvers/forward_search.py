@@ -6,7 +6,7 @@ which ``ForwardSearch`` runs. Tests compare the two.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -40,6 +40,7 @@ from planner_core.solvers.base import (
     ImageNeeds,
     Solution,
 )
+from planner_core.solvers.priced import better_of
 from planner_core.solvers.sequential import Turn, plan_in_turn
 from planner_core.solvers.walk import contact_above_metadata
 
@@ -292,7 +293,11 @@ class ForwardSearch:
         guidance = self.guidance
 
         def plan_turn(turn: Turn) -> list[int]:
-            return self._plan_turn(turn, problem.worth[turn.satellite.rows], guidance, budget)
+            fresh = replace(turn, collected=turn.collected.copy())
+            rows = self._plan_turn(turn, problem.worth[turn.satellite.rows], guidance, budget)
+            if self.feasibility == "penalty" or budget.is_spent():
+                return rows
+            return better_of(problem, fresh, rows, looks_ahead=True)
 
         solution = plan_in_turn(problem, budget, plan_turn)
         return polished(problem, solution, self.window_moves_per_task, budget)

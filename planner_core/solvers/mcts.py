@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar, Final, Literal
 
 import numpy as np
@@ -36,6 +36,7 @@ from planner_core.solvers.mcts_tree import (
     empty_tree,
     new_node,
 )
+from planner_core.solvers.priced import better_of, with_choices
 from planner_core.solvers.sequential import Turn, plan_in_turn
 from planner_core.solvers.walk import contact_above_metadata
 
@@ -177,9 +178,15 @@ class Mcts:
         """Return the plan; the same one for the same seed."""
 
         def plan_turn(turn: Turn) -> list[int]:
-            return self._plan_turn(turn, problem.worth[turn.satellite.rows], budget, seed)
+            fresh = replace(turn, collected=turn.collected.copy())
+            rows = self._plan_turn(turn, problem.worth[turn.satellite.rows], budget, seed)
+            if self.feasibility == "penalty" or budget.is_spent():
+                return rows
+            return better_of(problem, fresh, rows, looks_ahead=True)
 
         solution = plan_in_turn(problem, budget, plan_turn)
+        if self.feasibility == "hard":
+            solution = with_choices(problem, solution, budget, seed)
         return polished(problem, solution, self.window_moves_per_task, budget)
 
     def _plan_turn(self, turn: Turn, worth: Floats, budget: Budget, seed: int) -> list[int]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar, Literal
 
 from planner_core.budget import Budget
 from planner_core.problem import Problem
 from planner_core.solvers.base import Constraint, Feasibility, Solution
+from planner_core.solvers.priced import better_of
 from planner_core.solvers.sequential import Turn, plan_in_turn
 from planner_core.solvers.walk import (
     CONTACT_ABOVE,
@@ -73,6 +74,10 @@ class Rule:
             images = rows[track.is_contact[rows] == 0]
             images = images[before[track.place[images]] == 0]
             turn.report(1.0, problem.worth_of(turn.satellite.rows[images]))
-            return [int(row) for row in rows]
+            taken = [int(row) for row in rows]
+            if self.feasibility == "penalty" or self.thresholds == "code":
+                return taken
+            fresh = replace(turn, collected=before)
+            return better_of(problem, fresh, taken, looks_ahead=False)
 
         return plan_in_turn(problem, budget, plan_turn)

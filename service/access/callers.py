@@ -18,6 +18,7 @@ class Scope(StrEnum):
 
     READ = "read"
     SUBMIT = "submit"
+    APPROVE = "approve"
     ADMIN = "admin"
 
     def includes(self, other: Scope) -> bool:

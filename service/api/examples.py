@@ -45,9 +45,14 @@ BODIES: Final[dict[str, Any]] = {
         "runs": [{"solver": "rule"}, {"solver": "forward_search", "params": {"depth": 2}}],
     },
     "WhatIfIn": {"forbid": ["bern"], "relax": {"slew_rate_deg_s": 2.0}},
+    "PlanIn": {"job_id": _ID, "name": "Monday"},
+    "TransitionIn": {"to": "approved", "reason": "Checked by the shift lead."},
     "WebhookIn": {"url": "https://ops.example/slewline", "events": ["job.succeeded"]},
 }
 """By the name of the schema."""
+
+EXECUTIONS: Final = [{"action_id": "a2", "outcome": "executed", "mbit": 120.5}]
+"""What is reported of a plan."""
 
 _FEATURES: Final = {
     "type": "FeatureCollection",

@@ -17,7 +17,7 @@ from service.answers.blocks import TIMELINE, Entry, holds, items_in
 from service.api import job_intake as intake
 from service.api.accept import preferred
 from service.api.conditional import NOT_MODIFIED
-from service.api.deps import CallDep, DatabaseDep, own_job_only
+from service.api.deps import Call, CallDep, DatabaseDep, own_job_only
 from service.api.errors import problem_responses
 from service.api.etags import matches
 from service.api.job_shapes import etag_of_timeline
@@ -46,7 +46,7 @@ Suffix = Annotated[
 ]
 
 
-def _responses(forms: Sequence[Form]) -> dict[int | str, dict[str, Any]]:
+def timeline_responses(forms: Sequence[Form]) -> dict[int | str, dict[str, Any]]:
     """Return the entries of the OpenAPI document for a route that offers these forms and JSON."""
     # JSON stands first: generated clients read the first form they know.
     content: dict[str, Any] = {_JSON: {"schema": _TIMELINE}}
@@ -68,7 +68,9 @@ def _responses(forms: Sequence[Form]) -> dict[int | str, dict[str, Any]]:
 
 
 @router.get(
-    "/{job_id}/timeline", response_class=Response, responses=_responses(list(_BY_TYPE.values()))
+    "/{job_id}/timeline",
+    response_class=Response,
+    responses=timeline_responses(list(_BY_TYPE.values())),
 )
 def get_timeline(job_id: str, call: CallDep) -> Response:
     """Return the plan, judged: actions, resources, totals, violations.
@@ -85,11 +87,18 @@ def get_timeline(job_id: str, call: CallDep) -> Response:
     return _answer(call.database, call.request, job, _BY_TYPE.get(media_type))
 
 
-@router.get("/{job_id}/timeline.{suffix}", response_class=Response, responses=_responses(FORMS))
+@router.get(
+    "/{job_id}/timeline.{suffix}", response_class=Response, responses=timeline_responses(FORMS)
+)
 def get_timeline_as(job_id: str, suffix: Suffix, call: CallDep) -> Response:
     """Return the plan in the form that the suffix names, whatever `Accept` says."""
     with call.database.reading() as session:
         job = intake.find_job(session, job_id)
+    return timeline_answer(call, job, suffix)
+
+
+def timeline_answer(call: Call, job: JobRow, suffix: str) -> Response:
+    """Return a job's plan in the form that a suffix names."""
     if suffix not in _SUFFIXES:
         offered = ", ".join(f".{known}" for known in _SUFFIXES)
         raise ServiceError("not_acceptable", f"The timeline is offered as {offered}.")

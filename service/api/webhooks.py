@@ -26,7 +26,7 @@ from service.webhooks import outbox
 from service.webhooks.addresses import AddressRefused, require_good_url
 from service.wire.base import Listed
 from service.wire.webhooks import (
-    JOB_EVENTS,
+    EVENTS,
     CreatedWebhook,
     DeliveryOut,
     TestData,
@@ -45,7 +45,7 @@ _SECRET_BYTES: Final = 32
 
 @router.post("", status_code=201)
 def create_webhook(body: WebhookIn, call: CallDep, once: OnceDep) -> CreatedWebhook:
-    """Tell the ends of this owner's jobs to an address; the answer holds the signing secret."""
+    """Tell an address of this owner's jobs and plans; the answer holds the signing secret."""
     try:
         require_good_url(body.url, private=call.settings.webhook_private_addresses)
     except AddressRefused as error:
@@ -58,7 +58,7 @@ def create_webhook(body: WebhookIn, call: CallDep, once: OnceDep) -> CreatedWebh
             owner=call.caller.owner,
             name=body.name,
             url=body.url,
-            events=[event for event in JOB_EVENTS if event in body.events],
+            events=[event for event in EVENTS if event in body.events],
             secret="whsec_" + base64.b64encode(secrets.token_bytes(_SECRET_BYTES)).decode(),
             created_at=session.execute(sa.select(utc_now())).scalar_one(),
         )

@@ -25,6 +25,10 @@ from service.wire.operations import SolverOut as Solver
 from service.wire.places import GroundStationOut as GroundStation
 from service.wire.places import TargetCatalogOut as TargetCatalog
 from service.wire.places import TargetIn as Target
+from service.wire.plans import ExecutionOut as Execution
+from service.wire.plans import PlanActionOut as PlanAction
+from service.wire.plans import PlanEventOut as PlanEvent
+from service.wire.plans import PlanOut as Plan
 from service.wire.satellites import SatelliteOut as Satellite
 from service.wire.scenarios import OpportunityOut as Opportunity
 from service.wire.scenarios import ScenarioOut as Scenario
@@ -48,6 +52,7 @@ __all__ = [
     "ComparedRun",
     "Comparison",
     "Delivery",
+    "Execution",
     "Explanation",
     "Fault",
     "GroundStation",
@@ -55,7 +60,10 @@ __all__ = [
     "Job",
     "JobFailed",
     "Opportunity",
+    "Plan",
+    "PlanAction",
     "PlanDiff",
+    "PlanEvent",
     "Progress",
     "Satellite",
     "SatelliteTimeline",

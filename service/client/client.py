@@ -15,6 +15,7 @@ import planner_core
 from service.client.comparisons import Comparisons
 from service.client.ground_stations import GroundStations
 from service.client.jobs import Jobs
+from service.client.plans import Plans
 from service.client.satellites import Satellites
 from service.client.scenarios import Scenarios
 from service.client.target_catalogs import TargetCatalogs
@@ -47,6 +48,7 @@ class Client:
     scenarios: Scenarios
     jobs: Jobs
     comparisons: Comparisons
+    plans: Plans
     webhooks: Webhooks
 
     def __init__(
@@ -75,6 +77,7 @@ class Client:
         self.scenarios = Scenarios(self._transport)
         self.jobs = Jobs(self._transport)
         self.comparisons = Comparisons(self._transport)
+        self.plans = Plans(self._transport)
         self.webhooks = Webhooks(self._transport)
 
     @property

@@ -346,3 +346,101 @@ class WebhookDeliveryRow(Row):
     last_error: Mapped[str | None]
     created_at: Mapped[datetime]
     ended_at: Mapped[datetime | None]
+
+
+class PlanRow(Row):
+    """A plan with a life: a job's answer that is approved, published, and one day superseded.
+
+    What it says never changes; a change is a new plan with a ``parent_id``. ``version`` grows with
+    each transition. ``violations`` are those that approval has to waive.
+    """
+
+    __tablename__ = "plan"
+    __table_args__ = (sa.Index("ix_plan_owner_state_id", "owner", "state", "id"),)
+
+    id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
+    owner: Mapped[str] = mapped_column(sa.String(64))
+    name: Mapped[str | None]
+    job_id: Mapped[str] = mapped_column(sa.ForeignKey("job.id"), index=True)
+    parent_id: Mapped[str | None] = mapped_column(sa.ForeignKey("plan.id"), index=True)
+    state: Mapped[str] = mapped_column(sa.String(16))
+    plan_sha256: Mapped[str] = mapped_column(sa.String(64))
+    horizon_start: Mapped[datetime]
+    horizon_end: Mapped[datetime]
+    validity: Mapped[str] = mapped_column(sa.String(16))
+    violations: Mapped[list[Json]] = mapped_column(sa.JSON)
+    version: Mapped[int] = mapped_column(default=1)
+    created_at: Mapped[datetime]
+
+
+class PlanSatelliteRow(Row):
+    """A satellite of a plan, and the span in which the plan is in force for it.
+
+    Both ends are null as long as the plan has not been published.
+    """
+
+    __tablename__ = "plan_satellite"
+
+    plan_id: Mapped[str] = mapped_column(sa.ForeignKey("plan.id"), primary_key=True)
+    satellite_id: Mapped[str] = mapped_column(primary_key=True, index=True)
+    name: Mapped[str]
+    in_force_from: Mapped[datetime | None]
+    in_force_until: Mapped[datetime | None]
+
+
+class PlanActionRow(Row):
+    """A collect or a contact of a plan. ``action_id`` is its id in the job's timeline."""
+
+    __tablename__ = "plan_action"
+
+    plan_id: Mapped[str] = mapped_column(sa.ForeignKey("plan.id"), primary_key=True)
+    position: Mapped[int] = mapped_column(primary_key=True)
+    action_id: Mapped[str]
+    satellite_id: Mapped[str]
+    mode: Mapped[str] = mapped_column(sa.String(16))
+    start: Mapped[datetime]
+    end: Mapped[datetime]
+    target_id: Mapped[str | None]
+    station_id: Mapped[str | None]
+
+
+class PlanEventRow(Row):
+    """One transition of a plan: who, when and why."""
+
+    __tablename__ = "plan_event"
+
+    id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
+    plan_id: Mapped[str] = mapped_column(sa.ForeignKey("plan.id"), index=True)
+    at: Mapped[datetime]
+    from_state: Mapped[str | None] = mapped_column(sa.String(16))
+    to_state: Mapped[str] = mapped_column(sa.String(16))
+    by_owner: Mapped[str] = mapped_column(sa.String(64))
+    by_key: Mapped[str | None] = mapped_column(sa.String(64))
+    reason: Mapped[str | None]
+    effective_from: Mapped[datetime | None]
+    waivers: Mapped[list[Json]] = mapped_column(sa.JSON)
+
+
+class PublisherRow(Row):
+    """One row for each owner, locked by whoever publishes: one plan after the other."""
+
+    __tablename__ = "publisher"
+
+    owner: Mapped[str] = mapped_column(sa.String(64), primary_key=True)
+
+
+class ExecutionRow(Row):
+    """What became of an action, as reported. Rows are added, never changed."""
+
+    __tablename__ = "plan_execution"
+
+    id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
+    plan_id: Mapped[str] = mapped_column(sa.ForeignKey("plan.id"), index=True)
+    action_id: Mapped[str]
+    outcome: Mapped[str] = mapped_column(sa.String(16))
+    at: Mapped[datetime | None]
+    mbit: Mapped[float | None] = mapped_column(sa.Double)
+    detail: Mapped[str | None]
+    by_owner: Mapped[str] = mapped_column(sa.String(64))
+    by_key: Mapped[str | None] = mapped_column(sa.String(64))
+    reported_at: Mapped[datetime]

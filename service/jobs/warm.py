@@ -48,6 +48,7 @@ from planner_core.solvers.base import Solver
 from planner_core.solvers.registry import (
     SOLVERS,
     Certified,
+    ForwardSearch,
     Graph,
     Mcts,
     Milp,
@@ -234,6 +235,16 @@ def _slow() -> None:
         excluded_by(each.satellites[0], 0)
 
 
+def _flown() -> None:
+    """Plan with turns in motion, to the sun and back."""
+    globe = _over_the_globe()
+    (plain,) = globe.satellites
+    agility = Agility(slew_rate_deg_s=2.0, acceleration_deg_s2=0.2, slew_model="moving")
+    resources = replace(plain.resources, sun_pointing="slew", eclipse_aware=True)
+    flown = replace(plain, agility=agility, resources=resources)
+    _plan(replace(globe, satellites=(flown,)), Rule(), ForwardSearch(), Graph(path="longest"))
+
+
 ESSENTIAL: Final[dict[str, Callable[[], None]]] = {
     # Judging and the tree search take longest; two processes begin with one each.
     "rule": _judge,
@@ -250,6 +261,7 @@ PARTS: Final[dict[str, Callable[[], None]]] = {
     "fleet with resources": _fleet_with_resources,
     "shortage": _shortage,
     "slow": _slow,
+    "flown": _flown,
 }
 
 

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from service.db.rows import JobRow
+from datetime import datetime
+from typing import cast
+
+from service.db.rows import JobRow, PlanRow
+from service.wire.plans import PlanChange, PlanState
 from service.wire.webhooks import JobEnd
 
 
@@ -27,4 +31,27 @@ def end_of(job: JobRow) -> JobEnd:
         label=job.label,
         scenario_id=job.scenario_id,
         links={"job": address, "timeline": f"{address}/timeline"},
+    )
+
+
+def event_of_plan(state: str) -> str:
+    """Return the event of a plan that has come to this state.
+
+    >>> event_of_plan("published")
+    'plan.published'
+    """
+    return f"plan.{state}"
+
+
+def change_of(plan: PlanRow, reason: str | None, effective_from: datetime | None) -> PlanChange:
+    """Return what an event tells of a plan."""
+    return PlanChange(
+        plan_id=plan.id,
+        state=cast(PlanState, plan.state),
+        name=plan.name,
+        job_id=plan.job_id,
+        parent_id=plan.parent_id,
+        reason=reason,
+        effective_from=effective_from,
+        links={"plan": f"/v1/plans/{plan.id}", "job": f"/v1/jobs/{plan.job_id}"},
     )

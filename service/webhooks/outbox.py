@@ -11,6 +11,7 @@ import json
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
+from datetime import datetime
 from typing import Any, Final
 
 import sqlalchemy as sa
@@ -18,9 +19,10 @@ from sqlalchemy.orm import Session
 
 from service.db.clock import utc_now
 from service.db.ids import new_id
-from service.db.rows import JobRow, WebhookDeliveryRow, WebhookRow
+from service.db.rows import JobRow, PlanRow, WebhookDeliveryRow, WebhookRow
 from service.webhooks import events
 from service.wire.base import dumped
+from service.wire.plans import PlanChange
 from service.wire.webhooks import EventOut, JobEnd, TestData
 
 TAKEN_S: Final = 60.0
@@ -63,11 +65,25 @@ def tell_end_of(session: Session, job_id: str) -> None:
             queue(session, webhook, event, events.end_of(job), job_id=job_id)
 
 
+def tell_plan(
+    session: Session, plan: PlanRow, reason: str | None, effective_from: datetime | None
+) -> None:
+    """Queue a delivery for each webhook of the plan's owner that asked for this transition."""
+    event = events.event_of_plan(plan.state)
+    data = events.change_of(plan, reason, effective_from)
+    wanted = sa.select(WebhookRow).where(
+        WebhookRow.owner == plan.owner, WebhookRow.disabled_at.is_(None)
+    )
+    for webhook in session.scalars(wanted):
+        if event in webhook.events:
+            queue(session, webhook, event, data, job_id=None)
+
+
 def queue(
     session: Session,
     webhook: WebhookRow,
     event: str,
-    data: JobEnd | TestData,
+    data: JobEnd | PlanChange | TestData,
     *,
     job_id: str | None,
 ) -> str:

@@ -9,7 +9,7 @@ from pydantic import Field
 from service.wire.base import Instant, Json, Open, Wire
 
 Constraint = Literal["slew", "station", "battery", "recorder", "duplicate"]
-Scope = Literal["read", "submit", "admin"]
+Scope = Literal["read", "submit", "approve", "admin"]
 
 
 class FaultOut(Wire):
@@ -98,7 +98,7 @@ class CallerOut(Wire):
 
     owner: str = Field(description="Whose jobs it sends; `local` without a key.")
     scope: Open[Scope] = Field(
-        description="Each of read, submit and admin includes those before it."
+        description="Each of read, submit, approve and admin includes those before it."
     )
     key_id: str | None = Field(description="Public part of the key; null without one.")
     key_name: str | None

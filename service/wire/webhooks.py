@@ -8,13 +8,22 @@ from pydantic import Field, StringConstraints
 
 from service.wire.base import Body, Instant, Name, Open, Stored, Wire
 from service.wire.jobs import ErrorOut, JobState
+from service.wire.plans import PlanChange
 
 LONGEST_URL: Final = 2000
 JobEvent = Literal["job.succeeded", "job.failed", "job.cancelled", "job.expired"]
 JOB_EVENTS: Final[tuple[JobEvent, ...]] = (
     "job.succeeded", "job.failed", "job.cancelled", "job.expired",
 )  # fmt: skip
-Event = Literal[JobEvent, "test"]
+PlanEvent = Literal[
+    "plan.draft", "plan.approved", "plan.published", "plan.superseded", "plan.withdrawn"
+]
+PLAN_EVENTS: Final[tuple[PlanEvent, ...]] = (
+    "plan.draft", "plan.approved", "plan.published", "plan.superseded", "plan.withdrawn",
+)  # fmt: skip
+ToldEvent = Literal[JobEvent, PlanEvent]
+EVENTS: Final[tuple[ToldEvent, ...]] = (*JOB_EVENTS, *PLAN_EVENTS)
+Event = Literal[JobEvent, PlanEvent, "test"]
 DeliveryState = Literal["pending", "delivered", "failed"]
 
 
@@ -24,11 +33,11 @@ class WebhookIn(Body):
     url: Annotated[str, StringConstraints(min_length=1, max_length=LONGEST_URL)] = Field(
         description="Gets each event as a POST. `https` only, unless the server allows more."
     )
-    events: list[JobEvent] = Field(
-        default_factory=lambda: cast("list[JobEvent]", list(JOB_EVENTS)),
+    events: list[ToldEvent] = Field(
+        default_factory=lambda: cast("list[ToldEvent]", list(JOB_EVENTS)),
         min_length=1,
-        max_length=len(JOB_EVENTS),
-        description="Ends of jobs that are told.",
+        max_length=len(EVENTS),
+        description="What is told: ends of jobs, and transitions of plans. By default the former.",
     )
     name: Name | None = None
 
@@ -38,9 +47,9 @@ class WebhookOut(Stored):
 
     id: str
     url: str
-    events: tuple[Open[JobEvent], ...]
+    events: tuple[Open[ToldEvent], ...]
     name: str | None
-    owner: str = Field(description="Whose jobs it tells of.")
+    owner: str = Field(description="Whose jobs and plans it tells of.")
     created_at: Instant
     disabled_at: Instant | None = Field(
         description="Since when nothing is sent any more: the receiver answered 410."
@@ -95,4 +104,4 @@ class EventOut(Wire):
 
     type: Open[Event]
     timestamp: Instant
-    data: JobEnd | TestData
+    data: JobEnd | PlanChange | TestData

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from datetime import timedelta
 
 import numpy as np
 import numpy.typing as npt
@@ -12,12 +13,16 @@ from hypothesis import strategies as st
 
 from planner_core.access.limits import Limits
 from planner_core.access.windows import find_accesses
-from planner_core.domain import Sensor, Target
+from planner_core.budget import Budget
+from planner_core.build import compute_opportunities
+from planner_core.domain import Horizon, Scenario, Sensor, Target
 from planner_core.errors import InvalidScenario
 from planner_core.orbits.ephemeris import Ephemeris, propagate
 from planner_core.orbits.places import Places, view
+from planner_core.problem import ACCESS_FOUND, OUTSIDE_LIMITS
+from planner_core.reasons.access_changes import access_changes
 from tests.examples import examples
-from tests.geometry import hours, orbit, satellite, windows_by_scan
+from tests.geometry import YEAR_2019, hours, orbit, satellite, windows_by_scan
 
 Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
@@ -232,3 +237,23 @@ def test_impossible_limits_are_refused_with_the_field(
         with pytest.raises(InvalidScenario) as caught:
             make()
         assert caught.value.fault.pointer == pointer
+
+
+def test_a_target_that_the_sun_rules_out_is_told_the_angle_that_would_do() -> None:
+    flown = satellite(orbit(inclination_deg=97.4), sensor=replace(WIDE, sun_exclusion_deg=179.0))
+    asked = Scenario(
+        horizon=Horizon(start=YEAR_2019, end=YEAR_2019 + timedelta(hours=24)),
+        satellites=(flown,),
+        targets=(NORTH,),
+        use_resources=False,
+    )
+    assert compute_opportunities(asked, Budget()).target_access[0] == OUTSIDE_LIMITS
+    changes = {c.setting: c.value for c in access_changes(asked, 0, Budget())}
+    assert set(changes) == {"sun_exclusion_deg"}
+    value = changes["sun_exclusion_deg"]
+    assert isinstance(value, float)
+    for angle_deg, has_access in ((value, True), (value + 0.1, False)):
+        sensor = replace(flown.sensor, sun_exclusion_deg=angle_deg)
+        tried = replace(asked, satellites=(replace(flown, sensor=sensor),))
+        found = compute_opportunities(tried, Budget()).target_access[0]
+        assert (found == ACCESS_FOUND) == has_access

@@ -23,11 +23,13 @@ from planner_core.problem.plan import Plan
 from planner_core.problem.slew import slew_s
 from planner_core.problem.sun_turns import SunPath, sun_turn_s
 from planner_core.referee.replay import Timeline, replay
+from planner_core.solvers.priced import better_of, energy_of, is_priced, with_choices
 from planner_core.solvers.registry import SOLVERS, Certified, Milp
+from planner_core.solvers.sequential import Turn
 from tests.examples import examples
 from tests.geometry import orbit, satellite
 from tests.planner_core.brute_force import best_reward
-from tests.planner_core.problems import TIGHT, Task, make_problem, sunny_problem
+from tests.planner_core.problems import TIGHT, Task, make_problem, random_problem, sunny_problem
 
 SEEDS = st.integers(0, 10**6)
 SOUTH = SunPath(step_s=1000.0, directions=np.array([[0.0, 0.0, -1.0], [0.0, 0.0, -1.0]]))
@@ -253,3 +255,62 @@ def test_turns_take_acceleration_and_settling() -> None:
     agility = Agility(slew_rate_deg_s=2.0, acceleration_deg_s2=0.1, settle_s=4.0)
     turn_s = sun_turn_s(SLEWING, agility, SOUTH, (1.0, 0.0, 0.0), 0.0)
     assert turn_s == pytest.approx(slew_s(90.0, 2.0, 0.1) + 4.0)
+
+
+@examples(100)
+@given(seed=SEEDS)
+def test_energy_paid_for_is_what_the_satellite_lacks_back_at_the_sun(seed: int) -> None:
+    """Two tasks and a stay at the sun against the first task and that stay, far from full."""
+    problem = sunny_problem(seed)
+    own = problem.satellites[0]
+    track = compile_track(problem, own, np.zeros(len(own), dtype=np.uint8))
+    first, second = track.charge_from_s, track.charge_to_s
+    for i in range(len(own)):
+        for j in range(i + 1, len(own)):
+            if not own.transitions.allows(i, j):
+                continue
+            charged_s = max(0.0, second[j] - first[i])
+            with_it = charged_s * track.charge_per_s - track.battery_cost[j]
+            without = (first[j] - first[i]) * track.charge_per_s
+            assert energy_of(track, i, j) == pytest.approx(without - with_it, abs=1e-12)
+
+
+def _batches() -> Problem:
+    """Return four passes over three images each, of which a battery pays for one pass in two."""
+    tasks = [
+        Task(kind=COLLECT, place=3 * p + k, start_s=1000.0 * p + 300 + 60 * k,
+             end_s=1000.0 * p + 330 + 60 * k)
+        for p in range(4) for k in range(3)
+    ]  # fmt: skip
+    resources = replace(
+        SLEWING, initial_battery_fraction=0.65, collect_drain_per_s=1 / 300,
+        sunpoint_charge_per_s=1 / 4000, recorder_max_fraction=1.0, collect_fill_per_s=1e-4,
+    )  # fmt: skip
+    return make_problem(
+        tasks, num_targets=12, horizon_s=4000.0, resources=resources,
+        sun=replace(SOUTH, step_s=4000.0),
+    )  # fmt: skip
+
+
+def test_a_price_of_energy_batches_images_between_visits_to_the_sun() -> None:
+    problem = _batches()
+    best = replay(problem, Certified().solve(problem, Budget(), 0).plan).reward
+    for name in ("rule", "forward_search", "mcts"):
+        timeline = replay(problem, SOLVERS[name]().solve(problem, Budget(), 0).plan)
+        assert timeline.is_valid
+        assert timeline.reward >= best - 1.0
+    assert replay(problem, SOLVERS["mcts"]().solve(problem, Budget(), 0).plan).reward == best
+
+
+def test_missions_that_charge_in_all_idle_time_are_planned_as_ever() -> None:
+    problem = random_problem(7)
+    turn = Turn(
+        satellite=problem.satellites[0],
+        track=compile_track(problem, problem.satellites[0], np.zeros(10, dtype=np.uint8)),
+        collected=np.zeros(5, dtype=np.uint8),
+        report=lambda _fraction, _reward: None,
+    )
+    assert not is_priced(problem, turn)
+    assert better_of(problem, turn, [2, 3], looks_ahead=True) == [2, 3]
+    solution = SOLVERS["rule"]().solve(problem, Budget(), 0)
+    assert with_choices(problem, solution, Budget(), 0) is solution

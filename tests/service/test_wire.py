@@ -30,6 +30,7 @@ from service.wire import (
     jobs,
     operations,
     places,
+    plans,
     satellites,
     scenarios,
     timelines,
@@ -42,14 +43,15 @@ from service.wire.base import Wire, dumped, read
 from tests.service.jobs.mission import small_mission
 
 MODULES = (
-    base, changes, imports, jobs, operations, wire_pins, places, satellites, scenarios, timelines,
-    webhooks,
+    base, changes, imports, jobs, operations, wire_pins, places, plans, satellites, scenarios,
+    timelines, webhooks,
 )  # fmt: skip
 NOW = "2026-03-01T00:00:00.000Z"
 ACTION = {
     "id": "a1", "mode": "collect", "start": NOW, "end": NOW, "target_id": "t1", "station_id": None,
     "opportunity_id": "o1", "off_nadir_deg": 10.0, "azimuth_deg": 90.0,
-    "slew": {"angle_deg": 1.0, "needed_s": 1.0, "available_s": 2.0}, "reward": 0.8,
+    "slew": {"angle_deg": 1.0, "needed_s": 1.0, "available_s": 2.0},
+    "turn_to_s": None, "turn_back_s": None, "reward": 0.8,
     "worth": 0.8, "quality": 0.8, "battery_fraction_end": None, "recorder_fraction_end": None,
 }  # fmt: skip
 JOB = {

@@ -167,7 +167,10 @@ def test_every_call_that_changes_something_is_in_the_table_above(door: Door) -> 
     changing = {
         (method, path) for method, path, _ in operations(door.client) if method not in READ_ONLY
     }
-    assert changing == set(CHANGES)
+    # Plans need a job with an answer: tests/service/access/test_plans.py.
+    others = {call for call in changing if call[1].startswith("/v1/plans")}
+    assert changing - others == set(CHANGES)
+    assert len(others) == 3
 
 
 @pytest.mark.parametrize("call", CHANGES, ids=" ".join)

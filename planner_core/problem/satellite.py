@@ -1,0 +1,82 @@
+"""One satellite's view of the table of opportunities: its rows, its turns, its times to the sun."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planner_core.domain import Agility, Resources
+from planner_core.problem.problem import (
+    Floats,
+    Ints,
+    Opportunities,
+    SatelliteProblem,
+    Sunlight,
+)
+from planner_core.problem.sun_turns import SunPath, sun_turns
+from planner_core.problem.transitions import Transitions, slews_of
+
+
+def build_satellite_problem(
+    index: int,
+    opportunities: Opportunities,
+    *,
+    id: str,  # noqa: A002 - the field's own name
+    name: str,
+    agility: Agility,
+    resources: Resources,
+    sunlight: Sunlight,
+    sun: SunPath | None = None,
+    events: tuple[Floats, Ints] | None = None,
+) -> SatelliteProblem:
+    """Return one satellite's view of the table.
+
+    Parameters
+    ----------
+    events
+        ``event_s`` and ``event``, where there are more of them than opportunities.
+    """
+    rows = np.flatnonzero(opportunities.satellite == index).astype(np.int32)
+    start_s, end_s = opportunities.start_s[rows], opportunities.end_s[rows]
+    looks = np.ascontiguousarray(opportunities.los_start[rows])
+    looked = np.ascontiguousarray(opportunities.los_end[rows])
+    own = rows if agility.tracks else rows[:0]
+    moves = opportunities.los_rate_start[own].astype(np.float64)
+    moved = opportunities.los_rate_end[own].astype(np.float64)
+    return SatelliteProblem(
+        id=id,
+        name=name,
+        agility=agility,
+        resources=resources,
+        rows=rows,
+        kind=opportunities.kind[rows],
+        place=opportunities.place[rows],
+        start_s=start_s,
+        end_s=end_s,
+        transitions=Transitions(
+            start_s=start_s,
+            end_s=end_s,
+            looks=looks,
+            looked=looked,
+            moves=moves,
+            moved=moved,
+            slews=slews_of(agility),
+            acceleration_deg_s2=float(agility.acceleration_deg_s2 or 0.0)
+            if agility.tracks
+            else 0.0,
+        ),
+        sunlight=sunlight,
+        event_s=start_s if events is None else events[0],
+        event=np.arange(len(rows), dtype=np.int32) if events is None else events[1],
+        sun=sun,
+        turns=sun_turns(
+            resources,
+            agility,
+            sun,
+            start_s=start_s,
+            end_s=end_s,
+            looks=looks,
+            looked=looked,
+            moves=moves,
+            moved=moved,
+        ),
+    )

@@ -1,0 +1,236 @@
+r"""Plans of simple planners where the battery charges between turns to the sun only.
+
+Who takes each image as it comes goes to the sun after every one of them. What helps is a price of
+energy: an image costs what it draws and the charge that its two turns forgo, and next to other
+images hardly more than what it draws. Taking ``j`` after ``i`` so costs
+:math:`\mu\,(d_j + f_j - t_j - g_{ij})` with the draw :math:`d`, the charge :math:`f` up to the
+arrival at the sun and :math:`t` up to the departure from it, and :math:`g` where there is no time
+between the two. The price follows the battery, :math:`\mu = \mu_0\, e^{\kappa (0.6 - b)}`: what is
+nearly full is cheap.
+
+A few dozen pairs of :math:`\mu_0` and :math:`\kappa` are tried on each mission, in milliseconds
+each, and the best plan counts.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from planner_core.budget import Budget
+from planner_core.certified.dp.resource_network import Network, strict_network_of
+from planner_core.certified.lns.choices import ChoiceSearch
+from planner_core.jit import inlined, kernel
+from planner_core.mdp.actions import next_action
+from planner_core.mdp.track import NO_TASK, Track, take
+from planner_core.problem import Bytes, Floats, Ints, Problem
+from planner_core.referee.replay import replay
+from planner_core.solvers.base import Solution
+from planner_core.solvers.sequential import Turn
+
+_PRICES: Final = (0.0, 0.2, 0.35, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.2)
+"""Of an image's worth, for what an image draws."""
+_FOLLOWING: Final = (1.0, 2.0, 4.0, 6.0)
+_CONTACTS_ABOVE: Final = (0.45, 0.7)
+"""How full the recorder is before a contact is worth its power."""
+_AHEAD: Final = 40
+"""Feasible tasks that a look ahead compares."""
+_MOVES: Final = 10  # of the choice search, for each satellite
+_MOST_UNITS: Final = 2000
+_NEUTRAL: Final = 0.6  # the battery at which energy has its price
+
+
+class Priced(NamedTuple):
+    """A satellite's plan and the figures it was made with.
+
+    Attributes
+    ----------
+    rows
+        Of the track, in order.
+    worth
+        What its new targets earn.
+    price, following
+        Price of energy in images for an image's draw, and how it follows the battery.
+    """
+
+    rows: list[int]
+    worth: float
+    price: float
+    following: float
+
+
+def is_priced(problem: Problem, turn: Turn) -> bool:
+    """Return whether the turn's satellite charges at the sun only."""
+    return problem.use_resources and turn.satellite.resources.sun_pointing == "slew"
+
+
+def best_priced(problem: Problem, turn: Turn, *, looks_ahead: bool) -> Priced:
+    """Return the best plan over all prices, of the rule or with a look ahead at what follows."""
+    track = turn.track
+    worth = np.where(track.is_contact == 1, 0.0, problem.worth[turn.satellite.rows])
+    is_new = (track.is_contact == 0) & (turn.collected[track.place] == 0)
+    draw, image = _typical(track, worth, is_new)
+    network = strict_network_of(problem, turn.satellite)
+    breadth = _AHEAD if looks_ahead else 1
+    best = Priced([], -1.0, 0.0, 0.0)
+    for price in _PRICES:
+        per_energy = price * image / draw
+        ahead = np.zeros(len(worth))
+        if looks_ahead:
+            ahead = values_ahead(network, np.where(is_new, worth, 0.0), per_energy)
+        for following in _FOLLOWING if price > 0.0 else (0.0,):
+            for contact_above in _CONTACTS_ABOVE:
+                collected = turn.collected.copy()
+                rows = priced_plan(
+                    track, worth, collected, ahead, per_energy, following, contact_above, breadth
+                )
+                gained = float(worth[rows].sum())
+                if gained > best.worth:
+                    best = Priced(rows.tolist(), gained, price, following)
+    return best
+
+
+def better_of(problem: Problem, turn: Turn, rows: list[int], *, looks_ahead: bool) -> list[int]:
+    """Return a search's plan, or a priced one that earns more."""
+    if not is_priced(problem, turn):
+        return rows
+    track = turn.track
+    own = np.array(rows, dtype=np.int64)
+    images = own[(track.is_contact[own] == 0) & (turn.collected[track.place[own]] == 0)]
+    gained = problem.worth_of(turn.satellite.rows[images])
+    priced = best_priced(problem, turn, looks_ahead=looks_ahead)
+    if priced.worth <= gained:
+        return rows
+    turn.report(1.0, priced.worth)
+    return priced.rows
+
+
+def _typical(track: Track, worth: Floats, is_new: Bytes) -> tuple[float, float]:
+    """Return what an image draws and earns, about; something positive in any case."""
+    offered = np.flatnonzero(is_new & (worth > 0.0))
+    if len(offered) == 0:
+        return 1.0, 1.0
+    draw = float(np.median(track.battery_cost[offered]))
+    return max(draw, 1e-9), float(worth[offered].mean())
+
+
+@kernel
+def values_ahead(network: Network, worth: Floats, per_energy: float) -> Floats:
+    """Return what can be gained after each task, energy paid for and targets seen as many.
+
+    Backward in one pass over the arcs. Shape ``(m,)``.
+
+    Parameters
+    ----------
+    worth
+        Of an image by each task; 0 for contacts. Shape ``(m,)``.
+    per_energy
+        Price of a full battery.
+    """
+    m = len(worth)
+    after, idle = np.empty(m), np.zeros(m + 1)
+    for k in range(m - 1, -1, -1):
+        best = idle[network.idle_from[k]]
+        for at in range(network.near_first[k], network.near_first[k + 1]):
+            j = network.near_rows[at]
+            paid = per_energy * (network.energy_cost[j] - network.near_give[at])
+            best = max(best, worth[j] - paid + after[j])
+        after[k] = best
+        own = worth[k] - per_energy * network.energy_cost[k] + best
+        idle[k] = max(idle[k + 1], own)
+    return after
+
+
+@kernel
+def priced_plan(
+    track: Track,
+    worth: Floats,
+    collected: Bytes,
+    ahead: Floats,
+    per_energy: float,
+    following: float,
+    contact_above: float,
+    breadth: int,
+) -> Ints:
+    """Return the rows of the plan at these prices; marks its targets in ``collected``.
+
+    Parameters
+    ----------
+    ahead
+        What each task leaves to be gained. Shape ``(m,)``.
+    breadth
+        How many of the next feasible tasks are compared. With 1 that is the rule, which
+        takes the next one that pays for itself.
+    """
+    m = len(worth)
+    rows = np.empty(m, dtype=np.int32)
+    count = 0
+    cursor, last = NO_TASK, NO_TASK
+    battery, recorder = track.battery_start, track.recorder_start
+    while True:
+        price = per_energy * math.exp(following * (_NEUTRAL - battery))
+        row, is_chosen, best = cursor, -1, -np.inf
+        seen = 0
+        while seen < breadth:
+            row = next_action(
+                track, last, row + 1, battery, recorder, True, collected, True, contact_above
+            )
+            if row == m:
+                break
+            must = track.is_contact[row] == 1 or row == track.next_kept[last + 1]
+            value = worth[row] - price * energy_of(track, last, row) + ahead[row]
+            if breadth == 1 and not must and value < 0.0:
+                continue
+            seen += 1
+            if value > best:
+                best, is_chosen = value, row
+            # Nothing beyond it is feasible, or it is there because it is needed.
+            if must:
+                break
+        if is_chosen < 0:
+            return rows[:count]
+        battery, recorder, _ = take(track, last, is_chosen, battery, recorder)
+        if not track.is_contact[is_chosen]:
+            collected[track.place[is_chosen]] = 1
+        rows[count] = is_chosen
+        count += 1
+        cursor = last = is_chosen
+
+
+@inlined
+def energy_of(track: Track, last: int, row: int) -> float:
+    """Return the energy that taking a task costs: its draw, and the charge forgone for it."""
+    charge_from_s = track.charge_from_s[last] if last >= 0 else 0.0
+    # Beyond the departure the charge is forgone until the sun is reached again.
+    until_s = max(track.charge_to_s[row], charge_from_s)
+    return float(
+        track.battery_cost[row] + track.charge_per_s * (track.charge_from_s[row] - until_s)
+    )
+
+
+def with_choices(problem: Problem, solution: Solution, budget: Budget, seed: int) -> Solution:
+    """Return an answer after a few moves that settle each target on one of its times.
+
+    A better batch of images often wants several visits to the sun moved at once, which no search
+    step by step does. Where no satellite turns to the sun the answer stays as it is.
+    """
+    turning = [s for s in problem.satellites if s.resources.sun_pointing == "slew" and len(s)]
+    if not (problem.use_resources and turning) or budget.is_spent():
+        return solution
+    top = float(problem.best_worth.sum())
+    unit = problem.reward_unit
+    if unit == 0.0 or top / unit > _MOST_UNITS:
+        unit = max(top / _MOST_UNITS, 1e-12)
+    moves = ChoiceSearch(problem, unit, seed, budget.stop)
+    moves.adopt(solution.plan)
+    for _ in range(_MOVES * len(turning)):
+        if budget.is_spent():
+            break
+        moves.move()
+    before, after = replay(problem, solution.plan), replay(problem, moves.plan)
+    if not after.is_valid or after.reward <= before.reward:
+        return solution
+    return replace(solution, plan=moves.plan)

@@ -1,0 +1,317 @@
+"""Plans with a life: taken from a job, approved, published, and reported on."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated, Any, cast
+
+from fastapi import APIRouter, Body, Query, Response
+from sqlalchemy.orm import Session
+
+from planner_core.errors import Fault
+from service.access.callers import Caller, Scope
+from service.api import job_intake as intake
+from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
+from service.api.deps import CallDep
+from service.api.errors import problem_responses
+from service.api.etags import etagged
+from service.api.examples import EXECUTIONS
+from service.api.guard import require_scope
+from service.api.idempotency import OnceDep
+from service.api.paging import PagingDep, newest_first
+from service.api.timelines import Suffix, timeline_answer, timeline_responses
+from service.db.rows import (
+    ExecutionRow,
+    JobRow,
+    PlanActionRow,
+    PlanEventRow,
+    PlanRow,
+    PlanSatelliteRow,
+)
+from service.exports.forms import FORMS
+from service.plans import lifecycle
+from service.plans import store as plan_store
+from service.problems.faults import refuse
+from service.problems.kinds import ServiceError
+from service.stores import job_store
+from service.webhooks import outbox
+from service.wire.base import Listed, parse_instant, read
+from service.wire.plans import (
+    MAX_REPORTED,
+    TRANSITIONS,
+    ExecutionIn,
+    ExecutionOut,
+    PlanActionOut,
+    PlanEventOut,
+    PlanIn,
+    PlanOut,
+    PlanSatelliteOut,
+    PlanState,
+    ReportedOut,
+    TransitionIn,
+    WaiverOut,
+)
+from service.wire.scenarios import HorizonOut
+from service.wire.timelines import TimelineOut, ViolationOut
+
+router = APIRouter(prefix="/v1/plans", tags=["plans"])
+
+At = Annotated[
+    str | None,
+    Query(description="Only plans in force at this instant; `now` for the present one."),
+]
+
+
+@router.post("", status_code=201, responses=problem_responses(409, 422))
+def create_plan(body: PlanIn, call: CallDep, once: OnceDep) -> PlanOut:
+    """Take the plan of a job into operations, as a draft."""
+    with once.transaction() as session:
+        owner = job_store.owner_of(session, body.job_id)
+        if owner is None or call.caller.visible_owner not in (None, owner):
+            detail = f"There is no job {body.job_id!r}."
+            raise refuse([Fault(code="unknown_job", detail=detail, pointer="/job_id")])
+        job = intake.find_job(session, body.job_id)
+        timeline = read(TimelineOut, intake.find_timeline(session, job))
+        plan = plan_store.add(session, call.caller, owner, job.id, body.name, timeline)
+        call.audit.record(session, "create", "plan", plan.id)
+        outbox.tell_plan(session, plan, None, None)
+        return once.keep(
+            session, created(call.response, _shown(session, plan), f"/v1/plans/{plan.id}")
+        )
+
+
+@router.get("")
+def list_plans(
+    call: CallDep,
+    paging: PagingDep,
+    state: Annotated[PlanState | None, Query(description="Only plans in this state.")] = None,
+    satellite_id: Annotated[str | None, Query(description="Only plans of this satellite.")] = None,
+    at: At = None,
+    job_id: Annotated[str | None, Query(description="Only plans of this job.")] = None,
+    parent_id: Annotated[str | None, Query(description="Only changes of this plan.")] = None,
+) -> Listed[PlanOut]:
+    """List plans, newest first.
+
+    `state=published&at=now` is the stable link to what is in force; with an instant, plans that
+    were superseded later are listed for the time before that.
+    """
+    with call.database.reading() as session:
+        query = plan_store.matching(
+            owner=call.caller.visible_owner, state=state, satellite_id=satellite_id,
+            at=_instant(session, at), job_id=job_id, parent_id=parent_id,
+        )  # fmt: skip
+        page = newest_first(session, query, PlanRow.id, paging)
+        satellites = plan_store.satellites(session, [plan.id for plan in page.rows])
+    items = [_plan_out(plan, satellites[plan.id]) for plan in page.rows]
+    return Listed(items=items, next=page.next)
+
+
+def _instant(session: Session, at: str | None) -> datetime | None:
+    if at is None:
+        return None
+    if at == "now":
+        return plan_store.now(session)
+    try:
+        return parse_instant(at)
+    except ValueError as error:
+        raise refuse([Fault(code="invalid_time", detail=f"at: {error}.")]) from None
+
+
+@router.get(
+    "/{plan_id}", response_model=PlanOut, responses={**NOT_MODIFIED, **problem_responses(404)}
+)
+def get_plan(plan_id: str, call: CallDep) -> PlanOut | Response:
+    """Return one plan."""
+    with call.database.reading() as session:
+        shown = _shown(session, _find(session, plan_id, call.caller))
+    return unless_known(call.request, call.response, shown)
+
+
+@router.post("/{plan_id}/transitions", responses=problem_responses(403, 404, 409, 412, 422))
+def move_plan(plan_id: str, body: TransitionIn, call: CallDep, once: OnceDep) -> PlanOut:
+    """Approve, publish or withdraw a plan.
+
+    Publishing supersedes what is in force for the plan's satellites from `effective_from` on. It is
+    refused (409) where somebody has published another plan there since this one was approved,
+    unless this one is its change. Approval takes the scope `approve`, and a waiver for each
+    violation.
+    """
+    if body.to == "approved":
+        require_scope(call.caller, Scope.APPROVE)
+    with once.transaction() as session:
+        if body.to == "published":
+            # Before the plan itself is locked, so that two publishers come one after the other.
+            plan_store.lock_publishing(session, _find(session, plan_id, call.caller).owner)
+        plan = _find(session, plan_id, call.caller, to_change=True)
+        require_match(call.request, lambda: _shown(session, plan))
+        lifecycle.move(session, call.caller, plan, body)
+        call.audit.record(session, body.to, "plan", plan.id)
+        shown = _shown(session, plan)
+        call.response.headers["ETag"] = etagged(shown)
+        return once.keep(session, shown)
+
+
+@router.get("/{plan_id}/history", responses=problem_responses(404))
+def list_history(plan_id: str, call: CallDep) -> Listed[PlanEventOut]:
+    """List a plan's transitions in their order: who, when and why."""
+    with call.database.reading() as session:
+        _find(session, plan_id, call.caller)
+        events = plan_store.history(session, plan_id)
+    return Listed(items=[_event_out(event) for event in events], next=None)
+
+
+@router.get("/{plan_id}/actions", responses=problem_responses(404))
+def list_actions(
+    plan_id: str,
+    call: CallDep,
+    paging: PagingDep,
+    satellite_id: Annotated[str | None, Query(description="Only of this satellite.")] = None,
+) -> Listed[PlanActionOut]:
+    """List a plan's collects and contacts, and what became of them as far as it was reported."""
+    with call.database.reading() as session:
+        _find(session, plan_id, call.caller)
+        found = plan_store.actions(
+            session, plan_id, paging.after_number(), paging.limit + 1, satellite_id
+        )
+    page = paging.answer(found, lambda pair: pair[0].position)
+    return Listed(items=[_action_out(row, last) for row, last in page.rows], next=page.next)
+
+
+@router.post("/{plan_id}/executions", status_code=201, responses=problem_responses(404, 409, 422))
+def report_executions(
+    plan_id: str,
+    reports: Annotated[
+        list[ExecutionIn],
+        Body(min_length=1, max_length=MAX_REPORTED, examples=[EXECUTIONS]),
+    ],
+    call: CallDep,
+    once: OnceDep,
+) -> ReportedOut:
+    """Report what became of actions. Reports are added, never changed: the last one counts."""
+    with once.transaction() as session:
+        plan = _find(session, plan_id, call.caller)
+        if plan.state in ("draft", "approved"):
+            raise ServiceError(
+                "invalid_transition", f"The plan is {plan.state}: it has not been published yet."
+            )
+        unknown = plan_store.unknown_actions(session, plan_id, [r.action_id for r in reports])
+        faults = [
+            Fault(code="unknown_action", detail=f"The plan has no action {each.action_id!r}.",
+                  pointer=f"/{i}/action_id")
+            for i, each in enumerate(reports)
+            if each.action_id in unknown
+        ]  # fmt: skip
+        if faults:
+            raise refuse(faults)
+        rows = plan_store.report(session, call.caller, plan_id, reports)
+        call.audit.record(session, "report", "plan", plan_id)
+        return once.keep(session, ReportedOut(executions=tuple(map(_execution_out, rows))))
+
+
+@router.get("/{plan_id}/executions", responses=problem_responses(404))
+def list_executions(plan_id: str, call: CallDep, paging: PagingDep) -> Listed[ExecutionOut]:
+    """List what was reported of a plan, newest first."""
+    with call.database.reading() as session:
+        _find(session, plan_id, call.caller)
+        query = plan_store.executions(plan_id)
+        page = newest_first(session, query, ExecutionRow.id, paging)
+    return Listed(items=[_execution_out(row) for row in page.rows], next=page.next)
+
+
+@router.get(
+    "/{plan_id}/timeline.{suffix}", response_class=Response, responses=timeline_responses(FORMS)
+)
+def get_plan_as(plan_id: str, suffix: Suffix, call: CallDep) -> Response:
+    """Return the plan in the form that the suffix names, as of its job."""
+    with call.database.reading() as session:
+        job = session.get_one(JobRow, _find(session, plan_id, call.caller).job_id)
+    return timeline_answer(call, job, suffix)
+
+
+def _find(session: Session, plan_id: str, caller: Caller, *, to_change: bool = False) -> PlanRow:
+    plan = session.get(PlanRow, plan_id, with_for_update=to_change, populate_existing=to_change)
+    if plan is None or caller.visible_owner not in (None, plan.owner):
+        raise ServiceError("not_found", f"There is no plan {plan_id!r}.")
+    return plan
+
+
+def _shown(session: Session, plan: PlanRow) -> PlanOut:
+    return _plan_out(plan, plan_store.satellites(session, [plan.id])[plan.id])
+
+
+def _plan_out(plan: PlanRow, satellites: list[PlanSatelliteRow]) -> PlanOut:
+    address = f"/v1/plans/{plan.id}"
+    links = {
+        "self": address,
+        "actions": f"{address}/actions",
+        "history": f"{address}/history",
+        "executions": f"{address}/executions",
+        "timeline": f"{address}/timeline.json",
+        "job": f"/v1/jobs/{plan.job_id}",
+    }
+    if plan.parent_id is not None:
+        links["parent"] = f"/v1/plans/{plan.parent_id}"
+    return PlanOut(
+        id=plan.id,
+        name=plan.name,
+        state=cast(PlanState, plan.state),
+        owner=plan.owner,
+        job_id=plan.job_id,
+        parent_id=plan.parent_id,
+        plan_sha256=plan.plan_sha256,
+        horizon=HorizonOut(start=plan.horizon_start, end=plan.horizon_end),
+        validity=cast(Any, plan.validity),
+        violations=tuple(ViolationOut.model_validate(each) for each in plan.violations),
+        satellites=tuple(
+            PlanSatelliteOut(
+                satellite_id=row.satellite_id,
+                satellite_name=row.name,
+                in_force_from=row.in_force_from,
+                in_force_until=row.in_force_until,
+            )
+            for row in satellites
+        ),
+        allowed=TRANSITIONS[cast(PlanState, plan.state)],
+        created_at=plan.created_at,
+        links=links,
+    )
+
+
+def _event_out(row: PlanEventRow) -> PlanEventOut:
+    return PlanEventOut(
+        at=row.at,
+        from_state=cast(Any, row.from_state),
+        to_state=cast(PlanState, row.to_state),
+        owner=row.by_owner,
+        key_name=row.by_key,
+        reason=row.reason,
+        effective_from=row.effective_from,
+        waivers=tuple(WaiverOut(**waiver) for waiver in row.waivers),
+    )
+
+
+def _action_out(row: PlanActionRow, outcome: str | None) -> PlanActionOut:
+    return PlanActionOut(
+        id=row.action_id,
+        satellite_id=row.satellite_id,
+        mode=cast(Any, row.mode),
+        start=row.start,
+        end=row.end,
+        target_id=row.target_id,
+        station_id=row.station_id,
+        outcome=cast(Any, outcome),
+    )
+
+
+def _execution_out(row: ExecutionRow) -> ExecutionOut:
+    return ExecutionOut(
+        id=row.id,
+        action_id=row.action_id,
+        outcome=cast(Any, row.outcome),
+        at=row.at,
+        mbit=row.mbit,
+        detail=row.detail,
+        owner=row.by_owner,
+        key_name=row.by_key,
+        reported_at=row.reported_at,
+    )

@@ -1,0 +1,121 @@
+"""Plans with a life: drafts that are approved, published and reported on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from datetime import datetime
+from typing import Any, Literal
+
+from service.client.transport import Transport, path_of
+from service.wire.instants import instant_text
+from service.wire.plans import ExecutionOut as Execution
+from service.wire.plans import PlanActionOut as PlanAction
+from service.wire.plans import PlanEventOut as PlanEvent
+from service.wire.plans import PlanOut as Plan
+from service.wire.plans import ReportedOut
+
+At = datetime | Literal["now"]
+
+
+class Plans:
+    """The plans of the key's owner."""
+
+    def __init__(self, transport: Transport):
+        self._transport = transport
+
+    def create(
+        self, job_id: str, *, name: str | None = None, idempotency_key: str | None = None
+    ) -> Plan:
+        """Take a job's plan into operations, as a draft."""
+        body = {"job_id": job_id} | ({} if name is None else {"name": name})
+        return self._transport.post(
+            path_of("plans"), Plan, json=body, idempotency_key=idempotency_key
+        )
+
+    def list(
+        self,
+        *,
+        state: str | None = None,
+        satellite_id: str | None = None,
+        at: At | None = None,
+        job_id: str | None = None,
+        parent_id: str | None = None,
+    ) -> Iterator[Plan]:
+        """Yield plans, newest first; with ``state="published", at="now"`` those in force."""
+        instant = instant_text(at) if isinstance(at, datetime) else at
+        wanted = {"state": state, "satellite_id": satellite_id, "at": instant,
+                  "job_id": job_id, "parent_id": parent_id}  # fmt: skip
+        params = {name: value for name, value in wanted.items() if value is not None}
+        return self._transport.pages(path_of("plans"), Plan, params=params)
+
+    def get(self, plan_id: str) -> Plan:
+        """Return one plan."""
+        return self._transport.get(path_of("plans", plan_id), Plan)
+
+    def approve(
+        self,
+        plan_id: str,
+        *,
+        reason: str | None = None,
+        waivers: Mapping[str, str] | None = None,
+        if_match: str | None = None,
+    ) -> Plan:
+        """Approve a draft; ``waivers`` gives a reason for each of its violations."""
+        told = [{"violation": each, "reason": why} for each, why in (waivers or {}).items()]
+        return self._move(plan_id, "approved", if_match, reason=reason, waivers=told or None)
+
+    def publish(
+        self,
+        plan_id: str,
+        *,
+        reason: str | None = None,
+        effective_from: datetime | None = None,
+        if_match: str | None = None,
+    ) -> Plan:
+        """Put an approved plan in force, in place of what is so for its satellites."""
+        instant = None if effective_from is None else instant_text(effective_from)
+        return self._move(plan_id, "published", if_match, reason=reason, effective_from=instant)
+
+    def withdraw(
+        self, plan_id: str, *, reason: str | None = None, if_match: str | None = None
+    ) -> Plan:
+        """Take a plan out of operations."""
+        return self._move(plan_id, "withdrawn", if_match, reason=reason)
+
+    def history(self, plan_id: str) -> Iterator[PlanEvent]:
+        """Yield the plan's transitions in their order."""
+        return self._transport.pages(path_of("plans", plan_id, "history"), PlanEvent)
+
+    def actions(self, plan_id: str, *, satellite_id: str | None = None) -> Iterator[PlanAction]:
+        """Yield the plan's collects and contacts, with what became of them."""
+        params = {} if satellite_id is None else {"satellite_id": satellite_id}
+        return self._transport.pages(
+            path_of("plans", plan_id, "actions"), PlanAction, params=params
+        )
+
+    def report(
+        self,
+        plan_id: str,
+        executions: Iterable[Mapping[str, Any]],
+        *,
+        idempotency_key: str | None = None,
+    ) -> Sequence[Execution]:
+        """Report what became of actions: ``{"action_id": …, "outcome": "executed"}``, and so on."""
+        told = self._transport.post(
+            path_of("plans", plan_id, "executions"), ReportedOut,
+            json=[dict(each) for each in executions], idempotency_key=idempotency_key,
+        )  # fmt: skip
+        return told.executions
+
+    def executions(self, plan_id: str) -> Iterator[Execution]:
+        """Yield what was reported, newest first."""
+        return self._transport.pages(path_of("plans", plan_id, "executions"), Execution)
+
+    def _move(self, plan_id: str, to: str, if_match: str | None, **fields: Any) -> Plan:
+        return self._transport.post(
+            path_of("plans", plan_id, "transitions"),
+            Plan,
+            json={"to": to} | {k: v for k, v in fields.items() if v is not None},
+            headers={} if if_match is None else {"If-Match": if_match},
+            idempotency_key=None,
+        )

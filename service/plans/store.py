@@ -1,0 +1,213 @@
+"""Plans in the database: taken from jobs, moved from state to state, and reported on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from datetime import datetime
+
+import sqlalchemy as sa
+from sqlalchemy.dialects import postgresql, sqlite
+from sqlalchemy.orm import Session
+
+from service.access.callers import Caller
+from service.db.clock import utc_now
+from service.db.ids import new_id
+from service.db.rows import (
+    ExecutionRow,
+    PlanActionRow,
+    PlanEventRow,
+    PlanRow,
+    PlanSatelliteRow,
+    PublisherRow,
+)
+from service.wire.base import dumped
+from service.wire.plans import ExecutionIn, PlanState, WaiverIn
+from service.wire.timelines import IDLE_MODES, TimelineOut
+
+
+def now(session: Session) -> datetime:
+    """Return the database's time."""
+    return session.execute(sa.select(utc_now())).scalar_one()
+
+
+def add(
+    session: Session, caller: Caller, owner: str, job_id: str, name: str | None,
+    timeline: TimelineOut, parent_id: str | None = None,
+) -> PlanRow:  # fmt: skip
+    """Store a job's plan as a draft: its actions as rows."""
+    plan = PlanRow(
+        id=new_id(), owner=owner, name=name, job_id=job_id, parent_id=parent_id, state="draft",
+        plan_sha256=timeline.plan_sha256, horizon_start=timeline.horizon.start,
+        horizon_end=timeline.horizon.end, validity=timeline.validity,
+        violations=[dumped(each) for each in timeline.violations if each.code != "duplicate"],
+        created_at=now(session),
+    )  # fmt: skip
+    session.add(plan)
+    session.flush()
+    session.add_all(
+        PlanSatelliteRow(plan_id=plan.id, satellite_id=each.id, name=each.name)
+        for each in timeline.satellites
+    )
+    actions = [
+        (satellite.id, action)
+        for satellite in timeline.satellites
+        for action in satellite.actions
+        if action.mode not in IDLE_MODES
+    ]
+    rows = [
+        {
+            "plan_id": plan.id, "position": position, "action_id": action.id,
+            "satellite_id": satellite_id, "mode": action.mode, "start": action.start,
+            "end": action.end, "target_id": action.target_id, "station_id": action.station_id,
+        }
+        for position, (satellite_id, action) in enumerate(actions)
+    ]  # fmt: skip
+    if rows:
+        session.execute(sa.insert(PlanActionRow), rows)
+    note(session, caller, plan, None)
+    return plan
+
+
+def note(
+    session: Session, caller: Caller, plan: PlanRow, from_state: str | None,
+    reason: str | None = None, effective_from: datetime | None = None,
+    waivers: Sequence[WaiverIn] = (),
+) -> None:  # fmt: skip
+    """Write a transition into the plan's history."""
+    session.add(
+        PlanEventRow(
+            id=new_id(), plan_id=plan.id, at=now(session), from_state=from_state,
+            to_state=plan.state, by_owner=caller.owner, by_key=caller.key_name, reason=reason,
+            effective_from=effective_from, waivers=[dumped(each) for each in waivers],
+        )
+    )  # fmt: skip
+    session.flush()
+
+
+def history(session: Session, plan_id: str) -> Sequence[PlanEventRow]:
+    """Return the transitions of a plan, in order."""
+    wanted = sa.select(PlanEventRow).where(PlanEventRow.plan_id == plan_id)
+    return session.scalars(wanted.order_by(PlanEventRow.id)).all()
+
+
+def satellites(session: Session, plan_ids: Iterable[str]) -> dict[str, list[PlanSatelliteRow]]:
+    """Return the satellites of each of these plans."""
+    ids = list(plan_ids)
+    found: dict[str, list[PlanSatelliteRow]] = {own_id: [] for own_id in ids}
+    wanted = sa.select(PlanSatelliteRow).where(PlanSatelliteRow.plan_id.in_(ids))
+    for row in session.scalars(wanted.order_by(PlanSatelliteRow.satellite_id)):
+        found[row.plan_id].append(row)
+    return found
+
+
+def matching(
+    *, owner: str | None, state: PlanState | None, satellite_id: str | None, job_id: str | None,
+    parent_id: str | None, at: datetime | None,
+) -> sa.Select[PlanRow]:  # fmt: skip
+    """Return the query of plans by what they are and when they are in force.
+
+    With an instant, `published` means what was or will be in force then, by what is known now.
+    """
+    query = sa.select(PlanRow)
+    for column, value in (
+        (PlanRow.owner, owner), (PlanRow.job_id, job_id), (PlanRow.parent_id, parent_id)
+    ):  # fmt: skip
+        if value is not None:
+            query = query.where(column == value)
+    if at is not None and state == "published":
+        query = query.where(PlanRow.state.in_(("published", "superseded")))
+    elif state is not None:
+        query = query.where(PlanRow.state == state)
+    of = [PlanSatelliteRow.plan_id == PlanRow.id]
+    if satellite_id is not None:
+        of.append(PlanSatelliteRow.satellite_id == satellite_id)
+    if at is not None:
+        of.append(PlanRow.horizon_end > at)
+        of.append(PlanSatelliteRow.in_force_from <= at)
+        ends = PlanSatelliteRow.in_force_until
+        of.append(sa.or_(ends.is_(None), ends > at))
+    if len(of) > 1:
+        query = query.where(sa.exists().where(*of))
+    return query
+
+
+def lock_publishing(session: Session, owner: str) -> None:
+    """Let nobody else publish for this owner until the transaction ends."""
+    assert session.bind is not None
+    dialect = postgresql if session.bind.dialect.name == "postgresql" else sqlite
+    session.execute(dialect.insert(PublisherRow).values(owner=owner).on_conflict_do_nothing())
+    session.execute(sa.select(PublisherRow).where(PublisherRow.owner == owner).with_for_update())
+
+
+def in_force(session: Session, plan: PlanRow, effective_from: datetime) -> list[PlanSatelliteRow]:
+    """Return where other plans of the owner are in force for this plan's satellites, from then on.
+
+    Only as far as the plan's own horizon reaches.
+    """
+    own = sa.select(PlanSatelliteRow.satellite_id).where(PlanSatelliteRow.plan_id == plan.id)
+    ends = PlanSatelliteRow.in_force_until
+    wanted = (
+        sa.select(PlanSatelliteRow)
+        .join(PlanRow, PlanRow.id == PlanSatelliteRow.plan_id)
+        .where(
+            PlanRow.owner == plan.owner,
+            PlanRow.id != plan.id,
+            PlanRow.state == "published",
+            PlanSatelliteRow.satellite_id.in_(own),
+            PlanRow.horizon_end > effective_from,
+            PlanRow.horizon_start < plan.horizon_end,
+            sa.or_(ends.is_(None), ends > effective_from),
+        )
+        .order_by(PlanSatelliteRow.plan_id)
+    )
+    return list(session.scalars(wanted))
+
+
+def actions(
+    session: Session, plan_id: str, after: int, limit: int, satellite_id: str | None
+) -> list[tuple[PlanActionRow, str | None]]:
+    """Return a page of a plan's actions, each with the last outcome that was reported."""
+    wanted = sa.select(PlanActionRow).where(
+        PlanActionRow.plan_id == plan_id, PlanActionRow.position > after
+    )
+    if satellite_id is not None:
+        wanted = wanted.where(PlanActionRow.satellite_id == satellite_id)
+    rows = session.scalars(wanted.order_by(PlanActionRow.position).limit(limit)).all()
+    reports = (
+        sa.select(ExecutionRow.action_id, ExecutionRow.outcome)
+        .where(
+            ExecutionRow.plan_id == plan_id,
+            ExecutionRow.action_id.in_([row.action_id for row in rows]),
+        )
+        .order_by(ExecutionRow.id)
+    )
+    last: dict[str, str] = {each.action_id: each.outcome for each in session.execute(reports)}
+    return [(row, last.get(row.action_id)) for row in rows]
+
+
+def unknown_actions(session: Session, plan_id: str, action_ids: Sequence[str]) -> set[str]:
+    """Return which of these ids no action of the plan has."""
+    wanted = sa.select(PlanActionRow.action_id).where(PlanActionRow.plan_id == plan_id)
+    return set(action_ids) - set(session.scalars(wanted))
+
+
+def report(
+    session: Session, caller: Caller, plan_id: str, reports: Sequence[ExecutionIn]
+) -> list[ExecutionRow]:
+    """Take down what became of some actions."""
+    reported_at = now(session)
+    rows = [
+        ExecutionRow(
+            id=new_id(), plan_id=plan_id, by_owner=caller.owner, by_key=caller.key_name,
+            reported_at=reported_at, **each.model_dump(),
+        )
+        for each in reports
+    ]  # fmt: skip
+    session.add_all(rows)
+    session.flush()
+    return rows
+
+
+def executions(plan_id: str) -> sa.Select[ExecutionRow]:
+    """Return the query of all that was reported of a plan."""
+    return sa.select(ExecutionRow).where(ExecutionRow.plan_id == plan_id)
