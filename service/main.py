@@ -36,10 +36,12 @@ from service.api import (
     what_if,
 )
 from service.api.body_limit import BodyLimit
+from service.api.bulkhead import Admitted, Bulkhead
 from service.api.deps import check_request
 from service.api.errors import install_error_handlers
 from service.api.guard import Guard
 from service.api.idempotency import install_replay
+from service.api.job_wait import Versions
 from service.api.middleware import RequestContext
 from service.api.polls import Polls
 from service.api.security_headers import SecurityHeaders
@@ -83,7 +85,13 @@ ROUTERS = (
 )
 
 
-def create_app(settings: Settings, queue: JobQueue | None = None) -> FastAPI:
+def create_app(
+    settings: Settings,
+    queue: JobQueue | None = None,
+    *,
+    heavy: str | None = None,
+    is_heavy: bool = False,
+) -> FastAPI:
     """Return the application. The database must have been migrated.
 
     Parameters
@@ -92,6 +100,10 @@ def create_app(settings: Settings, queue: JobQueue | None = None) -> FastAPI:
         The configuration of this process.
     queue
         Where jobs are sent; without one the service takes none.
+    heavy
+        Socket file of a process that is given what is heavy; without one it is done here.
+    is_heavy
+        This is that process: who calls it has been let in by another one.
     """
     app = FastAPI(
         title="Slewline",
@@ -119,6 +131,7 @@ def create_app(settings: Settings, queue: JobQueue | None = None) -> FastAPI:
     app.state.explainer = Explainer()
     app.state.variations = Variations()
     app.state.queue = queue
+    app.state.versions = Versions(app.state)
     app.state.call_counters = metrics.CallCounters()
     for router in ROUTERS:
         app.include_router(router)
@@ -126,6 +139,11 @@ def create_app(settings: Settings, queue: JobQueue | None = None) -> FastAPI:
     install_replay(app)
     openapi.install_openapi(app)
     # The last one added is the outermost.
+    if is_heavy:
+        app.add_middleware(Admitted)
+        return app
+    if heavy is not None:
+        app.add_middleware(Bulkhead, address=heavy)
     app.add_middleware(Polls, state=app.state)
     app.add_middleware(BodyLimit, max_bytes=int(settings.max_body_mb * 1_000_000))
     app.add_middleware(Guard, settings=settings)

@@ -16,9 +16,11 @@ import uvicorn
 from service.access import key_store
 from service.db.migrate import upgrade
 from service.db.session import Database
+from service.heavy import running_heavy
 from service.jobs.queue import DbosQueue, migrate_queue
 from service.jobs.supervisor import Supervisor
 from service.main import create_app
+from service.process.connections import Protocol, allow_connections
 from service.process.logs import configure_logging
 from service.process.stopping import StopRequest
 from service.process.tracing import CannotTrace, start_tracing
@@ -101,12 +103,14 @@ def serve(settings: Settings, *, with_workers: bool) -> int:
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stop.ask())
     require_key(settings)
+    allow_connections()
     with ExitStack() as stack:
         listener = stack.enter_context(listen(settings.host, settings.port))
         configure_logging()
         stack.enter_context(_traced(settings))
         prepare_database(settings)
-        api = stack.enter_context(_running_api(settings, listener))
+        heavy = stack.enter_context(running_heavy(settings))
+        api = stack.enter_context(_running_api(settings, listener, heavy))
         health = "live"
         if with_workers and settings.workers:
             stack.enter_context(_running_workers(settings))
@@ -133,12 +137,15 @@ def _traced(settings: Settings) -> Iterator[None]:
 
 
 @contextmanager
-def _running_api(settings: Settings, listener: socket.socket) -> Iterator[threading.Thread]:
+def _running_api(
+    settings: Settings, listener: socket.socket, heavy: str
+) -> Iterator[threading.Thread]:
     queue = DbosQueue(settings.database_url, settings.database_timeout_s)
     config = uvicorn.Config(
-        create_app(settings, queue),
+        create_app(settings, queue, heavy=heavy),
         log_config=None,
         access_log=False,
+        http=Protocol,
         timeout_graceful_shutdown=_LAST_ANSWERS_WITHIN_S,
     )
     server = uvicorn.Server(config)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ipaddress
 import os
 import re
+import socket
 from pathlib import Path
 from typing import Final
 
@@ -52,8 +53,12 @@ class Settings(BaseSettings):
     max_memory_mb: int = Field(16_384, ge=64)
     solver_threads: int | None = Field(None, ge=1, le=64)
     queue_poll_s: float = Field(0.1, gt=0)
+    heavy_memory_mb: int = Field(2048, ge=256)
     max_queued: int = Field(10_000, ge=1)
+    max_queued_per_tenant: int = Field(1000, ge=1)
     max_running_per_tenant: int = Field(64, ge=1)
+    max_rows_per_tenant: int = Field(20_000_000, ge=1)
+    max_stored_mb_per_tenant: float = Field(20_000.0, gt=0)
     webhook_private_addresses: bool = False
     idempotency_hours: float = Field(24.0, gt=0, le=8760)
     otel: bool | None = None
@@ -62,6 +67,7 @@ class Settings(BaseSettings):
     rate_limit_per_s: float | None = Field(None, ge=0, allow_inf_nan=False)
     rate_limit_burst: int = Field(200, ge=1)
     cors_origins: str = ""
+    allowed_hosts: str = ""
 
     @property
     def scenario_limits(self) -> ScenarioLimits:
@@ -108,6 +114,15 @@ class Settings(BaseSettings):
     def allowed_origins(self) -> tuple[str, ...]:
         """Return the sites whose pages may call the service from a browser."""
         return tuple(self.cors_origins.replace(",", " ").split())
+
+    @property
+    def own_hosts(self) -> frozenset[str]:
+        """Return the names by which the service is called, in lower case; "*" for any.
+
+        Addresses need not be named: a page that has another name lead here sends that name.
+        """
+        own = f"localhost {self.host} {socket.gethostname()} {self.allowed_hosts}"
+        return frozenset(own.lower().replace(",", " ").split())
 
     @field_validator("api_keys")
     @classmethod

@@ -66,6 +66,10 @@ _XML_GROUPS = frozenset(
 _MOST_LINES = 1000
 _DEEPEST = 50
 _MOST_ELEMENTS = 30 * MOST_SETS
+_MOST_ATTRIBUTES = 15 * MOST_SETS
+_ATTRIBUTES = ("version", "units", "parameter")
+_PIECE_BYTES = 65_536
+_MOST_QUIET_PIECES = 3  # a parser may wait for a second one, and more, before it reads on
 _NDM_TEXTS = frozenset(("COMMENT", "MESSAGE_ID"))
 _LONGEST_SHOWN = 40
 
@@ -211,8 +215,11 @@ def read_xml(data: bytes) -> Read:
     Document types are refused, and with them entities of every kind.
     """
     try:
-        parser = DefusedXMLParser(target=_Builder(), forbid_dtd=True)
-        parser.feed(data)
+        builder = _Builder()
+        parser = DefusedXMLParser(target=builder, forbid_dtd=True)
+        for start in range(0, len(data), _PIECE_BYTES):
+            parser.feed(data[start : start + _PIECE_BYTES])
+            builder.note_piece()
         root: Element = parser.close()
     except DefusedXmlException:
         return [], [Fault("xml_forbidden", "The XML declares a document type or an entity")]
@@ -231,20 +238,33 @@ class _Builder(TreeBuilder):
         super().__init__()
         self._depth = 0
         self._num_elements = 0
+        self._num_attributes = 0
+        self._quiet_pieces = 0
+
+    def note_piece(self) -> None:
+        """Refuse what does not end: the parser would keep all of a tag, and build it at once."""
+        self._quiet_pieces += 1
+        if self._quiet_pieces > _MOST_QUIET_PIECES:
+            raise ValueError(f"a tag or comment is longer than {_PIECE_BYTES} bytes")
 
     def start(self, tag: str, attrs: dict[str, str], /) -> Element:
         """Open an element."""
         self._depth += 1
         self._num_elements += 1
+        self._num_attributes += len(attrs)
+        self._quiet_pieces = 0
         if self._depth > _DEEPEST:
             raise ValueError(f"elements are nested more than {_DEEPEST} deep")
         if self._num_elements > _MOST_ELEMENTS:
             raise ValueError(f"it has more than {_MOST_ELEMENTS} elements")
-        return super().start(tag, attrs)
+        if self._num_attributes > _MOST_ATTRIBUTES:
+            raise ValueError(f"it has more than {_MOST_ATTRIBUTES} attributes")
+        return super().start(tag, {key: attrs[key] for key in _ATTRIBUTES if key in attrs})
 
     def end(self, tag: str, /) -> Element:
         """Close an element."""
         self._depth -= 1
+        self._quiet_pieces = 0
         return super().end(tag)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from typing import Final
 
 from starlette.datastructures import Headers
@@ -11,8 +12,14 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.api.errors import problem
 
+PART_WITHIN_S: Final = 20.0
+"""Between two parts of a body."""
+BODY_WITHIN_S: Final = 300.0
+"""From the first part that is waited for to the last."""
 MOST_VALUES: Final = 1_000_000
 """Objects and lists in one JSON body. An empty one is two bytes, and eighty once it is read."""
+MOST_COMMAS: Final = 5_000_000
+"""Between its values: a number takes two bytes, and thirty once it is read."""
 
 
 class BodyLimit:
@@ -44,11 +51,12 @@ class BodyLimit:
             await response(scope, receive, send)
             return
         is_json = "json" in headers.get("content-type", "").lower()
-        num_bytes = num_values = 0
+        num_bytes = num_values = num_commas = 0
+        in_time = _InTime(asyncio.get_running_loop())
 
         async def receive_within_limit() -> Message:
-            nonlocal num_bytes, num_values
-            message = await receive()
+            nonlocal num_bytes, num_values, num_commas
+            message = await in_time(receive)
             part = message.get("body", b"")
             num_bytes += len(part)
             if num_bytes > self.max_bytes:
@@ -58,9 +66,36 @@ class BodyLimit:
                 if num_values > MOST_VALUES:
                     detail = f"The body has more than {MOST_VALUES} objects and lists."
                     raise HTTPException(413, detail)
+                num_commas += part.count(b",")
+                if num_commas > MOST_COMMAS:
+                    raise HTTPException(413, f"The body has more than {MOST_COMMAS} values.")
             return message
 
         await self.app(scope, receive_within_limit, send)
 
     def _too_many_bytes(self) -> str:
         return f"The body is larger than {self.max_bytes} bytes."
+
+
+class _InTime:
+    """Waits for the parts of a body, not for ever; who has sent all may be silent."""
+
+    def __init__(self, clock: asyncio.AbstractEventLoop):
+        self._clock = clock
+        self._left_s = BODY_WITHIN_S
+        self._is_whole = False
+
+    async def __call__(self, receive: Receive) -> Message:
+        """Return the next message; 408 where it does not come."""
+        if self._is_whole:
+            return await receive()
+        began_s = self._clock.time()
+        try:
+            async with asyncio.timeout(min(self._left_s, PART_WITHIN_S)):
+                message = await receive()
+        except TimeoutError:
+            raise HTTPException(408, "The body did not come in time.") from None
+        # Only waiting counts: what is done with a part in between is not the client's fault.
+        self._left_s -= self._clock.time() - began_s
+        self._is_whole = not message.get("more_body", False)
+        return message

@@ -41,16 +41,16 @@ router = APIRouter(prefix="/v1/comparisons", tags=["comparisons"])
 @router.post("", status_code=202, responses=problem_responses(503))
 def create_comparison(body: ComparisonIn, call: CallDep, once: OnceDep) -> ComparisonOut:
     """Queue a job for each run, all or none; the answer tells where the table grows."""
-    queue = intake.queue_of(call.request)
     params = []
     for position, run in enumerate(body.runs):
         with inside(f"/runs/{position}"):
             params.append(intake.all_params(run.solver, run.params))
     time_s, memory_mb = intake.limits_of(body.limits, call.settings)
-    inline = intake.frozen(call.database, call.settings, body)
+    inline = intake.frozen(call, body)
+    queue = intake.queue_with_room(call, len(body.runs))
     with once.transaction() as session:
-        intake.require_room(session, call.settings, len(body.runs))
-        scenario_id = intake.stored_scenario(session, call.audit, body, inline)
+        intake.require_room(session, call, len(body.runs))
+        scenario_id = intake.stored_scenario(session, call, body, inline)
         specs = [
             submission.JobSpec(
                 scenario_id=scenario_id,
@@ -81,7 +81,7 @@ def list_comparisons(call: CallDep, paging: PagingDep) -> Listed[ComparisonOut]:
     if call.caller.visible_owner is not None:
         query = query.where(ComparisonRow.tenant == call.caller.visible_owner)
     with call.database.reading() as session:
-        page = newest_first(session, query, ComparisonRow.id, paging)
+        page = newest_first(session, query, ComparisonRow.id, paging, store.weight())
         return Listed(items=_shown(session, page.rows), next=page.next)
 
 

@@ -10,6 +10,7 @@ from typing import Annotated, cast
 from fastapi import Depends, Request, Response
 from fastapi.dependencies.models import Dependant
 from fastapi.routing import APIRoute
+from sqlalchemy.orm import Session
 from starlette.concurrency import run_in_threadpool
 
 from planner_core.errors import Fault
@@ -20,7 +21,7 @@ from service.db.session import Database
 from service.problems.faults import refuse
 from service.problems.kinds import ServiceError
 from service.settings import Settings
-from service.stores import job_store
+from service.stores import job_store, usage_store
 
 # What needs no thread is async: FastAPI runs everything else in one, which costs more than the
 # work itself.
@@ -65,6 +66,14 @@ class Call:
     database: Database
     settings: Settings
     audit: Audit
+
+    def count_stored(self, session: Session, *, num_rows: int = 0, num_bytes: int = 0) -> None:
+        """Count what is stored for the caller; 403 ``quota_exceeded`` where it is too much."""
+        owner, settings = self.caller.owner, self.settings
+        usage = usage_store.used(session, owner)
+        if num_rows or num_bytes:
+            usage = usage_store.add(session, owner, num_rows=num_rows, num_bytes=num_bytes)
+        usage_store.require(usage, settings.max_rows_per_tenant, settings.max_stored_mb_per_tenant)
 
 
 async def _call(request: Request, response: Response) -> Call:

@@ -33,7 +33,7 @@ def install_error_handlers(app: FastAPI) -> None:
     app.add_exception_handler(ServiceError, _on_service_error)
     app.add_exception_handler(PlannerError, _on_planner_error)
     app.add_exception_handler(RequestValidationError, _on_validation_error)
-    app.add_exception_handler(HTTPException, _on_http_exception)
+    app.add_exception_handler(HTTPException, on_http_exception)
     app.add_exception_handler(SQLAlchemyError, on_database_error)
     app.add_exception_handler(Exception, _on_bug)
 
@@ -118,7 +118,8 @@ _HTTP_CODES = {
 }
 
 
-def _on_http_exception(request: Request, error: Exception) -> JSONResponse:
+def on_http_exception(request: Request, error: Exception) -> JSONResponse:
+    """Answer what the framework, or a limit of a body, has refused."""
     assert isinstance(error, HTTPException)
     code = _HTTP_CODES.get(error.status_code)
     if code is None:

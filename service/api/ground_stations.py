@@ -16,7 +16,7 @@ from service.api.deps import CallDep, DatabaseDep, RawBodyDep, require_media_typ
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
 from service.api.imports import OnError, OnErrorQuery, body_schemas, imported, refuse_if_asked
-from service.api.paging import PagingDep, newest_first
+from service.api.paging import PagingDep, newest_first, size_of
 from service.db.ids import new_id
 from service.db.rows import GroundStationRow
 from service.problems.kinds import ServiceError
@@ -75,6 +75,7 @@ def import_ground_stations(
     good, faults = read_stations(kind, data)
     refuse_if_asked(len(good), faults, on_error)
     with once.transaction() as session:
+        call.count_stored(session, num_rows=len(good), num_bytes=len(data))
         items = _store(session, good)
         for status, action in _ACTIONS.items():
             changed = [item.id for item in items if item.status == status]
@@ -100,7 +101,8 @@ def list_ground_stations(database: DatabaseDep, paging: PagingDep) -> Listed[Gro
     """List the ground stations, newest first."""
     query = sa.select(GroundStationRow).where(GroundStationRow.deleted_at.is_(None))
     with database.reading() as session:
-        page = newest_first(session, query, GroundStationRow.id, paging)
+        weight = size_of(GroundStationRow.body)
+        page = newest_first(session, query, GroundStationRow.id, paging, weight)
     return Listed(items=[_shown(row) for row in page.rows], next=page.next)
 
 

@@ -16,6 +16,8 @@ from service.access.callers import Scope as KeyScope
 from service.access.rate_limit import RateLimiter
 from service.access.static_keys import StaticKeys
 from service.api.errors import on_database_error, problem
+from service.api.sites import READING, Sites
+from service.api.slots import Slots
 from service.db.session import Database
 from service.problems.kinds import ServiceError
 from service.settings import Settings
@@ -26,9 +28,11 @@ OPEN: Final = (
 )  # fmt: skip
 """What anybody may read, with all below it: the dashboard's pages get their data by calls."""
 
+MOST_AT_ONCE: Final = 512
+MOST_OF_AN_OWNER: Final = 256
+"""Requests under way, streams and waits among them. Connections leave room for others."""
+
 _UNLIMITED: Final = "/health"
-_READING: Final = ("GET", "HEAD", "OPTIONS")
-_FOREIGN: Final = ("cross-site", "same-site")
 
 
 def is_open(path: str) -> bool:
@@ -58,7 +62,8 @@ class Guard:
         self.app = app
         self._keys_required = settings.keys_required
         self._static_keys: StaticKeys = settings.static_keys
-        self._own_pages = settings.allowed_origins
+        self._sites = Sites(settings.own_hosts, settings.allowed_origins)
+        self._slots = Slots(MOST_AT_ONCE, MOST_OF_AN_OWNER)
         per_s = settings.requests_per_s
         self._limiter = RateLimiter(per_s, settings.rate_limit_burst) if per_s else None
 
@@ -69,7 +74,9 @@ class Guard:
             return
         request = Request(scope)
         try:
-            request.state.caller = await self._admitted(request)
+            caller = request.state.caller = await self._admitted(request)
+            if is_limited(scope["path"]):
+                await self._slots.take(caller.owner)
         except ServiceError as error:
             answer = problem(request, error.code, error.detail, headers=error.headers)
             await answer(scope, receive, send)
@@ -77,10 +84,16 @@ class Guard:
         except SQLAlchemyError as error:
             await on_database_error(request, error)(scope, receive, send)
             return
-        await self.app(scope, receive, send)
+        try:
+            await self.app(scope, receive, send)
+        finally:
+            if is_limited(scope["path"]):
+                self._slots.give_back(caller.owner)
 
     async def _admitted(self, request: Request) -> Caller:
         path = request.scope["path"]
+        if is_limited(path):
+            self._sites.check(request.method, request.headers)
         if is_open(path):
             if is_limited(path):
                 self._count(request, NOBODY)
@@ -92,9 +105,7 @@ class Guard:
             self._count(request, NOBODY)
             raise
         self._count(request, caller)
-        require_scope(caller, KeyScope.READ if _is_reading(request) else KeyScope.SUBMIT)
-        if caller.key_id is None:
-            self._refuse_foreign_pages(request)
+        require_scope(caller, KeyScope.READ if request.method in READING else KeyScope.SUBMIT)
         return caller
 
     async def _caller(self, request: Request) -> Caller:
@@ -130,18 +141,6 @@ class Guard:
                 headers={"Retry-After": str(math.ceil(wait_s))},
             )
 
-    def _refuse_foreign_pages(self, request: Request) -> None:
-        # Without a key, being on this machine is the credential; a browser on it lends that to
-        # every page of the internet. Browsers say where a request comes from, and no page can
-        # change what they say.
-        is_foreign = request.headers.get("sec-fetch-site") in _FOREIGN
-        if not is_foreign or _is_reading(request):
-            return
-        if request.headers.get("origin") not in self._own_pages:
-            raise ServiceError(
-                "foreign_origin", "A page of another site may not change anything here."
-            )
-
 
 def require_scope(caller: Caller, needed: KeyScope) -> None:
     """Raise 403 ``insufficient_scope`` where the caller's scope does not include this one."""
@@ -153,10 +152,6 @@ def require_scope(caller: Caller, needed: KeyScope) -> None:
         f"This call needs the scope {needed}; the key has {caller.scope}.",
         headers={"WWW-Authenticate": challenge},
     )
-
-
-def _is_reading(request: Request) -> bool:
-    return request.method in _READING
 
 
 def _token(request: Request) -> str | None:

@@ -13,7 +13,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from service.api.deps import DatabaseDep, own_job_only
 from service.api.errors import problem_responses
 from service.api.job_shapes import etag_of_job, shown
-from service.api.job_wait import wait_for_change
+from service.api.job_wait import Versions, VersionsDep, wait_for_change
 from service.db.failures import why_unavailable
 from service.db.session import Database
 from service.wire.jobs import ACTIVE, FINAL
@@ -37,6 +37,7 @@ _NOTHING_SEEN: Final = "0"
 async def job_events(
     job_id: str,
     database: DatabaseDep,
+    versions: VersionsDep,
     last_event_id: Annotated[
         str, Header(alias="Last-Event-ID", description="The last event that was seen.")
     ] = "",
@@ -47,22 +48,26 @@ async def job_events(
     event comes when the job is no longer what that event told. The stream also ends where the
     database fails: ask again with `Last-Event-ID`.
     """
-    job, _ = await wait_for_change(database, job_id, None, 0.0, _never)
+    job, _ = await wait_for_change(database, versions, job_id, None, 0.0, _never)
     seen = last_event_id or _NOTHING_SEEN
     if job.state in FINAL and seen == str(job.version):
         # What browsers do after a stream has ended is to ask for it again, for ever.
         return Response(status_code=204)
     return StreamingResponse(
-        _events(database, job_id, f'"{seen}"'),
+        _events(database, versions, job_id, f'"{seen}"'),
         media_type="text/event-stream",
         headers={"Cache-Control": "no-store"},
     )
 
 
-async def _events(database: Database, job_id: str, seen: str) -> AsyncIterator[str]:
+async def _events(
+    database: Database, versions: Versions, job_id: str, seen: str
+) -> AsyncIterator[str]:
     while True:
         try:
-            job, sha256 = await wait_for_change(database, job_id, seen, SIGN_OF_LIFE_S, _never)
+            job, sha256 = await wait_for_change(
+                database, versions, job_id, seen, SIGN_OF_LIFE_S, _never
+            )
         except SQLAlchemyError as error:
             why = why_unavailable(error)
             if why is None:

@@ -11,18 +11,18 @@ from sqlalchemy.orm import Session
 
 from planner_core.errors import Fault
 from planner_core.solvers.registry import solver_class
-from service.access.audit import Audit
 from service.answers import store as answer_store
-from service.api import ask_again
+from service.api import ask_again, bulkhead
+from service.api.deps import Call
 from service.api.job_shapes import headers_of, shown
-from service.db.rows import JobRow
-from service.db.session import Database
+from service.db.rows import JobRow, ScenarioRow
 from service.jobs.queue import JobQueue
 from service.jobs.solver_params import params_of, parse_params
 from service.problems.faults import refuse
 from service.problems.kinds import ServiceError
 from service.scenarios import freezing as scenario_store
 from service.scenarios.freezing import FrozenScenario
+from service.scenarios.pin_inputs import refuse_duplicate_pins
 from service.scenarios.translate import inside, read_file
 from service.settings import Settings
 from service.stores import job_store as store
@@ -40,14 +40,25 @@ def queue_of(request: Request) -> JobQueue:
     return queue
 
 
+def queue_with_room(call: Call, num_jobs: int = 1) -> JobQueue:
+    """Return the queue; 503 where it is full: before there is any work, and without a lock.
+
+    ``require_room`` has the last word, in the transaction that stores the jobs.
+    """
+    queue = queue_of(call.request)
+    with call.database.reading() as session:
+        require_room(session, call, num_jobs)
+    return queue
+
+
 def all_params(solver: str, params: Mapping[str, Any]) -> dict[str, Any]:
     """Return a solver's parameters, defaults filled in; a planner's error where they are wrong."""
     return params_of(parse_params(solver_class(solver), params))
 
 
-def frozen(database: Database, settings: Settings, body: QuestionIn) -> FrozenScenario | None:
+def frozen(call: Call, body: QuestionIn) -> FrozenScenario | None:
     """Return the inline scenario of a body, ready to be stored; None where it names one."""
-    scenario, limits = body.scenario, settings.scenario_limits
+    scenario, limits = body.scenario, call.settings.scenario_limits
     if (scenario is None) == (body.scenario_id is None):
         detail = "Give either scenario_id or scenario."
         if scenario is None:
@@ -55,22 +66,37 @@ def frozen(database: Database, settings: Settings, body: QuestionIn) -> FrozenSc
         raise refuse([Fault(code="invalid_value", detail=detail, pointer="/scenario")])
     with inside("/scenario"):
         if isinstance(scenario, ScenarioIn):
-            return scenario_store.freeze(database, scenario, limits)
+            return freeze(call, scenario)
         if isinstance(scenario, ScenarioFile):
+            refuse_duplicate_pins(scenario.pins)
             file = read_file(scenario.model_dump(mode="json"))
             return scenario_store.freeze_file(file, limits)
     return None
 
 
+def freeze(call: Call, body: ScenarioIn) -> FrozenScenario:
+    """Return a question over what is stored, ready to be stored: here, where it is not large."""
+    with call.database.reading() as session:
+        num_targets = scenario_store.num_targets(session, body.target_catalog_ids)
+    bulkhead.require_light(call.request, num_targets, len(body.satellite_ids))
+    return scenario_store.freeze(call.database, body, call.settings.scenario_limits)
+
+
+def save(session: Session, call: Call, frozen: FrozenScenario) -> tuple[ScenarioRow, bool]:
+    """Return the stored scenario of this content, and whether it is new, and then the caller's."""
+    row, is_new = scenario_store.save(session, frozen)
+    if is_new:
+        call.count_stored(session, num_rows=1, num_bytes=len(frozen.content))
+        call.audit.record(session, "create", "scenario", row.id)
+    return row, is_new
+
+
 def stored_scenario(
-    session: Session, audit: Audit, body: QuestionIn, inline: FrozenScenario | None
+    session: Session, call: Call, body: QuestionIn, inline: FrozenScenario | None
 ) -> str:
     """Return the id of the scenario in question; an inline one is stored."""
     if inline is not None:
-        row, is_new = scenario_store.save(session, inline)
-        if is_new:
-            audit.record(session, "create", "scenario", row.id)
-        return row.id
+        return save(session, call, inline)[0].id
     assert body.scenario_id is not None
     if store.has_scenario(session, body.scenario_id):
         return body.scenario_id
@@ -91,14 +117,19 @@ def limits_of(limits: LimitsIn, settings: Settings) -> tuple[float, int]:
     return time_s, memory_mb
 
 
-def require_room(session: Session, settings: Settings, num_jobs: int = 1) -> None:
-    """Refuse more jobs than the queue may hold."""
-    if store.num_waiting(session) + num_jobs > settings.max_queued:
-        raise ServiceError(
-            "queue_full",
-            f"At most {settings.max_queued} jobs may wait, and there is no room for {num_jobs}.",
-            headers={"Retry-After": str(_QUEUE_FULL_S)},
-        )
+def require_room(session: Session, call: Call, num_jobs: int = 1) -> None:
+    """Refuse more jobs than the queue may hold, in all and of one owner, or whose owner is full."""
+    settings = call.settings
+    call.count_stored(session)
+    most = (settings.max_queued, settings.max_queued_per_tenant)
+    waiting = store.num_waiting(session, call.caller.owner)
+    for limit, number, whose in zip(most, waiting, ("", " of one owner"), strict=True):
+        if number + num_jobs > limit:
+            raise ServiceError(
+                "queue_full",
+                f"At most {limit} jobs{whose} may wait, and there is no room for {num_jobs}.",
+                headers={"Retry-After": str(_QUEUE_FULL_S)},
+            )
 
 
 def find_job(session: Session, job_id: str) -> JobRow:

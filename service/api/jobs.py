@@ -15,8 +15,8 @@ from service.api.errors import problem_responses
 from service.api.etags import matches
 from service.api.idempotency import OnceDep
 from service.api.job_shapes import etag_of_job, shown
-from service.api.job_wait import wait_for_change
-from service.api.paging import PagingDep, newest_first
+from service.api.job_wait import VersionsDep, wait_for_change
+from service.api.paging import PagingDep, newest_first, size_of
 from service.db.rows import JobRow
 from service.jobs import lease, submission
 from service.jobs.queue import JobQueue
@@ -37,14 +37,14 @@ def create_job(body: JobIn, call: CallDep, once: OnceDep) -> JobOut:
 
     Jobs with a higher `priority` start first, those of the same priority in their order.
     """
-    queue = intake.queue_of(call.request)
     params = intake.all_params(body.solver, body.params)
     time_s, memory_mb = intake.limits_of(body.limits, call.settings)
-    inline = intake.frozen(call.database, call.settings, body)
+    inline = intake.frozen(call, body)
+    queue = intake.queue_with_room(call)
     with once.transaction() as session:
-        intake.require_room(session, call.settings)
+        intake.require_room(session, call)
         spec = submission.JobSpec(
-            scenario_id=intake.stored_scenario(session, call.audit, body, inline),
+            scenario_id=intake.stored_scenario(session, call, body, inline),
             solver=body.solver,
             params=params,
             seed=body.seed,
@@ -77,7 +77,7 @@ def list_jobs(
         tenant=call.caller.visible_owner,
     )
     with call.database.reading() as session:
-        page = newest_first(session, query, JobRow.id, paging)
+        page = newest_first(session, query, JobRow.id, paging, size_of(JobRow.change))
         hashes = store.scenario_hashes(session, page.rows)
     return Listed(items=[shown(job, hashes[job.scenario_id]) for job in page.rows], next=page.next)
 
@@ -90,6 +90,7 @@ def list_jobs(
 async def get_job(
     job_id: str,
     call: CallDep,
+    versions: VersionsDep,
     wait: Annotated[
         float,
         Query(ge=0, le=LONGEST_WAIT_S, description="Hold so many seconds for a change."),
@@ -102,7 +103,7 @@ async def get_job(
     """
     known = call.request.headers.get("if-none-match")
     job, sha256 = await wait_for_change(
-        call.database, job_id, known, wait, call.request.is_disconnected
+        call.database, versions, job_id, known, wait, call.request.is_disconnected
     )
     if matches(known, etag_of_job(job)):
         return Response(status_code=304, headers={"ETag": etag_of_job(job)})
@@ -138,10 +139,10 @@ def rerun_job(job_id: str, call: CallDep, once: OnceDep) -> JobOut:
     Scenario, solver, params, seed, limits, priority and label are the first one's, to which
     `links.rerun_of` leads. Same seed and same version of the service give the same plan.
     """
-    queue = intake.queue_of(call.request)
+    queue = intake.queue_with_room(call)
     with once.transaction() as session:
         spec = submission.spec_again(intake.find_job(session, job_id), call.caller.owner)
-        intake.require_room(session, call.settings)
+        intake.require_room(session, call)
         job = submission.submit(session, queue, spec)
         call.audit.record(session, "create", "job", job.id)
         return once.keep(session, intake.accepted(session, call.response, job))

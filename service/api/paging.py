@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import base64
 import binascii
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Annotated, Generic, TypeVar
+import itertools
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, Final, Generic, TypeVar
 
 import sqlalchemy as sa
 from fastapi import Depends, Query, Request, Response
@@ -17,6 +18,9 @@ from service.problems.kinds import ServiceError
 T = TypeVar("T")
 R = TypeVar("R")
 K = TypeVar("K", str, int)
+
+MOST_BYTES: Final = 2_000_000
+"""Of a page whose rows may be large; one row more, where a single one is larger."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,9 +99,40 @@ def newest_first(
     statement: sa.Select[R],
     key: InstrumentedAttribute[str],
     paging: Paging,
+    weight: sa.ColumnElement[Any] | None = None,
 ) -> Page[R]:
-    """Return one page of a statement's rows, newest first; ids sort by the time they were made."""
+    """Return one page of a statement's rows, newest first; ids sort by the time they were made.
+
+    Parameters
+    ----------
+    weight
+        What a row adds to the answer, in bytes, where that may be much: the page ends early.
+    """
     if paging.after is not None:
         statement = statement.where(key < paging.after)
-    rows = session.scalars(statement.order_by(key.desc()).limit(paging.limit + 1)).all()
+    statement = statement.order_by(key.desc()).limit(paging.limit + 1)
+    if weight is not None:
+        weights = session.scalars(
+            statement.with_only_columns(sa.func.coalesce(weight, 0), maintain_column_froms=True)
+        )
+        paging = replace(paging, limit=_num_fitting(weights, paging.limit))
+        statement = statement.limit(paging.limit + 1)
+    rows = session.scalars(statement).all()
     return paging.answer(rows, lambda row: getattr(row, key.key))
+
+
+def size_of(column: InstrumentedAttribute[Any]) -> sa.ColumnElement[int]:
+    """Return how many characters a JSON column holds."""
+    return sa.func.length(sa.cast(column, sa.Text))
+
+
+def _num_fitting(weights: Iterable[int], most: int) -> int:
+    """Return how many rows fit on a page; always one, or the list would never end.
+
+    >>> _num_fitting([1, 1, 1], 2), _num_fitting([MOST_BYTES, 1], 2), _num_fitting([], 2)
+    (2, 1, 2)
+    """
+    for number, total in enumerate(itertools.accumulate(weights)):
+        if total > MOST_BYTES:
+            return max(1, min(number, most))
+    return most

@@ -80,6 +80,7 @@ def import_satellites(
     found = read_elements(data, require_media_type(call.request, *_IMPORT_TYPES))
     refuse_if_asked(len(found.entries), found.faults, on_error)
     with once.transaction() as session:
+        call.count_stored(session, num_rows=len(found.entries), num_bytes=len(data))
         items = [_imported(one) for one in store.import_entries(session, found.entries)]
         for status, action in _ACTIONS.items():
             changed = [item.id for item in items if item.status == status]

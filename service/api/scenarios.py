@@ -14,16 +14,17 @@ from sqlalchemy.orm import Session
 from planner_core.build import view_at
 from planner_core.orbits.places import View
 from planner_core.problem import COLLECT, CONTACT
+from service.api import job_intake as intake
 from service.api.conditional import NOT_MODIFIED, created, unless_known
 from service.api.deps import CallDep, DatabaseDep
 from service.api.errors import problem_responses
 from service.api.etags import etag_of, matches
 from service.api.idempotency import OnceDep
-from service.api.paging import PagingDep, newest_first
+from service.api.paging import PagingDep, newest_first, size_of
 from service.db.rows import ScenarioRow
 from service.problems.kinds import ServiceError
-from service.scenarios import freezing as store
 from service.scenarios.opportunities import Described, OpportunityReader
+from service.scenarios.stored_question import StoredQuestion
 from service.wire.base import Listed
 from service.wire.scenarios import (
     Kind,
@@ -31,6 +32,7 @@ from service.wire.scenarios import (
     ScenarioFile,
     ScenarioIn,
     ScenarioOut,
+    ScenarioSummary,
     ViewOut,
 )
 
@@ -49,21 +51,20 @@ def create_scenario(body: ScenarioIn, call: CallDep, once: OnceDep) -> ScenarioO
 
     The same content again, under whatever name, answers 200 with the scenario that is there.
     """
-    frozen = store.freeze(call.database, body, call.settings.scenario_limits)
+    frozen = intake.freeze(call, body)
     with once.transaction() as session:
-        row, is_new = store.save(session, frozen)
-        if is_new:
-            call.audit.record(session, "create", "scenario", row.id)
+        row, is_new = intake.save(session, call, frozen)
         call.response.status_code = 201 if is_new else 200
         return once.keep(session, created(call.response, _shown(row), f"/v1/scenarios/{row.id}"))
 
 
 @router.get("")
-def list_scenarios(database: DatabaseDep, paging: PagingDep) -> Listed[ScenarioOut]:
-    """List the scenarios, newest first."""
+def list_scenarios(database: DatabaseDep, paging: PagingDep) -> Listed[ScenarioSummary]:
+    """List the scenarios, newest first, without their pins."""
     with database.reading() as session:
-        page = newest_first(session, sa.select(ScenarioRow), ScenarioRow.id, paging)
-    return Listed(items=[_shown(row) for row in page.rows], next=page.next)
+        weight = size_of(ScenarioRow.summary)
+        page = newest_first(session, sa.select(ScenarioRow), ScenarioRow.id, paging, weight)
+    return Listed(items=[_summary(row) for row in page.rows], next=page.next)
 
 
 @router.get(
@@ -83,7 +84,8 @@ def get_scenario(
         row = _find(session, scenario_id)
         if expand:
             return _file(call.request, row)
-    return unless_known(call.request, call.response, _shown(row))
+        shown = _shown(row)
+    return unless_known(call.request, call.response, shown)
 
 
 def _file(request: Request, row: ScenarioRow) -> Response:
@@ -201,12 +203,17 @@ def _find(session: Session, scenario_id: str) -> ScenarioRow:
 
 
 def _shown(row: ScenarioRow) -> ScenarioOut:
+    return ScenarioOut(**dict(_summary(row)), pins=StoredQuestion(row.content).pins)
+
+
+def _summary(row: ScenarioRow) -> ScenarioSummary:
     where = f"/v1/scenarios/{row.id}"
-    return ScenarioOut(
+    summary = {name: value for name, value in row.summary.items() if name != "pins"}
+    return ScenarioSummary(
         id=row.id,
         sha256=row.sha256,
         name=row.name,
         created_at=row.created_at,
         links={"opportunities": f"{where}/opportunities", "file": f"{where}?expand=true"},
-        **row.summary,
+        **summary,
     )

@@ -86,6 +86,7 @@ def create_target_catalog(
     kind = require_media_type(call.request, *_TYPES)
     found, targets = read_targets(kind, data)
     with once.transaction() as session:
+        call.count_stored(session, num_rows=len(targets), num_bytes=len(data))
         row = _add(session, found.name or name or _UNNAMED, targets)
         call.audit.record(session, "create", "target_catalog", row.id)
         shown = created(call.response, _shown(row), f"/v1/target-catalogs/{row.id}")

@@ -37,6 +37,9 @@ from service.wire.webhooks import (
 router = APIRouter(prefix="/v1/webhooks", tags=["webhooks"])
 
 MOST_OF_AN_OWNER: Final = 20
+_TEST: Final = "test"
+_MOST_TESTS: Final = 5
+_TEST_AGAIN_S: Final = 60
 _SECRET_BYTES: Final = 32
 
 
@@ -107,8 +110,14 @@ def test_webhook(webhook_id: str, once: OnceDep, call: CallDep) -> DeliveryOut:
     with once.transaction() as session:
         row = _find(session, webhook_id, call.caller)
         _require_enabled(row)
+        if outbox.num_pending(session, row.id, _TEST) >= _MOST_TESTS:
+            raise ServiceError(
+                "too_many_deliveries",
+                f"{_MOST_TESTS} tests of this webhook wait to be sent.",
+                headers={"Retry-After": str(_TEST_AGAIN_S)},
+            )
         data = TestData(message="This is a test of the webhook.", webhook_id=row.id)
-        delivery_id = outbox.queue(session, row, "test", data, job_id=None)
+        delivery_id = outbox.queue(session, row, _TEST, data, job_id=None)
         call.audit.record(session, "test", "webhook", row.id)
         return once.keep(session, _accepted(session, call.response, row, delivery_id))
 

@@ -13,7 +13,6 @@ from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
 from service.db.rows import JobRow, ScenarioRow
 from service.jobs import submission
-from service.scenarios import freezing as scenario_store
 from service.scenarios.opportunities import OpportunityReader
 from service.settings import Settings
 from service.stores import opportunity_store
@@ -35,7 +34,7 @@ def create_what_if(job_id: str, body: WhatIfIn, call: CallDep, once: OnceDep) ->
     refused with its place in the body; working that out may take a while: 503 with
     `Retry-After` asks to come back.
     """
-    queue = intake.queue_of(call.request)
+    queue = intake.queue_with_room(call)
     with call.database.reading() as session:
         job = intake.find_job(session, job_id)
         timeline = intake.find_timeline(session, job) if body.needs_plan else None
@@ -53,10 +52,10 @@ def create_what_if(job_id: str, body: WhatIfIn, call: CallDep, once: OnceDep) ->
     described = reader.get(call.database, job.scenario_id, sha256)
     varied = cast(Variations, call.request.app.state.variations).get(asked, described)
     with once.transaction() as session:
-        intake.require_room(session, call.settings)
-        row, is_new = scenario_store.save(session, varied.frozen)
+        intake.require_room(session, call)
+        row, is_new = intake.save(session, call, varied.frozen)
         if is_new:
-            call.audit.record(session, "create", "scenario", row.id)
+            call.count_stored(session, num_bytes=len(varied.opportunity_block))
             opportunity_store.save(session, row.sha256, varied.opportunity_block)
         spec = submission.JobSpec(
             scenario_id=row.id,

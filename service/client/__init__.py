@@ -32,6 +32,7 @@ from service.wire.plans import PlanOut as Plan
 from service.wire.satellites import SatelliteOut as Satellite
 from service.wire.scenarios import OpportunityOut as Opportunity
 from service.wire.scenarios import ScenarioOut as Scenario
+from service.wire.scenarios import ScenarioSummary
 from service.wire.timelines import ActionOut as Action
 from service.wire.timelines import AttemptOut as Attempt
 from service.wire.timelines import DiffOut as PlanDiff
@@ -67,6 +68,7 @@ __all__ = [
     "Satellite",
     "SatelliteTimeline",
     "Scenario",
+    "ScenarioSummary",
     "ServiceError",
     "Solver",
     "Target",

@@ -10,6 +10,7 @@ from service.client.transport import Transport, path_of
 from service.wire.base import Json
 from service.wire.scenarios import OpportunityOut as Opportunity
 from service.wire.scenarios import ScenarioOut as Scenario
+from service.wire.scenarios import ScenarioSummary
 
 
 class Scenarios:
@@ -49,9 +50,9 @@ class Scenarios:
             path_of("scenarios"), Scenario, json=body, idempotency_key=idempotency_key
         )
 
-    def list(self) -> Iterator[Scenario]:
-        """Yield the scenarios, newest first."""
-        return self._transport.pages(path_of("scenarios"), Scenario)
+    def list(self) -> Iterator[ScenarioSummary]:
+        """Yield the scenarios, newest first, without their pins."""
+        return self._transport.pages(path_of("scenarios"), ScenarioSummary)
 
     def get(self, scenario_id: str) -> Scenario:
         """Return one scenario."""

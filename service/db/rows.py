@@ -261,6 +261,16 @@ class IdempotencyKeyRow(Row):
     created_at: Mapped[datetime] = mapped_column(index=True)
 
 
+class OwnerUsageRow(Row):
+    """How much an owner has had stored: what it has sent, and what its jobs have found."""
+
+    __tablename__ = "owner_usage"
+
+    owner: Mapped[str] = mapped_column(sa.String(64), primary_key=True)
+    num_rows: Mapped[int] = mapped_column(sa.BigInteger)
+    num_bytes: Mapped[int] = mapped_column(sa.BigInteger)
+
+
 class WorkerRow(Row):
     """A worker's heartbeat; readiness asks for a recent one."""
 

@@ -19,6 +19,7 @@ from service.answers.blocks import Block
 from service.db.clock import utc_now
 from service.db.rows import JobRow
 from service.jobs.queue import JobQueue
+from service.stores import usage_store
 from service.webhooks import outbox
 from service.wire.jobs import JobState
 
@@ -37,7 +38,8 @@ class Outcome:
     """How a run ended. ``blocks`` hold the documents of its answer; none where it has no answer.
 
     ``progress`` is the last report; None leaves the one that the job has. ``figures`` are the
-    timeline's numbers for tables, ``warnings`` what it says to people.
+    timeline's numbers for tables, ``warnings`` what it says to people. ``num_shared_bytes`` are
+    stored for all jobs of the scenario.
     """
 
     state: JobState
@@ -46,6 +48,7 @@ class Outcome:
     progress: Mapping[str, Any] | None = None
     blocks: Sequence[Block] = ()
     figures: Mapping[str, Any] | None = None
+    num_shared_bytes: int = 0
     warnings: Sequence[str] = ()
 
     @classmethod
@@ -128,6 +131,9 @@ def finish(session: Session, lease: Lease, outcome: Outcome) -> bool:
     )
     if changed and outcome.blocks:
         answer_store.save(session, lease.job_id, outcome.blocks, outcome.figures)
+        owner = session.scalars(sa.select(JobRow.tenant).where(JobRow.id == lease.job_id)).one()
+        num_bytes = outcome.num_shared_bytes + sum(len(block.text) for block in outcome.blocks)
+        usage_store.add(session, owner, num_rows=1 + len(outcome.blocks), num_bytes=num_bytes)
     return changed
 
 

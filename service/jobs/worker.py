@@ -43,7 +43,7 @@ log = logging.getLogger(__name__)
 T = TypeVar("T")
 
 _RETRY_S: Final = 1.0
-_COURIER_LOOKS_EVERY_S: Final = 1.0
+_COURIER_LOOKS_EVERY_S: Final = 0.2
 _STOP_WITHIN_S: Final = 5.0
 _FORGET_WORKER_S: Final = 86400.0
 
@@ -256,6 +256,7 @@ def outcome_of(ending: Ending) -> Outcome:
         blocks=(*answer.blocks, *proof_blocks(answer.proof or "")),
         figures=answer.figures,
         warnings=answer.warnings,
+        num_shared_bytes=len(answer.opportunity_block or b""),
     )
 
 

@@ -18,6 +18,7 @@ from planner_core.errors import InvalidScenario, PlannerError
 from service.db.ids import new_id
 from service.db.rows import GroundStationRow, SatelliteRow, ScenarioRow, TargetCatalogRow, TargetRow
 from service.db.session import Database
+from service.scenarios.pin_inputs import refuse_duplicate_pins
 from service.scenarios.scenario_limits import ScenarioLimits
 from service.scenarios.translate import (
     canonical_of_file,
@@ -65,14 +66,15 @@ def freeze(database: Database, body: ScenarioIn, limits: ScenarioLimits) -> Froz
         ``unknown_satellite``, ``unknown_target_catalog``, ``unknown_ground_station``,
         ``duplicate_satellite_id``, ``duplicate_target_catalog_id``, ``duplicate_target_id``,
         ``duplicate_ground_station_id``, ``horizon_inverted``, ``horizon_too_long``,
-        ``scenario_too_large``; with a pointer into the body.
+        ``scenario_too_large``, ``duplicate_pin``; with a pointer into the body.
     PropagationFailed
         SGP4 cannot carry a satellite through the horizon.
     """
     with database.reading() as session:
-        num_targets = _num_targets(session, body.target_catalog_ids)
-        limits.check(horizon_from(body.horizon), len(body.satellite_ids), num_targets)
+        number = num_targets(session, body.target_catalog_ids)
+        limits.check(horizon_from(body.horizon), len(body.satellite_ids), number)
         file = _expanded(session, body)
+    refuse_duplicate_pins(file.pins)
     with _named_by_ids():
         return freeze_file(file, limits)
 
@@ -125,7 +127,7 @@ def _named_by_ids() -> Iterator[None]:
         raise
 
 
-def _num_targets(session: Session, catalog_ids: Sequence[str]) -> int:
+def num_targets(session: Session, catalog_ids: Sequence[str]) -> int:
     """Return how many targets catalogues hold, without reading them."""
     total = sa.func.coalesce(sa.func.sum(TargetCatalogRow.num_targets), 0)
     wanted = sa.select(total).where(TargetCatalogRow.id.in_(set(catalog_ids)))
@@ -202,7 +204,7 @@ def _find(session: Session, table: type[R], what: str, ids: Sequence[str]) -> li
 
 
 def _summary(file: ScenarioFile, warnings: Iterable[str]) -> dict[str, Any]:
-    shown = file.model_dump(mode="json", include=set(Question.model_fields) - {"name"})
+    shown = file.model_dump(mode="json", include=set(Question.model_fields) - {"name", "pins"})
     catalogs = dict.fromkeys(t.catalog_id for t in file.targets if t.catalog_id is not None)
     return shown | {
         "satellite_ids": [satellite.id for satellite in file.satellites],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from planner_core.errors import InvalidScenario
 from planner_core.pins import BlockedInterval, PinnedAction, Pins
 from service.wire.pins import BlockedIn, PinnedActionIn, PinsIn
 
@@ -22,6 +23,21 @@ def pins_from(body: PinsIn) -> Pins:
         ),
         forbid=tuple(body.forbid),
     )
+
+
+def refuse_duplicate_pins(body: PinsIn) -> None:
+    """Raise ``duplicate_pin`` where one is written twice.
+
+    Not part of what a scenario is checked for: those of earlier releases keep theirs.
+    """
+    for kind in PinsIn.model_fields:
+        seen = set()
+        for position, pin in enumerate(getattr(body, kind)):
+            text = pin if isinstance(pin, str) else pin.model_dump_json()
+            if text in seen:
+                pointer = f"/pins/{kind}/{position}"
+                raise InvalidScenario("duplicate_pin", "It is listed before.", pointer=pointer)
+            seen.add(text)
 
 
 def pins_in(pins: Pins) -> PinsIn:

@@ -22,6 +22,7 @@ from service.scenarios.translate import (
     satellite_from,
     target_from,
 )
+from service.wire.pins import PinsIn
 from service.wire.scenarios import FileGroundStation, FileSatellite, FileTarget, HorizonIn
 
 _TARGETS: Final = "targets"
@@ -38,6 +39,13 @@ class StoredQuestion:
     def horizon(self) -> Horizon:
         """Return the span that is planned."""
         return horizon_from(HorizonIn.model_validate(self._before_targets[0]["horizon"]))
+
+    @cached_property
+    def pins(self) -> PinsIn:
+        """Return what is pinned."""
+        if '"pins":' not in self._content:
+            return PinsIn()
+        return PinsIn.model_validate(self._before_targets[0].get("pins", {}))
 
     @cached_property
     def satellites(self) -> tuple[Satellite, ...]:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
 
-from service.db.rows import ComparisonRunRow, JobResultRow, JobRow
+from service.db.rows import ComparisonRow, ComparisonRunRow, JobResultRow, JobRow
+
+_BYTES_OF_A_RUN: Final = 1000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -18,6 +20,13 @@ class Run:
 
     job: JobRow
     figures: Mapping[str, Any] | None
+
+
+def weight() -> sa.ColumnElement[int]:
+    """Return about how many bytes a comparison has when it is shown."""
+    own = ComparisonRunRow.comparison_id == ComparisonRow.id
+    num_runs = sa.select(sa.func.count()).select_from(ComparisonRunRow).where(own)
+    return num_runs.correlate(ComparisonRow).scalar_subquery() * _BYTES_OF_A_RUN
 
 
 def runs_of(session: Session, comparison_ids: Iterable[str]) -> dict[str, list[Run]]:

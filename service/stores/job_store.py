@@ -11,7 +11,9 @@ from sqlalchemy.orm import Session
 from service.db.rows import JobRow, ScenarioRow
 
 # Made once: to make and compile it takes longer than to run it.
-_VERSION: Final = sa.select(JobRow.version).where(JobRow.id == sa.bindparam("job_id"))
+_VERSIONS: Final = sa.select(JobRow.id, JobRow.version).where(
+    JobRow.id.in_(sa.bindparam("job_ids", expanding=True))
+)
 
 
 def has_scenario(session: Session, scenario_id: str) -> bool:
@@ -20,10 +22,12 @@ def has_scenario(session: Session, scenario_id: str) -> bool:
     return session.scalar(wanted) is not None
 
 
-def num_waiting(session: Session) -> int:
-    """Return how many jobs wait for a worker."""
-    waiting = sa.select(sa.func.count()).select_from(JobRow).where(JobRow.state == "queued")
-    return session.execute(waiting).scalar_one()
+def num_waiting(session: Session, owner: str) -> tuple[int, int]:
+    """Return how many jobs wait for a worker, and how many of those are this owner's."""
+    own = sa.func.count().filter(JobRow.tenant == owner)
+    waiting = sa.select(sa.func.count(), own).where(JobRow.state == "queued")
+    in_all, of_owner = session.execute(waiting).one()
+    return in_all, of_owner
 
 
 def find(session: Session, job_id: str) -> JobRow | None:
@@ -36,9 +40,10 @@ def owner_of(session: Session, job_id: str) -> str | None:
     return session.scalar(sa.select(JobRow.tenant).where(JobRow.id == job_id))
 
 
-def version_of(connection: sa.Connection, job_id: str) -> int | None:
-    """Return the number that grows with every visible change of a job, or None for no job."""
-    return connection.scalar(_VERSION, {"job_id": job_id})
+def versions_of(connection: sa.Connection, job_ids: Collection[str]) -> dict[str, int]:
+    """Return the number of each of these jobs that grows with its every visible change."""
+    rows = connection.execute(_VERSIONS, {"job_ids": list(job_ids)})
+    return {row.id: row.version for row in rows}
 
 
 def matching(**wanted: str | None) -> sa.Select[JobRow]:

@@ -122,7 +122,10 @@ def _job_times(session: Session) -> list[JobTime]:
 def _orbits(session: Session, now: datetime) -> list[OrbitAge]:
     is_in_use = sa.or_(JobRow.state.in_(ACTIVE), JobRow.created_at >= utc_now(-ORBITS_OF_LAST_S))
     planned = sa.select(JobRow.scenario_id).where(is_in_use)
-    summaries = session.scalars(sa.select(ScenarioRow.summary).where(ScenarioRow.id.in_(planned)))
+    summaries = session.scalars(
+        sa.select(ScenarioRow.summary).where(ScenarioRow.id.in_(planned)),
+        execution_options={"yield_per": 20},
+    )
     ids = {own_id for summary in summaries for own_id in summary.get("satellite_ids", ())}
     names = {
         row.id: row.name

@@ -32,7 +32,8 @@ T = TypeVar("T")
 RETRY_AFTER_S: Final = (5.0, 300.0, 1800.0, 7200.0, 18000.0, 36000.0, 50400.0, 72000.0, 86400.0)
 """Waits between attempts, as Standard Webhooks proposes them; three days in all."""
 
-_MOST_AT_ONCE: Final = 16
+_MOST_AT_ONCE: Final = 64
+_MOST_OF_AN_OWNER: Final = 4
 _ANSWER_WITHIN_S: Final = 20.0
 _LONGEST_WAIT_S: Final = 86400.0
 _STOP_WITHIN_S: Final = 5.0
@@ -65,7 +66,7 @@ class Courier:
         self._look_every_s = look_every_s
         self._backend = httpcore.AnyIOBackend() if private else PublicOnly()
         self._retry_after_s = retry_after_s
-        self._busy: set[str] = set()
+        self._busy: dict[str, str] = {}
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="courier", daemon=True)
 
@@ -88,7 +89,7 @@ class Courier:
         while not self._stopping.is_set():
             room = _MOST_AT_ONCE - len(sending)
             for parcel in await self._take(room) if room else ():
-                self._busy.add(parcel.webhook_id)
+                self._busy[parcel.webhook_id] = parcel.owner
                 task = asyncio.create_task(self._deliver(parcel))
                 sending.add(task)
                 task.add_done_callback(sending.discard)
@@ -101,9 +102,21 @@ class Courier:
         await asyncio.gather(*sending, return_exceptions=True)
 
     async def _take(self, room: int) -> list[Parcel]:
-        busy = tuple(self._busy)
-        taken = await self._in_database(lambda s: outbox.take(s, busy=busy, limit=room))
+        if not await asyncio.to_thread(self._is_any_due):
+            return []
+        busy = dict(self._busy)
+        taken = await self._in_database(
+            lambda s: outbox.take(s, busy=busy, limit=room, of_an_owner=_MOST_OF_AN_OWNER)
+        )
         return taken or []
+
+    def _is_any_due(self) -> bool:
+        """Look without a transaction: most of the time there is nothing, and writers wait."""
+        try:
+            with self._database.asking() as connection:
+                return outbox.is_any_due(connection)
+        except SQLAlchemyError:
+            return True  # what is wrong is told by who takes it
 
     async def _in_database(self, work: Callable[[Session], T]) -> T | None:
         """Do one transaction; None where the database does not serve: it will be due later."""
@@ -135,7 +148,7 @@ class Courier:
             else:
                 await self._failed(parcel, f"The receiver answered {status}.", status, headers)
         finally:
-            self._busy.discard(parcel.webhook_id)
+            self._busy.pop(parcel.webhook_id, None)
 
     async def _post(self, parcel: Parcel) -> tuple[int, dict[str, str]]:
         """Send one request; redirects are not followed, and no answer's body is read."""

@@ -8,7 +8,8 @@ the same ``webhook-id``.
 from __future__ import annotations
 
 import json
-from collections.abc import Collection
+from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any, Final
@@ -26,6 +27,8 @@ from service.wire.webhooks import EventOut, JobEnd, TestData
 
 TAKEN_S: Final = 60.0
 KEEP_S: Final = 30 * 86400.0
+MOST_PENDING: Final = 1000
+"""Of one webhook. What comes on top has failed at once, and can be sent again by hand."""
 _SWEPT_AT_ONCE: Final = 500
 
 
@@ -41,6 +44,7 @@ class Parcel:
 
     id: str
     webhook_id: str
+    owner: str
     attempt: int
     url: str
     secret: str
@@ -99,6 +103,10 @@ def _add(
     session: Session, webhook: WebhookRow, event: str, payload: str, job_id: str | None
 ) -> str:
     delivery_id = new_id()
+    outcome: dict[str, Any] = {"state": "pending", "due_at": utc_now()}
+    if num_pending(session, webhook.id) >= MOST_PENDING:
+        why = f"{MOST_PENDING} messages waited for this webhook already."
+        outcome = {"state": "failed", "last_error": why, "ended_at": utc_now()}
     session.execute(
         sa.insert(WebhookDeliveryRow).values(
             id=delivery_id,
@@ -106,21 +114,42 @@ def _add(
             job_id=job_id,
             event=event,
             payload=payload,
-            state="pending",
-            due_at=utc_now(),
             created_at=utc_now(),
+            **outcome,
         )
     )
     return delivery_id
 
 
-def take(session: Session, *, busy: Collection[str], limit: int) -> list[Parcel]:
+def num_pending(session: Session, webhook_id: str, event: str | None = None) -> int:
+    """Return how many messages wait to be sent to a webhook, of one event or of all."""
+    waiting = sa.select(sa.func.count()).where(
+        WebhookDeliveryRow.webhook_id == webhook_id, WebhookDeliveryRow.state == "pending"
+    )
+    if event is not None:
+        waiting = waiting.where(WebhookDeliveryRow.event == event)
+    return session.execute(waiting).scalar_one()
+
+
+def is_any_due(connection: sa.Connection) -> bool:
+    """Return whether there is anything to take, whoever is being sent to."""
+    due = sa.select(WebhookDeliveryRow.id).where(
+        WebhookDeliveryRow.state == "pending", WebhookDeliveryRow.due_at <= utc_now()
+    )
+    return connection.execute(due.limit(1)).first() is not None
+
+
+def take(
+    session: Session, *, busy: Mapping[str, str], limit: int, of_an_owner: int
+) -> list[Parcel]:
     """Take deliveries that are due, the oldest of each webhook, and count the attempt.
 
     Parameters
     ----------
     busy
-        Webhooks that are being sent to: a slow one holds up nobody else.
+        The webhooks that are being sent to, and their owners: a slow one holds up nobody else.
+    limit, of_an_owner
+        How many to take at most, and how many of an owner may be under way.
     """
     is_due = sa.and_(
         WebhookDeliveryRow.state == "pending",
@@ -128,14 +157,21 @@ def take(session: Session, *, busy: Collection[str], limit: int) -> list[Parcel]
         WebhookDeliveryRow.webhook_id.not_in(busy),
     )
     first = sa.select(sa.func.min(WebhookDeliveryRow.id)).where(is_due)
-    first = first.group_by(WebhookDeliveryRow.webhook_id).limit(limit)
+    first = first.group_by(WebhookDeliveryRow.webhook_id)
     found = session.execute(
-        sa.select(WebhookDeliveryRow.id, WebhookDeliveryRow.attempts).where(
-            WebhookDeliveryRow.id.in_(first)
-        )
+        sa.select(WebhookDeliveryRow.id, WebhookDeliveryRow.attempts, WebhookRow.owner)
+        .join(WebhookRow, WebhookRow.id == WebhookDeliveryRow.webhook_id)
+        .where(WebhookDeliveryRow.id.in_(first))
+        .order_by(WebhookDeliveryRow.id)
     ).all()
-    parcels = []
-    for delivery_id, attempts in found:
+    parcels: list[Parcel] = []
+    under_way = Counter(busy.values())
+    for delivery_id, attempts, owner in found:
+        if under_way[owner] >= of_an_owner:
+            continue
+        if len(parcels) == limit:
+            break
+        under_way[owner] += 1
         # The guard lets only one of several workers have it.
         taken = _update(
             session, delivery_id, attempts, due_at=utc_now(TAKEN_S), attempts=attempts + 1
@@ -155,6 +191,7 @@ def _parcel(session: Session, delivery_id: str) -> Parcel:
     return Parcel(
         id=delivery.id,
         webhook_id=webhook.id,
+        owner=webhook.owner,
         attempt=delivery.attempts,
         url=webhook.url,
         secret=webhook.secret,

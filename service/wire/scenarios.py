@@ -130,8 +130,8 @@ class Counts(Wire):
     ground_stations: int
 
 
-class ScenarioOut(Stored):
-    """A frozen question. Later edits of what it names change nothing in it."""
+class ScenarioSummary(Stored):
+    """A frozen question without its pins, as lists have it."""
 
     id: str
     sha256: str = Field(description="Of the canonical content, the name left out.")
@@ -147,11 +147,16 @@ class ScenarioOut(Stored):
     continuous_starts: bool
     quality: QualityIn = QualityIn()
     allow_old_elements: bool
-    pins: PinsIn = PinsIn()
     counts: Counts
     warnings: tuple[str, ...] = Field(description="About the age of orbits, for people.")
     created_at: Instant
     links: dict[str, str]
+
+
+class ScenarioOut(ScenarioSummary):
+    """A frozen question. Later edits of what it names change nothing in it."""
+
+    pins: PinsIn = PinsIn()
 
 
 class ViewOut(Wire):

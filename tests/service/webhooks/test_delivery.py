@@ -238,8 +238,8 @@ def test_what_a_dead_courier_had_taken_comes_due_again(post: Post, courier: Star
     post.webhook()
     end(post.jobs, SUCCEEDED)
     with post.jobs.database.transaction() as session:
-        (taken,) = outbox.take(session, busy=(), limit=5)
-        assert outbox.take(session, busy=(), limit=5) == []
+        (taken,) = outbox.take(session, busy={}, limit=5, of_an_owner=5)
+        assert outbox.take(session, busy={}, limit=5, of_an_owner=5) == []
         overdue = sa.update(WebhookDeliveryRow).values(due_at=post.rows()[0].created_at)
         session.execute(overdue)
     with courier():

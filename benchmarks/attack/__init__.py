@@ -1,0 +1,1 @@
+"""What other owners notice while one attacks the service (``python -m benchmarks.attack``)."""

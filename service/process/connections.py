@@ -1,0 +1,112 @@
+"""Connections that cost little: time limits, and places that the idle give up.
+
+uvicorn waits for ever for the rest of a request's head, and its limit of connections refuses
+health checks like all else.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import sys
+from typing import Any, ClassVar, Final
+
+from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
+
+HEAD_WITHIN_S: Final = 10.0
+"""From the connection, or the answer before, to the last byte of a request's head."""
+LONGEST_HEAD: Final = 65_536
+
+_MOST: Final = 1000
+_SPARE_FILES: Final = 256
+"""For databases, logs, and connections that are being closed."""
+
+
+class Protocol(HttpToolsProtocol):
+    """Closes connections that ask for nothing, and the oldest of those where there are too many.
+
+    A connection *asks* from the end of a request's head until its answer is sent. One that
+    does not, or sends a body that nobody has let in yet, gives its place to a new one.
+    """
+
+    most: ClassVar[int] = _MOST
+    _places: ClassVar[dict[Protocol, None]] = {}
+
+    def __init__(self, *arguments: Any, **named: Any):
+        super().__init__(*arguments, **named)
+        self._head_timer: asyncio.TimerHandle | None = None
+        self._is_head = False
+        self._head_bytes = 0
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        """Take a place, that of the oldest idle connection where there is none."""
+        super().connection_made(transport)
+        self._places[self] = None
+        if len(self._places) > self.most:
+            self._make_room()
+        self._await_head()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Give the place back."""
+        self._places.pop(self, None)
+        self._stop_timer()
+        super().connection_lost(exc)
+
+    def data_received(self, data: bytes) -> None:
+        """Take bytes; a head of too many is none."""
+        if self._is_head:
+            if self._head_bytes > LONGEST_HEAD:
+                self.transport.close()
+                return
+            self._head_bytes += len(data)
+        super().data_received(data)
+
+    def on_message_begin(self) -> None:
+        """Begin to read a head."""
+        self._is_head = True
+        self._head_bytes = 0
+        super().on_message_begin()
+
+    def on_headers_complete(self) -> None:
+        """Begin a request."""
+        self._is_head = False
+        self._stop_timer()
+        super().on_headers_complete()
+
+    def on_response_complete(self) -> None:
+        """Wait for the next request, or for what is left of this one's body."""
+        is_next_here = bool(self.pipeline)
+        super().on_response_complete()
+        if not is_next_here and not self.transport.is_closing():
+            self._await_head()
+
+    def _await_head(self) -> None:
+        self._stop_timer()
+        self._head_timer = self.loop.call_later(HEAD_WITHIN_S, self.transport.close)
+
+    def _stop_timer(self) -> None:
+        if self._head_timer is not None:
+            self._head_timer.cancel()
+            self._head_timer = None
+
+    def _make_room(self) -> None:
+        others = [one for one in self._places if one is not self]
+        idle = (one for one in others if one._head_timer is not None)
+        sending = (one for one in others if one._head_timer is None and one.cycle.more_body)
+        for one in itertools.islice(itertools.chain(idle, sending), 1):
+            del self._places[one]
+            one.transport.abort()
+
+
+def allow_connections() -> None:
+    """Let this process have as many files open as it may, and as many connections as fit."""
+    if sys.platform == "win32":
+        return
+    import resource
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = _MOST + _SPARE_FILES
+    if soft != resource.RLIM_INFINITY and soft < wanted:
+        most = wanted if hard == resource.RLIM_INFINITY else min(wanted, hard)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (most, hard))
+        Protocol.most = max(16, min(_MOST, most - _SPARE_FILES))

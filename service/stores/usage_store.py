@@ -1,0 +1,54 @@
+"""How much of the database each owner has filled."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from typing import Final
+
+import sqlalchemy as sa
+from sqlalchemy.exc import IntegrityError
+from sqlalchemy.orm import Session
+
+from service.db.rows import OwnerUsageRow
+from service.problems.kinds import ServiceError
+
+MB: Final = 1_000_000
+
+
+def add(session: Session, owner: str, *, num_rows: int, num_bytes: int) -> tuple[int, int]:
+    """Add to what an owner has stored; return its rows and bytes in all."""
+    added = (
+        sa.update(OwnerUsageRow)
+        .where(OwnerUsageRow.owner == owner)
+        .values(
+            num_rows=OwnerUsageRow.num_rows + num_rows,
+            num_bytes=OwnerUsageRow.num_bytes + num_bytes,
+        )
+        .returning(OwnerUsageRow.num_rows, OwnerUsageRow.num_bytes)
+        .execution_options(synchronize_session=False)
+    )
+    found = session.execute(added).one_or_none()
+    if found is None:
+        # Somebody else may be the first at this moment.
+        with suppress(IntegrityError), session.begin_nested():
+            nothing = {"owner": owner, "num_rows": 0, "num_bytes": 0}
+            session.execute(sa.insert(OwnerUsageRow).values(nothing))
+        found = session.execute(added).one()
+    return found[0], found[1]
+
+
+def used(session: Session, owner: str) -> tuple[int, int]:
+    """Return how many rows and bytes an owner has stored."""
+    row = session.get(OwnerUsageRow, owner)
+    return (0, 0) if row is None else (row.num_rows, row.num_bytes)
+
+
+def require(usage: tuple[int, int], max_rows: int, max_mb: float) -> None:
+    """Raise ``quota_exceeded`` where an owner has stored more than it may."""
+    num_rows, num_bytes = usage
+    if num_rows > max_rows or num_bytes > max_mb * MB:
+        raise ServiceError(
+            "quota_exceeded",
+            f"An owner may store {max_rows} rows and {max_mb:g} MB; "
+            f"this would make {num_rows} rows and {num_bytes / MB:.1f} MB.",
+        )

@@ -1,0 +1,1 @@
+"""Attacks on the running service, each of which once did harm."""

@@ -1,0 +1,86 @@
+"""What attacks are aimed at: servers with owners and keys, on SQLite or the named PostgreSQL."""
+
+from __future__ import annotations
+
+import os
+import resource
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+
+import httpx
+import psutil
+import pytest
+
+from tests.service.access.conftest import Door, MakeDoor, door, make_door
+from tests.service.jobs.conftest import Jobs, client, jobs, template_url, workers
+from tests.service.webhooks.conftest import courier, post
+
+__all__ = [
+    "Door",
+    "Jobs",
+    "MakeDoor",
+    "Program",
+    "StartProgram",
+    "client",
+    "courier",
+    "door",
+    "jobs",
+    "make_door",
+    "post",
+    "program",
+    "template_url",
+    "workers",
+]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Program:
+    """The program as it is installed: an API that asks for keys, and all that it starts."""
+
+    door: Door
+    process: subprocess.Popen[str]
+
+    @property
+    def heavy(self) -> psutil.Process:
+        """The process that does what is heavy."""
+        (process,) = psutil.Process(self.process.pid).children()
+        return process
+
+
+StartProgram = Callable[..., AbstractContextManager[Program]]
+
+
+@pytest.fixture
+def program(jobs: Jobs) -> StartProgram:
+    """Return what runs the program on the database of jobs, with some settings changed."""
+
+    @contextmanager
+    def run(num_files: int = 0, **settings: object) -> Iterator[Program]:
+        url = jobs.settings.database_url
+        command = [sys.executable, "-m", "service", "api", "--port", "0", "--database-url", url]
+        given = {"require_keys": True} | settings
+        variables = {f"SLEWLINE_{name}".upper(): str(value) for name, value in given.items()}
+        with (jobs.folder / "api.log").open("ab") as log:
+            process = subprocess.Popen(
+                command,
+                env=os.environ | variables,
+                stdout=subprocess.PIPE,
+                stderr=log,
+                text=True,
+            )
+        if num_files:
+            resource.prlimit(process.pid, resource.RLIMIT_NOFILE, (num_files, num_files))
+        assert process.stdout is not None
+        try:
+            address = process.stdout.readline().split()[-1]
+            with httpx.Client(base_url=address, timeout=120) as client:
+                yield Program(door=Door(client=client, jobs=jobs), process=process)
+        finally:
+            process.terminate()
+            process.wait()
+            process.stdout.close()
+
+    return run

@@ -1,0 +1,128 @@
+"""More connections than a process may have, and such as never say what they want."""
+
+from __future__ import annotations
+
+import resource
+import socket
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+
+import httpx
+import pytest
+
+from service.api import body_limit
+from service.api.guard import MOST_OF_AN_OWNER
+from service.process.connections import LONGEST_HEAD
+from tests.attack.conftest import Door, Program, StartProgram
+from tests.patience import PATIENCE_S
+
+NUM = 1050
+NUM_FILES = 1024
+
+
+@contextmanager
+def connected(client: httpx.Client, number: int, text: str) -> Iterator[list[socket.socket]]:
+    """Open connections that send a text each."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if soft < 2 * number:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (min(2 * number, hard), hard))
+    address = (client.base_url.host, client.base_url.port)
+    with ExitStack() as stack:
+        opened = []
+        for _ in range(number):
+            one = socket.create_connection(address, timeout=PATIENCE_S)
+            opened.append(stack.enter_context(one))
+            one.sendall(text.encode())
+        yield opened
+
+
+def head(method: str, path: str, **headers: str) -> str:
+    """Return the head of a request."""
+    named = (f"{name.replace('_', '-')}: {value}" for name, value in headers.items())
+    return "\r\n".join([f"{method} {path} HTTP/1.1", "Host: localhost", *named, "", ""])
+
+
+def status_of(connection: socket.socket) -> int:
+    return int(connection.recv(12).split()[1])
+
+
+def is_closed(connection: socket.socket) -> bool:
+    """Wait until the other side closes."""
+    try:
+        while connection.recv(65_536):
+            pass
+    except ConnectionError:
+        pass
+    return True
+
+
+def assert_served(run: Program, key: dict[str, str]) -> None:
+    """Others are served, each over a connection of its own."""
+    for _ in range(10):
+        for path in ("/health/live", "/v1/me"):
+            address = run.door.client.base_url.join(path)
+            assert httpx.get(address, headers=key, timeout=PATIENCE_S).status_code == 200
+
+
+def test_streams_of_one_owner_leave_room_for_others(program: StartProgram) -> None:
+    with program(num_files=NUM_FILES) as run:
+        greedy, other = run.door.key("submit", "greedy"), run.door.key("read", "other")
+        path = f"/v1/jobs/{run.door.submit(greedy)}/events"
+        with connected(run.door.client, NUM, head("GET", path, **greedy)) as streams:
+            statuses = Counter(map(status_of, streams))
+            assert statuses == {200: MOST_OF_AN_OWNER, 503: NUM - MOST_OF_AN_OWNER}
+            assert_served(run, other)
+        # Those that have gone leave their places to others.
+        with connected(run.door.client, 1, head("GET", path, **greedy)) as (again,):
+            assert status_of(again) == 200
+
+
+@pytest.mark.parametrize("text", ["", "GET /health/live HT", head("GET", "/")[:-2]])
+def test_half_sent_requests_leave_room_for_others(program: StartProgram, text: str) -> None:
+    with program(num_files=NUM_FILES) as run:
+        other = run.door.key("read", "other")
+        with connected(run.door.client, NUM, text) as silent:
+            assert_served(run, other)
+            assert all(map(is_closed, silent))
+
+
+def test_half_sent_bodies_leave_room_for_others(program: StartProgram) -> None:
+    with program(num_files=NUM_FILES) as run:
+        greedy, other = run.door.key("submit", "greedy"), run.door.key("read", "other")
+        sent = {"Content_Type": "application/json", "Content_Length": "1000"}
+        with connected(run.door.client, NUM, head("POST", "/v1/jobs", **greedy, **sent) + "{"):
+            assert_served(run, other)
+        # Nobody reads on after a refusal, however long somebody goes on sending.
+        with connected(run.door.client, 1, head("POST", "/v1/jobs", **sent)) as (refused,):
+            assert status_of(refused) == 401
+            refused.settimeout(1.0)
+            with pytest.raises(ConnectionError):
+                send_for_ever(refused, b"{")
+
+
+def send_for_ever(connection: socket.socket, piece: bytes) -> None:
+    """Send pieces until the other side closes."""
+    while True:
+        connection.sendall(piece)
+        try:
+            if not connection.recv(65_536):
+                raise ConnectionResetError
+        except TimeoutError:
+            pass
+
+
+def test_a_head_without_an_end_is_not_read(program: StartProgram) -> None:
+    with program() as run, connected(run.door.client, 1, "GET / HTTP/1.1\r\nX: ") as (endless,):
+        endless.settimeout(0.1)
+        with pytest.raises(ConnectionError):
+            send_for_ever(endless, b"x" * LONGEST_HEAD)
+
+
+def test_a_body_that_does_not_come_is_not_waited_for(
+    door: Door, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(body_limit, "PART_WITHIN_S", 0.2)
+    sent = {"Content_Type": "application/json", "Content_Length": "9"} | door.key("submit")
+    with connected(door.client, 1, head("POST", "/v1/jobs", **sent) + "{") as (slow,):
+        assert status_of(slow) == 408
