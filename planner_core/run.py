@@ -105,8 +105,8 @@ def plan_scenario(
     )
     search = Search(
         is_optimal=timeline.is_valid and solution.termination is Termination.OPTIMAL,
-        breadth=getattr(solver, "breadth", None),
-        contact_above=getattr(solver, "contact_above_fraction", 0.0),
+        breadth=solver.outlook.breadth,
+        contact_above=solver.outlook.contact_above,
     )
     outcomes = explain(problem, solution.plan, timeline, search)
     clock.append(time.perf_counter())

@@ -15,7 +15,7 @@ from planner_core.certified.drivers.continuous import (
 from planner_core.certified.drivers.fleet import solve_without_resources
 from planner_core.certified.drivers.resources import solve_with_resources
 from planner_core.problem import Problem
-from planner_core.solvers.base import Constraint, Solution
+from planner_core.solvers.base import Constraint, Outlook, Solution
 from planner_core.solvers.milp import Milp, is_free
 
 
@@ -45,6 +45,11 @@ class Certified:
             "description": "Moves of the window search for each opportunity before the proof.",
         },
     )
+
+    @property
+    def outlook(self) -> Outlook:
+        """Which actions it looks at."""
+        return Outlook()
 
     def solve(self, problem: Problem, budget: Budget, seed: int) -> Solution:
         """Return the best plan and its bound; the same for the same seed if time suffices."""

@@ -27,7 +27,7 @@ column              ``physical``                  ``paper`` (event model)
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Final, NamedTuple, TypedDict
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -119,29 +119,6 @@ class Track(NamedTuple):
     is_guarded: bool
 
 
-class _ResourceColumns(TypedDict):
-    charge_from_s: Floats
-    charge_to_s: Floats
-    charge_top_s: Floats
-    data_from_s: Floats
-    data_to_s: Floats
-    data_peak_s: Floats
-    battery_full: Floats
-    battery_floor: Floats
-    battery_floor_least: Floats
-    battery_cost: Floats
-    recorder_gain: Floats
-    data_end_s: float
-    charge_per_s: float
-    idle_per_s: float
-    telemetry_per_s: float
-    battery_min: float
-    recorder_max: float
-    battery_start: float
-    recorder_start: float
-    reserve_start: float
-
-
 def compile_track(problem: Problem, satellite: SatelliteProblem, blocked: Bytes) -> Track:
     """Return a satellite's arrays; ``blocked`` rows (shape ``(m,)``) may not be taken."""
     m = len(satellite)
@@ -225,7 +202,7 @@ def _fill_ahead(
 
 def _resource_columns(
     problem: Problem, satellite: SatelliteProblem, is_contact: Bytes
-) -> _ResourceColumns:
+) -> dict[str, Any]:
     satellite = with_counted_resources(problem, satellite)
     r = satellite.resources
     start_s, end_s = satellite.start_s, satellite.end_s

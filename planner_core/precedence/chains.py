@@ -1,23 +1,23 @@
-"""Heavy chains of one satellite's tasks in which no target stands twice (a heuristic of ``graph``).
+"""Heavy chains of one satellite's tasks, and those in which no target stands twice (``graph``).
 
 What a chain has passed is handed on along the arcs of the relation's Hasse diagram, and the
-answer depends on them; so they are made here, as is the table of all pairs for a satellite that
-turns more slowly than it tracks.
+answer depends on them, as does the choice among chains that are as heavy; so they are made here,
+as is the table of all pairs for a satellite that turns more slowly than it tracks.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from planner_core.jit import kernel
-from planner_core.precedence.arcs import Arcs, covering_arcs
-from planner_core.precedence.relation import (
-    Precedence,
-    comes_before,
-    direct_precedence,
-    is_transitive_on,
-)
+from planner_core.jit import borrowing, kernel
+from planner_core.precedence.arcs import Arcs, Words, covering_arcs
+from planner_core.precedence.relation import Precedence, direct_precedence, is_transitive_on
 from planner_core.problem import Floats, Ints, SatelliteProblem
+
+
+def heaviest_chain(satellite: SatelliteProblem, weight: Floats) -> list[int]:
+    """Return the tasks of a heaviest chain; a place may stand on it twice."""
+    return chain_with_history(satellite, weight, np.full(len(weight), -1, dtype=np.int32))
 
 
 def chain_with_history(satellite: SatelliteProblem, weight: Floats, place: Ints) -> list[int]:
@@ -26,7 +26,8 @@ def chain_with_history(satellite: SatelliteProblem, weight: Floats, place: Ints)
     Parameters
     ----------
     weight, place
-        Worth of each task, not negative; where it happens. Shape ``(m,)``.
+        Worth of each task, not negative; where it happens, or -1 where it may happen again.
+        Shape ``(m,)``.
     """
     before = np.full(len(weight), -1, dtype=np.int32)
     direct = direct_precedence(satellite)
@@ -34,10 +35,10 @@ def chain_with_history(satellite: SatelliteProblem, weight: Floats, place: Ints)
         _, task = longest_path_with_history(weight, place, covering_arcs(direct), before)
     else:
         _, task = longest_chain_with_history(weight, place, direct, before)
-    return chain_to(task, before)
+    return _chain_to(task, before)
 
 
-def chain_to(task: int, before: Ints) -> list[int]:
+def _chain_to(task: int, before: Ints) -> list[int]:
     """Return the tasks of a chain in order of time (EXTRACTPATH of Alg. 3)."""
     chain = []
     while task >= 0:
@@ -46,38 +47,27 @@ def chain_to(task: int, before: Ints) -> list[int]:
     return chain[::-1]
 
 
-def heaviest_chain(satellite: SatelliteProblem, weight: Floats) -> list[int]:
-    """Return the tasks of the heaviest chain, pair by pair; ``weight`` as above.
-
-    For turns in motion, of which a skyline of labels knows no dominance.
-    """
-    before = np.full(len(weight), -1, dtype=np.int32)
-    return chain_to(_heaviest_chain(weight, direct_precedence(satellite), before), before)
-
-
 @kernel
-def _heaviest_chain(weight: Floats, precedence: Precedence, before: Ints) -> int:
-    """Fill in the task before each on its heaviest chain; return the last one's end, or -1."""
-    m = len(weight)
-    value, top = np.zeros(m), np.zeros(m + 1)
-    last = -1
-    for b in range(m):
-        top[b + 1] = top[b]
-        if weight[b] <= 0.0:
-            continue
-        best = 0.0
-        a = b - 1
-        # No task before has more than the top up to there.
-        while a >= 0 and top[a + 1] > best:
-            if value[a] > best and comes_before(precedence, a, b):
-                best = value[a]
-                before[b] = a
-            a -= 1
-        value[b] = best + weight[b]
-        if value[b] > top[b]:
-            top[b + 1] = value[b]
-            last = b
-    return last
+def _no_history(weight: Floats, place: Ints) -> Words:
+    """Return an empty set of places for each task."""
+    num_words = 0
+    for a in range(len(weight)):
+        if weight[a] > 0.0:
+            num_words = max(num_words, (place[a] >> 6) + 1)
+    return np.zeros((len(weight), num_words), dtype=np.uint64)
+
+
+@borrowing
+def _holds(history: Words, task: int, place: int) -> bool:
+    if place < 0:
+        return False
+    return bool(history[task, place >> 6] & (np.uint64(1) << np.uint64(place & 63)))
+
+
+@borrowing
+def _note(history: Words, task: int, place: int) -> None:
+    if place >= 0:
+        history[task, place >> 6] |= np.uint64(1) << np.uint64(place & 63)
 
 
 @kernel
@@ -93,16 +83,12 @@ def longest_path_with_history(
     Parameters
     ----------
     weight, place
-        Worth of each task, not negative; where it happens. Shape ``(m,)``.
+        Worth of each task, not negative; where it happens, or -1. Shape ``(m,)``.
     before
         Filled with the task before each on its chain, or -1. Shape ``(m,)``.
     """
     m = len(weight)
-    num_words = 1
-    for a in range(m):
-        if weight[a] > 0.0:
-            num_words = max(num_words, (place[a] >> 6) + 1)
-    history = np.zeros((m, num_words), dtype=np.uint64)
+    history = _no_history(weight, place)
     value = np.zeros(m)
     passed = np.full(m, -1, dtype=np.int32)  # where the heaviest chain comes from
     fitting = np.full(m, -1, dtype=np.int32)  # and the heaviest without this task's place
@@ -118,7 +104,7 @@ def longest_path_with_history(
                 before[a] = last[source]
             else:
                 before[a] = -1
-            history[a, place[a] >> 6] |= np.uint64(1) << np.uint64(place[a] & 63)
+            _note(history, a, place[a])
             value[a] = total + weight[a]
             last[a] = a
             if value[a] > best:
@@ -133,9 +119,7 @@ def longest_path_with_history(
                 passed[b] = a
             if fitting[b] >= 0 and value[a] <= value[fitting[b]]:
                 continue
-            if weight[b] > 0.0 and not (
-                history[a, place[b] >> 6] & (np.uint64(1) << np.uint64(place[b] & 63))
-            ):
+            if weight[b] > 0.0 and not _holds(history, a, place[b]):
                 fitting[b] = a
     return best, best_task
 
@@ -147,11 +131,7 @@ def longest_chain_with_history(
     """Return what ``longest_path_with_history`` does, on the table of all pairs."""
     near_from, far_from, offset, bits = precedence
     m = len(weight)
-    num_words = 1
-    for a in range(m):
-        if weight[a] > 0.0:
-            num_words = max(num_words, (place[a] >> 6) + 1)
-    history = np.zeros((m, num_words), dtype=np.uint64)
+    history = _no_history(weight, place)
     reached = np.zeros(m)
     # Tasks by falling weight of their chains, among those that everything from here may follow.
     far = np.empty(m, dtype=np.int32)
@@ -172,20 +152,18 @@ def longest_chain_with_history(
             num_far += 1
         if weight[b] <= 0.0:
             continue
-        word = place[b] >> 6
-        bit = np.uint64(1) << np.uint64(place[b] & 63)
         if reached[b] == 0.0:
             before[b] = -1
         for at in range(num_far):
             if reached[far[at]] <= reached[b]:
                 break
-            if not history[far[at], word] & bit:
+            if not _holds(history, far[at], place[b]):
                 reached[b] = reached[far[at]]
                 before[b] = far[at]
                 break
         if before[b] >= 0:
             history[b] = history[before[b]]
-        history[b, word] |= bit
+        _note(history, b, place[b])
         reached[b] += weight[b]
         if reached[b] > best:
             best, best_task = reached[b], b
@@ -193,7 +171,7 @@ def longest_chain_with_history(
             near = offset[b] + c - near_from[b]
             if not (bits[near >> 3] >> (near & 7)) & 1 or reached[b] <= reached[c]:
                 continue
-            if not history[b, place[c] >> 6] & (np.uint64(1) << np.uint64(place[c] & 63)):
+            if not _holds(history, b, place[c]):
                 reached[c] = reached[b]
                 before[c] = b
     return best, best_task

@@ -14,6 +14,7 @@ from planner_core.precedence.relation import turns_slower_than_it_tracks
 from planner_core.precedence.skyline import (
     Skyline,
     best_ahead,
+    clear,
     enter,
     skyline_for,
     value_of,
@@ -29,7 +30,7 @@ from planner_core.problem import (
     Transitions,
 )
 from planner_core.problem.slew import TIME_TOLERANCE_S
-from planner_core.problem.transitions import Slews, turns_within
+from planner_core.problem.transitions import Slews
 
 
 @bundle
@@ -185,6 +186,7 @@ def _scan(
     if is_backward:
         starts_s, ends_s, sign = network.end_s, network.start_s, -1.0
         looks, looked = network.looked, network.looks
+    clear(sky)
     count, entered = 0, 0
     best, best_at = 0.0, -1
     for i in range(end - begin):
@@ -207,7 +209,7 @@ def _scan(
                     sky, count, value[c], sign * ends_s[c],
                     (looked[c, 0], looked[c, 1], looked[c, 2]), c, slews,
                 )  # fmt: skip
-        at = best_ahead(sky, count, start_s, (looks[b, 0], looks[b, 1], looks[b, 2]), slews)
+        at = best_ahead(sky, start_s, (looks[b, 0], looks[b, 1], looks[b, 2]), slews)
         value[b] = value_of(sky, at) + weight[b]
         if at >= 0:
             previous[b] = sky.node[at]
@@ -235,31 +237,3 @@ def heaviest_through(network: Network, weight: Floats) -> tuple[float, Floats]:
         for a in range(network.first[part], network.first[part + 1]):
             through[a] += others + onward[a] - weight[a]
     return total, through
-
-
-@borrowing
-def first_of_equals(
-    network: Network, weight: Floats, value: Floats, previous: Ints, ends: Ints
-) -> None:
-    """Lead the heaviest paths through the first of the tasks that are as good before the next.
-
-    The arrays are those that ``heaviest_paths`` has filled; ``previous`` of other nodes stays.
-    """
-    for part in range(len(ends)):
-        b = ends[part]
-        slews = slews_in(network, part)
-        while b >= 0 and previous[b] >= 0:
-            a = network.first[part]
-            while (
-                value[a] != value[previous[b]]
-                or weight[a] <= 0.0
-                or not turns_within(
-                    slews,
-                    network.start_s[b] - network.end_s[a] - slews.settle_s + TIME_TOLERANCE_S,
-                    (network.looked[a, 0], network.looked[a, 1], network.looked[a, 2]),
-                    (network.looks[b, 0], network.looks[b, 1], network.looks[b, 2]),
-                )
-            ):
-                a += 1
-            previous[b] = a
-            b = a

@@ -3,15 +3,16 @@
 A label says what a path is worth, when its last task ends, and where the satellite looks then.
 Labels enter in order of end. One that has ended before, is worth no less, and could have turned
 since to where the new one looks reaches whatever the new one does: a slew through two angles
-takes no less than one through both. Such a new label is left out. Asked for the best that a task
-may follow, labels are looked at from the newest back, until none before is worth more.
+takes no less than one through both. Such a new label is left out. Labels hang together from the
+one worth most down, so whoever asks for the best that a task may follow takes the first that it
+may; those that could make a new label needless are the ones that stand before its place.
 
 Nothing is assumed of the tasks in between, so that "may follow" need not be transitive: but
 where a satellite turns more slowly than it tracks, a task of no worth may still be a way to turn.
 
 What else a path carries (a level of energy or data, the targets that it has imaged) belongs
 beside the labels, by their number. A label then stands for another one only where it is at least
-as good in that as well: such a caller asks ``is_as_good`` and its own question, and appends.
+as good in that as well: such a caller asks ``is_as_good`` and its own question, and inserts.
 """
 
 from __future__ import annotations
@@ -27,17 +28,11 @@ from planner_core.problem.transitions import CLEARLY, Slews, Vector, turns_withi
 
 NO_LABEL: Final = -1
 
-COMPARED: Final = 32
-"""With how many of the newest labels one is compared before it enters. More would only keep out
-a few more; fewer than half of all enter anyway."""
-
-# One label lies in one line of the cache.
 _VALUE: Final = 0
 _END: Final = 1
 _X: Final = 2
 _Y: Final = 3
 _Z: Final = 4
-_TOP: Final = 5
 
 
 class Skyline(NamedTuple):
@@ -46,27 +41,31 @@ class Skyline(NamedTuple):
     Attributes
     ----------
     label
-        Value, end (s), line of sight (three numbers), and the greatest value up to here.
-        Shape ``(n, 6)``.
+        Value, end (s) and line of sight (three numbers). Shape ``(n, 5)``.
     node
         The task that a label stands for. Shape ``(n,)``.
-    top_at
-        The label with the greatest value up to here. Shape ``(n,)``.
+    next
+        The label worth most, and after each label the one that is worth as much or else next to
+        it; ``NO_LABEL`` after the last. Shape ``(n + 1,)``.
     """
 
     label: Floats
     node: Ints
-    top_at: Ints
+    next: Ints
 
 
 @kernel
 def skyline_for(num_labels: int) -> Skyline:
     """Return room for so many labels."""
-    return Skyline(
-        np.empty((num_labels, 6)),
-        np.empty(num_labels, dtype=np.int32),
-        np.empty(num_labels, dtype=np.int32),
-    )
+    next_label = np.empty(num_labels + 1, dtype=np.int32)
+    next_label[0] = NO_LABEL
+    return Skyline(np.empty((num_labels, 5)), np.empty(num_labels, dtype=np.int32), next_label)
+
+
+@borrowing
+def clear(sky: Skyline) -> None:
+    """Forget all labels."""
+    sky.next[0] = NO_LABEL
 
 
 @borrowing
@@ -76,19 +75,21 @@ def value_of(sky: Skyline, at: int) -> float:
 
 
 @borrowing
-def top_label(sky: Skyline, count: int) -> int:
-    """Return the best of so many labels; ``NO_LABEL`` if there is none."""
-    return int(sky.top_at[count - 1]) if count > 0 else NO_LABEL
+def top_label(sky: Skyline) -> int:
+    """Return the label worth most; ``NO_LABEL`` if there is none."""
+    return int(sky.next[0])
 
 
 @borrowing
-def is_as_good(
-    sky: Skyline, at: int, value: float, end_s: float, looked: Vector, slews: Slews
-) -> bool:
-    """Return whether whatever follows a new label may follow another one, for no less."""
+def next_label(sky: Skyline, at: int) -> int:
+    """Return the label that stands after one, worth no more; ``NO_LABEL`` after the last."""
+    return int(sky.next[at + 1])
+
+
+@borrowing
+def is_as_good(sky: Skyline, at: int, end_s: float, looked: Vector, slews: Slews) -> bool:
+    """Return whether whatever follows a new label may follow another one that stands before it."""
     label = sky.label
-    if label[at, _VALUE] < value:
-        return False
     room_s = end_s - label[at, _END]
     if room_s >= slews.longest_s:
         return True
@@ -99,16 +100,15 @@ def is_as_good(
 
 
 @borrowing
-def append(sky: Skyline, count: int, value: float, end_s: float, looked: Vector, node: int) -> None:
-    """Add a label to ``count`` others, none of which ends later."""
+def insert(
+    sky: Skyline, count: int, before: int, value: float, end_s: float, looked: Vector, node: int
+) -> None:
+    """Add a label to ``count`` others, none of which ends later, after one worth no less."""
     label = sky.label
     label[count, _VALUE], label[count, _END] = value, end_s
     label[count, _X], label[count, _Y], label[count, _Z] = looked
     sky.node[count] = node
-    if count == 0 or value > label[count - 1, _TOP]:
-        label[count, _TOP], sky.top_at[count] = value, count
-    else:
-        label[count, _TOP], sky.top_at[count] = label[count - 1, _TOP], sky.top_at[count - 1]
+    sky.next[count + 1], sky.next[before + 1] = sky.next[before + 1], count
 
 
 @borrowing
@@ -119,10 +119,12 @@ def enter(
 
     Labels must come in order of end.
     """
-    for at in range(count - 1, max(count - 1 - COMPARED, -1), -1):
-        if is_as_good(sky, at, value, end_s, looked, slews):
+    before, at = NO_LABEL, top_label(sky)
+    while at >= 0 and value_of(sky, at) >= value:
+        if is_as_good(sky, at, end_s, looked, slews):
             return count
-    append(sky, count, value, end_s, looked, node)
+        before, at = at, next_label(sky, at)
+    insert(sky, count, before, value, end_s, looked, node)
     return count + 1
 
 
@@ -135,19 +137,12 @@ def reaches(sky: Skyline, at: int, start_s: float, looks: Vector, slews: Slews) 
 
 
 @borrowing
-def best_ahead(sky: Skyline, count: int, start_s: float, looks: Vector, slews: Slews) -> int:
-    """Return the label worth most that a task may follow; ``NO_LABEL`` if none is worth anything.
+def best_ahead(sky: Skyline, start_s: float, looks: Vector, slews: Slews) -> int:
+    """Return the label worth most that a task may follow; ``NO_LABEL`` if there is none.
 
     All that end in time must have entered.
     """
-    label = sky.label
-    best, best_at = 0.0, NO_LABEL
-    always_s = start_s - slews.settle_s - slews.longest_s
-    at = count - 1
-    while at >= 0 and label[at, _TOP] > best:
-        if label[at, _END] <= always_s:
-            return int(sky.top_at[at])
-        if label[at, _VALUE] > best and reaches(sky, at, start_s, looks, slews):
-            best, best_at = label[at, _VALUE], at
-        at -= 1
-    return best_at
+    at = top_label(sky)
+    while at >= 0 and not reaches(sky, at, start_s, looks, slews):
+        at = next_label(sky, at)
+    return at

@@ -50,6 +50,22 @@ class Solution:
         return None if self.proven is None else self.proven.value
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outlook:
+    """Which actions of a state a search looks at: what it misses else, it could not know.
+
+    Attributes
+    ----------
+    breadth
+        How many tasks at most; None for all.
+    contact_above
+        How full the recorder is, as a share, before contacts are among them.
+    """
+
+    breadth: int | None = None
+    contact_above: float = 0.0
+
+
 class Solver(Protocol):
     """A frozen dataclass whose fields are its parameters, and nothing else.
 
@@ -68,6 +84,11 @@ class Solver(Protocol):
     paper: ClassVar[str]
     exact: ClassVar[bool]
     honours: ClassVar[frozenset[Constraint]]
+
+    @property
+    def outlook(self) -> Outlook:
+        """Which actions it looks at."""
+        ...
 
     def solve(self, problem: Problem, budget: Budget, seed: int) -> Solution:
         """Return the best plan found before the budget is spent."""

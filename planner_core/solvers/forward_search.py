@@ -38,6 +38,7 @@ from planner_core.solvers.base import (
     ContactCounts,
     Feasibility,
     ImageNeeds,
+    Outlook,
     Solution,
 )
 from planner_core.solvers.priced import better_of
@@ -287,6 +288,11 @@ class ForwardSearch:
             "without resources only. The paper has none.",
         },
     )
+
+    @property
+    def outlook(self) -> Outlook:
+        """Which actions it looks at."""
+        return Outlook(breadth=self.breadth, contact_above=self.contact_above_fraction)
 
     def solve(self, problem: Problem, budget: Budget, seed: int) -> Solution:
         """Return the plan; the same one whatever the seed."""

@@ -13,10 +13,9 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from planner_core.budget import Budget
-from planner_core.precedence.chains import chain_to, chain_with_history, heaviest_chain
-from planner_core.precedence.network import first_of_equals, heaviest_paths, network_of
-from planner_core.problem import Floats, Problem, SatelliteProblem
-from planner_core.solvers.base import Constraint, Feasibility, Solution
+from planner_core.precedence.chains import chain_with_history, heaviest_chain
+from planner_core.problem import Problem
+from planner_core.solvers.base import Constraint, Feasibility, Outlook, Solution
 from planner_core.solvers.sequential import Turn, plan_in_turn
 from planner_core.solvers.walk import (
     CONTACT_ABOVE,
@@ -56,6 +55,11 @@ class Graph:
         metadata=contact_above_metadata("Matters where feasibility is hard."),
     )
 
+    @property
+    def outlook(self) -> Outlook:
+        """Which actions it looks at."""
+        return Outlook(contact_above=self.contact_above_fraction)
+
     def solve(self, problem: Problem, budget: Budget, seed: int) -> Solution:
         """Return the plan; the same one whatever the seed."""
 
@@ -64,7 +68,7 @@ class Graph:
             is_wanted = (track.is_contact == 0) & (turn.collected[track.place] == 0)
             weight = np.where(is_wanted, problem.worth[turn.satellite.rows], 0.0)
             if self.path == "longest":
-                path = longest_chain(problem, turn.satellite, weight)
+                path = heaviest_chain(turn.satellite, weight)
             else:
                 path = chain_with_history(turn.satellite, weight, track.place)
             path = _with_kept(problem, turn, path)
@@ -86,20 +90,6 @@ class Graph:
             return path
 
         return plan_in_turn(problem, budget, plan_turn)
-
-
-def longest_chain(problem: Problem, satellite: SatelliteProblem, weight: Floats) -> list[int]:
-    """Return the tasks of the heaviest chain; of equal ones that of the first tasks."""
-    if satellite.transitions.is_moving:
-        return heaviest_chain(satellite, weight)
-    network = network_of(problem, [satellite])
-    # Tasks of no worth stand in no chain, not even to turn.
-    network = network._replace(is_turning=np.zeros_like(network.is_turning))
-    value, previous = np.empty(len(weight)), np.empty(len(weight), dtype=np.int32)
-    ends = np.empty(len(network.first) - 1, dtype=np.int32)
-    heaviest_paths(network, weight, value, previous, ends)
-    first_of_equals(network, weight, value, previous, ends)
-    return [task for end in ends.tolist() for task in chain_to(end, previous)]
 
 
 def _with_kept(problem: Problem, turn: Turn, path: list[int]) -> list[int]:

@@ -24,10 +24,11 @@ from planner_core.solvers.base import (
     ContactCounts,
     Feasibility,
     ImageNeeds,
+    Outlook,
     Solution,
 )
 from planner_core.solvers.mcts_choices import Rules
-from planner_core.solvers.mcts_simulate import Path, search, sunpoint_instead
+from planner_core.solvers.mcts_simulate import Path, Step, search, sunpoint_instead
 from planner_core.solvers.mcts_successors import no_successors
 from planner_core.solvers.mcts_tree import (
     UNSEEN,
@@ -174,6 +175,11 @@ class Mcts:
         ),
     )
 
+    @property
+    def outlook(self) -> Outlook:
+        """Which actions it looks at."""
+        return Outlook(breadth=self.breadth, contact_above=self.contact_above_fraction)
+
     def solve(self, problem: Problem, budget: Budget, seed: int) -> Solution:
         """Return the plan; the same one for the same seed."""
 
@@ -234,20 +240,20 @@ class Mcts:
             discount=np.empty(self.depth),
             options=np.empty(rules.breadth + 1, dtype=np.int32),
         )
-        best, best_actions = np.full(1, -np.inf), np.full(self.depth, NO_TASK, dtype=np.int32)
+        step = Step(
+            track, rules, guidance, successors, worth, collected, random, path,
+            best=np.full(1, -np.inf), best_actions=np.full(self.depth, NO_TASK, dtype=np.int32),
+        )  # fmt: skip
         taken: list[int] = []
         reward = 0.0
         while not budget.is_spent():
-            edge = search(
-                tree, track, rules, guidance, successors, worth, collected, random,
-                path, self.num_simulations, budget.stop, best, best_actions,
-            )  # fmt: skip
+            edge = search(tree, step, self.num_simulations, budget.stop)
             if edge == UNSEEN or budget.is_spent():
                 break
             if self.keep_incumbent:
-                edge = _edge_of(tree, int(best_actions[0]), edge)
+                edge = _edge_of(tree, int(step.best_actions[0]), edge)
             if self.worthless == "sunpoint":
-                edge = sunpoint_instead(tree, track, rules, guidance, worth, collected, edge)
+                edge = sunpoint_instead(tree, step, edge)
             action = int(tree.action[edge])
             child = int(tree.child[edge])
             if action != WAIT:
@@ -261,7 +267,7 @@ class Mcts:
                 ):
                     collected[place] = successors.imaged[place] = 1
                     reward += float(worth[action])
-            best[0] = -np.inf
+            step.best[0] = -np.inf
             copy_branch(tree, spare, child)
             tree, spare = spare, tree
             turn.report((int(tree.cursor[0]) + 1) / len(track.start_s), reward)

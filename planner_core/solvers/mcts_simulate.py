@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from planner_core.bundles import bundle
 from planner_core.draws import Uint64s
@@ -33,6 +33,9 @@ from planner_core.solvers.mcts_tree import (
     new_node,
 )
 
+ROOT: Final = 0
+"""The node of the state that a step begins with."""
+
 
 @bundle
 class Path(NamedTuple):
@@ -46,27 +49,42 @@ class Path(NamedTuple):
     options: Ints
 
 
+@bundle
+class Step(NamedTuple):
+    """What the simulations of one step look at, beside the tree, and what they leave.
+
+    Attributes
+    ----------
+    worth
+        Of each task. Shape ``(m,)``.
+    collected
+        Targets that are imaged already. Shape ``(num_targets,)``.
+    best, best_actions
+        The greatest return so far, and the sequence that earned it. Shape ``(1,)``, ``(depth,)``.
+    """
+
+    track: Track
+    rules: Rules
+    guidance: Guidance
+    successors: Successors
+    worth: Floats
+    collected: Bytes
+    random: Uint64s
+    path: Path
+    best: Floats
+    best_actions: Ints
+
+
 @borrowing
-def _simulate(
-    tree: Tree,
-    track: Track,
-    rules: Rules,
-    guidance: Guidance,
-    successors: Successors,
-    worth: Floats,
-    collected: Bytes,
-    random: Uint64s,
-    path: Path,
-    root: int,
-    best: Floats,
-    best_actions: Ints,
-) -> None:
-    """SIMULATE and ROLLOUT from ``root``; keeps the sequence of greatest return in ``best``."""
+def _simulate(tree: Tree, step: Step) -> None:
+    """SIMULATE and ROLLOUT from the root; keeps the sequence of greatest return in ``best``."""
+    track, rules, guidance, successors = step.track, step.rules, step.guidance, step.successors
+    worth, collected, path = step.worth, step.collected, step.path
     m = len(track.start_s)
     depth = rules.depth
-    node = root
-    cursor, last = tree.cursor[root], tree.last[root]
-    battery, recorder = tree.battery[root], tree.recorder[root]
+    node = ROOT
+    cursor, last = tree.cursor[ROOT], tree.last[ROOT]
+    battery, recorder = tree.battery[ROOT], tree.recorder[ROOT]
     in_tree = 0
     d = 0
     is_rollout = False
@@ -74,8 +92,8 @@ def _simulate(
         if not is_rollout and tree.first_edge[node] < 0:
             # The listing rolls out from a new state; the root itself is searched at once. What
             # may be done in a state is looked for when it is met again, which most never are.
-            is_met = node == root or tree.first_edge[node] == ROLLED_OUT
-            if node != root and not has_room(tree, rules.breadth):
+            is_met = node == ROOT or tree.first_edge[node] == ROLLED_OUT
+            if node != ROOT and not has_room(tree, rules.breadth):
                 is_rollout = True
             elif is_met:
                 expand(tree, track, rules, guidance, successors, collected, node)
@@ -92,7 +110,7 @@ def _simulate(
                 first = action
             else:
                 action, first = random_action(
-                    track, rules, guidance, successors, collected, random, path.options,
+                    track, rules, guidance, successors, collected, step.random, path.options,
                     cursor, last, battery, recorder,
                 )  # fmt: skip
             if action == m:
@@ -134,7 +152,7 @@ def _simulate(
         if not is_rollout:
             if tree.child[path.edge[d]] != UNSEEN:
                 node = tree.child[path.edge[d]]
-            elif node == root or has_room(tree, rules.breadth):
+            elif node == ROOT or has_room(tree, rules.breadth):
                 tree.child[path.edge[d]] = new_node(tree, cursor, last, battery, recorder)
                 node = tree.child[path.edge[d]]
             else:
@@ -156,46 +174,19 @@ def _simulate(
             else:
                 tree.value[edge] += (q - tree.value[edge]) / tree.visits[edge]
         returned = q
-    if d > 0 and returned > best[0]:
-        best[0] = returned
+    if d > 0 and returned > step.best[0]:
+        step.best[0] = returned
         for i in range(depth):
-            best_actions[i] = path.action[i] if i < d else m
+            step.best_actions[i] = path.action[i] if i < d else m
 
 
 @borrowing
-def search(
-    tree: Tree,
-    track: Track,
-    rules: Rules,
-    guidance: Guidance,
-    successors: Successors,
-    worth: Floats,
-    collected: Bytes,
-    random: Uint64s,
-    path: Path,
-    num_simulations: int,
-    stop: Bytes,
-    best: Floats,
-    best_actions: Ints,
-) -> int:
-    """Run the simulations of one step from node 0 and return the edge of greatest value."""
+def search(tree: Tree, step: Step, num_simulations: int, stop: Bytes) -> int:
+    """Run the simulations of one step and return the root's edge of greatest value."""
     for _ in range(num_simulations):
         if stop[0]:
             break
-        _simulate(
-            tree,
-            track,
-            rules,
-            guidance,
-            successors,
-            worth,
-            collected,
-            random,
-            path,
-            0,
-            best,
-            best_actions,
-        )
+        _simulate(tree, step)
     chosen = UNSEEN
     if tree.first_edge[0] < 0:
         return chosen
@@ -208,19 +199,12 @@ def search(
 
 
 @borrowing
-def sunpoint_instead(
-    tree: Tree,
-    track: Track,
-    rules: Rules,
-    guidance: Guidance,
-    worth: Floats,
-    collected: Bytes,
-    edge: int,
-) -> int:
+def sunpoint_instead(tree: Tree, step: Step, edge: int) -> int:
     """Return the edge of sun-pointing where the action of ``edge`` earns nothing by itself.
 
     Without resources A(s) has no sun-pointing; it is added here, and lets the first task pass.
     """
+    track, rules, guidance = step.track, step.rules, step.guidance
     row = tree.action[edge]
     if row == WAIT:
         return edge
@@ -230,7 +214,7 @@ def sunpoint_instead(
         battery_after, recorder_after, _ = take(track, last, row, battery, recorder)
     now_s = track.start_s[tree.cursor[0]] if tree.cursor[0] >= 0 else 0.0
     reward = task_reward(
-        track, guidance, worth, collected, track.start_s[row] - now_s, 1.0,
+        track, guidance, step.worth, step.collected, track.start_s[row] - now_s, 1.0,
         row, battery_after, recorder_after,
     )  # fmt: skip
     end = tree.first_edge[0] + tree.num_edges[0]

@@ -26,7 +26,7 @@ from planner_core.precedence.relation import is_transitive, num_near_pairs
 from planner_core.problem import COLLECT, Floats, Problem
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
-from planner_core.solvers.base import Constraint, Solution
+from planner_core.solvers.base import Constraint, Outlook, Solution
 from planner_core.solvers.forward_search import ForwardSearch
 from planner_core.solvers.graph import Graph
 from planner_core.solvers.rule import Rule
@@ -85,6 +85,11 @@ class Milp:
             "start from a good plan (without resources only).",
         },
     )
+
+    @property
+    def outlook(self) -> Outlook:
+        """Which actions it looks at."""
+        return Outlook()
 
     def solve(self, problem: Problem, budget: Budget, seed: int) -> Solution:
         """Return the best plan; the same one for the same seed where the budget suffices."""

@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 
 from planner_core.budget import Budget
 from planner_core.problem import Problem
-from planner_core.solvers.base import Constraint, Feasibility, Solution
+from planner_core.solvers.base import Constraint, Feasibility, Outlook, Solution
 from planner_core.solvers.priced import better_of
 from planner_core.solvers.sequential import Turn, plan_in_turn
 from planner_core.solvers.walk import (
@@ -56,6 +56,11 @@ class Rule:
             "and no collects while the recorder is half full or more (the authors' code)."
         },
     )
+
+    @property
+    def outlook(self) -> Outlook:
+        """Which actions it looks at."""
+        return Outlook(contact_above=self.contact_above_fraction)
 
     def solve(self, problem: Problem, budget: Budget, seed: int) -> Solution:
         """Return the plan; the same one whatever the seed."""

@@ -74,6 +74,7 @@ class _Words(Wording):
         return AttemptOut(
             opportunity_id=f"o{attempt.scenario_row}",
             satellite_id=self.problem.satellites[attempt.satellite].id,
+            satellite_name=self.problem.satellites[attempt.satellite].name,
             start=self.instant(attempt.start_s),
             end=self.instant(attempt.end_s),
             violations=[self.violation(violation) for violation in attempt.violations],

@@ -14,6 +14,7 @@ from planner_core.problem.plan import Plan
 from planner_core.reasons.reason import Search
 from planner_core.referee.plan_diff import PlannedAction, PlanView
 from planner_core.referee.replay import Timeline, replay
+from planner_core.solvers.registry import outlook_of
 from service.answers.reading import Finder
 from service.scenarios.opportunities import Described
 from service.wire.timelines import IDLE_MODES, TimelineOut
@@ -41,7 +42,7 @@ def rebuild(described: Described, timeline: TimelineOut, budget: Budget) -> Rebu
     problem = build_problem(described.scenario, described.computed, budget)
     plan = stored_plan(timeline, described.scenario, problem)
     judged = replay(problem, plan)
-    params = timeline.solver.params
+    outlook = outlook_of(timeline.solver.name, timeline.solver.params)
     return Rebuilt(
         scenario=described.scenario,
         computed=described.computed,
@@ -50,8 +51,8 @@ def rebuild(described: Described, timeline: TimelineOut, budget: Budget) -> Rebu
         timeline=judged,
         search=Search(
             is_optimal=judged.is_valid and timeline.termination == Termination.OPTIMAL.value,
-            breadth=params.get("breadth"),
-            contact_above=params.get("contact_above_fraction", 0.0),
+            breadth=outlook.breadth,
+            contact_above=outlook.contact_above,
         ),
     )
 

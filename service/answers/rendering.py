@@ -88,6 +88,7 @@ class Wording:
         return ViolationOut(
             code=found.code,
             satellite_id=self.problem.satellites[found.satellite].id,
+            satellite_name=self.problem.satellites[found.satellite].name,
             at=self.instant(found.at_s),
             needed=found.needed,
             available=found.available,
@@ -98,13 +99,15 @@ class Wording:
 
     def target(self, found: TargetOutcome) -> TargetItem:
         """Return what became of a target."""
-        target, satellite = self.scenario.targets[found.target], found.satellite
+        target = self.scenario.targets[found.target]
+        satellite = None if found.satellite is None else self.problem.satellites[found.satellite]
         return TargetItem(
             target_id=target.id,
             target_catalog_id=target.catalog_id,
             outcome=found.outcome,
             action_id=None if found.position is None else self.action_ids[found.position],
-            satellite_id=None if satellite is None else self.problem.satellites[satellite].id,
+            satellite_id=None if satellite is None else satellite.id,
+            satellite_name=None if satellite is None else satellite.name,
             reason=None if found.reason is None else self._reason(found.reason, target.reward),
         )
 
@@ -242,7 +245,7 @@ class Documents(Wording):
 
     def _action(self, action_id: str, action: JudgedAction) -> ActionOut:
         table, row = self.problem.opportunities, action.opportunity
-        target_id = station_id = off_nadir_deg = azimuth_deg = worth = quality = None
+        target_id = station = off_nadir_deg = azimuth_deg = worth = quality = None
         if row is not None:
             own = table.off_nadir_deg[row], table.azimuth_deg[row]
             off_nadir_deg, azimuth_deg = self._seen.get(action.position, own)
@@ -251,14 +254,15 @@ class Documents(Wording):
                 target_id = self.scenario.targets[place].id
                 worth, quality = float(self.problem.worth[row]), self._quality[row]
             else:
-                station_id = self.scenario.ground_stations[place].id
+                station = self.scenario.ground_stations[place]
         return ActionOut(
             id=action_id,
             mode=action.mode,
             start=self.instant(action.start_s),
             end=self.instant(action.end_s),
             target_id=target_id,
-            station_id=station_id,
+            station_id=None if station is None else station.id,
+            station_name=None if station is None else station.name,
             opportunity_id=self.opportunity_id(row),
             off_nadir_deg=_rounded(off_nadir_deg, 4),
             azimuth_deg=_rounded(azimuth_deg, 4),

@@ -41,13 +41,13 @@ router = APIRouter(prefix="/v1/comparisons", tags=["comparisons"])
 @router.post("", status_code=202, responses=problem_responses(503))
 def create_comparison(body: ComparisonIn, call: CallDep, once: OnceDep) -> ComparisonOut:
     """Queue a job for each run, all or none; the answer tells where the table grows."""
-    queue = intake.queue_with_room(call, len(body.runs))
     params = []
     for position, run in enumerate(body.runs):
         with inside(f"/runs/{position}"):
             params.append(intake.all_params(run.solver, run.params))
     time_s, memory_mb = intake.limits_of(body.limits, call.settings)
     inline = intake.frozen(call, body)
+    queue = intake.queue_with_room(call, len(body.runs))
     with once.transaction() as session:
         intake.require_room(session, call, len(body.runs))
         scenario_id = intake.stored_scenario(session, call, body, inline)

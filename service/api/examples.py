@@ -26,6 +26,8 @@ BODIES: Final[dict[str, Any]] = {
     "SatelliteIn": {"name": "Polar-500", "omm": _OMM},
     "OrbitIn": {"omm": _OMM | {"EPOCH": "2019-01-01T06:00:00", "MEAN_ANOMALY": 92}},
     "GroundStationIn": {"name": "Svalbard", "lat_deg": 78.22983, "lon_deg": 15.39244},
+    "SatellitePatch": {"agility": {"slew_rate_deg_s": 2.0, "settle_s": 5.0}},
+    "GroundStationPatch": {"min_elevation_deg": 10.0},
     "TargetCatalogIn": {
         "name": "Two cities",
         "targets": [

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from datetime import UTC, datetime
-from typing import Literal
+from typing import Final, Literal
 
 import sqlalchemy as sa
 from fastapi import APIRouter, Response
@@ -23,12 +24,20 @@ from service.scenarios.records import Checked, check, read_csv, read_geojson
 from service.scenarios.translate import ground_station_from
 from service.wire.base import Listed
 from service.wire.imports import Imported
-from service.wire.places import GroundStationIn, GroundStationOut, ImportedStation
+from service.wire.places import (
+    GroundStationIn,
+    GroundStationOut,
+    GroundStationPatch,
+    ImportedStation,
+)
 
 router = APIRouter(prefix="/v1/ground-stations", tags=["ground stations"])
 
+_Status = Literal["created", "updated", "unchanged"]
+
 _CSV_COLUMNS = tuple(n for n in GroundStationIn.model_fields if n != "elevation_mask")
 _REQUIRED = ("name", "lat_deg", "lon_deg")
+_ACTIONS: Final[dict[_Status, str]] = {"created": "create", "updated": "update"}
 _MOST_STATIONS = 10_000
 _IMPORT_TYPES = ("application/geo+json", "application/json", "text/csv")
 
@@ -55,7 +64,9 @@ def create_ground_station(body: GroundStationIn, once: OnceDep, call: CallDep) -
 def import_ground_stations(
     call: CallDep, data: RawBodyDep, once: OnceDep, on_error: OnErrorQuery = OnError.SKIP
 ) -> Imported[ImportedStation]:
-    """Store the stations of a file. A station that is stored already is not stored again.
+    """Store the stations of a file. A station whose name is known gets the figures of the file.
+
+    Where several stations have one name, only one that is stored just so counts as known.
 
     CSV: `lat`, `latitude`, `lon`, `lng` and `longitude` are taken as well. GeoJSON: the
     properties that are fields of a station count, others are ignored.
@@ -66,8 +77,9 @@ def import_ground_stations(
     with once.transaction() as session:
         call.count_stored(session, num_rows=len(good), num_bytes=len(data))
         items = _store(session, good)
-        new = [item.id for item in items if item.status == "created"]
-        call.audit.record(session, "create", "ground_station", *new)
+        for status, action in _ACTIONS.items():
+            changed = [item.id for item in items if item.status == status]
+            call.audit.record(session, action, "ground_station", *changed)
         return once.keep(session, imported(items, faults))
 
 
@@ -106,6 +118,26 @@ def get_ground_station(station_id: str, call: CallDep) -> GroundStationOut | Res
     return unless_known(call.request, call.response, shown)
 
 
+@router.patch("/{station_id}", responses=problem_responses(404, 412))
+def change_ground_station(
+    station_id: str, body: GroundStationPatch, call: CallDep
+) -> GroundStationOut:
+    """Change a ground station. Scenarios that use it keep their copy.
+
+    `If-Match` takes the ETag of the station.
+    """
+    with call.database.transaction() as session:
+        row = _find(session, station_id, to_change=True)
+        require_match(call.request, lambda: _shown(row))
+        changes = body.model_dump(mode="json", exclude_none=True)
+        changed = GroundStationIn(**row.body | changes)
+        ground_station_from(changed, station_id)
+        if _change(row, changed):
+            call.audit.record(session, "update", "ground_station", station_id)
+        shown = _shown(row)
+    return created(call.response, shown, f"/v1/ground-stations/{station_id}")
+
+
 @router.delete("/{station_id}", status_code=204, responses=problem_responses(404, 412))
 def delete_ground_station(station_id: str, call: CallDep) -> None:
     """Delete a ground station. Scenarios that use it keep their copy."""
@@ -136,14 +168,32 @@ def _add(session: Session, body: GroundStationIn) -> GroundStationRow:
 
 def _store(session: Session, good: list[Checked[GroundStationIn]]) -> list[ImportedStation]:
     query = sa.select(GroundStationRow).where(GroundStationRow.deleted_at.is_(None))
-    known = {_body(row): row for row in session.scalars(query)}
+    stored = session.scalars(query).all()
+    known = {_body(row): row for row in stored}
+    # A name that is there twice, or twice in the file, says nothing about which station is meant.
+    of_file = Counter(one.body.name for one in good)
+    of_store = Counter(row.name for row in stored)
+    by_name = {row.name: row for row in stored if of_store[row.name] == 1 == of_file[row.name]}
     items = []
     for one in good:
         key = one.body.model_dump_json()
-        status: Literal["created", "unchanged"] = "unchanged" if key in known else "created"
-        row = known[key] = known.get(key) or _add(session, one.body)
+        status: _Status = "unchanged"
+        if key not in known:
+            row = by_name.get(one.body.name)
+            status = "created" if row is None else "updated"
+            known[key] = row or _add(session, one.body)
+            _change(known[key], one.body)
+        row = known[key]
         items.append(ImportedStation(id=row.id, name=row.name, row=one.record.row, status=status))
     return items
+
+
+def _change(row: GroundStationRow, body: GroundStationIn) -> bool:
+    """Give a station these figures; return whether that changed anything."""
+    dumped = body.model_dump(mode="json")
+    is_other = dumped != row.body
+    row.name, row.body = body.name, dumped
+    return is_other
 
 
 def _body(row: GroundStationRow) -> str:

@@ -48,14 +48,15 @@ def _diff(job_id: str, other_id: str, before: str, after: str) -> DiffOut:
     first, second = read(TimelineOut, before), read(TimelineOut, after)
     one, other = view_of(first), view_of(second)
     found = plan_diff(one, other)
+    names = _Names(first, second)
     return DiffOut(
         before=job_id,
         after=other_id,
         is_empty=found.is_empty,
         questions_differ_in=tuple(_differences(first, second)),
-        added=[_shown(action) for action in found.added],
-        removed=[_shown(action) for action in found.removed],
-        moved=[MovedOut(before=_shown(a), after=_shown(b)) for a, b in found.moved],
+        added=[names.shown(action) for action in found.added],
+        removed=[names.shown(action) for action in found.removed],
+        moved=[MovedOut(before=names.shown(a), after=names.shown(b)) for a, b in found.moved],
         totals={
             name: TotalDiff(before=one.totals[name], after=other.totals[name], delta=delta)
             for name, delta in found.totals.items()
@@ -76,13 +77,28 @@ def _differences(first: TimelineOut, second: TimelineOut) -> Iterator[Difference
         yield "dynamics"
 
 
-def _shown(action: PlannedAction) -> PlannedOut:
-    is_collect = action.mode == "collect"
-    return PlannedOut(
-        satellite_id=action.satellite_id,
-        mode="collect" if is_collect else "contact",
-        target_id=action.place_id if is_collect else None,
-        station_id=None if is_collect else action.place_id,
-        start=action.start,
-        end=action.end,
-    )
+class _Names:
+    """What the timelines call satellites and stations."""
+
+    def __init__(self, *timelines: TimelineOut):
+        self._satellites = {s.id: s.name for t in timelines for s in t.satellites}
+        self._stations = {
+            action.station_id: action.station_name
+            for timeline in timelines
+            for satellite in timeline.satellites
+            for action in satellite.actions
+        }
+
+    def shown(self, action: PlannedAction) -> PlannedOut:
+        """Return an action as clients see it."""
+        is_collect = action.mode == "collect"
+        return PlannedOut(
+            satellite_id=action.satellite_id,
+            satellite_name=self._satellites[action.satellite_id],
+            mode="collect" if is_collect else "contact",
+            target_id=action.place_id if is_collect else None,
+            station_id=None if is_collect else action.place_id,
+            station_name=None if is_collect else self._stations[action.place_id],
+            start=action.start,
+            end=action.end,
+        )

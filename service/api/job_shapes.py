@@ -39,6 +39,8 @@ def shown(job: JobRow, scenario_sha256: str) -> JobOut:
         finished_at=job.finished_at,
         termination=job.termination,
         error=None if job.error is None else ErrorOut(**job.error),
+        validity=job.validity,
+        warnings=job.warnings or (),
         change=job.change,
         links={
             "self": address,

@@ -38,10 +38,10 @@ def create_job(body: JobIn, call: CallDep, once: OnceDep) -> JobOut:
 
     Jobs with a higher `priority` start first, those of the same priority in their order.
     """
-    queue = intake.queue_with_room(call)
     params = intake.all_params(body.solver, body.params)
     time_s, memory_mb = intake.limits_of(body.limits, call.settings)
     inline = intake.frozen(call, body)
+    queue = intake.queue_with_room(call)
     with once.transaction() as session:
         intake.require_room(session, call)
         spec = submission.JobSpec(

@@ -120,6 +120,12 @@ def _of_jobs(snapshot: Snapshot) -> Iterator[Metric]:
     for state, number in snapshot.num_jobs.items():
         jobs.add_metric([state], number)
     yield jobs
+    plans = GaugeMetricFamily(
+        "slewline_job_plans", "Plans that jobs have found, by validity.", labels=["validity"]
+    )
+    for validity, number in snapshot.num_plans.items():
+        plans.add_metric([validity], number)
+    yield plans
     yield GaugeMetricFamily(
         "slewline_queue_oldest_seconds",
         "How long the oldest waiting job has waited.",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from datetime import UTC, datetime
-from typing import Annotated, Final
+from typing import Annotated, Final, TypeVar
 
 import sqlalchemy as sa
 from fastapi import APIRouter, Query, Response
@@ -33,10 +33,13 @@ from service.wire.satellites import (
     RecordWarning,
     SatelliteIn,
     SatelliteOut,
+    SatellitePatch,
     SensorIn,
 )
 
 router = APIRouter(prefix="/v1/satellites", tags=["satellites"])
+
+P = TypeVar("P", AgilityIn, SensorIn)
 
 _ADD_ELEMENTS: Final = "add_elements"
 _ACTIONS: Final[dict[store.Status, str]] = {"created": "create", "elements_added": _ADD_ELEMENTS}
@@ -114,6 +117,27 @@ def get_satellite(satellite_id: str, call: CallDep) -> SatelliteOut | Response:
     return unless_known(call.request, call.response, shown)
 
 
+@router.patch("/{satellite_id}", responses=problem_responses(404, 412))
+def change_satellite(satellite_id: str, body: SatellitePatch, call: CallDep) -> SatelliteOut:
+    """Change a satellite's name or settings. Scenarios that exist do not change.
+
+    `If-Match` takes the ETag of the satellite. Its elements have a call of their own.
+    """
+    with call.database.transaction() as session:
+        row = find_satellite(session, satellite_id, to_change=True)
+        before = _shown(session, [row])[0]
+        require_match(call.request, lambda: before)
+        changed = _changed(before, body)
+        satellite_from(changed, satellite_id)
+        changes = changed.model_dump(mode="json", include=set(SatellitePatch.model_fields))
+        for name, value in changes.items():
+            setattr(row, name, value)
+        shown = _shown(session, [row])[0]
+        if shown != before:
+            call.audit.record(session, "update", "satellite", satellite_id)
+    return created(call.response, shown, f"/v1/satellites/{satellite_id}")
+
+
 @router.delete("/{satellite_id}", status_code=204, responses=problem_responses(404, 412))
 def delete_satellite(satellite_id: str, call: CallDep) -> None:
     """Delete a satellite. Scenarios that use it keep their copy."""
@@ -160,6 +184,25 @@ def find_satellite(session: Session, satellite_id: str, *, to_change: bool = Fal
     if row is None or row.deleted_at is not None:
         raise ServiceError("not_found", f"There is no satellite {satellite_id!r}.")
     return row
+
+
+def _changed(before: SatelliteOut, body: SatellitePatch) -> SatelliteIn:
+    return SatelliteIn(
+        name=body.name or before.name,
+        tle=None if before.tle is None else list(before.tle),
+        omm=before.omm,
+        agility=_merged(before.agility, body.agility),
+        sensor=_merged(before.sensor, body.sensor),
+        resources=before.resources if body.resources is None else body.resources,
+    )
+
+
+def _merged(before: P, changes: P | None) -> P:
+    """Return settings with those that a client has sent in place of their own."""
+    if changes is None:
+        return before
+    sent = {name: getattr(changes, name) for name in changes.model_fields_set}
+    return before.model_copy(update=sent)
 
 
 def _require_same_object(row: SatelliteRow, norad_cat_id: int, body: OrbitIn) -> None:

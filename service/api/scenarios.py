@@ -172,13 +172,17 @@ def _opportunity(described: Described, row: int, **edges: ViewOut) -> Opportunit
     scenario, table = described.scenario, described.computed.opportunities
     is_collect = int(table.kind[row]) == COLLECT
     place = int(table.place[row])
+    satellite = scenario.satellites[int(table.satellite[row])]
+    station = None if is_collect else scenario.ground_stations[place]
     at = scenario.horizon.instant
     return OpportunityOut(
         id=f"o{row}",
-        satellite_id=scenario.satellites[int(table.satellite[row])].id,
+        satellite_id=satellite.id,
+        satellite_name=satellite.name,
         kind="collect" if is_collect else "contact",
         target_id=scenario.targets[place].id if is_collect else None,
-        station_id=None if is_collect else scenario.ground_stations[place].id,
+        station_id=None if station is None else station.id,
+        station_name=None if station is None else station.name,
         start=at(float(table.start_s[row])),
         end=at(float(table.end_s[row])),
         access_start=at(float(table.access_start_s[row])),
@@ -189,7 +193,7 @@ def _opportunity(described: Described, row: int, **edges: ViewOut) -> Opportunit
         sun_elevation_deg=_rounded(table.sun_elevation_deg[row]),
         range_km=_rounded(table.range_m[row] / 1000.0),
         eclipse=bool(table.in_eclipse[row]),
-        nadir=scenario.satellites[int(table.satellite[row])].sensor.nadir,
+        nadir=satellite.sensor.nadir,
         **edges,
     )
 

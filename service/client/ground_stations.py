@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from service.client.transport import Transport, path_of
+from service.client.transport import Transport, held, path_of
 from service.client.uploads import Source, upload
 from service.wire.imports import Imported as Import
 from service.wire.places import GroundStationOut as GroundStation
@@ -61,6 +61,15 @@ class GroundStations:
     def get(self, station_id: str) -> GroundStation:
         """Return one station."""
         return self._transport.get(path_of("ground-stations", station_id), GroundStation)
+
+    def change(
+        self, station_id: str, *, if_match: str | None = None, **changes: Any
+    ) -> GroundStation:
+        """Change what is given, where the station is still as ``if_match`` says."""
+        headers = {} if if_match is None else {"If-Match": if_match}
+        path = path_of("ground-stations", station_id)
+        answer = self._transport.request("PATCH", path, json=changes, headers=headers)
+        return held(GroundStation, answer)
 
     def delete(self, station_id: str, *, if_match: str | None = None) -> None:
         """Delete a station; scenarios keep their copy."""

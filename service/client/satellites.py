@@ -101,6 +101,15 @@ class Satellites:
         answer = self._transport.request("PUT", path, json=body, headers=headers)
         return held(Satellite, answer)
 
+    def change(
+        self, satellite_id: str, *, if_match: str | None = None, **changes: Any
+    ) -> Satellite:
+        """Change what is given, where the satellite is still as ``if_match`` says."""
+        headers = {} if if_match is None else {"If-Match": if_match}
+        path = path_of("satellites", satellite_id)
+        answer = self._transport.request("PATCH", path, json=changes, headers=headers)
+        return held(Satellite, answer)
+
     def delete(self, satellite_id: str, *, if_match: str | None = None) -> None:
         """Delete a satellite; scenarios keep their copy."""
         self._transport.delete(path_of("satellites", satellite_id), if_match=if_match)

@@ -159,6 +159,7 @@ class JobRow(Row):
     ``request_id`` names the request that it came with, for the logs of its worker.
     ``traceparent`` names the trace that the job was queued in, where there is one (W3C).
     ``version`` grows with every visible change and is the job's ETag.
+    ``validity`` and ``warnings`` repeat what the head of its timeline says.
     """
 
     __tablename__ = "job"
@@ -186,6 +187,8 @@ class JobRow(Row):
     progress: Mapped[Json | None]
     termination: Mapped[str | None] = mapped_column(sa.String(32))
     error: Mapped[Json | None]
+    validity: Mapped[str | None] = mapped_column(sa.String(16))
+    warnings: Mapped[list[str] | None] = mapped_column(sa.JSON(none_as_null=True))
     dispatch: Mapped[int] = mapped_column(default=1)
     run: Mapped[int] = mapped_column(default=0)
     lost_runs: Mapped[int] = mapped_column(default=0)

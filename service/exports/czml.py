@@ -61,8 +61,9 @@ def _packets(answered: Answered) -> Iterator[Document]:
         yield _satellite(satellite, question.horizon, _TRACKS[number % len(_TRACKS)])
     for station in question.ground_stations:
         yield _station(station)
+    names = {satellite["id"]: satellite["name"] for satellite in answered.satellites}
     for target, told in zip(question.each_target(), answered.each_target(), strict=True):
-        yield _target(target, told)
+        yield _target(target, told, names)
     for number, about in enumerate(answered.satellites):
         contacts = [a for a in answered.actions_of(number) if a["mode"] == "contact"]
         yield from _contacts(about, contacts, question.ground_stations)
@@ -121,13 +122,14 @@ def _station(station: GroundStation) -> Document:
     }
 
 
-def _target(target: Target, told: Document) -> Document:
+def _target(target: Target, told: Document, names: dict[str, str]) -> Document:
     reason = told["reason"]
     properties = {
         "outcome": told["outcome"],
         "reason": reason and reason["code"],
         "action_id": told["action_id"],
         "satellite_id": told["satellite_id"],
+        "satellite_name": names.get(told["satellite_id"]),
     }
     return {
         "id": f"target/{target.id}",

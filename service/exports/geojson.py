@@ -70,6 +70,7 @@ def _point(lon_deg: float, lat_deg: float) -> Document:
 
 def _targets(answered: Answered) -> Iterator[Document]:
     spans = _Spans(answered)
+    names = {satellite["id"]: satellite["name"] for satellite in answered.satellites}
     for target, told in zip(answered.question.each_target(), answered.each_target(), strict=True):
         start, end = spans.of(told["action_id"])
         reason = told["reason"]
@@ -85,6 +86,7 @@ def _targets(answered: Answered) -> Iterator[Document]:
                 "reason_detail": reason and reason["detail"],
                 "action_id": told["action_id"],
                 "satellite_id": told["satellite_id"],
+                "satellite_name": names.get(told["satellite_id"]),
                 "start": start,
                 "end": end,
                 "reward": target.reward,
@@ -122,6 +124,7 @@ def _stations(answered: Answered) -> Iterator[Document]:
             _point(station.lon_deg, station.lat_deg),
             {
                 "station_id": station.id,
+                "station_name": station.name,
                 "name": station.name,
                 "min_elevation_deg": station.min_elevation_deg,
                 "antennas": station.antennas,
@@ -147,6 +150,7 @@ def _track(satellite: Satellite, horizon: Horizon, path: Ephemeris) -> Document:
         },
         {
             "satellite_id": satellite.id,
+            "satellite_name": satellite.name,
             "name": satellite.name,
             "norad_cat_id": satellite.orbit.norad_cat_id,
             "times": times[0] if is_one else times,
@@ -181,6 +185,7 @@ def _reach(station: GroundStation, altitude_km: float, satellite_ids: list[str])
         area(*ring, _DECIMALS),
         {
             "station_id": station.id,
+            "station_name": station.name,
             "altitude_km": altitude_km,
             "min_elevation_deg": station.min_elevation_deg,
             "satellite_ids": satellite_ids,

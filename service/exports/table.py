@@ -20,7 +20,7 @@ COLUMNS = (
     "action_id", "satellite_id", "satellite_name", "mode", "start", "end", "duration_s",
     "target_id", "station_id", "opportunity_id", "off_nadir_deg", "azimuth_deg",
     "slew_angle_deg", "slew_needed_s", "slew_available_s", "reward",
-    "battery_fraction_end", "recorder_fraction_end", "worth", "quality",
+    "battery_fraction_end", "recorder_fraction_end", "worth", "quality", "station_name",
 )  # fmt: skip
 
 
@@ -32,7 +32,15 @@ def write(answered: Answered) -> Iterator[str]:
 def _lines(answered: Answered) -> Iterator[str]:
     yield _line(COLUMNS)
     for satellite, action in answered.each_action():
-        yield _line(_cells(satellite, action))
+        yield _line((*_cells(satellite, action), guarded(_station_name(answered, action))))
+
+
+def _station_name(answered: Answered, action: Document) -> str | None:
+    if action["station_id"] is None or "station_name" in action:
+        return action.get("station_name")
+    # Answers of the first release have no names of stations; their questions do.
+    stations = answered.question.ground_stations
+    return next((one.name for one in stations if one.id == action["station_id"]), None)
 
 
 def _line(cells: tuple[Any, ...]) -> str:

@@ -38,7 +38,8 @@ class Outcome:
     """How a run ended. ``blocks`` hold the documents of its answer; none where it has no answer.
 
     ``progress`` is the last report; None leaves the one that the job has. ``figures`` are the
-    timeline's numbers for tables. ``num_shared_bytes`` are stored for all jobs of the scenario.
+    timeline's numbers for tables, ``warnings`` what it says to people. ``num_shared_bytes`` are
+    stored for all jobs of the scenario.
     """
 
     state: JobState
@@ -48,6 +49,7 @@ class Outcome:
     blocks: Sequence[Block] = ()
     figures: Mapping[str, Any] | None = None
     num_shared_bytes: int = 0
+    warnings: Sequence[str] = ()
 
     @classmethod
     def failed(cls, code: str, detail: str) -> Outcome:
@@ -124,6 +126,8 @@ def finish(session: Session, lease: Lease, outcome: Outcome) -> bool:
         termination=outcome.termination,
         error=sa.null() if outcome.error is None else dict(outcome.error),
         progress=JobRow.progress if outcome.progress is None else dict(outcome.progress),
+        validity=None if outcome.figures is None else outcome.figures["validity"],
+        warnings=list(outcome.warnings) or None,
     )
     if changed and outcome.blocks:
         answer_store.save(session, lease.job_id, outcome.blocks, outcome.figures)

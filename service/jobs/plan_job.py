@@ -89,6 +89,8 @@ class PlanAnswer:
         Opportunities to store, where this job was the first to compute them.
     figures
         The timeline's numbers for tables.
+    warnings
+        What the timeline says to people.
     """
 
     blocks: tuple[Block, ...]
@@ -98,6 +100,7 @@ class PlanAnswer:
     proof: str | None = None
     opportunity_block: bytes | None = None
     figures: Mapping[str, Any] | None = None
+    warnings: tuple[str, ...] = ()
 
     @property
     def timeline(self) -> str:
@@ -149,6 +152,7 @@ def run_plan_job(request: PlanRequest, budget: Budget) -> PlanAnswer:
         proof=proofs.to_json(judged.bound) if judged.bound else None,
         opportunity_block=judged.opportunities.to_bytes() if known is None else None,
         figures=figures_of(dumped(head)),
+        warnings=tuple(head.warnings),
     )
 
 

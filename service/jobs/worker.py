@@ -265,6 +265,7 @@ def outcome_of(ending: Ending) -> Outcome:
         ),
         blocks=(*answer.blocks, *proof_blocks(answer.proof or "")),
         figures=answer.figures,
+        warnings=answer.warnings,
         num_shared_bytes=len(answer.opportunity_block or b""),
     )
 

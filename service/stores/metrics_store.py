@@ -14,6 +14,7 @@ from service.db.clock import seconds_between, utc_now
 from service.db.rows import JobRow, SatelliteRow, ScenarioRow, WebhookDeliveryRow, WorkerRow
 from service.stores import satellite_store
 from service.wire.jobs import ACTIVE, JobState
+from service.wire.timelines import Validity
 from service.wire.webhooks import DeliveryState
 
 ORBITS_OF_LAST_S: Final = 7 * 86400.0
@@ -48,6 +49,8 @@ class Snapshot:
     ----------
     num_jobs
         By state, states without a job included.
+    num_plans
+        Those that jobs have found, by validity.
     oldest_waiting_s
         How long the oldest waiting job has waited; 0 where none waits.
     heartbeat_age_s
@@ -57,6 +60,7 @@ class Snapshot:
     """
 
     num_jobs: Mapping[str, int]
+    num_plans: Mapping[str, int]
     oldest_waiting_s: float
     job_times: Sequence[JobTime]
     num_leases_lost: int
@@ -72,6 +76,7 @@ def take(session: Session) -> Snapshot:
     seen_s = sa.select(WorkerRow.id, seconds_between(WorkerRow.seen_at, utc_now()))
     return Snapshot(
         num_jobs=_num_jobs(session),
+        num_plans=_num_plans(session),
         oldest_waiting_s=session.scalar(waiting_s.where(JobRow.state == "queued")) or 0.0,
         job_times=_job_times(session),
         num_leases_lost=session.scalar(sa.select(sa.func.sum(JobRow.lost_runs))) or 0,
@@ -85,6 +90,12 @@ def _num_jobs(session: Session) -> dict[str, int]:
     counted = sa.select(JobRow.state, sa.func.count()).group_by(JobRow.state)
     found = dict(session.execute(counted).all())
     return {state: found.get(state, 0) for state in get_args(JobState)}
+
+
+def _num_plans(session: Session) -> dict[str, int]:
+    counted = sa.select(JobRow.validity, sa.func.count()).where(JobRow.validity.is_not(None))
+    found = dict(session.execute(counted.group_by(JobRow.validity)).all())
+    return {validity: found.get(validity, 0) for validity in get_args(Validity)}
 
 
 def _num_deliveries(session: Session) -> dict[str, int]:

@@ -27,6 +27,8 @@ def end_of(job: JobRow) -> JobEnd:
         state=job.state,
         termination=job.termination,
         error=job.error,
+        validity=job.validity,
+        warnings=job.warnings or (),
         solver=job.solver,
         label=job.label,
         scenario_id=job.scenario_id,

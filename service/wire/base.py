@@ -201,3 +201,13 @@ class Body(Wire):
                 {"num_fields": len(value), "most": _MOST_FIELDS},
             )
         return value
+
+
+class Patch(Body):
+    """Base of what changes a part of a thing."""
+
+    @model_validator(mode="after")
+    def _changes_something(self) -> Self:
+        if not self.model_fields_set:
+            raise PydanticCustomError("nothing_changed", "Give at least one field to change")
+        return self

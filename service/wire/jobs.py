@@ -131,6 +131,12 @@ class JobOut(Stored):
     finished_at: Instant | None
     termination: str | None = Field(description="Why the search ended.")
     error: ErrorOut | None
+    validity: Open[Literal["valid", "inherited", "violations"]] | None = Field(
+        None,
+        description="Of its plan, by the referee; `inherited`: only what it began with breaks "
+        "limits. Null without a plan.",
+    )
+    warnings: tuple[str, ...] = Field((), description="About its plan, for people.")
     change: Json | None = Field(
         None, description="Of a what-if: what was to be different from the job it varies."
     )

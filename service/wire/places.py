@@ -14,6 +14,7 @@ from service.wire.base import (
     Name,
     NonNegative,
     Open,
+    Patch,
     Stored,
     Wire,
 )
@@ -46,6 +47,24 @@ class GroundStationIn(Body):
     antennas: int = Field(1, ge=1, le=100, description="Satellites served at a time.")
 
 
+class GroundStationPatch(Patch):
+    """What is to be different about a ground station; what is left out or null stays."""
+
+    name: Name | None = None
+    lat_deg: Latitude | None = None
+    lon_deg: Longitude | None = None
+    alt_m: Altitude | None = None
+    min_elevation_deg: Annotated[float, Field(ge=0, lt=90)] | None = None
+    min_contact_s: NonNegative | None = None
+    elevation_mask: (
+        Annotated[
+            list[Annotated[list[float], Field(min_length=2, max_length=2)]], Field(max_length=720)
+        ]
+        | None
+    ) = Field(None, description="Replaces the mask as a whole.")
+    antennas: Annotated[int, Field(ge=1, le=100)] | None = None
+
+
 class GroundStationOut(GroundStationIn, Stored):
     """A ground station."""
 
@@ -59,8 +78,9 @@ class ImportedStation(Wire):
     id: str
     name: str
     row: int | None = Field(description="Line of the file, for CSV.")
-    status: Open[Literal["created", "unchanged"]] = Field(
-        description="`unchanged`: the same station is stored already."
+    status: Open[Literal["created", "updated", "unchanged"]] = Field(
+        description="`updated`: the only station of this name has other figures now; "
+        "`unchanged`: the same station is stored already."
     )
 
 

@@ -16,6 +16,7 @@ from service.wire.base import (
     Name,
     NonNegative,
     Open,
+    Patch,
     Positive,
     Stored,
     Wire,
@@ -196,6 +197,15 @@ class SatelliteIn(OrbitIn):
         "with the rates of its text (paper) or of the authors' code (paper_code); with fractions "
         'of your own as {"preset": "paper", "battery_min_fraction": 0.2}.',
     )
+
+
+class SatellitePatch(Patch):
+    """What is to be different about a satellite; what is left out or null stays."""
+
+    name: Name | None = None
+    agility: AgilityIn | None = Field(None, description="Only the settings given are changed.")
+    sensor: SensorIn | None = Field(None, description="Only the settings given are changed.")
+    resources: ResourcesField | None = Field(None, description="Replaces them as a whole.")
 
 
 class ElementsOut(Stored):

@@ -175,9 +175,11 @@ class OpportunityOut(Wire):
 
     id: str
     satellite_id: str
+    satellite_name: str | None = None
     kind: Open[Kind]
     target_id: str | None = Field(description="Of a collect.")
     station_id: str | None = Field(description="Of a contact.")
+    station_name: str | None = Field(None, description="Of a contact.")
     start: Instant
     end: Instant
     access_start: Instant = Field(

@@ -12,6 +12,7 @@ from service.wire.scenarios import HorizonOut
 
 Mode = Literal["collect", "contact", "sunpoint", "hold"]
 IDLE_MODES: Final = ("sunpoint", "hold")
+Validity = Literal["valid", "inherited", "violations"]
 Outcome = Literal["downlinked", "collected", "unscheduled", "excluded"]
 
 
@@ -41,6 +42,7 @@ class ViolationOut(Wire):
         "more may be added. A plan whose only violations are `duplicate` is valid."
     )
     satellite_id: str
+    satellite_name: str | None = None
     at: Instant
     needed: float = Field(description="What the rule asks for, in seconds or as a fraction.")
     available: float = Field(description="What the plan leaves, in the same unit.")
@@ -94,6 +96,7 @@ class ActionOut(Wire):
     end: Instant
     target_id: str | None
     station_id: str | None
+    station_name: str | None = Field(None, description="Of a contact.")
     opportunity_id: str | None
     off_nadir_deg: float | None = Field(description="At the middle of the action.")
     azimuth_deg: float | None
@@ -157,7 +160,7 @@ class TimelineHead(Wire):
     use_resources: bool
     termination: str
     runtime_s: RuntimeOut
-    validity: Open[Literal["valid", "inherited", "violations"]] = Field(
+    validity: Open[Validity] = Field(
         description="`inherited`: what is broken was so at the horizon's start, and no action has "
         "a part in it."
     )
@@ -198,6 +201,7 @@ class TargetItem(Wire):
     outcome: Open[Outcome]
     action_id: str | None = None
     satellite_id: str | None = None
+    satellite_name: str | None = None
     reason: ReasonOut | None = Field(None, description="Why it is not collected.")
 
 
@@ -206,6 +210,7 @@ class AttemptOut(Wire):
 
     opportunity_id: str
     satellite_id: str
+    satellite_name: str | None = None
     start: Instant
     end: Instant
     violations: tuple[ViolationOut, ...] = Field(
@@ -239,9 +244,11 @@ class PlannedOut(Wire):
     """A collect or a contact."""
 
     satellite_id: str
+    satellite_name: str | None = None
     mode: Open[Literal["collect", "contact"]]
     target_id: str | None
     station_id: str | None
+    station_name: str | None = Field(None, description="Of a contact.")
     start: Instant
     end: Instant
 

@@ -89,6 +89,10 @@ class JobEnd(Wire):
     state: Open[JobState]
     termination: str | None
     error: ErrorOut | None
+    validity: Open[Literal["valid", "inherited", "violations"]] | None = Field(
+        None, description="Of its plan; null without one."
+    )
+    warnings: tuple[str, ...] = ()
     solver: str
     label: str | None
     scenario_id: str

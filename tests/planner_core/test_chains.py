@@ -12,11 +12,10 @@ from hypothesis import strategies as st
 from planner_core.budget import Budget
 from planner_core.domain import Agility
 from planner_core.precedence.arcs import covering_arcs
-from planner_core.precedence.chains import chain_with_history
+from planner_core.precedence.chains import chain_with_history, heaviest_chain
 from planner_core.precedence.relation import direct_precedence
-from planner_core.problem import COLLECT
+from planner_core.problem import COLLECT, Bools, SatelliteProblem
 from planner_core.referee.replay import replay
-from planner_core.solvers.graph import longest_chain
 from planner_core.solvers.registry import Graph
 from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
@@ -34,14 +33,41 @@ def test_arcs_are_the_pairs_with_nothing_in_between(
     satellite = problem.satellites[0]
     arcs = covering_arcs(direct_precedence(satellite))
     m = len(satellite)
+    found = np.zeros((m, m), dtype=np.bool_)
+    found[np.repeat(np.arange(m), np.diff(arcs.first)), arcs.to] = True
+    assert (found == _nothing_between(satellite)).all()
+
+
+def _nothing_between(satellite: SatelliteProblem) -> Bools:
+    """Return which pairs may follow each other and have no third task between. Shape (m, m)."""
+    m = len(satellite)
     follows = np.array(
         [[a < b and satellite.transitions.allows(a, b) for b in range(m)] for a in range(m)],
         dtype=np.int64,
     ).reshape(m, m)
-    covering = (follows == 1) & (follows @ follows == 0)
-    found = np.zeros((m, m), dtype=np.bool_)
-    found[np.repeat(np.arange(m), np.diff(arcs.first)), arcs.to] = True
-    assert (found == covering).all()
+    covering: Bools = (follows == 1) & (follows @ follows == 0)
+    return covering
+
+
+@examples(60)
+@given(seed=SEEDS)
+def test_of_chains_as_heavy_the_one_handed_on_first_counts(seed: int) -> None:
+    """Values and tasks passed along the arcs, a task of no worth handing on what it was given."""
+    problem = random_problem(
+        seed, num_collects=40, num_targets=30, use_resources=False, span_s=1500.0
+    )
+    satellite = problem.satellites[0]
+    covering = _nothing_between(satellite)
+    weight = np.random.default_rng(seed).integers(0, 3, 40).astype(np.float64)
+    chains: list[tuple[float, list[int]]] = [(0.0, [])] * 40
+    best: tuple[float, list[int]] = (0.0, [])
+    for a in range(40):
+        if weight[a] > 0.0:
+            chains[a] = chains[a][0] + weight[a], [*chains[a][1], a]
+        best = chains[a] if chains[a][0] > best[0] else best
+        for b in np.flatnonzero(covering[a]):
+            chains[b] = chains[a] if chains[a][0] > chains[b][0] else chains[b]
+    assert heaviest_chain(satellite, weight) == best[1]
 
 
 @examples(60)
@@ -59,7 +85,7 @@ def test_chains_are_as_heavy_as_those_of_the_listing(seed: int, slew_rate_deg_s:
     for b in range(40):
         earlier = [value[a] for a in range(b) if weight[a] > 0.0 and allows(a, b)]
         value[b] = weight[b] + max(earlier, default=0.0)
-    chain = longest_chain(problem, satellite, weight)
+    chain = heaviest_chain(satellite, weight)
     assert weight[chain].sum() == pytest.approx(value[weight > 0.0].max(initial=0.0))
     for tasks in (chain, chain_with_history(satellite, weight, satellite.place)):
         assert (weight[tasks] > 0.0).all()

@@ -160,7 +160,7 @@ def settled(client: Client, path: str) -> httpx.Response:
 
 def refuse_all(client: Client) -> None:
     """Send what every operation must refuse."""
-    for method in ("get", "post", "put", "delete"):
+    for method in ("get", "post", "put", "patch", "delete"):
         for template, operation in client.operations(method):
             path = client.path(template, operation)
             assert path is not None
@@ -221,13 +221,14 @@ def test_a_client_of_the_document_alone_uses_every_operation(client: Client) -> 
     create_all(client)
     read_all(client)
     refuse_all(client)
-    for template, operation in client.operations("put"):
-        path = client.path(template, operation)
-        assert path is not None
-        for media_type, body in client.bodies(operation):
-            stale = client.send("PUT", path, media_type, body, If_Match='"stale"')
-            assert stale.status_code == 412
-            assert client.send("PUT", path, media_type, body, If_Match="*").status_code == 200
+    for method in ("put", "patch"):
+        for template, operation in client.operations(method):
+            path = client.path(template, operation)
+            assert path is not None
+            for media_type, body in client.bodies(operation):
+                stale = client.send(method, path, media_type, body, If_Match='"stale"')
+                assert stale.status_code == 412
+                assert client.send(method, path, media_type, body, If_Match="*").status_code == 200
     for template, operation in client.operations("post"):
         if "requestBody" not in operation:
             path = client.path(template, operation)

@@ -13,7 +13,8 @@ from planner_core.budget import Budget, Termination
 from planner_core.errors import InvalidParameters
 from planner_core.problem import Problem
 from planner_core.problem.plan import Plan
-from planner_core.solvers.base import Constraint, Solution
+from planner_core.solvers.base import Constraint, Outlook, Solution
+from planner_core.solvers.registry import Mcts, Rule, outlook_of
 from service.jobs.solver_params import params_of, params_schema, parse_params
 
 
@@ -32,6 +33,10 @@ class Example:
     greedy: bool = False
     mode: Literal["hard", "penalty"] = "hard"
     breadth: int | None = None
+
+    @property
+    def outlook(self) -> Outlook:
+        return Outlook(breadth=self.breadth)
 
     def solve(self, problem: Problem, budget: Budget, seed: int) -> Solution:
         return Solution(plan=Plan(), termination=Termination.OPTIMAL)
@@ -103,3 +108,10 @@ def test_a_wrong_parameter_is_refused_by_name(params: dict[str, Any], code: str)
 def test_a_refusal_of_an_unknown_name_lists_the_known_ones() -> None:
     with pytest.raises(InvalidParameters, match="depth, gamma, greedy, mode, breadth"):
         parse_params(Example, {"dept": 3})
+
+
+def test_what_a_search_looked_at_is_known_from_what_was_stored() -> None:
+    stored = {**params_of(Mcts(breadth=2, contact_above_fraction=0.25)), "gone_since": 1}
+    assert outlook_of("mcts", stored) == Outlook(breadth=2, contact_above=0.25)
+    assert outlook_of("rule", {}) == Rule().outlook
+    assert outlook_of("a solver of old", {"breadth": 2}) == Outlook()

@@ -49,9 +49,9 @@ MODULES = (
 NOW = "2026-03-01T00:00:00.000Z"
 ACTION = {
     "id": "a1", "mode": "collect", "start": NOW, "end": NOW, "target_id": "t1", "station_id": None,
-    "opportunity_id": "o1", "off_nadir_deg": 10.0, "azimuth_deg": 90.0,
-    "slew": {"angle_deg": 1.0, "needed_s": 1.0, "available_s": 2.0},
-    "turn_to_s": None, "turn_back_s": None, "reward": 0.8,
+    "station_name": None, "turn_to_s": None, "turn_back_s": None, "opportunity_id": "o1",
+    "off_nadir_deg": 10.0, "azimuth_deg": 90.0,
+    "slew": {"angle_deg": 1.0, "needed_s": 1.0, "available_s": 2.0}, "reward": 0.8,
     "worth": 0.8, "quality": 0.8, "battery_fraction_end": None, "recorder_fraction_end": None,
 }  # fmt: skip
 JOB = {
@@ -59,6 +59,7 @@ JOB = {
     "params": {}, "seed": 0, "limits": {"time_s": 1.0, "memory_mb": 64}, "attempt": 1,
     "priority": 5, "label": None, "progress": None, "created_at": NOW, "started_at": None,
     "finished_at": None, "termination": None, "error": None, "change": None, "links": {},
+    "validity": None, "warnings": [],
 }  # fmt: skip
 REASON = {
     "code": "displaced_by", "certainty": "verified", "blocking_actions": ["a1"],

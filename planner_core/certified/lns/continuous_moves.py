@@ -39,6 +39,9 @@ _AIMED: Final = 0.7  # of the moves begin at a target that nobody images
 _ATTEMPTS: Final = 30
 _DONE: Final = -2
 
+Within = tuple[float, float]
+"""When a window begins, and by when the task after it must have its start."""
+
 
 @bundle
 class Scratch(NamedTuple):
@@ -64,6 +67,29 @@ class Scratch(NamedTuple):
     chosen: Ints
     chosen_s: Floats
     old: Route
+
+
+@bundle
+class RouteSearch(NamedTuple):
+    """What moves on one satellite's route look at, and what they change.
+
+    Attributes
+    ----------
+    worth
+        Of each task; what must be kept is worth more than all else. Shape ``(n,)``.
+    holder
+        For each target the task that images it, or ``FREE``, ``ELSEWHERE`` or ``FIXED``. Shape
+        ``(num_targets,)``.
+    """
+
+    spans: Spans
+    looks: View  # Numba has a meaning of its own for an attribute ``view``
+    arrivals: Arrivals
+    worth: Floats
+    holder: Ints
+    route: Route
+    scratch: Scratch
+    draws: Uint64s
 
 
 def scratch_of(num_tasks: int, num_cells: int, num_targets: int) -> Scratch:
@@ -95,30 +121,14 @@ def scratch_of(num_tasks: int, num_cells: int, num_targets: int) -> Scratch:
 
 @borrowing
 def make_moves(
-    spans: Spans,
-    view: View,
-    arrivals: Arrivals,
-    worth: Floats,
-    holder: Ints,
-    route: Route,
-    scratch: Scratch,
-    draws: Uint64s,
+    search: RouteSearch,
     num_moves: int,
     longest: int,
     stop: Bytes,
 ) -> None:
-    """Make moves, in place.
-
-    Parameters
-    ----------
-    worth
-        Of each task; what must be kept is worth more than all else. Shape ``(n,)``.
-    holder
-        For each target the task that images it, or ``FREE``, ``ELSEWHERE`` or ``FIXED``. Shape
-        ``(num_targets,)``.
-    longest
-        The most tasks that a window takes up.
-    """
+    """Make moves, in place, of windows that take up ``longest`` tasks at the most."""
+    spans, route, draws = search.spans, search.route, search.draws
+    worth, holder = search.worth, search.holder
     n = len(spans.open_s)
     for _ in range(num_moves):
         if stop[0] or n == 0:
@@ -139,35 +149,25 @@ def make_moves(
                 high = middle
         size = int(next_draw(draws) * (longest + 1))
         first = max(0, low - int(next_draw(draws) * (size + 1)))
-        replan(
-            spans, view, arrivals, worth, holder, route, scratch, draws,
-            first, min(first + size, route.size[0]),
-        )  # fmt: skip
+        _replan(search, first, min(first + size, route.size[0]))
 
 
 @borrowing
-def replan(
-    spans: Spans,
-    view: View,
-    arrivals: Arrivals,
-    worth: Floats,
-    holder: Ints,
-    route: Route,
-    scratch: Scratch,
-    draws: Uint64s,
+def _replan(
+    search: RouteSearch,
     first: int,
     end: int,
 ) -> bool:
     """Plan the tasks ``first`` up to ``end`` anew; return whether the route has changed."""
+    spans, view, route, scratch = search.spans, search.looks, search.route, search.scratch
+    worth, holder = search.worth, search.holder
     scratch.mark[0] += 1
     mark = scratch.mark[0]
     old_gain = 0.0
     for p in range(first, end):
         old_gain += worth[route.task[p]]
         scratch.inside_mark[spans.place[route.task[p]]] = mark
-    last = _best_chain(
-        spans, view, arrivals, worth, holder, route, scratch, draws, first, end, old_gain
-    )
+    last = _best_chain(search, first, end, old_gain)
     if last == _DONE:
         return False
     size = 0
@@ -242,19 +242,13 @@ def _put_in(
 
 @borrowing
 def _best_chain(
-    spans: Spans,
-    view: View,
-    arrivals: Arrivals,
-    worth: Floats,
-    holder: Ints,
-    route: Route,
-    scratch: Scratch,
-    draws: Uint64s,
+    search: RouteSearch,
     first: int,
     end: int,
     old_gain: float,
 ) -> int:
     """Return the last label of the best chain, -1 for the empty one, ``_DONE`` for none as good."""
+    spans, view, route, scratch = search.spans, search.looks, search.route, search.scratch
     after, late_s = -1, np.inf
     looks = (1.0, 0.0, 0.0)
     if end < route.size[0]:
@@ -265,20 +259,14 @@ def _best_chain(
     if first > 0:
         before, start_s = route.task[first - 1], route.early_s[first - 1]
         from_s = start_s + spans.length_s[before]
-        count = _extend(
-            spans, arrivals, worth, holder, scratch, draws, count,
-            before, start_s, -1, from_s, late_s,
-        )  # fmt: skip
+        count = _extend(search, count, before, start_s, -1, (from_s, late_s))
     else:
         from_s = spans.open_s[0] if len(spans.open_s) else 0.0
         until_s = min(late_s, from_s + _MOST_BUCKETS * 4.0)
         for task in range(len(spans.open_s)):
             if spans.open_s[task] >= until_s:
                 break
-            count = _offer(
-                spans, arrivals, worth, holder, scratch, draws, count,
-                task, spans.open_s[task], -1, from_s, late_s,
-            )  # fmt: skip
+            count = _offer(search, count, task, spans.open_s[task], -1, (from_s, late_s))
     best, best_value = _DONE, -1.0
     if old_gain <= 1e-9 and end > first:
         best, best_value = -1, 0.0
@@ -287,7 +275,7 @@ def _best_chain(
         while at >= 0:
             scratch.bucket[b] = scratch.following[at]
             task, start_s = scratch.task[at], scratch.start_s[at]
-            cell = cell_of(arrivals, spans, task, start_s)
+            cell = cell_of(search.arrivals, spans, task, start_s)
             if scratch.label[cell] == at:
                 if scratch.value[at] > best_value and scratch.gain[at] >= old_gain - 1e-9:
                     done_s = start_s + spans.length_s[task]
@@ -297,30 +285,17 @@ def _best_chain(
                         fits = done_s + needed_s(view.agile, looked, looks) <= late_s + 0.02
                     if fits:
                         best, best_value = at, scratch.value[at]
-                count = _extend(
-                    spans, arrivals, worth, holder, scratch, draws, count,
-                    task, start_s, at, from_s, late_s,
-                )  # fmt: skip
+                count = _extend(search, count, task, start_s, at, (from_s, late_s))
             at = scratch.bucket[b]
     return best
 
 
 @borrowing
 def _extend(
-    spans: Spans,
-    arrivals: Arrivals,
-    worth: Floats,
-    holder: Ints,
-    scratch: Scratch,
-    draws: Uint64s,
-    count: int,
-    task: int,
-    start_s: float,
-    parent: int,
-    from_s: float,
-    late_s: float,
+    search: RouteSearch, count: int, task: int, start_s: float, parent: int, within_s: Within
 ) -> int:
     """Offer all that may follow a task at a start; return the number of labels then."""
+    spans, arrivals = search.spans, search.arrivals
     cell = cell_of(arrivals, spans, task, start_s)
     edge = edge_s(arrivals, spans, task, cell)
     for arc in range(arrivals.first_arc[cell], arrivals.first_arc[cell + 1]):
@@ -329,29 +304,18 @@ def _extend(
         then_s = max(then_s, spans.open_s[other])
         if then_s > spans.close_s[other]:
             continue
-        count = _offer(
-            spans, arrivals, worth, holder, scratch, draws, count,
-            other, then_s, parent, from_s, late_s,
-        )  # fmt: skip
+        count = _offer(search, count, other, then_s, parent, within_s)
     return count
 
 
 @borrowing
 def _offer(
-    spans: Spans,
-    arrivals: Arrivals,
-    worth: Floats,
-    holder: Ints,
-    scratch: Scratch,
-    draws: Uint64s,
-    count: int,
-    task: int,
-    start_s: float,
-    parent: int,
-    from_s: float,
-    late_s: float,
+    search: RouteSearch, count: int, task: int, start_s: float, parent: int, within_s: Within
 ) -> int:
     """Keep a chain that goes on to a task, where it is the best in its cell."""
+    spans, arrivals, scratch = search.spans, search.arrivals, search.scratch
+    worth, holder = search.worth, search.holder
+    from_s, late_s = within_s
     if start_s + spans.length_s[task] > late_s or count == _MOST_LABELS:
         return count
     mark, place = scratch.mark[0], spans.place[task]
@@ -364,7 +328,7 @@ def _offer(
         return count
     if scratch.worth_mark[task] != mark:
         scratch.worth_mark[task] = mark
-        luck = next_draw(draws)
+        luck = next_draw(search.draws)
         extra = 1.0 + _TIE * luck if is_new else _TIE * (2.0 * luck - 1.0)
         scratch.worth[task] = worth[task] * extra
     if scratch.worth[task] <= 0.0:

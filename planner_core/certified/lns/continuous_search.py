@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from planner_core.budget import Budget
-from planner_core.certified.lns.continuous_moves import make_moves, scratch_of
+from planner_core.certified.lns.continuous_moves import RouteSearch, make_moves, scratch_of
 from planner_core.certified.lns.insertion import insert_each
 from planner_core.certified.lns.route import (
     ELSEWHERE,
@@ -156,10 +156,10 @@ class ContinuousSearch:
         scratch = scratch_of(len(spans.row), num_cells, len(self.problem.target_ids))
         holder = self._holder(index)
         before = holder.copy()
-        make_moves(
-            spans, view, arrivals, satellite.worth, holder, satellite.route, scratch,
-            self._draws, num_moves, _LONGEST, self.budget.stop,
-        )  # fmt: skip
+        search = RouteSearch(
+            spans, view, arrivals, satellite.worth, holder, satellite.route, scratch, self._draws
+        )
+        make_moves(search, num_moves, _LONGEST, self.budget.stop)
         for place in np.flatnonzero((before == ELSEWHERE) & (holder >= 0)).tolist():
             self._give_up(index, place)
 

@@ -19,12 +19,13 @@ from planner_core.draws import Uint64s, next_draw
 from planner_core.jit import borrowing
 from planner_core.precedence.network import Network, slews_in
 from planner_core.precedence.skyline import (
-    COMPARED,
     NO_LABEL,
     Skyline,
-    append,
     best_ahead,
+    clear,
+    insert,
     is_as_good,
+    next_label,
     reaches,
     skyline_for,
     top_label,
@@ -335,6 +336,7 @@ def _heaviest(
     until_s = np.inf
     if right != NO_TASK:
         until_s = network.start_s[right] - slews.settle_s + TIME_TOLERANCE_S
+    clear(sky)
     count, num_waiting, entered = 0, 0, 0
     for node in range(low, high):
         target = network.place[node]
@@ -348,7 +350,7 @@ def _heaviest(
                 break
             count = _enter(network, room, slews, low, k, count, num_words)
             entered += 1
-        at = _best_without(network, room, slews, node, count, room.number[target], num_words)
+        at = _best_without(network, room, slews, node, room.number[target], num_words)
         if at == NO_LABEL and left != NO_TASK and not _follows(network, slews, left, node):
             continue
         room.value[node - low] = value_of(sky, at) + weight
@@ -359,8 +361,8 @@ def _heaviest(
         count = _enter(network, room, slews, low, room.waiting[entered], count, num_words)
         entered += 1
     if right == NO_TASK:
-        return top_label(sky, count)
-    at = best_ahead(sky, count, network.start_s[right], _looks(network, right), slews)
+        return top_label(sky)
+    at = best_ahead(sky, network.start_s[right], _looks(network, right), slews)
     if at == NO_LABEL and left != NO_TASK and not _follows(network, slews, left, right):
         return _NOWHERE
     return at
@@ -388,12 +390,14 @@ def _enter(
     number = room.number[network.place[node]]
     if number >= 0:
         room.on_chain[first + (number >> 6)] |= np.uint64(1) << np.uint64(number & 63)
-    for at in range(count - 1, max(count - 1 - COMPARED, -1), -1):
-        if is_as_good(room.sky, at, value, end_s, looked, slews) and _is_subset(
+    before, at = NO_LABEL, top_label(room.sky)
+    while at >= 0 and value_of(room.sky, at) >= value:
+        if is_as_good(room.sky, at, end_s, looked, slews) and _is_subset(
             room.on_chain, at * num_words, first, num_words
         ):
             return count
-    append(room.sky, count, value, end_s, looked, k)
+        before, at = at, next_label(room.sky, at)
+    insert(room.sky, count, before, value, end_s, looked, k)
     return count + 1
 
 
@@ -407,21 +411,20 @@ def _is_subset(words: npt.NDArray[np.uint64], one: int, other: int, num_words: i
 
 @borrowing
 def _best_without(
-    network: Network, room: Room, slews: Slews, node: int, count: int, number: int, num_words: int
+    network: Network, room: Room, slews: Slews, node: int, number: int, num_words: int
 ) -> int:
     """Return the best label that a node may follow and whose chain has not got its target."""
     sky, start_s, looks = room.sky, network.start_s[node], _looks(network, node)
     if number < 0:
-        return best_ahead(sky, count, start_s, looks, slews)
+        return best_ahead(sky, start_s, looks, slews)
     bit = np.uint64(1) << np.uint64(number & 63)
-    best_at, at = NO_LABEL, count - 1
-    while at >= 0 and value_of(sky, top_label(sky, at + 1)) > value_of(sky, best_at):
-        is_on_chain = room.on_chain[at * num_words + (number >> 6)] & bit
-        is_better = value_of(sky, at) > value_of(sky, best_at) and not is_on_chain
-        if is_better and reaches(sky, at, start_s, looks, slews):
-            best_at = at
-        at -= 1
-    return best_at
+    at = top_label(sky)
+    while at >= 0 and (
+        room.on_chain[at * num_words + (number >> 6)] & bit
+        or not reaches(sky, at, start_s, looks, slews)
+    ):
+        at = next_label(sky, at)
+    return at
 
 
 @borrowing

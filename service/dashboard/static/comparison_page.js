@@ -6,6 +6,7 @@ import { byId, fill, h } from "./dom.js";
 import { number, percent, short } from "./format.js";
 import { startPage } from "./page.js";
 import { aboutOf, scenario, titleOf } from "./scenarios.js";
+import { stateBadge } from "./state.js";
 
 /** @typedef {import("./types.js").ComparisonOut} ComparisonOut */
 /** @typedef {import("./types.js").ComparedRun} ComparedRun */
@@ -64,7 +65,7 @@ function line(run, largest) {
     "tr",
     {},
     h("th", { scope: "row" }, run.solver),
-    h("td", {}, h("span", { class: `state ${run.state}` }, run.state)),
+    h("td", {}, stateBadge(run)),
     h("td", {}, meter),
     numeric(number(reward)),
     numeric(number(boundOf(run))),

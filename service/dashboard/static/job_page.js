@@ -17,6 +17,7 @@ import { ProgressChart } from "./progress_chart.js";
 import { aboutOf, scenario, titleOf } from "./scenarios.js";
 import { Selection } from "./selection.js";
 import { watchSelection } from "./selected.js";
+import { stateBadge } from "./state.js";
 import { showSummary } from "./summary.js";
 import { TimeView } from "./time_view.js";
 
@@ -78,7 +79,7 @@ function showState(job) {
   const isFinal = FINAL.has(job.state);
   fill(
     byId("job-state"),
-    h("span", { class: `state ${job.state}` }, job.state),
+    stateBadge(job),
     h("small", {}, ` since ${utcLabelled(job.finished_at ?? job.started_at ?? job.created_at)}`),
     job.attempt > 1 && h("small", {}, ` attempt ${job.attempt}`),
     job.error && h("p", { class: "notice bad", role: "alert" }, job.error.detail),
@@ -221,7 +222,7 @@ async function showOthers(job) {
       { class: isThis ? "marked" : "" },
       h("th", { scope: "row" }, isThis ? "this one" : h("a", { href: `/jobs/${one.id}` }, one.label ?? short(one.id))),
       h("td", {}, one.solver),
-      h("td", {}, h("span", { class: `state ${one.state}` }, one.state)),
+      h("td", {}, stateBadge(one)),
       h("td", { class: "number" }, number(progress?.reward)),
       h("td", { class: "number" }, number(progress?.bound)),
       h("td", { class: "number" }, percent(gapOf(progress?.reward, progress?.bound))),

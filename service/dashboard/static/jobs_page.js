@@ -6,6 +6,7 @@ import { bar, byId, fill, h } from "./dom.js";
 import { duration, gapOf, number, percent, secondsBetween, short, utc } from "./format.js";
 import { showError, startPage } from "./page.js";
 import { nameOf } from "./scenarios.js";
+import { stateBadge } from "./state.js";
 
 /** @typedef {import("./types.js").JobOut} JobOut */
 /** @typedef {import("./types.js").ComparisonOut} ComparisonOut */
@@ -85,7 +86,7 @@ async function cellsOf(job) {
   const { progress } = job;
   const seconds = secondsBetween(job.started_at, job.finished_at);
   const cells = [
-    h("td", {}, stateOf(job)),
+    h("td", {}, stateBadge(job)),
     h("th", { scope: "row" }, h("a", { href: `/jobs/${job.id}` }, job.label ?? short(job.id))),
     h("td", {}, job.solver),
     h("td", {}, await nameOf(job.scenario.id)),
@@ -98,11 +99,6 @@ async function cellsOf(job) {
     h("td", {}, !FINAL.has(job.state) && job.state !== "cancelling" && cancelButton(job)),
   ];
   return cells;
-}
-
-/** @param {{state: string}} job */
-function stateOf(job) {
-  return h("span", { class: `state ${job.state}` }, job.state);
 }
 
 /** @param {JobOut} job */

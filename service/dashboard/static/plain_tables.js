@@ -82,7 +82,7 @@ function actionTable(plan, selection, caption) {
       { title: "Start (UTC)", cell: (a) => utc(a.start) },
       { title: "End (UTC)", cell: (a) => utc(a.end) },
       { title: "Length, s", cell: (a) => number((spanOf(a).end - spanOf(a).start) / 1000), isNumber: true },
-      { title: "Target or station", cell: (a) => targetButton(plan, selection, a.target_id) || a.station_id },
+      { title: "Target or station", cell: (a) => targetButton(plan, selection, a.target_id) || (a.station_name ?? a.station_id) },
       { title: "Off nadir, °", cell: (a) => number(a.off_nadir_deg), isNumber: true },
       { title: "Slew, °", cell: (a) => number(a.slew?.angle_deg), isNumber: true },
       { title: "Slew needed, s", cell: (a) => number(a.slew?.needed_s), isNumber: true },

@@ -99,7 +99,7 @@ function actionFacts(plan, action, satelliteId) {
   return [
     ["Action", h("strong", { id: "selected-action" }, `${action.id}, ${action.mode}`)],
     ["Satellite", satelliteId && plan.satelliteName(satelliteId)],
-    ...(action.station_id ? [/** @type {[string, string]} */ (["Station", action.station_id])] : []),
+    ...(action.station_id ? [/** @type {[string, string]} */ (["Station", action.station_name ?? action.station_id])] : []),
     ["Start", utcLabelled(action.start)],
     ["End", utcLabelled(action.end)],
     ["Pointing", action.off_nadir_deg === null ? "at the sun" : `${number(action.off_nadir_deg)}° off nadir, azimuth ${number(action.azimuth_deg)}°`],

@@ -49,6 +49,8 @@
  * @property {string | null} finished_at
  * @property {string | null} termination
  * @property {ErrorOut | null} error
+ * @property {string | null} validity
+ * @property {string[]} warnings
  */
 
 /**
@@ -145,6 +147,7 @@
  * @property {string} kind
  * @property {string | null} target_id
  * @property {string | null} station_id
+ * @property {string | null} station_name
  * @property {string} start
  * @property {string} end
  * @property {number} off_nadir_deg
@@ -189,6 +192,7 @@
  * @property {string} end
  * @property {string | null} target_id
  * @property {string | null} station_id
+ * @property {string | null} station_name
  * @property {string | null} opportunity_id
  * @property {number | null} off_nadir_deg
  * @property {number | null} azimuth_deg

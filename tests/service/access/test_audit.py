@@ -102,6 +102,16 @@ def compare(client: httpx.Client) -> str:
     )
 
 
+def rename(make: Callable[[httpx.Client], str], where: str) -> Callable[[httpx.Client], str]:
+    def change(client: httpx.Client) -> str:
+        own_id = make(client)
+        answer = client.patch(f"{where}/{own_id}", json={"name": "Another name"})
+        assert answer.status_code == 200, answer.text
+        return own_id
+
+    return change
+
+
 def new_webhook(client: httpx.Client) -> str:
     return post(client, "/v1/webhooks", {"url": "https://ops.example/"})
 
@@ -125,11 +135,17 @@ CHANGES: dict[tuple[str, str], tuple[Callable[[httpx.Client], str], str, str]] =
     ("post", "/v1/satellites"): (new_satellite, "create", "satellite"),
     ("post", "/v1/satellites/import"): (import_satellites, "create", "satellite"),
     ("put", "/v1/satellites/{satellite_id}/elements"): (put_elements, "add_elements", "satellite"),
+    ("patch", "/v1/satellites/{satellite_id}"): (
+        rename(new_satellite, "/v1/satellites"), "update", "satellite",
+    ),
     ("delete", "/v1/satellites/{satellite_id}"): (
         delete(new_satellite, "/v1/satellites"), "delete", "satellite",
     ),
     ("post", "/v1/ground-stations"): (new_station, "create", "ground_station"),
     ("post", "/v1/ground-stations/import"): (import_stations, "create", "ground_station"),
+    ("patch", "/v1/ground-stations/{station_id}"): (
+        rename(new_station, "/v1/ground-stations"), "update", "ground_station",
+    ),
     ("delete", "/v1/ground-stations/{station_id}"): (
         delete(new_station, "/v1/ground-stations"), "delete", "ground_station",
     ),

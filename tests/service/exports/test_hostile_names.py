@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import csv
 import io
 import json
@@ -31,7 +32,7 @@ HOSTILE = (
 @pytest.fixture(scope="module")
 def hostile() -> tuple[Mission, Answered]:
     """A mission in which everything that has a name or an id of its own has a hostile one."""
-    file = mission_file()
+    file = copy.deepcopy(mission_file())  # its stations are those of all missions
     stations, targets = file["ground_stations"], file["targets"]
     for number, name in enumerate(HOSTILE):
         targets[number]["id"] = name

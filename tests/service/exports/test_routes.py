@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import csv
+import io
+
 import httpx
 import pytest
 
@@ -89,3 +92,28 @@ def test_a_job_of_nobody_has_no_timeline(client: httpx.Client) -> None:
 )
 def test_the_best_liked_form_is_chosen(accept: str | None, chosen: str | None) -> None:
     assert preferred(accept, ["a/json", "t/csv"]) == chosen
+
+
+def test_every_form_names_stations_and_satellites(
+    client: httpx.Client, job_path: str, mission: Mission
+) -> None:
+    stations = {station.id: station.name for station in mission.scenario.ground_stations}
+    contacts = [
+        action
+        for satellite in client.get(f"{job_path}/timeline.json").json()["satellites"]
+        for action in satellite["actions"]
+        if action["mode"] == "contact"
+    ]
+    assert contacts
+    assert all(action["station_name"] == stations[action["station_id"]] for action in contacts)
+    rows = list(csv.DictReader(io.StringIO(client.get(f"{job_path}/timeline.csv").text)))
+    assert all(row["station_name"] == stations.get(row["station_id"], "") for row in rows)
+    for one in client.get(f"{job_path}/timeline.geojson").json()["features"]:
+        told = one["properties"]
+        assert ("station_name" in told) == ("station_id" in told)
+        if "satellite_id" in told:
+            assert (told["satellite_name"] is None) == (told["satellite_id"] is None)
+    packets = client.get(f"{job_path}/timeline.czml").json()
+    seen = [one["properties"] for one in packets if "satellite_id" in one.get("properties", {})]
+    assert seen
+    assert all(one["satellite_name"] for one in seen)

@@ -30,7 +30,7 @@ TIMELINE = EMPTY | {"job": "one", "termination": "optimal"}
 KEYS = {
     "id", "state", "scenario", "solver", "params", "seed", "limits", "attempt", "priority",
     "label", "progress", "created_at", "started_at", "finished_at", "termination", "error",
-    "links", "change",
+    "links", "change", "validity", "warnings",
 }  # fmt: skip
 
 TARGETS = [
@@ -415,3 +415,23 @@ def test_a_nul_in_an_address_or_an_id_is_refused_on_every_database(client: httpx
         assert response.status_code == 422, address
     response = client.post("/v1/jobs", json={"scenario_id": "a\0b", "solver": "rule"})
     assert_problem(response, 422, "invalid_value", "/scenario_id")
+
+
+def test_a_plan_that_breaks_limits_says_so_on_its_job_and_in_the_list(
+    client: httpx.Client, jobs: Jobs
+) -> None:
+    waiting, broken = posted(client, jobs), posted(client, jobs)
+    outcome = Outcome(
+        state="succeeded",
+        termination="optimal",
+        blocks=tuple(blocks_of_timeline(TIMELINE)),
+        figures={"validity": "violations"},
+        warnings=("Elements are old.",),
+    )
+    finish(jobs, broken, outcome)
+    job = client.get(f"/v1/jobs/{broken}").json()
+    assert (job["state"], job["validity"]) == ("succeeded", "violations")
+    assert job["warnings"] == ["Elements are old."]
+    listed = {one["id"]: one for one in client.get("/v1/jobs").json()["items"]}
+    assert listed[broken] == job
+    assert (listed[waiting]["validity"], listed[waiting]["warnings"]) == (None, [])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import get_args
 
 import httpx
 import pytest
@@ -15,6 +16,7 @@ from service.db.clock import seconds_between, utc_now
 from service.db.rows import JobRow, UtcDateTime, WorkerRow
 from service.db.session import Database
 from service.jobs.lease import Outcome
+from service.wire.timelines import Validity
 from tests.service.conftest import Service
 from tests.service.factories import EPOCH, post, satellite, target
 from tests.service.jobs.conftest import Jobs
@@ -154,3 +156,13 @@ def test_a_poll_that_finds_nothing_new_is_a_call_like_any_other(
     calls = read(client)
     assert calls[sample("slewline_http_requests_total", status="304", **labels)] == 1.0
     assert calls[sample("slewline_http_requests_total", status="200", **labels)] == 1.0
+
+
+def test_plans_are_counted_by_validity(client: httpx.Client, jobs: Jobs) -> None:
+    assert read(client)[sample("slewline_job_plans", validity="violations")] == 0.0
+    for validity in ("violations", "violations", "valid"):
+        ended = Outcome(state="succeeded", figures={"validity": validity})
+        finish(jobs, posted(client, jobs), ended)
+    found = read(client)
+    counts = {v: found[sample("slewline_job_plans", validity=v)] for v in get_args(Validity)}
+    assert counts == {"valid": 1.0, "inherited": 0.0, "violations": 2.0}

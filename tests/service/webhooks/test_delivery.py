@@ -10,6 +10,7 @@ import sqlalchemy as sa
 from sqlalchemy.orm import Session
 from standardwebhooks.webhooks import Webhook
 
+from service.answers.blocks import blocks_of_timeline
 from service.db.clock import utc_now
 from service.db.rows import WebhookDeliveryRow, WebhookRow
 from service.jobs import lease
@@ -18,6 +19,7 @@ from service.jobs.reconcile import Reconciler
 from service.webhooks import outbox
 from tests.patience import PATIENCE_S
 from tests.service.jobs.conftest import Jobs, Workers
+from tests.service.jobs.work import EMPTY
 from tests.service.webhooks.conftest import Post, StartCourier
 
 
@@ -279,3 +281,19 @@ def test_workers_are_couriers(post: Post) -> None:
     assert one.is_signed_with(webhook["secret"])
     assert one.event["data"]["job_id"] == job_id
     assert one.event["type"] == "job.succeeded"
+
+
+def test_an_end_tells_whether_the_plan_breaks_limits(post: Post, courier: StartCourier) -> None:
+    post.webhook()
+    outcome = Outcome(
+        state="succeeded",
+        blocks=tuple(blocks_of_timeline(EMPTY)),
+        figures={"validity": "violations"},
+        warnings=("Elements are old.",),
+    )
+    end(post.jobs, outcome)
+    with courier():
+        post.until_ended(1)
+    data = post.receiver.received[0].event["data"]
+    assert (data["state"], data["validity"]) == ("succeeded", "violations")
+    assert data["warnings"] == ["Elements are old."]
