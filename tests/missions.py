@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import csv
 from pathlib import Path
 from typing import Any
@@ -66,7 +67,7 @@ def paper_mission(targets: list[Document], **flags: Any) -> Document:
         "horizon": {"start": "2019-01-01T00:00:00Z", "end": "2019-01-02T00:00:00Z"},
         "satellites": [{"name": "PAPER", "omm": PAPER_ORBIT}],
         "targets": targets,
-        "ground_stations": STATIONS,
+        "ground_stations": copy.deepcopy(STATIONS),
         "use_resources": True,
         "dynamics": "physical",
         **flags,

@@ -220,9 +220,11 @@ def test_exact_solvers_find_the_best_plan(solver: Milp | Certified, seed: int) -
     problem = sunny_problem(seed)
     best = best_reward(problem)
     solution = solver.solve(problem, Budget(), seed)
-    assert solution.proven is not None
-    assert solution.proven.value >= best - 1e-6
-    if replay(problem, Plan(())).is_valid:
+    is_possible = replay(problem, Plan(())).is_valid
+    # Where idle load alone empties the battery no plan is valid, and HiGHS has none to bound.
+    assert solution.proven is not None or not is_possible
+    assert solution.proven is None or solution.proven.value >= best - 1e-6
+    if is_possible:
         assert replay(problem, solution.plan).reward == pytest.approx(best)
 
 

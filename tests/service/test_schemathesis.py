@@ -35,6 +35,7 @@ Ids = dict[str, list[str]]
 
 LUCK = {
     ("POST", "/v1/jobs/{job_id}/cancel"),  # before the job has ended
+    ("POST", "/v1/plans/{plan_id}/executions"),  # of a published plan, by its actions' own ids
     ("POST", "/v1/webhooks/{webhook_id}/deliveries/{delivery_id}/redeliver"),  # before its deletion
 }
 """Calls that may be refused throughout."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import csv
 import io
 import json
@@ -32,7 +31,7 @@ HOSTILE = (
 @pytest.fixture(scope="module")
 def hostile() -> tuple[Mission, Answered]:
     """A mission in which everything that has a name or an id of its own has a hostile one."""
-    file = copy.deepcopy(mission_file())  # its stations are those of all missions
+    file = mission_file()
     stations, targets = file["ground_stations"], file["targets"]
     for number, name in enumerate(HOSTILE):
         targets[number]["id"] = name
