@@ -135,7 +135,7 @@ class _Playback(sysModel.SysModel):  # type: ignore[misc]  # Basilisk has no typ
         """Say what holds at the beginning."""
         self.UpdateState(now_ns)
 
-    def UpdateState(self, now_ns: int) -> None:  # noqa: N802
+    def UpdateState(self, now_ns: int) -> None:  # noqa: N802  # likewise
         """Say what holds at an instant."""
         row = min(now_ns // _STEP_NS, len(self._told) - 1)
         wanted = messaging.AttRefMsgPayload()
@@ -167,7 +167,7 @@ class _Recorder(sysModel.SysModel):  # type: ignore[misc]  # Basilisk has no typ
     def Reset(self, now_ns: int) -> None:  # noqa: N802  # Basilisk calls it so
         """Begin with nothing kept."""
 
-    def UpdateState(self, now_ns: int) -> None:  # noqa: N802
+    def UpdateState(self, now_ns: int) -> None:  # noqa: N802  # likewise
         """Keep what there is at an instant."""
         row = min(now_ns // _STEP_NS, len(self.lit) - 1)
         state = self._body.scStateOutMsg.read()

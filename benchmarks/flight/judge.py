@@ -47,6 +47,8 @@ class Verdict:
         How far the flown battery was below the timeline's curve at most, of the capacity.
     recorder_error
         Greatest difference of the recorder, integrated again, from the timeline's curve.
+    nearest_sun_deg
+        Least angle between boresight and sun.
     incidence
         Mean cosine of the sun on the panels, by what the satellite was doing.
     charged
@@ -61,6 +63,7 @@ class Verdict:
     lowest_battery: float | None
     below_curve: float | None
     recorder_error: float | None
+    nearest_sun_deg: float
     incidence: dict[str, float]
     charged: dict[str, float]
 
@@ -74,7 +77,8 @@ def judge(mission: Mission, reference: Reference, flight: Flight) -> Verdict:
     """Return what the flight says of the plan."""
     times_s = STEP_S * np.arange(len(flight.lit), dtype=np.float64)
     doing = _doing(mission, reference, times_s)
-    towards_sun = _incidence(mission, flight)
+    from_sun_deg = _from_sun_deg(mission, flight)
+    towards_sun = _incidence(mission, from_sun_deg)
     power, curve = mission.power, mission.curve
     battery = below = recorder_error = None
     charged: dict[str, float] = {}
@@ -95,6 +99,7 @@ def judge(mission: Mission, reference: Reference, flight: Flight) -> Verdict:
         lowest_battery=None if battery is None else float(battery.min()),
         below_curve=below,
         recorder_error=recorder_error,
+        nearest_sun_deg=float(from_sun_deg.min()),
         incidence={what: float(towards_sun[at].mean()) for what, at in doing.items() if at.any()},
         charged=charged,
     )
@@ -139,17 +144,22 @@ def _within(times_s: Floats, spans_s: Iterable[tuple[float, float]]) -> Bools:
     return inside
 
 
-def _incidence(mission: Mission, flight: Flight) -> Floats:
-    """Return the cosine of the sun on panels that turn freely about the boresight."""
-    panel_deg = 180.0 if mission.power is None else mission.power.panel_angle_deg
+def _from_sun_deg(mission: Mission, flight: Flight) -> Floats:
+    """Return the angle between boresight and sun."""
     cosines = np.empty(len(flight.lit))
     where = orbit(mission)
     for first in range(0, len(cosines), _SUN_EVERY):
         rows = slice(first, first + _SUN_EVERY)
         sun = sun_km(mission, first * STEP_S) - satellite_km(where, first * STEP_S)[0]
         cosines[rows] = flight.boresight[rows] @ (sun / np.linalg.norm(sun))
-    angles_deg = np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0)))
-    incidence: Floats = np.maximum(0.0, np.cos(np.radians(angles_deg - panel_deg)))
+    from_sun_deg: Floats = np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0)))
+    return from_sun_deg
+
+
+def _incidence(mission: Mission, from_sun_deg: Floats) -> Floats:
+    """Return the cosine of the sun on panels that turn freely about the boresight."""
+    panel_deg = 180.0 if mission.power is None else mission.power.panel_angle_deg
+    incidence: Floats = np.maximum(0.0, np.cos(np.radians(from_sun_deg - panel_deg)))
     return incidence
 
 

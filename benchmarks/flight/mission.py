@@ -83,11 +83,14 @@ class Agility:
     ----------
     settle_s
         How long before a task its line of sight is to be reached.
+    sun_exclusion_deg
+        Least angle between boresight and sun at any time; 0 for none.
     """
 
     rate_deg_s: float
     acceleration_deg_s2: float | None
     settle_s: float
+    sun_exclusion_deg: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,6 +222,7 @@ def _agility(told: Json) -> Agility:
         rate_deg_s=float(told["slew_rate_deg_s"]),
         acceleration_deg_s2=None if acceleration is None else float(acceleration),
         settle_s=float(told.get("settle_s") or 0.0),
+        sun_exclusion_deg=float(told.get("sun_exclusion_deg") or 0.0),
     )
 
 

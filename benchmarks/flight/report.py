@@ -31,6 +31,7 @@ def lines(verdict: Verdict) -> Iterator[str]:
                f"{len(contacts)}, lowest elevation {lowest_deg:.3f} deg")  # fmt: skip
     yield (f"  body rate, wheel torque {verdict.rate_share:.2f} and "
            f"{verdict.torque_share:.2f} of their limits")  # fmt: skip
+    yield f"  nearest to the sun      {verdict.nearest_sun_deg:.1f} deg"
     told = ", ".join(f"{what} {share:.2f}" for what, share in verdict.incidence.items())
     yield f"  sun on the panels       {told}"
     if verdict.lowest_battery is not None:
@@ -47,6 +48,7 @@ def is_flyable(verdict: Verdict, share: float) -> bool:
     return (
         verdict.share("collect") >= share
         and verdict.share("contact") == 1.0
+        and verdict.nearest_sun_deg >= verdict.mission.agility.sun_exclusion_deg
         and (verdict.recorder_error or 0.0) <= _MOST_RECORDER_ERROR
         and (verdict.below_curve or 0.0) <= _MOST_BELOW_CURVE
     )

@@ -25,8 +25,8 @@ def _plan_id(*, is_key: bool = False) -> sa.Column[str]:
 
 def _by() -> list[sa.Column[str]]:
     return [
-        sa.Column("by_owner", sa.String(length=64), nullable=False),
-        sa.Column("by_key", sa.String(length=64), nullable=True),
+        sa.Column("owner", sa.String(length=64), nullable=False),
+        sa.Column("key_name", sa.String(length=64), nullable=True),
     ]
 
 
@@ -54,7 +54,7 @@ def upgrade() -> None:
         "plan_satellite",
         _plan_id(is_key=True),
         sa.Column("satellite_id", sa.Text(), primary_key=True),
-        sa.Column("name", sa.Text(), nullable=False),
+        sa.Column("satellite_name", sa.Text(), nullable=False),
         sa.Column("in_force_from", _INSTANT, nullable=True),
         sa.Column("in_force_until", _INSTANT, nullable=True),
     )

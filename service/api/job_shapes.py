@@ -9,14 +9,6 @@ import sqlalchemy as sa
 from service.api import ask_again
 from service.db.rows import JobRow
 from service.wire.jobs import ErrorOut, JobOut, JobState, LimitsOut, ProgressOut, ScenarioRef
-from service.wire.scenarios import ScenarioFile
-
-
-def _form(scenario: object) -> str:
-    is_file = isinstance(scenario, ScenarioFile) or (
-        isinstance(scenario, dict) and not {"satellites", "targets"}.isdisjoint(scenario)
-    )
-    return "file" if is_file else "stored"
 
 
 def shown(job: JobRow, scenario_sha256: str) -> JobOut:

@@ -24,7 +24,6 @@ from service.db.rows import (
     ExecutionRow,
     JobRow,
     PlanActionRow,
-    PlanEventRow,
     PlanRow,
     PlanSatelliteRow,
 )
@@ -49,7 +48,6 @@ from service.wire.plans import (
     PlanState,
     ReportedOut,
     TransitionIn,
-    WaiverOut,
 )
 from service.wire.scenarios import HorizonOut
 from service.wire.timelines import TimelineOut, ViolationOut
@@ -157,7 +155,10 @@ def list_history(plan_id: str, call: CallDep) -> Listed[PlanEventOut]:
     with call.database.reading() as session:
         _find(session, plan_id, call.caller)
         events = plan_store.history(session, plan_id)
-    return Listed(items=[_event_out(event) for event in events], next=None)
+    return Listed(
+        items=[PlanEventOut.model_validate(event, from_attributes=True) for event in events],
+        next=None,
+    )
 
 
 @router.get("/{plan_id}/actions", responses=problem_responses(404))
@@ -263,13 +264,7 @@ def _plan_out(plan: PlanRow, satellites: list[PlanSatelliteRow]) -> PlanOut:
         validity=cast(Any, plan.validity),
         violations=tuple(ViolationOut.model_validate(each) for each in plan.violations),
         satellites=tuple(
-            PlanSatelliteOut(
-                satellite_id=row.satellite_id,
-                satellite_name=row.name,
-                in_force_from=row.in_force_from,
-                in_force_until=row.in_force_until,
-            )
-            for row in satellites
+            PlanSatelliteOut.model_validate(row, from_attributes=True) for row in satellites
         ),
         allowed=TRANSITIONS[cast(PlanState, plan.state)],
         created_at=plan.created_at,
@@ -277,41 +272,12 @@ def _plan_out(plan: PlanRow, satellites: list[PlanSatelliteRow]) -> PlanOut:
     )
 
 
-def _event_out(row: PlanEventRow) -> PlanEventOut:
-    return PlanEventOut(
-        at=row.at,
-        from_state=cast(Any, row.from_state),
-        to_state=cast(PlanState, row.to_state),
-        owner=row.by_owner,
-        key_name=row.by_key,
-        reason=row.reason,
-        effective_from=row.effective_from,
-        waivers=tuple(WaiverOut(**waiver) for waiver in row.waivers),
-    )
+def _execution_out(row: ExecutionRow) -> ExecutionOut:
+    return ExecutionOut.model_validate(row, from_attributes=True)
 
 
 def _action_out(row: PlanActionRow, outcome: str | None) -> PlanActionOut:
-    return PlanActionOut(
-        id=row.action_id,
-        satellite_id=row.satellite_id,
-        mode=cast(Any, row.mode),
-        start=row.start,
-        end=row.end,
-        target_id=row.target_id,
-        station_id=row.station_id,
-        outcome=cast(Any, outcome),
-    )
-
-
-def _execution_out(row: ExecutionRow) -> ExecutionOut:
-    return ExecutionOut(
-        id=row.id,
-        action_id=row.action_id,
-        outcome=cast(Any, row.outcome),
-        at=row.at,
-        mbit=row.mbit,
-        detail=row.detail,
-        owner=row.by_owner,
-        key_name=row.by_key,
-        reported_at=row.reported_at,
-    )
+    fields = {
+        name: getattr(row, name) for name in PlanActionOut.model_fields.keys() - {"id", "outcome"}
+    }
+    return PlanActionOut(id=row.action_id, outcome=cast(Any, outcome), **fields)

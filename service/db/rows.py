@@ -395,7 +395,7 @@ class PlanSatelliteRow(Row):
 
     plan_id: Mapped[str] = mapped_column(sa.ForeignKey("plan.id"), primary_key=True)
     satellite_id: Mapped[str] = mapped_column(primary_key=True, index=True)
-    name: Mapped[str]
+    satellite_name: Mapped[str]
     in_force_from: Mapped[datetime | None]
     in_force_until: Mapped[datetime | None]
 
@@ -426,8 +426,8 @@ class PlanEventRow(Row):
     at: Mapped[datetime]
     from_state: Mapped[str | None] = mapped_column(sa.String(16))
     to_state: Mapped[str] = mapped_column(sa.String(16))
-    by_owner: Mapped[str] = mapped_column(sa.String(64))
-    by_key: Mapped[str | None] = mapped_column(sa.String(64))
+    owner: Mapped[str] = mapped_column(sa.String(64))
+    key_name: Mapped[str | None] = mapped_column(sa.String(64))
     reason: Mapped[str | None]
     effective_from: Mapped[datetime | None]
     waivers: Mapped[list[Json]] = mapped_column(sa.JSON)
@@ -453,6 +453,6 @@ class ExecutionRow(Row):
     at: Mapped[datetime | None]
     mbit: Mapped[float | None] = mapped_column(sa.Double)
     detail: Mapped[str | None]
-    by_owner: Mapped[str] = mapped_column(sa.String(64))
-    by_key: Mapped[str | None] = mapped_column(sa.String(64))
+    owner: Mapped[str] = mapped_column(sa.String(64))
+    key_name: Mapped[str | None] = mapped_column(sa.String(64))
     reported_at: Mapped[datetime]

@@ -45,7 +45,7 @@ def add(
     session.add(plan)
     session.flush()
     session.add_all(
-        PlanSatelliteRow(plan_id=plan.id, satellite_id=each.id, name=each.name)
+        PlanSatelliteRow(plan_id=plan.id, satellite_id=each.id, satellite_name=each.name)
         for each in timeline.satellites
     )
     actions = [
@@ -77,7 +77,7 @@ def note(
     session.add(
         PlanEventRow(
             id=new_id(), plan_id=plan.id, at=now(session), from_state=from_state,
-            to_state=plan.state, by_owner=caller.owner, by_key=caller.key_name, reason=reason,
+            to_state=plan.state, owner=caller.owner, key_name=caller.key_name, reason=reason,
             effective_from=effective_from, waivers=[dumped(each) for each in waivers],
         )
     )  # fmt: skip
@@ -198,7 +198,7 @@ def report(
     reported_at = now(session)
     rows = [
         ExecutionRow(
-            id=new_id(), plan_id=plan_id, by_owner=caller.owner, by_key=caller.key_name,
+            id=new_id(), plan_id=plan_id, owner=caller.owner, key_name=caller.key_name,
             reported_at=reported_at, **each.model_dump(),
         )
         for each in reports

@@ -137,6 +137,12 @@ def _as_told(reference: Reference) -> Flight:
     return Flight(boresight, rate_deg_s, np.ones(len(boresight)), 0.0)
 
 
+def _nearest_sun_deg(mission: Mission, reference: Reference) -> float:
+    towards = world.sun_km(mission, 900.0)
+    cosines = reference.attitude[:, :, BORESIGHT] @ (towards / norm(towards))
+    return math.degrees(math.acos(float(cosines.max())))
+
+
 def test_the_reference_keeps_its_limits_and_comes_in_time() -> None:
     free = _mission()
     at = [(time_s, *_below(free, time_s + 15.0)) for time_s in (300.0, 420.0, 900.0)]
@@ -150,6 +156,7 @@ def test_the_reference_keeps_its_limits_and_comes_in_time() -> None:
     assert verdict.too_short == ()
     assert [each.throughout for each in verdict.pointing] == [True] * 3
     assert verdict.share("collect") == 1.0
+    assert verdict.nearest_sun_deg == pytest.approx(_nearest_sun_deg(mission, reference), abs=0.1)
     # There is time to go to the sun before, between and after.
     assert len(reference.visits) >= 3
     assert all(earlier[1] <= later[0] for earlier, later in
