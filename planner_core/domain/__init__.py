@@ -1,0 +1,67 @@
+"""The nouns of planning.
+
+Glossary
+--------
+Target
+    A point on the ground that someone wants imaged once.
+Access
+    A maximal interval in which geometry allows a satellite to see a target or a station.
+Opportunity
+    A *collect* (image of a target) or a *contact* (pass over a station) that a plan may take.
+Plan
+    The actions chosen. A *timeline* is the plan replayed by the referee.
+Horizon
+    The span that is planned; instants inside it are seconds from its start.
+Epoch
+    The instant an element set is given for.
+Reward, quality, worth
+    What a perfect image of a target earns; how good an image is, from 0 to 1; their product.
+Pin
+    What a plan must hold, or must not; see ``planner_core.pins``.
+Off-nadir angle
+    At the satellite, between nadir and the line of sight. *Elevation* is measured at the ground.
+Slew, settle
+    The turn from one line of sight to another, and the wait after it.
+
+Every type is immutable and checks itself when made.
+"""
+
+from __future__ import annotations
+
+from planner_core.domain.horizon import Horizon
+from planner_core.domain.places import GroundStation, Target
+from planner_core.domain.quality import Curve, Quality
+from planner_core.domain.scenario import CollectAlignment, Dynamics, Scenario
+from planner_core.domain.spacecraft import (
+    Agility,
+    LookSide,
+    Nadir,
+    OrbitDirection,
+    OrbitElements,
+    Resources,
+    Satellite,
+    Sensor,
+    SlewModel,
+    SunPointing,
+)
+
+__all__ = [
+    "Agility",
+    "CollectAlignment",
+    "Curve",
+    "Dynamics",
+    "GroundStation",
+    "Horizon",
+    "LookSide",
+    "Nadir",
+    "OrbitDirection",
+    "OrbitElements",
+    "Quality",
+    "Resources",
+    "Satellite",
+    "Scenario",
+    "Sensor",
+    "SlewModel",
+    "SunPointing",
+    "Target",
+]

@@ -1,0 +1,83 @@
+"""What types of the domain check of themselves when they are made."""
+
+from __future__ import annotations
+
+import math
+from typing import Final, Protocol
+
+from planner_core.errors import InvalidScenario
+
+_LONGEST_SENSOR_TYPE: Final = 100
+
+
+class LightLimits(Protocol):
+    """Limits of sun and local time, which sensors and targets share."""
+
+    @property
+    def sun_elevation_min_deg(self) -> float | None:
+        """Return the lowest sun, as the target sees it."""
+
+    @property
+    def sun_elevation_max_deg(self) -> float | None:
+        """Return the highest sun."""
+
+    @property
+    def local_time_from_h(self) -> float | None:
+        """Return when the span of local solar time begins."""
+
+    @property
+    def local_time_to_h(self) -> float | None:
+        """Return when it ends."""
+
+
+def require(condition: bool, where: str, message: str) -> None:
+    """Raise ``InvalidScenario`` at a field unless the condition holds."""
+    if not condition:
+        raise InvalidScenario("value_out_of_range", f"{where}: {message}", pointer="/" + where)
+
+
+def require_finite(owner: object, *names: str) -> None:
+    """Check that these fields are finite numbers, or None."""
+    for name in names:
+        value = getattr(owner, name)
+        if value is not None:
+            require(math.isfinite(value), name, "must be a finite number")
+
+
+def check_light(limits: LightLimits) -> None:
+    """Check the limits of sun and local time that sensors and targets share."""
+    lowest, highest = limits.sun_elevation_min_deg, limits.sun_elevation_max_deg
+    for name, value in (("sun_elevation_min_deg", lowest), ("sun_elevation_max_deg", highest)):
+        require(value is None or -90 <= value <= 90, name, "must be between -90 and 90")
+    require(
+        lowest is None or highest is None or lowest <= highest,
+        "sun_elevation_max_deg",
+        "must not be below sun_elevation_min_deg",
+    )
+    begin, end = limits.local_time_from_h, limits.local_time_to_h
+    for name, hour in (("local_time_from_h", begin), ("local_time_to_h", end)):
+        require(hour is None or 0 <= hour <= 24, name, "must be between 0 and 24")
+    require(
+        (begin is None) == (end is None) and (begin is None or begin != end),
+        "local_time_to_h",
+        "needs a local_time_from_h that differs from it, and the other way round",
+    )
+
+
+def check_sun_exclusion(angle_deg: float | None) -> None:
+    """Check the least angle between boresight and sun."""
+    require(
+        angle_deg is None or 0 <= angle_deg <= 180,
+        "sun_exclusion_deg",
+        "must be between 0 and 180, or null for no limit",
+    )
+
+
+def check_sensor_type(sensor_type: str | None) -> None:
+    """Check the name of a type of sensor."""
+    require(
+        sensor_type is None
+        or (0 < len(sensor_type) <= _LONGEST_SENSOR_TYPE and sensor_type.isprintable()),
+        "sensor_type",
+        f"must be 1 to {_LONGEST_SENSOR_TYPE} printable characters, or null for none",
+    )

@@ -1,0 +1,110 @@
+"""The question that is put to a solver."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Literal
+
+from planner_core.domain.checks import require
+from planner_core.domain.horizon import Horizon
+from planner_core.domain.places import GroundStation, Target
+from planner_core.domain.quality import Quality
+from planner_core.domain.spacecraft import Satellite
+from planner_core.errors import InvalidScenario
+from planner_core.pins import Pins
+
+Dynamics = Literal["physical", "paper"]
+CollectAlignment = Literal["access", "horizon"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scenario:
+    """The frozen question: who may image what, when, and under which rules.
+
+    Attributes
+    ----------
+    collect_alignment
+        Whether the starts of ``collect_spacing_s`` count from each access, or are multiples of it
+        from the horizon's start.
+    quality
+        What part of its target's reward an image earns, by how it is taken.
+    allow_old_elements
+        Plan with element sets of any age (see ``build.check_element_age``).
+    """
+
+    horizon: Horizon
+    satellites: tuple[Satellite, ...]
+    targets: tuple[Target, ...]
+    ground_stations: tuple[GroundStation, ...] = ()
+    use_resources: bool = True
+    dynamics: Dynamics = "physical"
+    collect_spacing_s: float | None = None
+    collect_alignment: CollectAlignment = "access"
+    continuous_starts: bool = False
+    quality: Quality = field(default_factory=Quality)
+    allow_old_elements: bool = False
+    pins: Pins = field(default_factory=Pins)
+    warnings: tuple[str, ...] = field(default=(), compare=False)
+
+    def __post_init__(self) -> None:
+        require(len(self.satellites) > 0, "satellites", "at least one is needed")
+        require(
+            self.collect_spacing_s is None or self.collect_spacing_s > 0,
+            "collect_spacing_s",
+            "must be greater than 0",
+        )
+        require(
+            self.collect_alignment == "access"
+            or (self.collect_spacing_s is not None and not self.continuous_starts),
+            "collect_alignment",
+            "horizon needs a collect_spacing_s, and no continuous_starts",
+        )
+        # Plans with free starts are proven best where earlier is never worse.
+        require(
+            not (self.quality and self.continuous_starts),
+            "continuous_starts",
+            "an image's quality would change with its start: use collect_spacing_s with quality",
+        )
+        require(
+            not (self.continuous_starts and any(s.agility.tracks for s in self.satellites)),
+            "continuous_starts",
+            "how fast lines of sight move is known at the starts of opportunities only: "
+            "use collect_spacing_s with slew_model moving",
+        )
+        # The authors' events forgo or charge whole spans: there is no time to turn in them.
+        require(
+            not self.use_resources
+            or self.dynamics == "physical"
+            or all(s.resources.knows_free_charge_alone for s in self.satellites),
+            "dynamics",
+            "paper knows neither turns to the sun nor idle_power_w: use sun_pointing free without",
+        )
+        for what, ids in (
+            ("satellite", [s.id for s in self.satellites]),
+            ("target", [t.id for t in self.targets]),
+            ("ground_station", [g.id for g in self.ground_stations]),
+        ):
+            duplicate = _first_duplicate(ids)
+            if duplicate is not None:
+                position, value = duplicate
+                raise InvalidScenario(
+                    f"duplicate_{what}_id",
+                    f"The {what} id {value!r} appears twice.",
+                    pointer=f"/{what}s/{position}/id",
+                )
+        self.pins.check(
+            {s.id for s in self.satellites},
+            {t.id for t in self.targets},
+            {g.id for g in self.ground_stations},
+            has_contacts=self.use_resources,
+        )
+
+
+def _first_duplicate(ids: Iterable[str]) -> tuple[int, str] | None:
+    seen: set[str] = set()
+    for position, value in enumerate(ids):
+        if value in seen:
+            return position, value
+        seen.add(value)
+    return None
