@@ -67,7 +67,9 @@ def pinned_problem(scenario: Scenario, problem: Problem) -> Problem:
             np.flatnonzero(problem.opportunities.access == own).tolist() for own in accesses
         ]
     else:
-        skipped_rows = [[row] for row in skipped]
+        skipped_rows = [
+            _meant_by(table, row, pin) for row, pin in zip(skipped, pins.skip, strict=True)
+        ]
     return apply_pins(problem, resolve(scenario, kept, skipped_rows))
 
 
@@ -119,6 +121,8 @@ def row_of(scenario: Scenario, table: Opportunities, pin: PinnedAction, pointer:
         raise InvalidScenario(
             "pin_without_opportunity", _why_none(scenario, table, named, pin), pointer=pointer
         )
+    if pin.start is None and len(rows) > 1 and _are_parts(table, rows):
+        return int(rows[np.argmax(table.end_s[rows] - table.start_s[rows])])
     if pin.start is None and len(rows) > 1:
         raise InvalidScenario(
             "pin_ambiguous",
@@ -126,6 +130,20 @@ def row_of(scenario: Scenario, table: Opportunities, pin: PinnedAction, pointer:
             pointer=pointer,
         )
     return int(rows[np.argmin(np.abs(table.start_s[rows] - start_s))])
+
+
+def _are_parts(table: Opportunities, rows: Longs) -> bool:
+    """Return whether these are parts of one and the same pass."""
+    is_contact = bool((table.kind[rows] == CONTACT).all())
+    return is_contact and len(np.unique(table.access[rows])) == 1
+
+
+def _meant_by(table: Opportunities, row: int, pin: PinnedAction) -> list[int]:
+    """Return all rows that skipping one of them means: of a pass every part."""
+    if table.kind[row] != CONTACT or pin.opportunity_id is not None:
+        return [row]
+    rows: list[int] = np.flatnonzero(table.access == table.access[row]).tolist()
+    return rows
 
 
 def _number_of(opportunity_id: str) -> int:
