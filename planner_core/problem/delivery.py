@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from planner_core.domain import Objective
-from planner_core.problem.problem import COLLECT, CONTACT, Floats, Problem, SatelliteProblem
+from planner_core.problem.problem import COLLECT, CONTACT, Floats, Longs, Problem, SatelliteProblem
 from planner_core.problem.slew import TIME_TOLERANCE_S
 from planner_core.worth import share_earned
 
@@ -45,21 +45,41 @@ def least_age_s(problem: Problem) -> Floats:
     age_s = np.full(len(table), np.inf)
     for satellite in problem.satellites:
         own = satellite.rows[satellite.kind == COLLECT]
-        down_s = _first_down_s(satellite, first_end_s[own], table.end_s[own] - table.start_s[own])
+        down_s = _first_down_s(
+            problem, satellite, first_end_s[own], table.end_s[own] - table.start_s[own]
+        )
         age_s[own] = np.maximum(down_s - last_end_s[own] - _ROUNDING_S, 0.0)
     return age_s
 
 
-def _first_down_s(satellite: SatelliteProblem, end_s: Floats, length_s: Floats) -> Floats:
+def _first_down_s(
+    problem: Problem, satellite: SatelliteProblem, end_s: Floats, length_s: Floats
+) -> Floats:
     """Return when images that end then can be down; infinite for never."""
-    r = satellite.resources
-    is_contact = satellite.kind == CONTACT
-    starts_s = satellite.start_s[is_contact]
-    if len(starts_s) == 0 or r.downlink_per_s <= 0.0:
+    r, links = satellite.resources, problem.downlinks
+    contacts = np.flatnonzero(satellite.kind == CONTACT)
+    contacts = contacts[np.argsort(satellite.start_s[contacts], kind="stable")]
+    fastest_per_s = _fastest_per_s(problem, satellite, contacts)
+    if fastest_per_s <= 0.0:
         return np.full(len(end_s), np.inf)
-    order = np.argsort(starts_s, kind="stable")
-    starts_s = np.append(starts_s[order], np.inf)
+    starts_s = satellite.start_s[contacts]
+    ready_s = starts_s + links.stations.setup_s[satellite.place[contacts]]
+    # Of the contacts from each on, the first that is set up.
+    ready_s = np.append(np.minimum.accumulate(ready_s[::-1])[::-1], np.inf)
     following = np.searchsorted(starts_s, end_s - TIME_TOLERANCE_S)
-    down_s = starts_s[following] + length_s * r.collect_fill_per_s / r.downlink_per_s
-    last_s = float(satellite.end_s[is_contact].max())
+    down_s = ready_s[following] + length_s * r.collect_fill_per_s / fastest_per_s
+    last_s = float(satellite.end_s[contacts].max())
     return np.where(down_s <= last_s + _ROUNDING_S, down_s, np.inf)
+
+
+def _fastest_per_s(problem: Problem, satellite: SatelliteProblem, contacts: Longs) -> float:
+    """Return the highest rate at any instant of these contacts; 0 without any."""
+    links = problem.downlinks
+    access = problem.opportunities.access[satellite.rows[contacts]]
+    gain = links.stations.gain[satellite.place[contacts]]
+    rates = (satellite.resources.downlink_per_s * gain).tolist()
+    passes = [links.passes.get(int(number)) for number in access]
+    known = zip(passes, rates, strict=True)
+    return max(
+        (rate if own is None else float(own.per_s.max()) for own, rate in known), default=0.0
+    )

@@ -13,6 +13,7 @@ import numpy as np
 
 from planner_core.problem import CONTACT, Floats, Problem, SatelliteProblem
 from planner_core.problem.plan import Action
+from planner_core.referee.contact_flow import Piece, flow
 from planner_core.referee.resource_profile import Profile
 
 _AMOUNT_TOLERANCE: Final = 1e-9  # of a recorder's capacity, in comparing sums of many pieces
@@ -80,11 +81,25 @@ def _removal(
     else:
         # Events book a contact at its start: its bits come down one after another from there.
         points = [(0.0, 0.0)]
-        rate_per_s = satellite.resources.downlink_per_s
         for action, before, after in zip(actions, profile.before, profile.after, strict=True):
-            removed = after.removed - before.removed
-            if removed > 0.0:
-                points.append((action.start_s, before.removed))
-                points.append((action.start_s + removed / rate_per_s, after.removed))
+            if after.removed > before.removed:
+                pieces = flow(problem, satellite, action)
+                points += _one_after_another(pieces, before.removed, after.removed)
     time_s, removed_by = np.array(points).T
     return time_s, removed_by
+
+
+def _one_after_another(
+    pieces: Sequence[Piece], before: float, after: float
+) -> list[tuple[float, float]]:
+    """Return what a contact has removed by when, from its first bit to its last."""
+    points = [(pieces[0].from_s, before)]
+    removed = before
+    for from_s, to_s, per_s in pieces:
+        whole = (to_s - from_s) * per_s
+        if removed + whole >= after:
+            points.append((from_s + (after - removed) / per_s, after))
+            return points
+        removed += whole
+        points.append((to_s, removed))
+    return [*points[:-1], (points[-1][0], after)]

@@ -37,7 +37,7 @@ from planner_core.worth import share_earned
 
 Mode = Literal["collect", "contact", "sunpoint", "hold"]
 ViolationCode = Literal[
-    "window", "overlap", "slew", "station", "duplicate", "battery", "recorder", "pin"
+    "window", "overlap", "slew", "station", "duplicate", "battery", "recorder", "pin", "outage"
 ]
 
 
@@ -222,7 +222,7 @@ def replay(problem: Problem, plan: Plan) -> Timeline:
         violations += found
         slews |= turns
     violations += _stations(problem, plan)
-    violations += [Violation(code="pin", **b._asdict()) for b in breaches(problem, plan)]
+    violations += [Violation(**b._asdict()) for b in breaches(problem, plan)]
 
     profiles: list[Profile | None] = [None] * len(problem.satellites)
     if problem.use_resources:
