@@ -28,8 +28,9 @@ from service.scenarios.translate import (
     scenario_from_file,
     sha256_of,
 )
-from service.stores import satellite_store
+from service.stores import outage_store, satellite_store
 from service.stores import scenario_store as store
+from service.wire.pins import PlacedOutage
 from service.wire.scenarios import (
     FileGroundStation,
     FileSatellite,
@@ -158,13 +159,23 @@ def num_targets(session: Session, catalog_ids: Sequence[str]) -> int:
 
 
 def _expanded(session: Session, body: ScenarioIn) -> ScenarioFile:
-    shared = {name: getattr(body, name) for name in Question.model_fields}
+    shared = {name: getattr(body, name) for name in Question.model_fields if name != "outages"}
     return ScenarioFile(
         **shared,
         satellites=_satellites(session, body.satellite_ids),
         targets=_targets(session, body.target_catalog_ids),
         ground_stations=_ground_stations(session, body.ground_station_ids),
+        outages=_outages(session, body),
     )
+
+
+def _outages(session: Session, body: ScenarioIn) -> list[PlacedOutage]:
+    """Return the question's own outages, and those stored that concern it."""
+    stored = outage_store.concerning(
+        session, body.satellite_ids, body.ground_station_ids, body.horizon.start, body.horizon.end
+    )
+    named = {one.id for one in body.outages}
+    return [*body.outages, *(outage_store.placed(row) for row in stored if row.id not in named)]
 
 
 def _satellites(session: Session, ids: Sequence[str]) -> list[FileSatellite]:
@@ -244,7 +255,9 @@ def _find(session: Session, table: type[R], what: str, ids: Sequence[str]) -> li
 
 
 def _summary(file: ScenarioFile, warnings: Iterable[str]) -> dict[str, Any]:
-    shown = file.model_dump(mode="json", include=set(Question.model_fields) - {"name", "pins"})
+    shown = file.model_dump(
+        mode="json", include=set(Question.model_fields) - {"name", "pins", "outages"}
+    )
     catalogs = dict.fromkeys(t.catalog_id for t in file.targets if t.catalog_id is not None)
     return shown | {
         "satellite_ids": [satellite.id for satellite in file.satellites],

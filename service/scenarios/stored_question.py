@@ -22,7 +22,7 @@ from service.scenarios.translate import (
     satellite_from,
     target_from,
 )
-from service.wire.pins import PinsIn
+from service.wire.pins import PinsIn, PlacedOutage
 from service.wire.scenarios import FileGroundStation, FileSatellite, FileTarget, HorizonIn
 from service.wire.stored import from_store
 
@@ -47,6 +47,14 @@ class StoredQuestion:
         if '"pins":' not in self._content:
             return PinsIn()
         return from_store(PinsIn, self._before_targets[0].get("pins", {}))
+
+    @cached_property
+    def outages(self) -> tuple[PlacedOutage, ...]:
+        """Return what is out."""
+        if '"outages":' not in self._content:
+            return ()
+        found = self._before_targets[0].get("outages", ())
+        return tuple(PlacedOutage.model_validate(one) for one in found)
 
     @cached_property
     def satellites(self) -> tuple[Satellite, ...]:

@@ -88,6 +88,11 @@ Name = Annotated[
 ]
 Id = Annotated[str, StringConstraints(min_length=1, max_length=200, pattern=TEXT)]
 
+Reason = Annotated[
+    str, StringConstraints(min_length=1, max_length=1000, pattern=r"^[^\x00-\x1f\x7f]*$")
+]
+"""Why, for people; printable characters."""
+
 MOST: Final = 1e9
 """Of every amount, so that sums and products of amounts stay finite and exact."""
 LEAST: Final = 1e-6
