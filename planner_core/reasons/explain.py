@@ -29,6 +29,7 @@ from planner_core.problem import (
 )
 from planner_core.problem.plan import Plan
 from planner_core.reasons.as_flown import as_flown, in_rows_of
+from planner_core.reasons.delivery import weighed_by_delivery
 from planner_core.reasons.displacing import displace_each
 from planner_core.reasons.forcing import (
     FITS,
@@ -82,6 +83,8 @@ def explain(
         made, flown = as_flown(problem, plan, targets)
         found = _forced_reasons(made.problem, flown, timeline, search, targets)
         reasons |= {target: in_rows_of(made.source, reason) for target, reason in found.items()}
+    if problem.counts_delivery:
+        reasons = weighed_by_delivery(problem, plan, timeline, reasons)
     outcomes = []
     for target in range(len(problem.target_ids)):
         collected, reason = timeline.collected.get(target), reasons.get(target)

@@ -9,7 +9,7 @@ from typing import Final, Literal
 Outcome = Literal["downlinked", "collected", "unscheduled", "excluded"]
 ReasonCode = Literal[
     "no_access", "excluded", "outage", "slew_conflict", "displaced_by", "battery", "recorder",
-    "not_considered", "solver_limit",
+    "not_considered", "not_delivered", "solver_limit",
 ]  # fmt: skip
 Certainty = Literal["proven", "verified", "heuristic"]
 

@@ -15,8 +15,11 @@ from planner_core.certified.solver import Certified
 from planner_core.domain import Objective
 from planner_core.problem import COLLECT, Problem
 from planner_core.problem.delivery import with_objective
+from planner_core.problem.plan import Plan
+from planner_core.reasons.explain import explain
 from planner_core.referee.replay import replay
 from planner_core.solvers.milp import Milp
+from planner_core.solvers.rule import Rule
 from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import TIGHT, make_problem, random_problem, varied_problem
@@ -109,3 +112,31 @@ def test_telemetry_younger_than_the_last_image_may_stay_on_board() -> None:
     assert replay(made, solution.plan).reward == 1.0
     kinds = [made.opportunities.kind[a.opportunity] for a in solution.plan.actions]
     assert kinds.count(COLLECT) == 1
+
+
+def test_a_reason_says_that_an_image_would_not_come_down() -> None:
+    tasks = [collect(0, 100.0), collect(1, 290.0), contact(330.0, 374.0)]
+    problem = make_problem(tasks, num_targets=2, resources=ROOMY)
+    problem = with_objective(problem, Objective.delivered())
+    plan = Plan.of(problem, [0, 2])
+    first, second = explain(problem, plan, replay(problem, plan))
+    assert (first.outcome, second.outcome) == ("downlinked", "unscheduled")
+    assert second.reason is not None
+    assert second.reason.code == "not_delivered"
+    assert "would not come down by the end of the horizon" in second.reason.detail
+    assert second.reason.reward_delta == 0.0
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_what_reasons_say_of_the_reward_is_what_the_referee_awards(seed: int) -> None:
+    objective = Objective(collected_share=0.3, half_life_s=None if seed % 2 else 400.0)
+    problem = with_objective(_problem(seed, "physical", 1, num_contacts=3), objective)
+    plan = Rule().solve(problem, Budget(), 0).plan
+    before = replay(problem, plan)
+    for outcome in explain(problem, plan, before):
+        reason = outcome.reason
+        if reason is None or reason.reward_delta is None or reason.opportunity is None:
+            continue
+        rows = [a.opportunity for p, a in enumerate(plan.actions) if p not in reason.blocking]
+        after = replay(problem, Plan.of(problem, [*rows, reason.opportunity]))
+        assert reason.reward_delta == pytest.approx(after.reward - before.reward, abs=1e-9)

@@ -20,6 +20,7 @@ const MEANINGS = {
   battery: "the battery would fall below its limit",
   recorder: "the recorder would rise above its limit",
   not_considered: "the search did not look at them",
+  not_delivered: "it could be taken, but would not come down in time",
   solver_limit: "there is room, but the solver did not find it",
   duplicate: "taken already",
 };
