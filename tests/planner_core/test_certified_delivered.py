@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget, Termination
+from planner_core.certified.proofs.resource_bound import quick_bound, resource_value
 from planner_core.certified.solver import Certified
 from planner_core.domain import Objective
 from planner_core.problem import COLLECT, Problem
@@ -140,3 +141,39 @@ def test_what_reasons_say_of_the_reward_is_what_the_referee_awards(seed: int) ->
         rows = [a.opportunity for p, a in enumerate(plan.actions) if p not in reason.blocking]
         after = replay(problem, Plan.of(problem, [*rows, reason.opportunity]))
         assert reason.reward_delta == pytest.approx(after.reward - before.reward, abs=1e-9)
+
+
+@pytest.mark.parametrize("dynamics", ["physical", "paper"])
+@examples(500)
+@given(
+    seed=SEEDS,
+    collected_share=st.sampled_from([0.1, 0.5, 0.9]),
+    num_satellites=st.integers(1, 2),
+    has_quality=st.booleans(),
+    price=st.floats(0.0, 1.2),
+)
+def test_a_share_for_images_on_board_bounds_every_plan(
+    dynamics: Literal["physical", "paper"],
+    seed: int,
+    collected_share: float,
+    num_satellites: int,
+    has_quality: bool,
+    price: float,
+) -> None:
+    problem = _problem(seed, dynamics, num_satellites, num_contacts=3, has_quality=has_quality)
+    problem = with_objective(problem, Objective(collected_share=collected_share))
+    best = best_reward(problem)
+    for unit in (0.05, 0.25, 1.0):
+        assert resource_value(problem, price * problem.best_worth, unit) >= best - 1e-9
+    _is_optimum(problem, best)
+
+
+def test_what_stays_on_board_lowers_the_bound() -> None:
+    """Two images, and a contact that takes down one: half of the other's worth is out of reach."""
+    tasks = [collect(0, 100.0), collect(1, 200.0), contact(330.0, 374.0)]
+    bare = replace(ROOMY, telemetry_per_s=0.0, downlink_per_s=0.002)
+    problem = make_problem(tasks, num_targets=2, resources=bare)
+    problem = with_objective(problem, Objective(collected_share=0.5))
+    assert best_reward(problem) == 1.5
+    assert quick_bound(problem, 0.0).value < 2.0
+    assert quick_bound(problem, 0.0).value >= 1.5

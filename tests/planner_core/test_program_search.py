@@ -135,8 +135,8 @@ def test_what_is_shut_is_on_no_path(seed: int, dynamics: Dynamics) -> None:
     stop = Budget().stop
     for relaxation in relaxations(problem):
         is_shut = np.random.default_rng(seed).random(len(relaxation.satellite)) < 0.3
-        most, path = relaxation.most(worth, 0, stop, keeps_path=True)
-        less, other = relaxation.without(is_shut).most(worth, 0, stop, keeps_path=True)
+        most, path = relaxation.most(worth, 1.0, 0, stop, keeps_path=True)
+        less, other = relaxation.without(is_shut).most(worth, 1.0, 0, stop, keeps_path=True)
         assert path is not None
         assert other is not None
         assert not is_shut[other].any()

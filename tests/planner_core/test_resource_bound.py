@@ -97,11 +97,11 @@ def test_a_price_of_data_changes_nothing_but_the_time(
     worth[problem.opportunities.kind == CONTACT] = 0
     stop = np.zeros(1, dtype=np.uint8)
     for relaxation in relaxations(problem, 2):
-        most, _ = replace(relaxation, data_price=0.0).most(worth, 0, stop)
+        most, _ = replace(relaxation, data_price=0.0).most(worth, 1.0, 0, stop)
         expected = None if near is None else int(near * most)
         for data_price in (relaxation.with_data_price(10).data_price, 0.1, 0.5, 2.0):
             priced = replace(relaxation, data_price=data_price)
-            found, path = priced.most(worth, 0, stop, near=expected, keeps_path=True)
+            found, path = priced.most(worth, 1.0, 0, stop, near=expected, keeps_path=True)
             assert found == most
             assert path is not None
             assert worth[relaxation.satellite.rows[path]].sum() == most

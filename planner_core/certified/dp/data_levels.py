@@ -20,7 +20,8 @@ class DataLevels(NamedTuple):
     """The data columns of a ``Network`` in levels from 0; shape ``(m,)``.
 
     ``end`` is the highest at the end, whatever the last image is; ``delivered`` where it must be
-    down.
+    down. ``least`` is the least data of a plan at each level of optimistic ones (shape
+    ``(num_levels,)``, of capacity).
     """
 
     num_levels: int
@@ -29,6 +30,7 @@ class DataLevels(NamedTuple):
     before: Ints
     after: Ints
     delivered: Ints
+    least: Floats
     start: int
     end: int
 
@@ -74,6 +76,9 @@ def data_levels(network: Network, per_collect: int, *, is_optimistic: bool) -> D
         before=limit(network.data_before),
         after=limit(network.data_after),
         delivered=delivered.astype(np.int32),
+        least=np.asarray(
+            unit * (np.arange(int(limit(highest)) + 1) + base - abs(room)), np.float64
+        ),
         start=int(rounded(network.data_start, _ROUNDING)) - base,
         end=int(limit(network.data_end)),
     )
@@ -89,6 +94,7 @@ def levels_of_part(levels: DataLevels, rows: Ints) -> DataLevels:
         levels.before[rows],
         levels.after[rows],
         levels.delivered[rows],
+        levels.least,
         levels.start,
         levels.end,
     )

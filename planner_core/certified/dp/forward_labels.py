@@ -46,6 +46,7 @@ def most_value(
     idle_need: Singles,
     after_need: Singles,
     credit: Ints,
+    end_cost: Ints,
     top: int,
     goal: int,
     keeps_labels: bool,
@@ -63,6 +64,8 @@ def most_value(
     credit
         How much less than these weights count there can be left to gain from each data level,
         where data is priced there. Shape ``(num_levels,)``.
+    end_cost
+        What a path that ends at each data level gains less, not falling. Shape ``(num_levels,)``.
     top
         No path gains more.
     keeps_labels
@@ -153,9 +156,9 @@ def most_value(
         merged += 1
     best = UNREACHED
     for y in range(min(levels.end + 1, num_levels)):
-        for v in range(max(goal, low[y]), high[y] + 1):
+        for v in range(max(goal + end_cost[y], low[y]), high[y] + 1):
             if idle[y, v] > none:
-                best = max(best, v)
+                best = max(best, v - end_cost[y])
     return best, Labels(kept_first, kept_value, kept_level, kept_energy)
 
 
@@ -177,7 +180,14 @@ def _longer(values: np.ndarray, length: int) -> np.ndarray:
 
 
 @kernel
-def path_of(network: Network, levels: DataLevels, weight: Ints, labels: Labels, value: int) -> Ints:
+def path_of(
+    network: Network,
+    levels: DataLevels,
+    weight: Ints,
+    end_cost: Ints,
+    labels: Labels,
+    value: int,
+) -> Ints:
     """Return the rows of a path that gains ``value``, in order, worked out backward.
 
     Any label from which the next one follows to the last bit is as good as the one it was
@@ -191,7 +201,8 @@ def path_of(network: Network, levels: DataLevels, weight: Ints, labels: Labels, 
         first_kept += 1
     k, level, energy = m, levels.end, -np.inf
     while True:
-        is_start = value == 0 and k <= first_kept
+        at_start = value + end_cost[levels.start] if k == m else value
+        is_start = at_start == 0 and k <= first_kept
         if is_start and _leads_to(network, levels, k, 0.0, levels.start, network.energy_start,
                                   level, energy):  # fmt: skip
             break
@@ -201,7 +212,8 @@ def path_of(network: Network, levels: DataLevels, weight: Ints, labels: Labels, 
             if labels.first[i + 1] > labels.first[i] and may_be_next(network, i, k):
                 give = give_between(network, i, k)
                 for at in range(labels.first[i], labels.first[i + 1]):
-                    if labels.value[at] == value and _leads_to(
+                    ended = end_cost[labels.level[at]] if k == m else 0
+                    if labels.value[at] == value + ended and _leads_to(
                         network, levels, k, give, labels.level[at], labels.energy[at],
                         level, energy,
                     ):  # fmt: skip
@@ -214,7 +226,7 @@ def path_of(network: Network, levels: DataLevels, weight: Ints, labels: Labels, 
         rows[length] = k
         length += 1
         level, energy = labels.level[found], labels.energy[found]
-        value -= weight[k]
+        value = labels.value[found] - weight[k]
     return rows[:length][::-1].copy()
 
 

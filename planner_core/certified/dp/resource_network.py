@@ -33,7 +33,7 @@ from planner_core.precedence.relation import (
     Precedence,
     comes_before,
     direct_precedence,
-    is_transitive,
+    is_transitive_on,
 )
 from planner_core.problem import (
     COLLECT,
@@ -149,13 +149,18 @@ def _network(problem: Problem, satellite: SatelliteProblem, slack: float) -> Net
         energy_start=track.battery_start,
         data_start=track.recorder_start,
         data_end=top - track.telemetry_per_s * track.data_end_s,
-        must_deliver=must_deliver(problem),
+        must_deliver=must_deliver(problem, satellite),
     )
 
 
-def must_deliver(problem: Problem) -> bool:
-    """Return whether some best plan holds only images that come down, and what it must take."""
-    return problem.counts_delivery and problem.objective.is_delivered and is_transitive(problem)
+def must_deliver(problem: Problem, satellite: SatelliteProblem) -> bool:
+    """Return whether plans hold only images that come down, what they must take, and little else.
+
+    That is how some best plan is where images count on the ground alone.
+    """
+    is_asked = problem.objective.is_delivered or problem.left_on_board is not None
+    is_asked = is_asked and problem.counts_delivery
+    return is_asked and is_transitive_on(satellite)
 
 
 def _delivered(
@@ -168,6 +173,7 @@ def _delivered(
     if slack == 0.0:
         # A plan brings down what it must take, too, where that is possible.
         kept = kept[problem.worth[satellite.rows[kept]] == 0.0]
+        emptied = emptied + (problem.left_on_board or 0.0)
     delivered = emptied + float(fill[kept].sum()) + 3.0 * slack
     delivered[kept] = _ANY_LEVEL
     return delivered

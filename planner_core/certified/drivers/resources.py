@@ -18,6 +18,7 @@ import numpy as np
 
 from planner_core.budget import Budget, ignored
 from planner_core.certified.drivers.agility_only import Effort
+from planner_core.certified.drivers.commitments import best_commitment
 from planner_core.certified.drivers.fleet import solve_without_resources
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.alternating import TurnSearch
@@ -244,7 +245,12 @@ def solve_with_resources(problem: Problem, budget: Budget, seed: int, gap: float
         preferred = search.without_resources()
         choices.start(preferred, 1.0)
         search.best.offer(choices.plan)
-    turns = TurnSearch(problem, best.plan, unit, budget, seed)
+    committed = best_commitment(best, unit, _FIRST_GOAL, seed)
+    turns = (
+        TurnSearch(committed.problem, committed.plan, unit, budget, seed)
+        if committed
+        else TurnSearch(problem, best.plan, unit, budget, seed)
+    )
     search.search(turns, int(np.clip(len(problem.opportunities) // _TASKS_A_MOVE, *_FIRST_MOVES)))
     _close_in(search, turns)
     if not search.best.is_done:
@@ -257,7 +263,11 @@ def _close_in_fleet(search: ResourceSearch, unit: float) -> None:
 
     What is left of a small fleet HiGHS soon settles.
     """
-    turns = TurnSearch(search.problem, search.best.plan, unit, search.budget, search.seed)
+    committed = best_commitment(search.best, unit, _FIRST_GOAL, search.seed)
+    if committed:
+        turns = TurnSearch(committed.problem, committed.plan, unit, search.budget, search.seed)
+    else:
+        turns = TurnSearch(search.problem, search.best.plan, unit, search.budget, search.seed)
     pool = PlanPool(search.problem, search.budget, search.seed)
     with ThreadPoolExecutor(search.budget.num_threads) as threads:
         pricing = _FleetPricing(search)

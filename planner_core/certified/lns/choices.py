@@ -46,6 +46,8 @@ class SatelliteChoices:
         Of each task; -1 for contacts. Shape ``(m,)``.
     weight
         Worth of each task in units. Shape ``(m,)``.
+    may_stay
+        Whether images may stay on board.
     """
 
     rows: Ints
@@ -53,6 +55,7 @@ class SatelliteChoices:
     levels: DataLevels
     target: Ints
     weight: Ints
+    may_stay: bool
 
     @classmethod
     def of(cls, problem: Problem, index: int, unit: float) -> SatelliteChoices:
@@ -66,6 +69,7 @@ class SatelliteChoices:
             network=network,
             levels=data_levels(network, 2, is_optimistic=False),
             target=target,
+            may_stay=problem.left_on_board is not None and problem.left_on_board > 0.0,
             # Far above the bound, of which there are at most so many: such a task is in no plan.
             weight=np.minimum(np.round(worth / unit), _MOST_UNITS).astype(np.int32),
         )
@@ -75,7 +79,7 @@ class SatelliteChoices:
 
         Answers -1 and no tasks where there is none. Targets may be collected again and again.
         """
-        if self.network.must_deliver:
+        if self.network.must_deliver and not self.may_stay:
             allowed = allowed & ((self.target < 0) | self._comes_down(allowed))
         rows = np.flatnonzero(allowed | self.network.is_kept).astype(np.int32)
         nothing = rows[:0]
@@ -95,11 +99,11 @@ class SatelliteChoices:
         idle, after = idle[:, : top + 1].copy(), after[:, : top + 1].copy()
         credit = np.zeros(levels.num_levels, dtype=np.int32)
         value, labels = most_value(
-            network, levels, weight, idle, after, credit, top, max(goal, 0), True, stop
+            network, levels, weight, idle, after, credit, credit, top, max(goal, 0), True, stop
         )
         if value < 0:
             return -1, nothing
-        return value, rows[path_of(network, levels, weight, labels, value)]
+        return value, rows[path_of(network, levels, weight, credit, labels, value)]
 
     def _comes_down(self, allowed: Bools) -> Bools:
         """Return the tasks that lie before an allowed contact."""

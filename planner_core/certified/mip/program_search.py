@@ -167,7 +167,9 @@ class ProgramSearch:
             if not group[table.satellite[satellite.rows[0]]]:
                 continue
             is_shut = blocked_rows(self._problem, satellite, taken + drawn) != 0
-            _, path = relaxation.without(is_shut).most(worth, 0, self._budget.stop, keeps_path=True)
+            _, path = relaxation.without(is_shut).most(
+                worth, self._unit, 0, self._budget.stop, keeps_path=True
+            )
             if path is None:
                 return ()
             drawn += satellite.rows[self._needed_contacts(relaxation.network, path)].tolist()

@@ -141,7 +141,7 @@ def resource_terms(problem: Problem, satellite: SatelliteProblem) -> ResourceTer
         if problem.dynamics == "physical"
         else event_terms(satellite)
     )
-    if not must_deliver(problem):
+    if not must_deliver(problem, satellite):
         return terms
     return replace(terms, delivered=network_of(problem, satellite).delivered)
 

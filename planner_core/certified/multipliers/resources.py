@@ -158,8 +158,10 @@ class PriceSearch:
         for i, relaxation in enumerate(self.satellites):
             near = self._known(i, worth)
             if near is None:
-                near, _ = relaxation.most(worth, 0, self._stop)
-            most, path = relaxation.most(worth, 0, self._stop, near=near, keeps_path=True)
+                near, _ = relaxation.most(worth, self.unit, 0, self._stop)
+            most, path = relaxation.most(
+                worth, self.unit, 0, self._stop, near=near, keeps_path=True
+            )
             if path is None:
                 return None
             units += most

@@ -26,6 +26,7 @@ from planner_core.certified.dp.forward_labels import (
 from planner_core.certified.dp.resource_network import Network, network_of
 from planner_core.certified.proofs.bound import Bound, rounded_bound
 from planner_core.certified.proofs.lagrangian import lagrangian_bound
+from planner_core.precedence.relation import is_transitive_on
 from planner_core.problem import (
     COLLECT,
     Bools,
@@ -36,16 +37,18 @@ from planner_core.problem import (
     SatelliteProblem,
     Singles,
 )
-from planner_core.worth import surplus, weights
+from planner_core.worth import common_unit, surplus, weights
 
 _MAX_CELLS: Final = 30_000_000  # of one table of least energy
 _MAX_UNITS: Final = 2000
 _FIRST_STEP: Final = 0.01
 _SHARES: Final = (0.0, 0.25, 0.5, 0.75, 1.0)  # of prices that hold where agility alone counts
 _TRIED: Final = 2
+_PARTS: Final = 4  # of whole rewards, where images may earn parts of them
 _FEW: Final = 1000  # opportunities whose programme takes no time
 _TRIAL_UNITS: Final = 24  # of an image, in the search for a price of data
 _ROUNDING: Final = 1e-9  # of a unit
+_LEFT_SLACK: Final = 3e-9  # of a recorder's capacity, that the referee forgives
 _SPAN: Final = 0.6  # of an image: telemetry in a span of the last image
 FINE: Final = 8
 """Levels of the recorder that the smallest collect fills, where a proof counts."""
@@ -62,6 +65,8 @@ class SatelliteRelaxation:
     classes
         The levels with the last image in one span after another, from the last one on, where it
         must come down: what may be left at the end hangs on that. The same levels otherwise.
+    shares
+        What images earn less that stay on board, where they earn something there.
     data_price
         What the data of a collect is worth, about, in typical collects.
     """
@@ -70,6 +75,7 @@ class SatelliteRelaxation:
     network: Network
     levels: DataLevels
     classes: tuple[DataLevels, ...]
+    shares: _Shares | None = None
     data_price: float = 0.0
 
     @classmethod
@@ -80,7 +86,10 @@ class SatelliteRelaxation:
         network = network_of(problem, satellite)
         levels = data_levels(network, levels_per_collect, is_optimistic=True)
         classes = _classes(problem, satellite, network, levels)
-        return cls(satellite=satellite, network=network, levels=levels, classes=classes)
+        shares = _Shares.of(problem, satellite, network)
+        return cls(
+            satellite=satellite, network=network, levels=levels, classes=classes, shares=shares
+        )
 
     def with_data_price(self, num_images: int) -> SatelliteRelaxation:
         """Return the same with the price of data at which the battery alone allows least.
@@ -115,6 +124,7 @@ class SatelliteRelaxation:
     def most(
         self,
         worth: Ints,
+        unit: float,
         enough: int,
         stop: Bytes,
         *,
@@ -130,19 +140,27 @@ class SatelliteRelaxation:
         ----------
         worth
             In units, of every opportunity of the problem. Shape ``(n,)``.
+        unit
+            What they are.
         near
             What is expected at least, if anything.
         keeps_path
             Whether to answer the path.
         """
         weight = worth[self.satellite.rows]
+        end_cost = np.zeros(self.levels.num_levels, dtype=np.int32)
+        if self.shares is not None:
+            weight = self.shares.weights(weight, unit)
+            end_cost = self.shares.end_cost(self.levels, unit)
         best, path = UNREACHED, None
         for number, levels in enumerate(self.classes):
             least = max(enough, best + 1)
             own = np.where(levels.before < 0, 0, weight).astype(np.int32)
             if number and _Needs.of(self.network, levels, own, 0.0, near).top < least:
                 break  # there is no more to gain by images that lie earlier still
-            gained, found = self._most_of_class(levels, own, least, stop, near, keeps_path)
+            gained, found = self._most_of_class(
+                levels, own, end_cost, least, stop, near, keeps_path
+            )
             if gained == STOPPED:
                 return max(_Needs.of(self.network, self.levels, weight, 0.0, near).top, 0), None
             if gained != UNREACHED:
@@ -153,6 +171,7 @@ class SatelliteRelaxation:
         self,
         levels: DataLevels,
         weight: Ints,
+        end_cost: Ints,
         least: int,
         stop: Bytes,
         near: int | None,
@@ -164,8 +183,9 @@ class SatelliteRelaxation:
         ----------
         levels
             The recorder where the last image lies in a certain span.
-        weight
-            In units, of each task of the satellite. Shape ``(m,)``.
+        weight, end_cost
+            In units, of each task of the satellite and of each level at the end. Shapes ``(m,)``
+            and ``(num_levels,)``.
         """
         needs = _Needs.of(self.network, levels, weight, self._price_in(weight), near)
         top = needs.top
@@ -177,7 +197,7 @@ class SatelliteRelaxation:
             # Labels that cannot reach the goal are dropped: the higher, the quicker.
             goal = max(least, goal - step, 0)
             most, labels = most_value(
-                self.network, levels, weight, needs.idle, needs.after, needs.credit,
+                self.network, levels, weight, needs.idle, needs.after, needs.credit, end_cost,
                 top, goal, keeps_path, stop,
             )  # fmt: skip
             if most == STOPPED:
@@ -185,7 +205,7 @@ class SatelliteRelaxation:
             if most != UNREACHED:
                 if not keeps_path:
                     return most, None
-                return most, path_of(self.network, levels, weight, labels, most)
+                return most, path_of(self.network, levels, weight, end_cost, labels, most)
             goal, step = goal - 1, 2 * step
         return UNREACHED, None
 
@@ -195,6 +215,73 @@ class SatelliteRelaxation:
         filled = self.levels.gain[self.levels.gain > 0]
         least = int(filled.min()) if len(filled) else 1
         return float(np.round(self.data_price * typical)) / least
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Shares:
+    r"""What images earn less that stay on board, as a price of what a recorder holds at the end.
+
+    An image that stays is worth :math:`w_k - l_k` at the prices of the targets, one that comes down
+    :math:`w_k`. What stays is at least what the recorder holds at the end, less all telemetry and
+    what it held at the start: :math:`\sum_{stay} s_k \ge g`. For any :math:`\mu \ge 0` a plan gains
+    :math:`\sum_k \max(w_k, w_k - l_k + \mu s_k) - \mu g` at most.
+
+    Attributes
+    ----------
+    lost, size
+        :math:`l_k`, and the image's data in recorder capacities, both 0 for contacts. Shape
+        ``(m,)``.
+    per_data
+        :math:`\mu`.
+    held
+        What the recorder holds at the start.
+    """
+
+    lost: Floats
+    size: Floats
+    is_kept: Bools
+    per_data: float
+    held: float
+
+    @classmethod
+    def of(cls, problem: Problem, satellite: SatelliteProblem, network: Network) -> _Shares | None:
+        """Return them where they matter; None where a task may be a detour for others."""
+        objective, rows = problem.objective, satellite.rows
+        if (
+            not problem.counts_delivery
+            or objective.half_life_s is not None
+            or network.must_deliver
+            or not is_transitive_on(satellite)
+        ):
+            return None
+        is_image = satellite.kind == COLLECT
+        size = np.where(is_image, satellite.end_s - satellite.start_s, 0.0)
+        size *= satellite.resources.collect_fill_per_s
+        on_board = objective.collected_share * problem.worth_on_ground[rows]
+        lost = np.where(is_image, problem.worth[rows] - on_board, 0.0)
+        counts = (lost > 0.0) & (size > 0.0)
+        if not counts.any():
+            return None
+        return cls(
+            lost=lost,
+            size=size,
+            is_kept=network.is_kept,
+            per_data=float(np.median(lost[counts] / size[counts])),
+            held=network.data_start,
+        )
+
+    def weights(self, weight: Ints, unit: float) -> Ints:
+        """Return what images count at most, in units, of what they are worth on the ground."""
+        worth = weight * unit
+        stays = np.maximum(worth - self.lost, 0.0) + self.per_data * self.size
+        # Whoever takes an image for nothing can do without.
+        most = np.where((weight > 0) | self.is_kept, np.maximum(worth, stays), 0.0)
+        return np.ceil(most / unit - _ROUNDING).astype(np.int32)
+
+    def end_cost(self, levels: DataLevels, unit: float) -> Ints:
+        """Return what a recorder costs that ends at each level, in units."""
+        left = np.maximum(levels.least - self.held - _LEFT_SLACK, 0.0)
+        return np.floor(self.per_data * left / unit).astype(np.int32)
 
 
 def _classes(
@@ -318,7 +405,7 @@ def _value(
     paid = float(prices.sum())
     # What the other satellites gain is known only afterwards: one alone may stop early.
     units_enough = int(np.floor((enough - paid) / unit)) if len(satellites) == 1 else 0
-    units = sum(s.most(worth, max(units_enough, 0), stop)[0] for s in satellites)
+    units = sum(s.most(worth, unit, max(units_enough, 0), stop)[0] for s in satellites)
     rounded_away = _ROUNDING * len(problem.opportunities) * unit
     return max(paid + units * unit + rounded_away, enough)
 
@@ -372,6 +459,9 @@ def _unit(problem: Problem, satellites: tuple[SatelliteRelaxation, ...], value: 
     most_units = min(_MAX_UNITS, _MAX_CELLS // largest)
     if problem.reward_unit > 0.0 and value <= most_units:
         return 1.0
+    whole = common_unit(problem.worth_on_ground)
+    if whole > 0.0 and value <= most_units * whole:
+        return whole / min(_PARTS, most_units * whole // value)
     return max(value / most_units, 1e-12)
 
 
