@@ -23,7 +23,8 @@ from planner_core.referee.replay import replay
 from planner_core.worth import share_earned
 
 _IMAGES: Final = (40, 20, 10, 5, 2, 0)  # typical ones, of each satellite
-_PATIENCE: Final = 2  # amounts that lead to nothing better
+_IMAGES_OF_FLEETS: Final = (20, 5, 0)
+_PATIENCE: Final = 2  # commitments that lead to nothing better
 _HALF_LIVES: Final = (0.25, 0.5, 1.0, 2.0)  # between contacts
 _LEAST_SHARE: Final = 0.4  # of the longest contact: shorter ones bring little down
 
@@ -49,7 +50,7 @@ def best_commitment(best: Incumbent, unit: float, first_goal: float, seed: int) 
     problem = best.problem
     if not problem.counts_delivery or problem.objective.is_delivered:
         return None
-    found, most, idle = None, best.reward, 0
+    found, most, idle = None, -np.inf, 0
     for part in _commitments(problem):
         if best.budget.is_spent() or idle == _PATIENCE:
             break
@@ -59,17 +60,20 @@ def best_commitment(best: Incumbent, unit: float, first_goal: float, seed: int) 
         reward = replay(problem, choices.plan).reward
         idle += 1
         if reward > most:
-            found, most, idle = Committed(problem=part, plan=choices.plan), reward, 0
+            found = None if part is problem else Committed(problem=part, plan=choices.plan)
+            most, idle = reward, 0
         best.report("plans")
     return found
 
 
 def _commitments(problem: Problem) -> Iterator[Problem]:
     """Yield the problem under one commitment after another."""
+    yield problem
     half_life_s = problem.objective.half_life_s
     if half_life_s is None:
         fill = _typical_fill(problem)
-        for num_images in _IMAGES:
+        is_fleet = sum(len(satellite) > 0 for satellite in problem.satellites) > 1
+        for num_images in _IMAGES_OF_FLEETS if is_fleet else _IMAGES:
             yield replace(problem, left_on_board=num_images * fill)
         return
     yield replace(problem, left_on_board=0.0)

@@ -386,7 +386,7 @@ def _close_in(search: ResourceSearch, turns: TurnSearch) -> None:
         if not is_new and not is_better:
             is_better = search.fix_contacts(is_last=True)
             is_better |= search.search(turns, _FURTHER_MOVES)
-        if is_better:
+        if is_better and turns.problem is search.problem:
             turns.adopt(best.plan)
         idle_rounds = 0 if is_new or is_better else idle_rounds + 1
 

@@ -38,6 +38,8 @@ class TurnSearch:
 
     Attributes
     ----------
+    problem
+        What it plans: the same opportunities, perhaps under a commitment.
     ended
         What each start but the last has led to.
     usage
@@ -45,7 +47,7 @@ class TurnSearch:
     """
 
     def __init__(self, problem: Problem, start: Plan, unit: float, budget: Budget, seed: int):
-        self._problem, self._start, self._budget = problem, start, budget
+        self.problem, self._start, self._budget = problem, start, budget
         self._num_satellites = sum(len(s) > 0 for s in problem.satellites)
         self._choices = ChoiceSearch(problem, unit, seed, budget.stop)
         self._seed, self._num_starts, self._idle_steps = seed, 0, _STALLED
@@ -68,7 +70,7 @@ class TurnSearch:
         if self._num_starts:
             self.ended.append(self.plan)
         # A seed of its own for each start of each search.
-        self._windows = ResourceWindows(self._problem, self._seed + _STARTS * self._num_starts)
+        self._windows = ResourceWindows(self.problem, self._seed + _STARTS * self._num_starts)
         self._windows.adopt(self._start)
         self._num_starts, self._idle_steps = self._num_starts + 1, 0
         # Whole days first: once most targets are taken, contacts hardly move.
