@@ -11,7 +11,7 @@ from sqlalchemy.orm import Session
 
 from service.api import ask_again
 from service.api import job_intake as intake
-from service.api.conditional import NOT_MODIFIED, created, unless_known
+from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
 from service.api.deps import Call, CallDep
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
@@ -98,11 +98,12 @@ def get_comparison(comparison_id: str, call: CallDep) -> ComparisonOut | Respons
     return unless_known(call.request, call.response, shown)
 
 
-@router.delete("/{comparison_id}", status_code=204, responses=problem_responses(404))
+@router.delete("/{comparison_id}", status_code=204, responses=problem_responses(404, 412))
 def delete_comparison(comparison_id: str, call: CallDep) -> None:
     """Delete a comparison. Its runs stay jobs like any other."""
     with call.database.transaction() as session:
-        _find(session, comparison_id, call)
+        row = _find(session, comparison_id, call)
+        require_match(call.request, lambda: _shown(session, [row])[0])
         deletion.delete_comparison(session, comparison_id)
         call.audit.record(session, "delete", "comparison", comparison_id)
 

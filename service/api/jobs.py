@@ -9,7 +9,7 @@ from fastapi import APIRouter, Depends, Query, Response
 from sqlalchemy.exc import SQLAlchemyError
 
 from service.api import job_intake as intake
-from service.api.conditional import NOT_MODIFIED
+from service.api.conditional import NOT_MODIFIED, require_match_of
 from service.api.deps import CallDep, own_job_only
 from service.api.errors import problem_responses
 from service.api.etags import matches
@@ -136,11 +136,13 @@ def cancel_job(job_id: str, call: CallDep) -> JobOut:
     return answer
 
 
-@router.delete("/{job_id}", status_code=204, responses=problem_responses(404, 409))
+@router.delete("/{job_id}", status_code=204, responses=problem_responses(404, 409, 412))
 def delete_job(job_id: str, call: CallDep) -> None:
     """Delete a finished job with its answer, for good: not one that a plan or a comparison has."""
     with call.database.transaction() as session:
-        deletion.delete_job(session, intake.find_job(session, job_id))
+        job = intake.find_job(session, job_id)
+        require_match_of(call.request, etag_of_job(job))
+        deletion.delete_job(session, job)
         call.audit.record(session, "delete", "job", job_id)
 
 

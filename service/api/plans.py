@@ -125,11 +125,13 @@ def get_plan(plan_id: str, call: CallDep) -> PlanOut | Response:
     return unless_known(call.request, call.response, shown)
 
 
-@router.delete("/{plan_id}", status_code=204, responses=problem_responses(404, 409))
+@router.delete("/{plan_id}", status_code=204, responses=problem_responses(404, 409, 412))
 def delete_plan(plan_id: str, call: CallDep) -> None:
     """Delete a plan for good: not an approved or published one, nor one that has changes."""
     with call.database.transaction() as session:
-        deletion.delete_plan(session, _find(session, plan_id, call.caller))
+        plan = _find(session, plan_id, call.caller)
+        require_match(call.request, lambda: _shown(session, plan))
+        deletion.delete_plan(session, plan)
         call.audit.record(session, "delete", "plan", plan_id)
 
 

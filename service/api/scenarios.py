@@ -16,7 +16,7 @@ from planner_core.orbits.places import View
 from planner_core.problem import COLLECT, CONTACT
 from service.access.callers import Caller
 from service.api import job_intake as intake
-from service.api.conditional import NOT_MODIFIED, created, unless_known
+from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
 from service.api.deps import CallDep
 from service.api.errors import problem_responses
 from service.api.etags import etag_of, matches
@@ -109,11 +109,13 @@ def _file(request: Request, row: ScenarioRow) -> Response:
     return Response(text, media_type="application/json", headers={"ETag": etag})
 
 
-@router.delete("/{scenario_id}", status_code=204, responses=problem_responses(404, 409))
+@router.delete("/{scenario_id}", status_code=204, responses=problem_responses(404, 409, 412))
 def delete_scenario(scenario_id: str, call: CallDep) -> None:
     """Delete a scenario for good, with its opportunities: not one that jobs have."""
     with call.database.transaction() as session:
-        deletion.delete_scenario(session, _find(session, scenario_id, call.caller))
+        row = _find(session, scenario_id, call.caller)
+        require_match(call.request, lambda: _shown(row))
+        deletion.delete_scenario(session, row)
         call.audit.record(session, "delete", "scenario", scenario_id)
 
 
