@@ -30,6 +30,7 @@ from service.api import (
     satellites,
     scenarios,
     solvers,
+    spacecraft,
     target_catalogs,
     timelines,
     webhooks,
@@ -63,6 +64,7 @@ DESCRIPTION = (
 ROUTERS = (
     element_exports.router,
     satellites.router,
+    spacecraft.router,
     ground_stations.router,
     target_catalogs.router,
     scenarios.router,

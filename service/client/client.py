@@ -18,6 +18,7 @@ from service.client.jobs import Jobs
 from service.client.plans import Plans
 from service.client.satellites import Satellites
 from service.client.scenarios import Scenarios
+from service.client.spacecraft import SpacecraftTypes
 from service.client.target_catalogs import TargetCatalogs
 from service.client.transport import Transport, held, path_of
 from service.client.webhooks import Webhooks
@@ -44,6 +45,7 @@ class Client:
 
     satellites: Satellites
     ground_stations: GroundStations
+    spacecraft: SpacecraftTypes
     target_catalogs: TargetCatalogs
     scenarios: Scenarios
     jobs: Jobs
@@ -73,6 +75,7 @@ class Client:
         self._transport = Transport(self._http, patience_s=patience_s)
         self.satellites = Satellites(self._transport)
         self.ground_stations = GroundStations(self._transport)
+        self.spacecraft = SpacecraftTypes(self._transport)
         self.target_catalogs = TargetCatalogs(self._transport)
         self.scenarios = Scenarios(self._transport)
         self.jobs = Jobs(self._transport)

@@ -36,6 +36,7 @@ from service.wire.scenarios import (
     ScenarioFile,
     ScenarioIn,
 )
+from service.wire.spacecraft_types import BUILT_IN
 
 R = TypeVar("R", SatelliteRow, TargetCatalogRow, GroundStationRow)
 
@@ -172,6 +173,7 @@ def _satellites(session: Session, ids: Sequence[str]) -> list[FileSatellite]:
             {
                 "id": row.id,
                 "name": row.name,
+                "spacecraft": row.spacecraft if row.spacecraft in BUILT_IN else None,
                 "agility": row.agility,
                 "sensor": row.sensor,
                 "resources": row.resources,
