@@ -46,6 +46,7 @@ from planner_core.problem import (
     Sunlight,
     build_satellite_problem,
 )
+from planner_core.problem.delivery import with_objective
 from planner_core.problem.pointing import Path, Pointing
 from planner_core.worth import quality_of, worth_of_collects
 
@@ -322,7 +323,7 @@ def build_problem(scenario: Scenario, computed: ScenarioOpportunities, budget: B
         opportunities=computed.opportunities,
         satellites=tuple(satellites),
     )
-    return pinned_problem(scenario, problem)
+    return pinned_problem(scenario, with_objective(problem, scenario.objective))
 
 
 def _worth(scenario: Scenario, table: Opportunities) -> Floats:

@@ -16,6 +16,10 @@ Epoch
     The instant an element set is given for.
 Reward, quality, worth
     What a perfect image of a target earns; how good an image is, from 0 to 1; their product.
+Objective
+    Which part of that an image earns when it is taken, and which when it is on the ground.
+Outage
+    A span in which a satellite or a station is not to be had.
 Pin
     What a plan must hold, or must not; see ``planner_core.pins``.
 Off-nadir angle
@@ -29,6 +33,8 @@ Every type is immutable and checks itself when made.
 from __future__ import annotations
 
 from planner_core.domain.horizon import Horizon
+from planner_core.domain.objective import Objective
+from planner_core.domain.outages import Outage
 from planner_core.domain.places import GroundStation, Target
 from planner_core.domain.quality import Curve, Quality
 from planner_core.domain.scenario import CollectAlignment, Dynamics, Scenario
@@ -54,8 +60,10 @@ __all__ = [
     "Horizon",
     "LookSide",
     "Nadir",
+    "Objective",
     "OrbitDirection",
     "OrbitElements",
+    "Outage",
     "Quality",
     "Resources",
     "Satellite",

@@ -10,6 +10,8 @@ import numpy as np
 
 from planner_core.domain.checks import require
 from planner_core.domain.horizon import Horizon
+from planner_core.domain.objective import Objective
+from planner_core.domain.outages import Outage
 from planner_core.domain.places import GroundStation, Target
 from planner_core.domain.quality import Quality
 from planner_core.domain.spacecraft import Satellite
@@ -31,8 +33,13 @@ class Scenario:
         from the horizon's start.
     quality
         What part of its target's reward an image earns, by how it is taken.
+    objective
+        What of that it earns when it is taken, and what when it is on the ground. Without
+        resources there are no contacts, and images earn all when they are taken.
     allow_old_elements
         Plan with element sets of any age (see ``build.check_element_age``).
+    outages
+        What is known to be out, and when.
     """
 
     horizon: Horizon
@@ -45,8 +52,10 @@ class Scenario:
     collect_alignment: CollectAlignment = "access"
     continuous_starts: bool = False
     quality: Quality = field(default_factory=Quality)
+    objective: Objective = field(default_factory=Objective)
     allow_old_elements: bool = False
     pins: Pins = field(default_factory=Pins)
+    outages: tuple[Outage, ...] = ()
     warnings: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
@@ -97,12 +106,16 @@ class Scenario:
                     f"The {what} id {value!r} appears twice.",
                     pointer=f"/{what}s/{position}/id",
                 )
+        satellite_ids = {s.id for s in self.satellites}
+        station_ids = {g.id for g in self.ground_stations}
         self.pins.check(
-            {s.id for s in self.satellites},
+            satellite_ids,
             {t.id for t in self.targets},
-            {g.id for g in self.ground_stations},
+            station_ids,
             has_contacts=self.use_resources,
         )
+        for position, outage in enumerate(self.outages):
+            outage.check(f"/outages/{position}", satellite_ids, station_ids)
 
     def _check_downlinks(self) -> None:
         """Refuse passes in which telemetry may fill the recorder faster than it is emptied.

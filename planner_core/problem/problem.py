@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from planner_core.domain import Agility, Dynamics, Resources
+from planner_core.domain import Agility, Dynamics, Objective, Resources
 from planner_core.problem.downlink import Downlinks
 from planner_core.problem.pointing import Pointing, Vector, sight
 from planner_core.problem.sun_turns import SunPath, SunTurns
@@ -37,7 +37,7 @@ NEVER_VISIBLE: Final = 1
 OUTSIDE_LIMITS: Final = 2
 ACCESS_TOO_SHORT: Final = 3
 RULED_OUT: Final = 4
-"""Geometry would allow it; what the scenario pins leaves no opportunity."""
+"""Geometry would allow it; what the scenario pins, or what is out, leaves no opportunity."""
 WRONG_SENSOR_TYPE: Final = 5
 OUTSIDE_TIMES: Final = 6
 """An access is long enough, but not between the target's release and due times."""
@@ -195,18 +195,40 @@ class Kept:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Blocked:
-    """A span in which a satellite may not do tasks of some kinds."""
+    """A span in which a satellite or a station may not do tasks of some kinds.
 
-    satellite: int
+    Attributes
+    ----------
+    satellite, station
+        Whose span it is: an index of the scenario's satellites, or of its stations.
+    pointer
+        The pin or the outage that says so.
+    """
+
     start_s: float
     end_s: float
     kinds: frozenset[int]
     pointer: str
+    satellite: int | None = None
+    station: int | None = None
+
+    @property
+    def is_outage(self) -> bool:
+        """Whether it is a fact that was reported, and not an operator's wish."""
+        return self.pointer.startswith("/outages/")
+
+    def concerns(self, satellite: int, kind: int, place: int) -> bool:
+        """Return whether such a task may not overlap the span."""
+        if kind not in self.kinds:
+            return False
+        if self.station is not None:
+            return kind == CONTACT and place == self.station
+        return satellite == self.satellite
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Struck:
-    """A collect that pins rule out.
+    """A collect that pins or outages rule out.
 
     Attributes
     ----------
@@ -214,6 +236,8 @@ class Struck:
         Of the scenario's table, which the problem no longer has.
     kept
         Rows of the problem that it cannot stand beside; none where it is ruled out itself.
+    by_outage
+        Whether it lies in an outage.
     """
 
     row: int
@@ -221,14 +245,17 @@ class Struck:
     start_s: float
     end_s: float
     kept: tuple[int, ...] = ()
+    by_outage: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pinned:
-    """What the scenario pins, in terms of the problem.
+    """What the scenario pins, and what is out, in terms of the problem.
 
     Attributes
     ----------
+    blocked
+        Spans that pins block, and outages.
     skipped
         Rows that no plan may take, as long as they are in the table, and the pin that says so.
     forbidden
@@ -251,8 +278,13 @@ class Problem:
     Attributes
     ----------
     worth
-        What an image by each opportunity earns alone, 0 for contacts (see ``planner_core.worth``).
+        What an image by each opportunity earns alone at most, 0 for contacts (see
+        ``planner_core.worth``).
         With continuous starts all collects of an access are worth the same. Shape ``(n,)``.
+    full_worth
+        The same for an image that is on the ground at once; None where that is ``worth``.
+    objective
+        What of its full worth an image earns when.
     target_access
         Why a target has no opportunity, or ``ACCESS_FOUND``. Shape ``(num_targets,)``.
     station_antennas
@@ -281,6 +313,8 @@ class Problem:
     downlinks: Downlinks
     opportunities: Opportunities
     satellites: tuple[SatelliteProblem, ...]
+    full_worth: Floats | None = None
+    objective: Objective = field(default_factory=Objective)
     pointing: Pointing | None = None
     pinned: Pinned = Pinned()
     origin: Ints | None = None
@@ -323,10 +357,28 @@ class Problem:
     @cached_property
     def reward_unit(self) -> float:
         """Return an amount of which what any plan earns is a multiple; 0 where there is none."""
-        return common_unit(self.worth)
+        if not self.counts_delivery or self.objective.is_delivered:
+            return common_unit(self.worth)
+        if self.objective.half_life_s is not None:
+            return 0.0
+        shares = (1.0, self.objective.collected_share)
+        return common_unit(np.concatenate([share * self.worth_on_ground for share in shares]))
+
+    @property
+    def counts_delivery(self) -> bool:
+        """Whether what an image earns hangs on when it is on the ground."""
+        return self.use_resources and self.objective.counts_delivery
+
+    @property
+    def worth_on_ground(self) -> Floats:
+        """Return what each image earns alone that is on the ground at once. Shape ``(n,)``."""
+        return self.worth if self.full_worth is None else self.full_worth
 
     def worth_of(self, rows: npt.NDArray[np.integer]) -> float:
-        """Return what a plan earns that takes these opportunities and breaks nothing."""
+        """Return what a plan earns at most that takes these opportunities and breaks nothing.
+
+        It earns that where all that it takes is on the ground as early as it can be.
+        """
         images = rows[self.opportunities.kind[rows] == COLLECT]
         return worth_of(self.opportunities.place[images], self.worth[images])
 

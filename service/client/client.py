@@ -15,6 +15,7 @@ import planner_core
 from service.client.comparisons import Comparisons
 from service.client.ground_stations import GroundStations
 from service.client.jobs import Jobs
+from service.client.outages import Outages
 from service.client.plans import Plans
 from service.client.satellites import Satellites
 from service.client.scenarios import Scenarios
@@ -46,6 +47,7 @@ class Client:
     satellites: Satellites
     ground_stations: GroundStations
     spacecraft: SpacecraftTypes
+    outages: Outages
     target_catalogs: TargetCatalogs
     scenarios: Scenarios
     jobs: Jobs
@@ -76,6 +78,7 @@ class Client:
         self.satellites = Satellites(self._transport)
         self.ground_stations = GroundStations(self._transport)
         self.spacecraft = SpacecraftTypes(self._transport)
+        self.outages = Outages(self._transport)
         self.target_catalogs = TargetCatalogs(self._transport)
         self.scenarios = Scenarios(self._transport)
         self.jobs = Jobs(self._transport)

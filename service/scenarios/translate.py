@@ -20,6 +20,7 @@ from planner_core.domain import (
     Agility,
     GroundStation,
     Horizon,
+    Objective,
     OrbitElements,
     Quality,
     Resources,
@@ -32,7 +33,7 @@ from planner_core.errors import InvalidScenario, PlannerError
 from planner_core.orbits.omm import elements_from_omm, omm_from_elements
 from planner_core.orbits.tle import read_tle
 from service.problems.faults import faults_of_validation
-from service.scenarios.pin_inputs import pins_from
+from service.scenarios.pin_inputs import outage_from, pins_from
 from service.wire.places import GroundStationIn, TargetIn
 from service.wire.satellites import (
     AgilityIn,
@@ -145,10 +146,21 @@ def canonical_of_file(file: ScenarioFile) -> str:
         _without_unset(target, "catalog_id", "release", "due", "sensor_type")
     if document["collect_alignment"] == "access":
         del document["collect_alignment"]
+    if not _counts_delivery(document["objective"]):
+        del document["objective"]
+    for outage in document["outages"]:
+        _without_unset(outage, "id", "satellite_id", "station_id", "reason")
+    if not document["outages"]:
+        del document["outages"]
     for part in ("pins", "quality"):
         if not any(document[part].values()):
             del document[part]
     return json.dumps(document, sort_keys=True, separators=(",", ":"), allow_nan=False)
+
+
+def _counts_delivery(objective: Mapping[str, Any]) -> bool:
+    """Whether images earn less than all when they are taken; a half-life is of what is left."""
+    return bool(objective["collected_share"] < 1.0)
 
 
 def _without_unset(part: dict[str, Any], *names: str) -> None:
@@ -185,8 +197,10 @@ def scenario_from_file(file: ScenarioFile) -> Scenario:
         collect_alignment=file.collect_alignment,
         continuous_starts=file.continuous_starts,
         quality=quality_from(file.quality),
+        objective=Objective(**file.objective.model_dump()),
         allow_old_elements=file.allow_old_elements,
         pins=pins_from(file.pins),
+        outages=tuple(outage_from(outage) for outage in file.outages),
     )
 
 
