@@ -385,7 +385,8 @@ def check_element_age(scenario: Scenario) -> None:
             raise InvalidScenario(
                 "elements_too_old",
                 f"Satellite {satellite.name!r}: the element set is up to {age_days:.0f} days from "
-                f"its epoch, more than {REFUSED_ELEMENTS_DAYS:.0f}.",
+                f"its epoch, more than {REFUSED_ELEMENTS_DAYS:.0f}. Store newer elements, or set "
+                "allow_old_elements.",
                 pointer=f"/satellites/{index}",
             )
 
