@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Final, Literal
+from typing import Annotated, Final, Literal, get_args
 
-from pydantic import BeforeValidator, FailFast, Field, model_validator
+from pydantic import BeforeValidator, FailFast, Field, GetJsonSchemaHandler, model_validator
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
 
 from service.wire.base import Body, Duration, Id, Instant, Name, Open, Stored, Wire
 from service.wire.pins import PinsIn, PlacedOutage
@@ -81,10 +83,20 @@ def _objective_named(value: object) -> object:
     return _NAMED.get(value, value) if isinstance(value, str) else value
 
 
-AnyObjective = Annotated[
-    ObjectiveIn,
-    BeforeValidator(_objective_named, json_schema_input_type=ObjectiveIn | ObjectiveName),
-]
+class _OrShortName:
+    """Shows the short names in the schema of what is sent and of what is answered alike.
+
+    Two schemas of one thing would give it two names, and generated clients would lose both.
+    """
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        names = {"type": "string", "enum": list(get_args(ObjectiveName))}
+        return {"anyOf": [handler(schema), names]}
+
+
+AnyObjective = Annotated[ObjectiveIn, BeforeValidator(_objective_named), _OrShortName()]
 
 
 class Question(Body):
@@ -115,6 +127,7 @@ class Question(Body):
         ObjectiveIn(),
         description="What a plan is to earn. `collected` is short for a collected_share of 1, "
         "`delivered` for 0; `paper` is the same as `collected`.",
+        json_schema_extra={"default": "collected"},
     )
     allow_old_elements: bool = Field(
         False,
