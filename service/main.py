@@ -31,6 +31,7 @@ from service.api import (
     satellites,
     scenarios,
     solvers,
+    spacecraft,
     target_catalogs,
     timelines,
     webhooks,
@@ -64,6 +65,7 @@ DESCRIPTION = (
 ROUTERS = (
     element_exports.router,
     satellites.router,
+    spacecraft.router,
     ground_stations.router,
     outages.router,
     target_catalogs.router,
