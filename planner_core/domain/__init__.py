@@ -28,6 +28,7 @@ Every type is immutable and checks itself when made.
 
 from __future__ import annotations
 
+from planner_core.domain.forecast import Forecast, SkySeries
 from planner_core.domain.horizon import Horizon
 from planner_core.domain.places import GroundStation, Target
 from planner_core.domain.quality import Curve, Quality
@@ -50,6 +51,7 @@ __all__ = [
     "CollectAlignment",
     "Curve",
     "Dynamics",
+    "Forecast",
     "GroundStation",
     "Horizon",
     "LookSide",
@@ -61,6 +63,7 @@ __all__ = [
     "Satellite",
     "Scenario",
     "Sensor",
+    "SkySeries",
     "SlewModel",
     "SunPointing",
     "Target",

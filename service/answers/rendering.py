@@ -24,7 +24,8 @@ from planner_core.referee.replay import (
     plan_sha256,
 )
 from planner_core.run import Judged
-from planner_core.worth import quality_of
+from planner_core.valuation import clear_probabilities
+from service.answers.image_figures import ImageFigures
 from service.wire.base import Json
 from service.wire.jobs import FiguresOut
 from service.wire.scenarios import HorizonOut
@@ -127,7 +128,12 @@ class Wording:
         """Return what the image of a reason would be worth, where that is less than the reward."""
         if row is None or self.problem.worth[row] >= reward:
             return ""
-        return f" An image then would be worth {self.problem.worth[row]:.3g} of {reward:g}."
+        sky = ""
+        if self.scenario.forecast is not None:
+            table, alone = self.problem.opportunities, np.array([row])
+            clear = float(clear_probabilities(self.scenario, table, alone)[0])
+            sky = f" (the sky is clear with {100.0 * clear:.0f} %)"
+        return f" An image then would be worth {self.problem.worth[row]:.3g} of {reward:g}{sky}."
 
     def _change(self, change: Change) -> Json:
         """Return a change in the words of a what-if's ``relax``."""
@@ -145,10 +151,7 @@ class Documents(Wording):
         super().__init__(judged.scenario, judged.problem, judged.timeline)
         self._judged = judged
         self._seen = _seen_at_own_starts(judged)
-        table = self.problem.opportunities
-        self._quality = quality_of(
-            judged.scenario.quality, table.off_nadir_deg, table.sun_elevation_deg
-        )
+        self._images = ImageFigures(judged, {p: seen[0] for p, seen in self._seen.items()})
 
     def head(self, *, job_id: str, scenario_sha256: str, solver: SolverUsed) -> TimelineHead:
         """Return the timeline but for its satellites."""
@@ -178,12 +181,13 @@ class Documents(Wording):
     def satellites(self) -> Iterator[tuple[SatelliteTimelineOut, Iterator[ActionOut]]]:
         """Yield what the timeline says of each satellite, and apart from that its actions."""
         judged, numbers = self._judged, count(1)
-        for satellite, line, lit in zip(
+        lines = zip(
             judged.problem.satellites,
             judged.timeline.satellites,
             judged.opportunities.sunlight,
             strict=True,
-        ):
+        )
+        for number, (satellite, line, lit) in enumerate(lines):
             gaps = lit.gaps(judged.problem.horizon_s)
             limits = satellite.resources
             about = SatelliteTimelineOut(
@@ -198,6 +202,7 @@ class Documents(Wording):
                     battery_min_fraction=limits.battery_min_fraction,
                     recorder_max_fraction=limits.recorder_max_fraction,
                 ),
+                totals=self._images.of(number),
             )
             yield about, (self._action(f"a{next(numbers)}", action) for action in line.actions)
 
@@ -233,26 +238,20 @@ class Documents(Wording):
             downlinked_fraction=sum(timeline.downlinked) if use_resources else None,
             battery_min_fraction=timeline.battery_min,
             recorder_max_fraction=timeline.recorder_max,
-            quality_mean=self._quality_mean(),
+            **self._images.of().model_dump(),
         )
-
-    def _quality_mean(self) -> float | None:
-        """Return the mean quality of the images that count, one of each target."""
-        judged = self._judged
-        actions = judged.solution.plan.actions
-        rows = [actions[c.position].opportunity for c in judged.timeline.collected.values()]
-        return round(float(self._quality[rows].mean()), 9) if rows else None
 
     def _action(self, action_id: str, action: JudgedAction) -> ActionOut:
         table, row = self.problem.opportunities, action.opportunity
-        target_id = station = off_nadir_deg = azimuth_deg = worth = quality = None
+        target_id = station = off_nadir_deg = azimuth_deg = worth = quality = clear = None
         if row is not None:
             own = table.off_nadir_deg[row], table.azimuth_deg[row]
             off_nadir_deg, azimuth_deg = self._seen.get(action.position, own)
             place = int(table.place[row])
             if action.mode == "collect":
                 target_id = self.scenario.targets[place].id
-                worth, quality = float(self.problem.worth[row]), self._quality[row]
+                worth, quality = float(self.problem.worth[row]), self._images.quality[row]
+                clear = None if self._images.clear is None else self._images.clear[row]
             else:
                 station = self.scenario.ground_stations[place]
         return ActionOut(
@@ -272,6 +271,7 @@ class Documents(Wording):
             reward=action.reward,
             worth=worth,
             quality=_rounded(quality, 9),
+            clear_probability=_rounded(clear, 9),
             battery_fraction_end=_rounded(action.battery_end, 9),
             recorder_fraction_end=_rounded(action.recorder_end, 9),
         )

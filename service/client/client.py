@@ -13,6 +13,7 @@ import httpx
 
 import planner_core
 from service.client.comparisons import Comparisons
+from service.client.forecasts import Forecasts
 from service.client.ground_stations import GroundStations
 from service.client.jobs import Jobs
 from service.client.plans import Plans
@@ -45,6 +46,7 @@ class Client:
     satellites: Satellites
     ground_stations: GroundStations
     target_catalogs: TargetCatalogs
+    forecasts: Forecasts
     scenarios: Scenarios
     jobs: Jobs
     comparisons: Comparisons
@@ -74,6 +76,7 @@ class Client:
         self.satellites = Satellites(self._transport)
         self.ground_stations = GroundStations(self._transport)
         self.target_catalogs = TargetCatalogs(self._transport)
+        self.forecasts = Forecasts(self._transport)
         self.scenarios = Scenarios(self._transport)
         self.jobs = Jobs(self._transport)
         self.comparisons = Comparisons(self._transport)

@@ -32,6 +32,7 @@ from planner_core.errors import InvalidScenario, PlannerError
 from planner_core.orbits.omm import elements_from_omm, omm_from_elements
 from planner_core.orbits.tle import read_tle
 from service.problems.faults import faults_of_validation
+from service.scenarios.forecast_inputs import forecast_from
 from service.scenarios.pin_inputs import pins_from
 from service.wire.places import GroundStationIn, TargetIn
 from service.wire.satellites import OrbitIn, Preset, PresetResourcesIn, ResourcesIn, SatelliteIn
@@ -129,7 +130,8 @@ def canonical_of_file(file: ScenarioFile) -> str:
         if isinstance(satellite["resources"], dict):
             _without_defaults(satellite["resources"])
     for target in document["targets"]:
-        _without_unset(target, "catalog_id", "release", "due", "sensor_type")
+        _without_unset(target, "catalog_id", "release", "due", "sensor_type", "reward_half_life_s")
+    _without_unset(document, "forecast")
     if document["collect_alignment"] == "access":
         del document["collect_alignment"]
     for part in ("pins", "quality"):
@@ -168,6 +170,7 @@ def scenario_from_file(file: ScenarioFile) -> Scenario:
         collect_alignment=file.collect_alignment,
         continuous_starts=file.continuous_starts,
         quality=quality_from(file.quality),
+        forecast=forecast_from(file),
         allow_old_elements=file.allow_old_elements,
         pins=pins_from(file.pins),
     )

@@ -51,7 +51,30 @@ class ViolationOut(Wire):
     inherited: bool = Field(False, description="It held at the start; no action has a part in it.")
 
 
-class TotalsOut(Wire):
+class SpreadOut(Wire):
+    """A figure over all images."""
+
+    mean: float
+    median: float
+
+
+class ImageFiguresOut(Wire):
+    """Of the images that earn, one of each target."""
+
+    images: int | None = Field(None, description="How many there are.")
+    expected_clear: float | None = Field(
+        None, description="How many of them are clear on average; null without a forecast."
+    )
+    night_images: int | None = Field(
+        None, description="Those with the sun below the target's horizon."
+    )
+    off_nadir_deg: SpreadOut | None = Field(
+        None, description="At the middle of each; null where there is none."
+    )
+    quality_mean: float | None = Field(None, description="Null where there is none.")
+
+
+class TotalsOut(ImageFiguresOut):
     """The plan in numbers, as the referee found them."""
 
     reward: float
@@ -71,9 +94,6 @@ class TotalsOut(Wire):
     downlinked_fraction: float | None = Field(description="In recorder capacities.")
     battery_min_fraction: float | None = Field(description="The lowest charge of any satellite.")
     recorder_max_fraction: float | None = Field(description="The highest fill of any recorder.")
-    quality_mean: float | None = Field(
-        None, description="Of the images that earn, one of each target; null where there is none."
-    )
 
 
 class SlewOut(Wire):
@@ -109,10 +129,15 @@ class ActionOut(Wire):
     )
     reward: float = Field(description="What the plan earns with it.")
     worth: float | None = Field(
-        None, description="Of a collect: what its image is worth by itself, reward times quality."
+        None,
+        description="Of a collect: what its image is worth by itself: the target's reward when it "
+        "starts, times quality and clear_probability.",
     )
     quality: float | None = Field(
         None, description="Of a collect: what part of its target's reward its image is worth."
+    )
+    clear_probability: float | None = Field(
+        None, description="Of a collect: that the sky is clear; null without a forecast."
     )
     battery_fraction_end: float | None
     recorder_fraction_end: float | None
@@ -136,6 +161,9 @@ class SatelliteTimelineOut(Wire):
     actions: tuple[ActionOut, ...]
     eclipses: tuple[HorizonOut, ...] = Field((), description="Spans in the Earth's shadow.")
     resources: ResourceCurvesOut | None = Field(description="Null without resources.")
+    totals: ImageFiguresOut | None = Field(
+        None, description="Null in answers of the first release."
+    )
 
 
 class ModelsOut(Wire):

@@ -26,6 +26,7 @@ from service.settings import Settings
 from service.wire import (
     base,
     changes,
+    forecasts,
     imports,
     jobs,
     operations,
@@ -43,7 +44,7 @@ from service.wire.base import Wire, dumped, read
 from tests.service.jobs.mission import small_mission
 
 MODULES = (
-    base, changes, imports, jobs, operations, wire_pins, places, plans, satellites, scenarios,
+    base, changes, forecasts, imports, jobs, operations, wire_pins, places, plans, satellites, scenarios,
     timelines, webhooks,
 )  # fmt: skip
 NOW = "2026-03-01T00:00:00.000Z"

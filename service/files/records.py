@@ -32,7 +32,7 @@ _ALIASES = {
     "longitude": "lon_deg",
 }
 _MISSPELT = 0.75
-_MOST_COLUMNS = 200
+MOST_COLUMNS = 200
 _MOST_FAULTS = 10_000
 
 
@@ -151,20 +151,20 @@ def read_csv(
     ``longitude`` are taken too. Other columns are ignored, unless they look like a misspelt
     one. An empty cell means the default.
     """
-    text = _decoded(data)
+    text = decoded(data)
     if isinstance(text, Fault):
         return Records(faults=(text,))
-    rows = _csv_rows(text)
+    rows = csv_rows(text)
     first = next(rows, None)
     if first is None:
         return Records(faults=(Fault(code="empty_file", detail="The file is empty."),))
     if isinstance(first, Fault):
         return Records(faults=(first,))
-    if len(first[1]) > _MOST_COLUMNS:
-        detail = f"The header has {len(first[1])} columns; {_MOST_COLUMNS} are the most."
+    if len(first[1]) > MOST_COLUMNS:
+        detail = f"The header has {len(first[1])} columns; {MOST_COLUMNS} are the most."
         return Records(faults=(Fault(code="malformed_csv", detail=detail, row=first[0]),))
-    columns = [_ALIASES.get(c.strip().lower(), c.strip().lower()) for c in first[1]]
-    faults = _faults_of_header(first[0], columns, known, required)
+    columns = column_names(first[1])
+    faults = faults_of_header(first[0], columns, known, required)
     if faults:
         return Records(faults=tuple(faults))
     records: list[Record] = []
@@ -191,14 +191,20 @@ def _too_many_rows(most: int) -> Records:
     return Records(faults=(Fault(code="too_many_rows", detail=detail),))
 
 
-def _decoded(data: bytes) -> str | Fault:
+def column_names(header: Sequence[str]) -> list[str]:
+    """Return our names of a file's columns."""
+    return [_ALIASES.get(name.strip().lower(), name.strip().lower()) for name in header]
+
+
+def decoded(data: bytes) -> str | Fault:
+    """Return the text of a file in UTF-8, or what is wrong with it."""
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         return Fault(code="not_utf8", detail=f"Byte {error.start} is no UTF-8.")
 
 
-def _csv_rows(text: str) -> Iterator[tuple[int, list[str]] | Fault]:
+def csv_rows(text: str) -> Iterator[tuple[int, list[str]] | Fault]:
     """Yield the line where each record starts, and its cells; blank lines are left out."""
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
     while True:
@@ -214,9 +220,10 @@ def _csv_rows(text: str) -> Iterator[tuple[int, list[str]] | Fault]:
             yield start, cells
 
 
-def _faults_of_header(
+def faults_of_header(
     row: int, columns: Sequence[str], known: Collection[str], required: Collection[str]
 ) -> list[Fault]:
+    """Return columns given twice, misspelt or missing; ``row`` is the line of the header."""
     faults = []
     for position, column in enumerate(columns):
         missing = [name for name in known if name not in columns]
@@ -249,7 +256,7 @@ def read_geojson(data: bytes, known: Collection[str], *, most: int) -> Records:
 
     Of a feature's properties those that are fields of ours count; others are ignored.
     """
-    text = _decoded(data)
+    text = decoded(data)
     if isinstance(text, Fault):
         return Records(faults=(text,))
     try:
