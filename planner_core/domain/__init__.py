@@ -16,6 +16,8 @@ Epoch
     The instant an element set is given for.
 Reward, quality, worth
     What a perfect image of a target earns; how good an image is, from 0 to 1; their product.
+Outage
+    A span in which a satellite or a station is not to be had.
 Pin
     What a plan must hold, or must not; see ``planner_core.pins``.
 Off-nadir angle
@@ -30,6 +32,7 @@ from __future__ import annotations
 
 from planner_core.domain.forecast import Forecast, SkySeries
 from planner_core.domain.horizon import Horizon
+from planner_core.domain.outages import Outage
 from planner_core.domain.places import GroundStation, Target
 from planner_core.domain.quality import Curve, Quality
 from planner_core.domain.scenario import CollectAlignment, Dynamics, Scenario
@@ -58,6 +61,7 @@ __all__ = [
     "Nadir",
     "OrbitDirection",
     "OrbitElements",
+    "Outage",
     "Quality",
     "Resources",
     "Satellite",

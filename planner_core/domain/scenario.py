@@ -6,9 +6,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
+import numpy as np
+
 from planner_core.domain.checks import require
 from planner_core.domain.forecast import Forecast
 from planner_core.domain.horizon import Horizon
+from planner_core.domain.outages import Outage
 from planner_core.domain.places import GroundStation, Target
 from planner_core.domain.quality import Quality
 from planner_core.domain.spacecraft import Satellite
@@ -34,6 +37,8 @@ class Scenario:
         How likely the sky over each target is clear. None to take it for clear.
     allow_old_elements
         Plan with element sets of any age (see ``build.check_element_age``).
+    outages
+        What is known to be out, and when.
     """
 
     horizon: Horizon
@@ -49,6 +54,7 @@ class Scenario:
     forecast: Forecast | None = None
     allow_old_elements: bool = False
     pins: Pins = field(default_factory=Pins)
+    outages: tuple[Outage, ...] = ()
     warnings: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
@@ -90,6 +96,8 @@ class Scenario:
             "dynamics",
             "paper knows neither turns to the sun nor idle_power_w: use sun_pointing free without",
         )
+        if self.use_resources:
+            self._check_downlinks()
         for what, ids in (
             ("satellite", [s.id for s in self.satellites]),
             ("target", [t.id for t in self.targets]),
@@ -105,12 +113,38 @@ class Scenario:
                 )
         if self.forecast is not None:
             check_coverage(self.forecast, self.horizon, self.targets)
+        satellite_ids = {s.id for s in self.satellites}
+        station_ids = {g.id for g in self.ground_stations}
         self.pins.check(
-            {s.id for s in self.satellites},
+            satellite_ids,
             {t.id for t in self.targets},
-            {g.id for g in self.ground_stations},
+            station_ids,
             has_contacts=self.use_resources,
         )
+        for position, outage in enumerate(self.outages):
+            outage.check(f"/outages/{position}", satellite_ids, station_ids)
+
+    def _check_downlinks(self) -> None:
+        """Refuse passes in which telemetry may fill the recorder faster than it is emptied.
+
+        Where data begins to flow the recorder must not fill again until the contact's end, so
+        that one number tells what it takes down.
+        """
+        for index, satellite in enumerate(self.satellites):
+            resources = satellite.resources
+            if not resources.downlink_by_elevation:
+                continue
+            knots_deg = [elevation_deg for elevation_deg, _ in resources.downlink_by_elevation]
+            for station in self.ground_stations:
+                lowest_deg = station.min_elevation_deg
+                seen_deg = [lowest_deg, 90.0, *(deg for deg in knots_deg if deg > lowest_deg)]
+                slowest = station.downlink_gain * resources.downlink_at(np.array(seen_deg)).min()
+                require(
+                    bool(slowest >= resources.telemetry_per_s),
+                    f"satellites/{index}/resources/downlink_rate_mbit_s",
+                    f"above {lowest_deg:g} deg at {station.name!r} it falls below the rate of "
+                    "telemetry: raise the station's min_elevation_deg to where data comes down",
+                )
 
 
 def check_coverage(forecast: Forecast, horizon: Horizon, targets: Sequence[Target]) -> None:

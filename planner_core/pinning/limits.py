@@ -44,11 +44,12 @@ def check_limits(
     problem: Problem,
     ruled_out: Sequence[tuple[str, Longs]],
     kept: Sequence[tuple[Kept, Bools]],
+    in_outage: Bools,
 ) -> None:
     """Raise where battery or recorder cannot bear what one satellite must or must not do.
 
     Contacts may help; that satellites share antennas is left out, but for contacts that are kept.
-    Where no plan keeps the limits without pins either, these are not to blame.
+    Where no plan keeps the limits without pins either, as with what is out, they are not to blame.
 
     Parameters
     ----------
@@ -58,6 +59,8 @@ def check_limits(
         Pins, and the opportunities that each rules out.
     kept
         Actions to be kept, and what cannot stand beside each. Shape ``(n,)``.
+    in_outage
+        Opportunities that are not to be had whatever is pinned. Shape ``(n,)``.
 
     Raises
     ------
@@ -70,14 +73,14 @@ def check_limits(
     for index, satellite in enumerate(problem.satellites):
         own = set(satellite.rows.tolist())
         must = [one for one, _ in kept if one.row in own]
-        missing = np.zeros(len(problem.opportunities), dtype=np.bool_)
+        missing = in_outage.copy()
         for _, rows in ruled_out:
             missing[rows] = True
         for _, excluded in kept:
             missing |= excluded
         if can_keep(problem, index, must, missing):
             continue
-        missing[:] = False
+        missing = in_outage.copy()
         if not can_keep(problem, index, [], missing):
             continue
         for pointer, rows in ruled_out:

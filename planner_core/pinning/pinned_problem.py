@@ -52,23 +52,21 @@ def pinned_problem(scenario: Scenario, problem: Problem) -> Problem:
         ``pin_without_opportunity``, ``pin_ambiguous``, ``pins_conflict`` or
         ``pin_breaks_limits``, with a pointer into ``/pins``.
     """
-    if not scenario.pins:
+    if not scenario.pins and not scenario.outages:
         return problem
     pins, table = scenario.pins, problem.opportunities
     whole = table if problem.pointing is None else whole_accesses(problem)
-    kept, skipped = (
-        [row_of(scenario, whole, pin, f"/pins/{name}/{i}") for i, pin in enumerate(actions)]
-        for name, actions in (("keep", pins.keep), ("skip", pins.skip))
-    )
+    kept = [row_of(scenario, whole, pin, f"/pins/keep/{i}") for i, pin in enumerate(pins.keep)]
+    skipped = [
+        rows_skipped(scenario, whole, pin, f"/pins/skip/{i}") for i, pin in enumerate(pins.skip)
+    ]
     if problem.pointing is not None:
-        accesses = table.access[skipped]
+        accesses = [table.access[rows] for rows in skipped]
         problem, kept = with_pinned_starts(scenario, problem, kept)
-        skipped_rows = [
-            np.flatnonzero(problem.opportunities.access == own).tolist() for own in accesses
+        skipped = [
+            np.flatnonzero(np.isin(problem.opportunities.access, own)).tolist() for own in accesses
         ]
-    else:
-        skipped_rows = [[row] for row in skipped]
-    return apply_pins(problem, resolve(scenario, kept, skipped_rows))
+    return apply_pins(problem, resolve(scenario, kept, skipped))
 
 
 def resolve(scenario: Scenario, kept: Sequence[int], skipped: Sequence[Sequence[int]]) -> Pinned:
@@ -80,22 +78,65 @@ def resolve(scenario: Scenario, kept: Sequence[int], skipped: Sequence[Sequence[
     return Pinned(
         kept=tuple(Kept(row=row, pointer=f"/pins/keep/{i}") for i, row in enumerate(kept)),
         skipped={row: f"/pins/skip/{i}" for i, rows in enumerate(skipped) for row in rows},
-        blocked=tuple(
-            Blocked(
-                satellite=satellites[pin.satellite_id],
-                start_s=offset_s(pin.start),
-                end_s=offset_s(pin.end),
-                kinds=frozenset(_KINDS[mode] for mode in pin.modes),
-                pointer=f"/pins/block/{i}",
-            )
-            for i, pin in enumerate(pins.block)
+        blocked=(
+            *(
+                Blocked(
+                    satellite=satellites[pin.satellite_id],
+                    start_s=offset_s(pin.start),
+                    end_s=offset_s(pin.end),
+                    kinds=frozenset(_KINDS[mode] for mode in pin.modes),
+                    pointer=f"/pins/block/{i}",
+                )
+                for i, pin in enumerate(pins.block)
+            ),
+            *_outages(scenario),
         ),
         forbidden=frozenset(targets[target_id] for target_id in pins.forbid),
     )
 
 
-def row_of(scenario: Scenario, table: Opportunities, pin: PinnedAction, pointer: str) -> int:
-    """Return the opportunity that an operator's words mean."""
+def _outages(scenario: Scenario) -> Iterator[Blocked]:
+    satellites = {satellite.id: i for i, satellite in enumerate(scenario.satellites)}
+    stations = {station.id: i for i, station in enumerate(scenario.ground_stations)}
+    for i, outage in enumerate(scenario.outages):
+        is_station = outage.station_id is not None
+        yield Blocked(
+            satellite=None if outage.satellite_id is None else satellites[outage.satellite_id],
+            station=None if outage.station_id is None else stations[outage.station_id],
+            start_s=scenario.horizon.offset_s(outage.start),
+            end_s=scenario.horizon.offset_s(outage.end),
+            kinds=frozenset({CONTACT} if is_station else (_KINDS[mode] for mode in outage.modes)),
+            pointer=f"/outages/{i}",
+        )
+
+
+def rows_skipped(
+    scenario: Scenario, table: Opportunities, pin: PinnedAction, pointer: str
+) -> list[int]:
+    """Return the opportunities that a skip means: of a span all that overlap it.
+
+    A span that is some opportunity's own, give or take a second, means that one alone; of a pass
+    it means every part.
+    """
+    nearest = row_of(scenario, table, pin, pointer)
+    if pin.start is None or pin.end is None:
+        return _meant_by(table, nearest, pin)
+    start_s, end_s = (scenario.horizon.offset_s(instant) for instant in (pin.start, pin.end))
+    is_its_own = (
+        abs(table.start_s[nearest] - start_s) <= _NEARLY_S
+        and abs(table.end_s[nearest] - end_s) <= _NEARLY_S
+    )
+    if is_its_own:
+        return _meant_by(table, nearest, pin)
+    overlaps = (table.start_s < end_s - TIME_TOLERANCE_S) & (
+        table.end_s > start_s + TIME_TOLERANCE_S
+    )
+    rows: list[int] = np.flatnonzero(_named_by(scenario, table, pin) & overlaps).tolist()
+    return rows or _meant_by(table, nearest, pin)
+
+
+def _named_by(scenario: Scenario, table: Opportunities, pin: PinnedAction) -> Bools:
+    """Return the opportunities that are of the satellite, target or station that a pin names."""
     fits = np.ones(len(table), dtype=np.bool_)
     if pin.satellite_id is not None:
         ids = [satellite.id for satellite in scenario.satellites]
@@ -108,6 +149,12 @@ def row_of(scenario: Scenario, table: Opportunities, pin: PinnedAction, pointer:
         fits &= (table.kind == CONTACT) & (table.place == ids.index(pin.station_id))
     if pin.opportunity_id is not None:
         fits &= np.arange(len(table)) == _number_of(pin.opportunity_id)
+    return fits
+
+
+def row_of(scenario: Scenario, table: Opportunities, pin: PinnedAction, pointer: str) -> int:
+    """Return the opportunity that an operator's words mean."""
+    fits = _named_by(scenario, table, pin)
     named = np.flatnonzero(fits)
     start_s = 0.0
     if pin.start is not None:
@@ -119,6 +166,8 @@ def row_of(scenario: Scenario, table: Opportunities, pin: PinnedAction, pointer:
         raise InvalidScenario(
             "pin_without_opportunity", _why_none(scenario, table, named, pin), pointer=pointer
         )
+    if pin.start is None and len(rows) > 1 and _are_parts(table, rows):
+        return int(rows[np.argmax(table.end_s[rows] - table.start_s[rows])])
     if pin.start is None and len(rows) > 1:
         raise InvalidScenario(
             "pin_ambiguous",
@@ -126,6 +175,20 @@ def row_of(scenario: Scenario, table: Opportunities, pin: PinnedAction, pointer:
             pointer=pointer,
         )
     return int(rows[np.argmin(np.abs(table.start_s[rows] - start_s))])
+
+
+def _are_parts(table: Opportunities, rows: Longs) -> bool:
+    """Return whether these are parts of one and the same pass."""
+    is_contact = bool((table.kind[rows] == CONTACT).all())
+    return is_contact and len(np.unique(table.access[rows])) == 1
+
+
+def _meant_by(table: Opportunities, row: int, pin: PinnedAction) -> list[int]:
+    """Return all rows that skipping one of them means: of a pass every part."""
+    if table.kind[row] != CONTACT or pin.opportunity_id is not None:
+        return [row]
+    rows: list[int] = np.flatnonzero(table.access == table.access[row]).tolist()
+    return rows
 
 
 def _number_of(opportunity_id: str) -> int:
@@ -152,6 +215,7 @@ def apply_pins(problem: Problem, pinned: Pinned) -> Problem:
     """
     pinned = replace(pinned, kept=_without_repeats(pinned.kept))
     _check_conflicts(problem, pinned)
+    in_outage = _in_outages(problem, pinned)
     n = len(problem.opportunities)
     beside = _kept_that_exclude(problem, pinned)
     is_struck = _ruled_out(problem, pinned)
@@ -168,11 +232,11 @@ def apply_pins(problem: Problem, pinned: Pinned) -> Problem:
         pinned=replace(
             part.pinned,
             skipped={},
-            struck=_struck(problem, is_struck, keepers),
+            struck=_struck(problem, is_struck, keepers, in_outage),
         ),
         target_access=_access_left(problem, part),
     )
-    check_limits(problem, list(_pins_that_rule_out(problem, pinned)), beside)
+    check_limits(problem, list(_pins_that_rule_out(problem, pinned)), beside, in_outage)
     return part
 
 
@@ -192,7 +256,7 @@ def _check_conflicts(problem: Problem, pinned: Pinned) -> None:
     last: dict[int, Kept] = {}
     for kept in ordered:
         if ruled_out[kept.row]:
-            raise _conflict(kept, "another pin forbids what this one wants kept")
+            raise _conflict(kept, "another pin or an outage rules it out")
         satellite = int(table.satellite[kept.row])
         before = last.get(satellite)
         local = problem.local_row
@@ -228,9 +292,10 @@ def _conflict(kept: Kept, why: str) -> InvalidScenario:
 
 
 def _ruled_out(problem: Problem, pinned: Pinned) -> Bools:
-    """Return the opportunities that are forbidden or lie in a blocked interval."""
+    """Return the opportunities that are forbidden, skipped, blocked or in an outage."""
     table = problem.opportunities
-    is_out: Bools = (table.kind == COLLECT) & np.isin(table.place, sorted(pinned.forbidden))
+    is_out: Bools = _in_outages(problem, pinned)
+    is_out |= (table.kind == COLLECT) & np.isin(table.place, sorted(pinned.forbidden))
     for _, rows in _pins_that_rule_out(problem, pinned):
         is_out[rows] = True
     return is_out
@@ -238,17 +303,36 @@ def _ruled_out(problem: Problem, pinned: Pinned) -> Bools:
 
 def _pins_that_rule_out(problem: Problem, pinned: Pinned) -> Iterator[tuple[str, Longs]]:
     """Yield pins that skip or block, and the opportunities that each is about."""
-    table = problem.opportunities
     for pointer, skipped in groupby(pinned.skipped, key=lambda row: pinned.skipped[row]):
         yield pointer, np.array(list(skipped))
     for blocked in pinned.blocked:
-        is_out = (
-            (table.satellite == blocked.satellite)
-            & np.isin(table.kind, sorted(blocked.kinds))
-            & (table.start_s < blocked.end_s - TIME_TOLERANCE_S)
-            & (table.end_s > blocked.start_s + TIME_TOLERANCE_S)
-        )
-        yield blocked.pointer, np.flatnonzero(is_out)
+        if not blocked.is_outage:
+            yield blocked.pointer, rows_in(problem, blocked)
+
+
+def rows_in(problem: Problem, blocked: Blocked) -> Longs:
+    """Return the opportunities that a blocked span takes."""
+    table = problem.opportunities
+    whose = (
+        table.satellite == blocked.satellite
+        if blocked.station is None
+        else (table.kind == CONTACT) & (table.place == blocked.station)
+    )
+    return np.flatnonzero(
+        whose
+        & np.isin(table.kind, sorted(blocked.kinds))
+        & (table.start_s < blocked.end_s - TIME_TOLERANCE_S)
+        & (table.end_s > blocked.start_s + TIME_TOLERANCE_S)
+    )
+
+
+def _in_outages(problem: Problem, pinned: Pinned) -> Bools:
+    """Return the opportunities that outages take."""
+    is_out = np.zeros(len(problem.opportunities), dtype=np.bool_)
+    for blocked in pinned.blocked:
+        if blocked.is_outage:
+            is_out[rows_in(problem, blocked)] = True
+    return is_out
 
 
 def _kept_that_exclude(problem: Problem, pinned: Pinned) -> list[tuple[Kept, Bools]]:
@@ -292,7 +376,7 @@ def _without_antenna(problem: Problem, row: int, kept: Longs) -> Bools:
 
 
 def _struck(
-    problem: Problem, is_struck: Bools, keepers: list[tuple[int, Bools]]
+    problem: Problem, is_struck: Bools, keepers: list[tuple[int, Bools]], in_outage: Bools
 ) -> dict[int, tuple[Struck, ...]]:
     """Return the collects that the pins rule out, by target."""
     table = problem.opportunities
@@ -304,6 +388,7 @@ def _struck(
             start_s=float(table.start_s[row]),
             end_s=float(table.end_s[row]),
             kept=tuple(kept for kept, excluded in keepers if excluded[row]),
+            by_outage=bool(in_outage[row]),
         )
         target = int(table.place[row])
         found[target] = (*found.get(target, ()), struck)

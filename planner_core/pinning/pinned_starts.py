@@ -1,8 +1,8 @@
 """Pins on a problem with continuous starts: kept actions at the starts that they were given.
 
 A kept collect becomes an opportunity at its own start. So do the starts right before and after
-it, and around blocked intervals, of the accesses there: what only overlaps at the opportunities'
-own starts may still be imaged beside it.
+it, and around blocked intervals and outages, of the accesses there: what only overlaps at the
+opportunities' own starts may still be imaged beside it.
 """
 
 from __future__ import annotations
@@ -11,8 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from planner_core.domain import Scenario
+from planner_core.domain import Outage, Scenario
 from planner_core.jit import kernel
+from planner_core.pins import BlockedInterval
 from planner_core.problem import (
     COLLECT,
     Floats,
@@ -54,10 +55,10 @@ def with_pinned_starts(
     kept
         For each action to be kept an opportunity of its access.
     """
-    table = problem.opportunities
+    table, pins = problem.opportunities, scenario.pins
     rows: list[int] = []
     starts: list[float] = []
-    for pin, row in zip(scenario.pins.keep, kept, strict=True):
+    for pin, row in zip(pins.keep, kept, strict=True):
         start_s = float(table.start_s[row])
         if pin.start is not None and table.kind[row] == COLLECT:
             open_s, close_s = starts_of(problem, row)
@@ -73,10 +74,11 @@ def with_pinned_starts(
     for action in own.actions:
         _add_beside(problem, action, rows, starts)
     ids = [satellite.id for satellite in scenario.satellites]
-    for block in scenario.pins.block:
-        if "collect" in block.modes:
-            from_s, to_s = (scenario.horizon.offset_s(t) for t in (block.start, block.end))
-            _add_around(problem, ids.index(block.satellite_id), from_s, to_s, rows, starts)
+    spans: list[BlockedInterval | Outage] = [*pins.block, *scenario.outages]
+    for span in spans:
+        if "collect" in span.modes and span.satellite_id is not None:
+            from_s, to_s = (scenario.horizon.offset_s(t) for t in (span.start, span.end))
+            _add_around(problem, ids.index(span.satellite_id), from_s, to_s, rows, starts)
     made = with_starts(problem, np.array(rows, dtype=np.int32), np.array(starts))
     return made.problem, [action.opportunity for action in offered(made, problem, own).actions]
 

@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from planner_core.domain import Agility, Dynamics, Resources
+from planner_core.problem.downlink import Downlinks
 from planner_core.problem.pointing import Pointing, Vector, sight
 from planner_core.problem.sun_turns import SunPath, SunTurns
 from planner_core.problem.transitions import Transitions
@@ -36,7 +37,7 @@ NEVER_VISIBLE: Final = 1
 OUTSIDE_LIMITS: Final = 2
 ACCESS_TOO_SHORT: Final = 3
 RULED_OUT: Final = 4
-"""Geometry would allow it; what the scenario pins leaves no opportunity."""
+"""Geometry would allow it; what the scenario pins, or what is out, leaves no opportunity."""
 WRONG_SENSOR_TYPE: Final = 5
 OUTSIDE_TIMES: Final = 6
 """An access is long enough, but not between the target's release and due times."""
@@ -154,6 +155,8 @@ class SatelliteProblem:
         Where the sun stands. None serves where pointing at it is free.
     turns
         Of each row to the sun and back; no time where pointing at the sun is free.
+    volume
+        What each contact takes down, in recorder capacities; 0 for collects. Shape ``(m,)``.
     """
 
     id: str
@@ -171,6 +174,7 @@ class SatelliteProblem:
     event: Ints
     sun: SunPath | None
     turns: SunTurns
+    volume: Floats
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -191,18 +195,40 @@ class Kept:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Blocked:
-    """A span in which a satellite may not do tasks of some kinds."""
+    """A span in which a satellite or a station may not do tasks of some kinds.
 
-    satellite: int
+    Attributes
+    ----------
+    satellite, station
+        Whose span it is: an index of the scenario's satellites, or of its stations.
+    pointer
+        The pin or the outage that says so.
+    """
+
     start_s: float
     end_s: float
     kinds: frozenset[int]
     pointer: str
+    satellite: int | None = None
+    station: int | None = None
+
+    @property
+    def is_outage(self) -> bool:
+        """Whether it is a fact that was reported, and not an operator's wish."""
+        return self.pointer.startswith("/outages/")
+
+    def concerns(self, satellite: int, kind: int, place: int) -> bool:
+        """Return whether such a task may not overlap the span."""
+        if kind not in self.kinds:
+            return False
+        if self.station is not None:
+            return kind == CONTACT and place == self.station
+        return satellite == self.satellite
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Struck:
-    """A collect that pins rule out.
+    """A collect that pins or outages rule out.
 
     Attributes
     ----------
@@ -210,6 +236,8 @@ class Struck:
         Of the scenario's table, which the problem no longer has.
     kept
         Rows of the problem that it cannot stand beside; none where it is ruled out itself.
+    by_outage
+        Whether it lies in an outage.
     """
 
     row: int
@@ -217,14 +245,17 @@ class Struck:
     start_s: float
     end_s: float
     kept: tuple[int, ...] = ()
+    by_outage: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pinned:
-    """What the scenario pins, in terms of the problem.
+    """What the scenario pins, and what is out, in terms of the problem.
 
     Attributes
     ----------
+    blocked
+        Spans that pins block, and outages.
     skipped
         Rows that no plan may take, as long as they are in the table, and the pin that says so.
     forbidden
@@ -253,6 +284,8 @@ class Problem:
         Why a target has no opportunity, or ``ACCESS_FOUND``. Shape ``(num_targets,)``.
     station_antennas
         How many satellites each station serves at a time. Shape ``(num_stations,)``.
+    downlinks
+        How fast each contact takes data down.
     continuous_starts
         Whether a collect may start anywhere in its access, at a whole millisecond.
     pointing
@@ -272,6 +305,7 @@ class Problem:
     target_access: npt.NDArray[np.int8]
     station_ids: tuple[str, ...]
     station_antennas: Ints
+    downlinks: Downlinks
     opportunities: Opportunities
     satellites: tuple[SatelliteProblem, ...]
     pointing: Pointing | None = None

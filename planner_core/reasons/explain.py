@@ -60,6 +60,7 @@ NO_ACCESS: Final = {
 }
 _EXCLUDED: Final = "A pin forbids it."
 _BLOCKED: Final = "Pins rule all its opportunities out."
+_OUT: Final = "An outage takes all its opportunities."
 _ROUNDED: Final = 1e4  # fractions of capacity are stated to as many parts
 _SURE: Final = 2e-9  # of capacity: a stated limit is not touched
 
@@ -125,7 +126,10 @@ def _without_opportunity(problem: Problem, positions: Mapping[int, int], target:
     detail = NO_ACCESS.get(int(problem.target_access[target]))
     if detail is not None:
         return Reason(code="no_access", certainty="proven", detail=detail)
-    kept = {row for struck in problem.pinned.struck.get(target, ()) for row in struck.kept}
+    struck = problem.pinned.struck.get(target, ())
+    if struck and all(each.by_outage for each in struck):
+        return Reason(code="outage", certainty="proven", detail=_OUT)
+    kept = {row for each in struck for row in each.kept}
     if not kept:
         return Reason(code="excluded", certainty="proven", detail=_BLOCKED)
     return Reason(

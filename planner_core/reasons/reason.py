@@ -8,7 +8,7 @@ from typing import Final, Literal
 
 Outcome = Literal["downlinked", "collected", "unscheduled", "excluded"]
 ReasonCode = Literal[
-    "no_access", "excluded", "slew_conflict", "displaced_by", "battery", "recorder",
+    "no_access", "excluded", "outage", "slew_conflict", "displaced_by", "battery", "recorder",
     "not_considered", "solver_limit",
 ]  # fmt: skip
 Certainty = Literal["proven", "verified", "heuristic"]

@@ -1,8 +1,8 @@
-"""Whether a plan honours what the scenario pins; the referee asks."""
+"""Whether a plan honours what the scenario pins, and what is out; the referee asks."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from planner_core.problem import COLLECT, Problem
 from planner_core.problem.plan import Plan
@@ -10,7 +10,7 @@ from planner_core.problem.slew import TIME_TOLERANCE_S
 
 
 class Breach(NamedTuple):
-    """A pin that a plan breaks, and the positions in ``plan.actions`` that break it."""
+    """A pin or an outage that a plan breaks; ``blamed`` are positions in ``plan.actions``."""
 
     satellite: int
     at_s: float
@@ -18,6 +18,7 @@ class Breach(NamedTuple):
     available: float
     detail: str
     blamed: tuple[int, ...]
+    code: Literal["pin", "outage"] = "pin"
 
 
 def breaches(problem: Problem, plan: Plan) -> list[Breach]:
@@ -43,23 +44,34 @@ def breaches(problem: Problem, plan: Plan) -> list[Breach]:
     for position, action in enumerate(plan.actions):
         row = action.opportunity
         satellite, kind = int(table.satellite[row]), int(table.kind[row])
-        why = [
-            f"It lies in the interval that {blocked.pointer} blocks."
+        place = int(table.place[row])
+        spans = [
+            blocked
             for blocked in pinned.blocked
-            if blocked.satellite == satellite
-            and kind in blocked.kinds
+            if blocked.concerns(satellite, kind, place)
             and action.start_s < blocked.end_s - TIME_TOLERANCE_S
             and action.end_s > blocked.start_s + TIME_TOLERANCE_S
         ]
-        if kind == COLLECT and int(table.place[row]) in pinned.forbidden:
+        why = [
+            f"It lies in the interval that {blocked.pointer} blocks."
+            for blocked in spans
+            if not blocked.is_outage
+        ]
+        if kind == COLLECT and place in pinned.forbidden:
             why.append("Its target is forbidden.")
         if row in pinned.skipped:
             why.append(f"It is what {pinned.skipped[row]} skips.")
+        codes: list[tuple[Literal["pin", "outage"], str]] = [("pin", detail) for detail in why]
+        codes += [
+            ("outage", f"It lies in the outage {blocked.pointer}.")
+            for blocked in spans
+            if blocked.is_outage
+        ]
         found += [
             Breach(
                 satellite=satellite, at_s=action.start_s, needed=0.0, available=1.0,
-                detail=detail, blamed=(position,),
+                detail=detail, blamed=(position,), code=code,
             )
-            for detail in why
+            for code, detail in codes
         ]  # fmt: skip
     return found

@@ -33,7 +33,7 @@ from planner_core.referee.sight import turn_between
 
 Mode = Literal["collect", "contact", "sunpoint", "hold"]
 ViolationCode = Literal[
-    "window", "overlap", "slew", "station", "duplicate", "battery", "recorder", "pin"
+    "window", "overlap", "slew", "station", "duplicate", "battery", "recorder", "pin", "outage"
 ]
 _AMOUNT_TOLERANCE = 1e-9  # of a recorder's capacity, in comparing sums of many pieces
 
@@ -203,7 +203,7 @@ def replay(problem: Problem, plan: Plan) -> Timeline:
         violations += found
         slews |= turns
     violations += _stations(problem, plan)
-    violations += [Violation(code="pin", **b._asdict()) for b in breaches(problem, plan)]
+    violations += [Violation(**b._asdict()) for b in breaches(problem, plan)]
 
     profiles: list[Profile | None] = [None] * len(problem.satellites)
     if problem.use_resources:

@@ -47,6 +47,7 @@ BODIES: Final[dict[str, Any]] = {
         "runs": [{"solver": "rule"}, {"solver": "forward_search", "params": {"depth": 2}}],
     },
     "WhatIfIn": {"forbid": ["bern"], "relax": {"slew_rate_deg_s": 2.0}},
+    "OutageIn": {"satellite_id": _ID, **_HORIZON, "modes": ["collect"], "reason": "safe mode"},
     "PlanIn": {"job_id": _ID, "name": "Monday"},
     "TransitionIn": {"to": "approved", "reason": "Checked by the shift lead."},
     "WebhookIn": {"url": "https://ops.example/slewline", "events": ["job.succeeded"]},

@@ -62,7 +62,7 @@ def create_scenario(body: ScenarioIn, call: CallDep, once: OnceDep) -> ScenarioO
 
 @router.get("")
 def list_scenarios(call: CallDep, paging: PagingDep) -> Listed[ScenarioSummary]:
-    """List the scenarios, newest first, without their pins.
+    """List the scenarios, newest first, without their pins and outages.
 
     Those that were sent with a job, or made by a what-if, are their owner's and not listed for
     others; the scope `admin` sees all.
@@ -210,7 +210,8 @@ def _find(session: Session, scenario_id: str, caller: Caller) -> ScenarioRow:
 
 
 def _shown(row: ScenarioRow) -> ScenarioOut:
-    return ScenarioOut(**dict(_summary(row)), pins=StoredQuestion(row.content).pins)
+    question = StoredQuestion(row.content)
+    return ScenarioOut(**dict(_summary(row)), pins=question.pins, outages=question.outages)
 
 
 def _summary(row: ScenarioRow) -> ScenarioSummary:

@@ -23,6 +23,7 @@ from service.wire.jobs import ComparisonOut as Comparison
 from service.wire.jobs import ProgressOut as Progress
 from service.wire.operations import FaultOut as Fault
 from service.wire.operations import SolverOut as Solver
+from service.wire.pins import OutageOut as Outage
 from service.wire.places import GroundStationOut as GroundStation
 from service.wire.places import TargetCatalogOut as TargetCatalog
 from service.wire.places import TargetIn as Target
@@ -62,6 +63,7 @@ __all__ = [
     "Job",
     "JobFailed",
     "Opportunity",
+    "Outage",
     "Plan",
     "PlanAction",
     "PlanDiff",

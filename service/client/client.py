@@ -16,6 +16,7 @@ from service.client.comparisons import Comparisons
 from service.client.forecasts import Forecasts
 from service.client.ground_stations import GroundStations
 from service.client.jobs import Jobs
+from service.client.outages import Outages
 from service.client.plans import Plans
 from service.client.satellites import Satellites
 from service.client.scenarios import Scenarios
@@ -45,6 +46,7 @@ class Client:
 
     satellites: Satellites
     ground_stations: GroundStations
+    outages: Outages
     target_catalogs: TargetCatalogs
     forecasts: Forecasts
     scenarios: Scenarios
@@ -75,6 +77,7 @@ class Client:
         self._transport = Transport(self._http, patience_s=patience_s)
         self.satellites = Satellites(self._transport)
         self.ground_stations = GroundStations(self._transport)
+        self.outages = Outages(self._transport)
         self.target_catalogs = TargetCatalogs(self._transport)
         self.forecasts = Forecasts(self._transport)
         self.scenarios = Scenarios(self._transport)

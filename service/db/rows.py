@@ -81,6 +81,23 @@ class GroundStationRow(Row):
     deleted_at: Mapped[datetime | None]
 
 
+class OutageRow(Row):
+    """A span in which a satellite or a ground station is out."""
+
+    __tablename__ = "outage"
+    __table_args__ = (sa.Index("ix_outage_end", "end"),)
+
+    id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
+    satellite_id: Mapped[str | None] = mapped_column(sa.ForeignKey("satellite.id"))
+    station_id: Mapped[str | None] = mapped_column(sa.ForeignKey("ground_station.id"))
+    start: Mapped[datetime]
+    end: Mapped[datetime]
+    modes: Mapped[list[str]] = mapped_column(sa.JSON)
+    reason: Mapped[str | None]
+    created_at: Mapped[datetime]
+    deleted_at: Mapped[datetime | None]
+
+
 class TargetCatalogRow(Row):
     """A catalogue of targets."""
 
@@ -140,7 +157,7 @@ class ForecastRow(Row):
     sha256: Mapped[str] = mapped_column(sa.String(64))
     first_at: Mapped[datetime]
     last_at: Mapped[datetime]
-    default_clear_probability: Mapped[float | None]
+    default_clear_probability: Mapped[float | None] = mapped_column(sa.Double)
     summary: Mapped[Json]
     created_at: Mapped[datetime]
     block: Mapped[bytes] = mapped_column(sa.LargeBinary, deferred=True)

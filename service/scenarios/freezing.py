@@ -10,6 +10,7 @@ from datetime import UTC, datetime
 from typing import Any, TypeVar
 
 import sqlalchemy as sa
+from pydantic import BaseModel, ValidationError
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
@@ -18,6 +19,7 @@ from planner_core.errors import InvalidScenario, PlannerError
 from service.db.ids import new_id
 from service.db.rows import GroundStationRow, SatelliteRow, ScenarioRow, TargetCatalogRow, TargetRow
 from service.db.session import Database
+from service.problems.faults import faults_of_validation
 from service.scenarios.forecast_inputs import find_forecast, frozen_forecast
 from service.scenarios.pin_inputs import refuse_duplicate_pins
 from service.scenarios.scenario_limits import ScenarioLimits
@@ -27,8 +29,9 @@ from service.scenarios.translate import (
     scenario_from_file,
     sha256_of,
 )
-from service.stores import satellite_store
+from service.stores import outage_store, satellite_store
 from service.stores import scenario_store as store
+from service.wire.pins import PlacedOutage
 from service.wire.scenarios import (
     FileGroundStation,
     FileSatellite,
@@ -38,6 +41,7 @@ from service.wire.scenarios import (
     ScenarioIn,
 )
 
+M = TypeVar("M", bound=BaseModel)
 R = TypeVar("R", SatelliteRow, TargetCatalogRow, GroundStationRow)
 
 
@@ -170,20 +174,31 @@ def num_targets(session: Session, catalog_ids: Sequence[str]) -> int:
 
 
 def _expanded(session: Session, body: ScenarioIn) -> ScenarioFile:
-    shared = {name: getattr(body, name) for name in Question.model_fields}
+    shared = {name: getattr(body, name) for name in Question.model_fields if name != "outages"}
     return ScenarioFile(
         **shared,
         satellites=_satellites(session, body.satellite_ids),
         targets=_targets(session, body.target_catalog_ids),
         ground_stations=_ground_stations(session, body.ground_station_ids),
+        outages=_outages(session, body),
     )
+
+
+def _outages(session: Session, body: ScenarioIn) -> list[PlacedOutage]:
+    """Return the question's own outages, and those stored that concern it."""
+    stored = outage_store.concerning(
+        session, body.satellite_ids, body.ground_station_ids, body.horizon.start, body.horizon.end
+    )
+    named = {one.id for one in body.outages}
+    return [*body.outages, *(outage_store.placed(row) for row in stored if row.id not in named)]
 
 
 def _satellites(session: Session, ids: Sequence[str]) -> list[FileSatellite]:
     rows = _find(session, SatelliteRow, "satellite", ids)
     elements = satellite_store.in_force(session, ids)
     return [
-        FileSatellite.model_validate(
+        _of_today(
+            FileSatellite,
             {
                 "id": row.id,
                 "name": row.name,
@@ -191,9 +206,10 @@ def _satellites(session: Session, ids: Sequence[str]) -> list[FileSatellite]:
                 "sensor": row.sensor,
                 "resources": row.resources,
                 **elements[row.id].orbit,
-            }
+            },
+            f"/satellite_ids/{position}",
         )
-        for row in rows
+        for position, row in enumerate(rows)
     ]
 
 
@@ -211,13 +227,28 @@ def _targets(session: Session, catalog_ids: Sequence[str]) -> list[FileTarget]:
                     pointer=f"/target_catalog_ids/{position}",
                 )
             seen.add(row.target_id)
-            targets.append(FileTarget(**row.body, catalog_id=catalog_id))
+            body = row.body | {"catalog_id": catalog_id}
+            targets.append(_of_today(FileTarget, body, f"/target_catalog_ids/{position}"))
     return targets
 
 
 def _ground_stations(session: Session, ids: Sequence[str]) -> list[FileGroundStation]:
     rows = _find(session, GroundStationRow, "ground_station", ids)
-    return [FileGroundStation(id=row.id, **row.body) for row in rows]
+    return [
+        _of_today(FileGroundStation, {"id": row.id, **row.body}, f"/ground_station_ids/{position}")
+        for position, row in enumerate(rows)
+    ]
+
+
+def _of_today(model: type[M], body: dict[str, Any], pointer: str) -> M:
+    """Return something stored as it is planned with; its values may be of an earlier release."""
+    try:
+        return model.model_validate(body)
+    except ValidationError as error:
+        first = faults_of_validation(error, body)[0]
+        name = body.get("name") or body["id"]
+        detail = f"What is stored of {name!r} has to be changed, {first.pointer}: {first.detail}"
+        raise InvalidScenario(first.code, detail, pointer=pointer) from None
 
 
 def _find(session: Session, table: type[R], what: str, ids: Sequence[str]) -> list[R]:
@@ -239,7 +270,9 @@ def _find(session: Session, table: type[R], what: str, ids: Sequence[str]) -> li
 
 
 def _summary(file: ScenarioFile, warnings: Iterable[str]) -> dict[str, Any]:
-    shown = file.model_dump(mode="json", include=set(Question.model_fields) - {"name", "pins"})
+    shown = file.model_dump(
+        mode="json", include=set(Question.model_fields) - {"name", "pins", "outages"}
+    )
     catalogs = dict.fromkeys(t.catalog_id for t in file.targets if t.catalog_id is not None)
     return shown | {
         "satellite_ids": [satellite.id for satellite in file.satellites],

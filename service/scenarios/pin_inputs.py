@@ -1,10 +1,11 @@
-"""Pins, from what clients send to the core's and back; `planner_core.pins` has the last word."""
+"""Pins and outages, from what clients send to the core's and back; the core has the last word."""
 
 from __future__ import annotations
 
+from planner_core.domain import Outage
 from planner_core.errors import InvalidScenario
 from planner_core.pins import BlockedInterval, PinnedAction, Pins
-from service.wire.pins import BlockedIn, PinnedActionIn, PinsIn
+from service.wire.pins import BlockedIn, OutageIn, PinnedActionIn, PinsIn
 
 
 def pins_from(body: PinsIn) -> Pins:
@@ -22,6 +23,18 @@ def pins_from(body: PinsIn) -> Pins:
             for blocked in body.block
         ),
         forbid=tuple(body.forbid),
+    )
+
+
+def outage_from(body: OutageIn) -> Outage:
+    """Return the outage of one body."""
+    return Outage(
+        satellite_id=body.satellite_id,
+        station_id=body.station_id,
+        start=body.start,
+        end=body.end,
+        modes=tuple(dict.fromkeys(body.modes)),
+        reason=body.reason,
     )
 
 

@@ -1,4 +1,4 @@
-"""Pinned actions, as clients write them."""
+"""Pinned actions and outages, as clients write them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from service.wire.base import Body, Id, Instant, Open
+from service.wire.base import Body, Id, Instant, Open, Reason, Wire
 
 PinnedMode = Literal["collect", "contact"]
 
@@ -35,6 +35,43 @@ class BlockedIn(Body):
     start: Instant
     end: Instant
     modes: list[Open[PinnedMode]] = Field(["collect", "contact"], min_length=1, max_length=2)
+
+
+class OutageIn(Body):
+    """A span in which a satellite or a ground station is not to be had."""
+
+    satellite_id: Id | None = Field(None, description="Either a satellite ...")
+    station_id: Id | None = Field(None, description="... or a station is out.")
+    start: Instant
+    end: Instant
+    modes: list[Open[PinnedMode]] = Field(
+        ["collect", "contact"],
+        min_length=1,
+        max_length=2,
+        description="What a satellite cannot do meanwhile; a station's outage takes its contacts.",
+    )
+    reason: Reason | None = Field(None, description="For people: safe mode, antenna in service.")
+
+
+class PlacedOutage(OutageIn):
+    """An outage of a scenario."""
+
+    id: Id | None = Field(None, description="Of the one under `/v1/outages` that it was.")
+
+
+class OutageOut(Wire):
+    """An outage that is stored."""
+
+    id: str
+    satellite_id: str | None
+    satellite_name: str | None
+    station_id: str | None
+    station_name: str | None
+    start: Instant
+    end: Instant
+    modes: tuple[Open[PinnedMode], ...]
+    reason: str | None
+    created_at: Instant
 
 
 class PinsIn(Body):

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Final, Literal
+from typing import Final, Literal
 
-from pydantic import Field, StringConstraints
+from pydantic import Field
 
-from service.wire.base import Body, Id, Instant, Name, Open, Stored, Wire
+from service.wire.base import Body, Id, Instant, Name, Open, Reason, Stored, Wire
 from service.wire.scenarios import HorizonOut
 from service.wire.timelines import ViolationOut
 
@@ -23,10 +23,6 @@ TRANSITIONS: Final[dict[PlanState, tuple[PlanState, ...]]] = {
     "withdrawn": (),
 }
 """What a caller may ask for; ``superseded`` comes by publishing another plan."""
-
-Reason = Annotated[
-    str, StringConstraints(min_length=1, max_length=1000, pattern=r"^[^\x00-\x1f\x7f]*$")
-]
 
 
 class PlanIn(Body):

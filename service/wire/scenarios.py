@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import FailFast, Field
 
 from service.wire.base import Body, Duration, Id, Instant, Name, Open, Stored, Wire
-from service.wire.pins import PinsIn
+from service.wire.pins import PinsIn, PlacedOutage
 from service.wire.places import GroundStationIn, TargetIn
 from service.wire.satellites import Nadir, SatelliteIn
 
@@ -78,6 +78,12 @@ class Question(Body):
         "(low orbits), which is refused otherwise.",
     )
     pins: PinsIn = PinsIn()
+    outages: list[PlacedOutage] = Field(
+        [],
+        max_length=10_000,
+        description="What is known to be out, and when. Those stored under `/v1/outages` that "
+        "concern the scenario are added when it is stored.",
+    )
 
 
 class ScenarioIn(Question):
@@ -189,6 +195,9 @@ class ScenarioOut(ScenarioSummary):
     """A frozen question. Later edits of what it names change nothing in it."""
 
     pins: PinsIn = PinsIn()
+    outages: tuple[PlacedOutage, ...] = Field(
+        (), description="With the `id` of each that was taken from `/v1/outages`."
+    )
 
 
 class ViewOut(Wire):

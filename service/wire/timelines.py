@@ -38,8 +38,8 @@ class ViolationOut(Wire):
     """A rule that the plan breaks."""
 
     code: str = Field(
-        description="`slew`, `overlap`, `window`, `battery`, `recorder`, `duplicate`, `station`; "
-        "more may be added. A plan whose only violations are `duplicate` is valid."
+        description="`slew`, `overlap`, `window`, `battery`, `recorder`, `duplicate`, `station`, "
+        "`pin`, `outage`; more may be added. A plan whose only violations are `duplicate` is valid."
     )
     satellite_id: str
     satellite_name: str | None = None
@@ -250,7 +250,7 @@ class AttemptOut(Wire):
     )
     fits_instead: bool = Field(description="The plan with it and without those is valid.")
     reward_delta: float | None = Field(description="What that plan earns more.")
-    ruled_out: bool = Field(description="A pin rules it out.")
+    ruled_out: bool = Field(description="A pin or an outage rules it out.")
 
 
 class ExplanationOut(TargetItem):

@@ -151,9 +151,9 @@ def test_only_the_times_of_a_target_need_be_covered() -> None:
     others = list(range(1, len(asked.targets)))
     all_day = covered(asked, 0.0, asked.horizon.duration_s, others).series
     replace(asked, forecast=Forecast(series=(*all_day, series([0], [7200, 18000], [[0.1, 0.2]]))))
+    short = Forecast(series=(*all_day, series([0], [7200, 17999], [[0.1, 0.2]])))
     with pytest.raises(InvalidScenario):
-        short = series([0], [7200, 17999], [[0.1, 0.2]])
-        replace(asked, forecast=Forecast(series=(*all_day, short)))
+        replace(asked, forecast=short)
 
 
 def test_falling_rewards_need_known_starts() -> None:

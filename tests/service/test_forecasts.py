@@ -12,8 +12,12 @@ import httpx
 import numpy as np
 import pytest
 
+from planner_core.errors import InvalidScenario
+from service.scenarios.forecast_inputs import find_forecast
 from service.scenarios.translate import canonical, scenario_from_content, sha256_of
+from service.stores import forecast_store
 from tests.missions import drawn_targets, paper_mission
+from tests.service.conftest import Service
 from tests.service.factories import EPOCH, post, send
 from tests.service.problems import assert_problem
 from tests.service.test_plan_job import run
@@ -133,6 +137,15 @@ def test_a_forecast_that_does_not_cover_the_question_is_refused(client: httpx.Cl
     assert_problem(unknown, 422, "unknown_forecast", pointer="/forecast_id")
 
 
+def test_a_forecast_is_its_owners_alone(service: Service) -> None:
+    made = upload(service.client, grid())
+    with service.database.reading() as session:
+        assert forecast_store.find(session, made["id"], "somebody else") is None
+        assert forecast_store.find(session, made["id"], None) is not None
+        with pytest.raises(InvalidScenario, match="There is no forecast"):
+            find_forecast(session, made["id"], "somebody else")
+
+
 def mission(**fields: Any) -> dict[str, Any]:
     targets = [target | {"reward": 1.0 + i % 3} for i, target in enumerate(drawn_targets(150))]
     return paper_mission(targets, **fields)
@@ -187,23 +200,6 @@ def test_every_collect_tells_how_clear_its_sky_is() -> None:
     assert 0 < totals["night_images"] < totals["images"]
     of_satellite = timeline["satellites"][0]["totals"]
     assert of_satellite == {name: totals[name] for name in of_satellite}
-
-
-def test_a_rule_that_is_told_of_the_weather_finds_clearer_skies() -> None:
-    file = mission()
-    own = skies(file)["series"][0]["clear_probability"]
-    sky = {name: float(np.mean(values)) for name, values in own.items()}
-    blind, seeing = (
-        [
-            sky.get(action["target_id"], 0.25)
-            for action in json.loads(run(mission(**fields), "rule").timeline)["satellites"][0][
-                "actions"
-            ]
-            if action["mode"] == "collect"
-        ]
-        for fields in ({}, {"forecast": skies(file)})
-    )
-    assert np.mean(seeing) > np.mean(blind)
 
 
 def test_falling_rewards_are_another_question() -> None:

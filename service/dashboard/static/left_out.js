@@ -14,6 +14,7 @@ import { PagedTable } from "./table.js";
 const MEANINGS = {
   no_access: "no satellite can take them in this horizon",
   excluded: "the request itself rules them out",
+  outage: "what could take them is out then",
   slew_conflict: "no time to turn between them and what is planned",
   displaced_by: "what is planned instead earns as much or more",
   battery: "the battery would fall below its limit",

@@ -131,7 +131,11 @@ def netcdf(
 ) -> bytes:
     """Return a file; latitudes descend as weather services write them."""
     values = np.asarray(values)
-    own = {"time": [0.0, 3.0], "latitude": [40.0, 39.0, 38.0], "longitude": [170, 175, 180, 185]}
+    own: dict[str, Any] = {
+        "time": [0.0, 3.0],
+        "latitude": [40.0, 39.0, 38.0],
+        "longitude": [170, 175, 180, 185],
+    }
     buffer = io.BytesIO()
     with h5netcdf.File(buffer, "w") as file:
         file.dimensions = dict(zip(axes, values.shape, strict=True))

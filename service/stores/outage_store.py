@@ -1,0 +1,48 @@
+"""Outages in the database."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from datetime import datetime
+
+import sqlalchemy as sa
+from sqlalchemy.orm import Session
+
+from service.db.rows import OutageRow
+from service.wire.pins import PlacedOutage
+
+
+def alive() -> sa.Select[OutageRow]:
+    """Return the query of all outages that have not been deleted."""
+    return sa.select(OutageRow).where(OutageRow.deleted_at.is_(None))
+
+
+def overlapping(
+    query: sa.Select[OutageRow], from_: datetime | None, to: datetime | None
+) -> sa.Select[OutageRow]:
+    """Return the query of those that overlap a span, of which either end may be open."""
+    if from_ is not None:
+        query = query.where(OutageRow.end > from_)
+    if to is not None:
+        query = query.where(OutageRow.start < to)
+    return query
+
+
+def concerning(
+    session: Session,
+    satellite_ids: Collection[str],
+    station_ids: Collection[str],
+    from_: datetime,
+    to: datetime,
+) -> Sequence[OutageRow]:
+    """Return the outages of these satellites and stations in a span, by their start."""
+    whose = sa.or_(OutageRow.satellite_id.in_(satellite_ids), OutageRow.station_id.in_(station_ids))
+    wanted = overlapping(alive().where(whose), from_, to)
+    return session.scalars(wanted.order_by(OutageRow.start, OutageRow.id)).all()
+
+
+def placed(row: OutageRow) -> PlacedOutage:
+    """Return the outage as scenarios take it along."""
+    return PlacedOutage.model_validate(
+        {name: getattr(row, name) for name in PlacedOutage.model_fields}
+    )
