@@ -11,6 +11,7 @@ import numpy as np
 
 from planner_core.build import view_at
 from planner_core.domain import Scenario
+from planner_core.mistakes import mistakes_of_accesses, usual_mistakes
 from planner_core.orbits.sgp4_record import GRAVITY
 from planner_core.problem import Problem
 from planner_core.problem.slew import TIME_TOLERANCE_S
@@ -171,7 +172,11 @@ class Documents(Wording):
             validity=judged.timeline.validity,
             violations=[self.violation(v) for v in judged.timeline.violations],
             totals=self._totals(),
-            warnings=judged.opportunities.warnings,
+            warnings=(
+                *judged.opportunities.warnings,
+                *usual_mistakes(judged.scenario),
+                *mistakes_of_accesses(judged.scenario, judged.opportunities.opportunities),
+            ),
             models=ModelsOut(
                 gravity=GRAVITY,
                 nadir={s.id: s.sensor.nadir for s in self.scenario.satellites},

@@ -16,6 +16,7 @@ from sqlalchemy.orm import Session
 
 from planner_core.build import check_element_age, check_propagation, orbit_warnings
 from planner_core.errors import InvalidScenario, PlannerError
+from planner_core.mistakes import usual_mistakes
 from service.db.ids import new_id
 from service.db.rows import GroundStationRow, SatelliteRow, ScenarioRow, TargetCatalogRow, TargetRow
 from service.db.session import Database
@@ -108,7 +109,7 @@ def freeze_file(file: ScenarioFile, limits: ScenarioLimits) -> FrozenScenario:
         name=file.name,
         content=content,
         sha256=sha256_of(content),
-        summary=_summary(file, orbit_warnings(scenario)),
+        summary=_summary(file, (*orbit_warnings(scenario), *usual_mistakes(scenario))),
     )
 
 

@@ -186,7 +186,9 @@ class ScenarioSummary(Stored):
     )
     has_forecast: bool = False
     counts: Counts
-    warnings: tuple[str, ...] = Field(description="About the age of orbits, for people.")
+    warnings: tuple[str, ...] = Field(
+        description="About old orbits and what is nearly always a mistake, for people."
+    )
     created_at: Instant
     links: dict[str, str]
 
