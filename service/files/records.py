@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import csv
 import difflib
-import io
 import json
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Generic, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
 from planner_core.errors import Fault, PlannerError
+from service.files.tables import Table, decoded, read_table
 from service.problems.faults import faults_of_validation, refuse
 
 B = TypeVar("B", bound=BaseModel)
@@ -149,12 +148,14 @@ def read_csv(
 
     Columns may stand in any order; ``lat``, ``latitude``, ``lon``, ``lng``, ``long`` and
     ``longitude`` are taken too. Other columns are ignored, unless they look like a misspelt
-    one. An empty cell means the default.
+    one. An empty cell means the default. Cells are parted by commas, or by semicolons or tabs where
+    the header shows it; there a comma may be the decimal sign.
     """
     text = decoded(data)
     if isinstance(text, Fault):
         return Records(faults=(text,))
-    rows = csv_rows(text)
+    table = read_table(text, column_names, required)
+    rows = table.rows
     first = next(rows, None)
     if first is None:
         return Records(faults=(Fault(code="empty_file", detail="The file is empty."),))
@@ -178,7 +179,9 @@ def read_csv(
             faults.append(Fault(code="malformed_csv", detail=detail, row=row[0]))
         else:
             cells = zip(columns, (cell.strip() for cell in row[1]), strict=True)
-            fields = {name: _value(name, cell) for name, cell in cells if cell and name in known}
+            fields = {
+                name: _value(name, cell, table) for name, cell in cells if cell and name in known
+            }
             records.append(Record(fields=fields, row=row[0]))
     if not records and not faults:
         faults.append(Fault(code="empty_file", detail="The file has a header and no records."))
@@ -186,38 +189,15 @@ def read_csv(
     return Records(records=tuple(records), faults=tuple(faults), ignored=ignored)
 
 
+def column_names(header: Sequence[str]) -> list[str]:
+    """Return our names of a file's columns."""
+    names = (cell.strip().lower() for cell in header)
+    return [_ALIASES.get(name, name) for name in names]
+
+
 def _too_many_rows(most: int) -> Records:
     detail = f"The file holds more than {most} records; split it."
     return Records(faults=(Fault(code="too_many_rows", detail=detail),))
-
-
-def column_names(header: Sequence[str]) -> list[str]:
-    """Return our names of a file's columns."""
-    return [_ALIASES.get(name.strip().lower(), name.strip().lower()) for name in header]
-
-
-def decoded(data: bytes) -> str | Fault:
-    """Return the text of a file in UTF-8, or what is wrong with it."""
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        return Fault(code="not_utf8", detail=f"Byte {error.start} is no UTF-8.")
-
-
-def csv_rows(text: str) -> Iterator[tuple[int, list[str]] | Fault]:
-    """Yield the line where each record starts, and its cells; blank lines are left out."""
-    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
-    while True:
-        start = reader.line_num + 1
-        try:
-            cells = next(reader)
-        except StopIteration:
-            return
-        except csv.Error as error:
-            yield Fault(code="malformed_csv", detail=f"{str(error).capitalize()}.", row=start)
-            continue
-        if any(cell.strip() for cell in cells):
-            yield start, cells
 
 
 def faults_of_header(
@@ -242,9 +222,10 @@ def faults_of_header(
     return faults
 
 
-def _value(column: str, cell: str) -> object:
+def _value(column: str, cell: str, table: Table) -> object:
     if column in _TEXT_COLUMNS:
         return cell
+    cell = table.number(cell)
     if column == "antennas" and _WHOLE.fullmatch(cell):
         return int(cell)
     # What is no number stays text, which the schema refuses by name.

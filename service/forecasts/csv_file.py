@@ -15,10 +15,9 @@ from planner_core.errors import Fault
 from service.files.records import (
     MOST_COLUMNS,
     column_names,
-    csv_rows,
-    decoded,
     faults_of_header,
 )
+from service.files.tables import Table, decoded, read_table
 from service.forecasts.axes import fault_of_axes, unwrapped
 from service.forecasts.fields import WHOLE, ByTarget, Field, Grid, time_ms_of
 from service.problems.faults import refuse
@@ -26,6 +25,7 @@ from service.wire.base import Id, Instant
 
 _GRID: Final = ("time", "lat_deg", "lon_deg", "clear_probability")
 _BY_TARGET: Final = ("target_id", "time", "clear_probability")
+_IN_BOTH: Final = ("time", "clear_probability")
 _MOST_FAULTS: Final = 100
 _INSTANT: Final[TypeAdapter[datetime]] = TypeAdapter(Instant)
 _ID: Final[TypeAdapter[str]] = TypeAdapter(Id)
@@ -42,9 +42,10 @@ def read_csv(data: bytes) -> tuple[Field, list[str]]:
     text = decoded(data)
     if isinstance(text, Fault):
         raise refuse([text])
-    rows = csv_rows(text)
+    form = read_table(text, column_names, _IN_BOTH)
+    rows = form.rows
     wanted, positions = _header(rows)
-    table = _Table(wanted, positions)
+    table = _Table(wanted, positions, form)
     for row in rows:
         table.add(row)
     if not table.faults and not table.lines:
@@ -78,7 +79,7 @@ def _header(rows: Iterator[tuple[int, list[str]] | Fault]) -> tuple[tuple[str, .
 class _Table:
     """The cells that are wanted, column by column, and what is wrong with the others."""
 
-    def __init__(self, wanted: tuple[str, ...], positions: list[int]):
+    def __init__(self, wanted: tuple[str, ...], positions: list[int], form: Table):
         self.columns: dict[str, list[Any]] = {name: [] for name in wanted}
         self.lines: list[int] = []
         self.faults: list[Fault] = []
@@ -88,9 +89,9 @@ class _Table:
         self._read: dict[str, Callable[[str], Any]] = {
             "time": self._time_ms,
             "target_id": self._target_id,
-            "lat_deg": lambda cell: _number(cell, -90.0, 90.0),
-            "lon_deg": lambda cell: _number(cell, -180.0, 360.0),
-            "clear_probability": lambda cell: _number(cell, 0.0, 1.0),
+            "lat_deg": lambda cell: _number(form.number(cell), -90.0, 90.0),
+            "lon_deg": lambda cell: _number(form.number(cell), -180.0, 360.0),
+            "clear_probability": lambda cell: _number(form.number(cell), 0.0, 1.0),
         }
 
     def add(self, row: tuple[int, list[str]] | Fault) -> None:

@@ -52,6 +52,13 @@ def test_a_grid_may_stand_in_any_order() -> None:
     assert np.array_equal(read_csv(other)[0].columns()["value"], field.value)
 
 
+def test_tables_of_spreadsheets_are_read_as_they_come() -> None:
+    plain, _ = read_csv(text(*lines()))
+    turned = [line.replace(",", ";").replace(".", ",") for line in (HEADER, *lines())]
+    semicolons, _ = read_csv("\r\n".join(turned).encode("utf-16"))
+    assert np.array_equal(semicolons.columns()["value"], plain.columns()["value"])
+
+
 def test_values_by_target_are_sorted_in_time() -> None:
     header = "target_id,time,clear_probability"
     rows = ["b,2026-03-01T02:00:00Z,1", "a,2026-03-01T01:00:00Z,0.5", "b,2026-03-01T00:00:00Z,0"]
@@ -76,7 +83,7 @@ def test_a_globe_that_ends_where_it_begins_has_one_column_less() -> None:
     [
         (b"", "empty_file", None, "empty"),
         (text(), "empty_file", None, "no records"),
-        (b"\xff\xfe", "not_utf8", None, "UTF-8"),
+        (b"\xff\xff", "not_utf8", None, "UTF-8"),
         (text("x", header="time,lat_deg,lon_deg"), "missing_field", 1, "clear_probability"),
         (text(header="time,lat_deg,lon_deg,clear_probabilty"), "unknown_field", 1, "is meant"),
         (text("2026-03-01T00:00:00,1,2,0.5"), "invalid_value", 2, "time"),
