@@ -21,9 +21,9 @@ from service.api.imports import OnError, OnErrorQuery, body_schemas, imported, r
 from service.api.paging import PagingDep, newest_first, size_of
 from service.db.ids import new_id
 from service.db.rows import GroundStationRow
+from service.files.records import Checked, check, read_csv, read_geojson
 from service.problems.faults import faults_of_validation, refuse
 from service.problems.kinds import ServiceError
-from service.scenarios.records import Checked, check, read_csv, read_geojson
 from service.scenarios.translate import ground_station_from
 from service.wire.base import Listed
 from service.wire.imports import Imported

@@ -21,9 +21,9 @@ from service.api.idempotency import OnceDep
 from service.api.paging import PagingDep, newest_first
 from service.db.ids import new_id
 from service.db.rows import TargetCatalogRow, TargetRow
+from service.files.records import Record, Records, check, first_of_each, read_csv, read_geojson
 from service.problems.faults import faults_of_validation, refuse
 from service.problems.kinds import ServiceError
-from service.scenarios.records import Record, Records, check, first_of_each, read_csv, read_geojson
 from service.scenarios.translate import target_from
 from service.wire.base import Body, Listed, Name
 from service.wire.places import MAX_TARGETS, CreatedCatalog, TargetCatalogOut, TargetIn

@@ -149,6 +149,9 @@ class ScenarioIn(Question):
     satellite_ids: list[Id] = Field(min_length=1, max_length=10_000)
     target_catalog_ids: list[Id] = Field(min_length=1, max_length=1000)
     ground_station_ids: list[Id] = Field([], max_length=10_000)
+    forecast_id: Id | None = Field(
+        None, description="What it says of the targets is frozen with the scenario."
+    )
 
 
 class FileSatellite(WholeSatellite):
@@ -166,6 +169,30 @@ class FileGroundStation(GroundStationIn):
     """A ground station of a scenario file."""
 
     id: Id | None = Field(None, description="Its name by default, made unique.")
+
+
+class SkySeriesIn(Body):
+    """Probabilities of a clear sky over some targets at the same instants; linear between them."""
+
+    times: Annotated[list[Instant], FailFast()] = Field(
+        min_length=1, max_length=100_000, description="Ascending."
+    )
+    clear_probability: Annotated[
+        dict[Id, Annotated[list[Annotated[float, Field(ge=0, le=1)]], FailFast()]], FailFast()
+    ] = Field(
+        min_length=1,
+        max_length=1_000_000,
+        description="By id of the target, one for each of `times`.",
+    )
+
+
+class FileForecast(Body):
+    """What a forecast says of the targets, frozen with the question."""
+
+    default_clear_probability: float | None = Field(
+        None, ge=0, le=1, description="Of targets and instants that no series covers."
+    )
+    series: Annotated[list[SkySeriesIn], FailFast()] = Field([], max_length=1_000_000)
 
 
 class FileTarget(TargetIn):
@@ -186,6 +213,7 @@ class ScenarioFile(Question):
     satellites: Annotated[list[FileSatellite], FailFast()] = Field(min_length=1, max_length=10_000)
     targets: Annotated[list[FileTarget], FailFast()] = Field(min_length=1, max_length=1_000_000)
     ground_stations: Annotated[list[FileGroundStation], FailFast()] = Field([], max_length=10_000)
+    forecast: FileForecast | None = Field(None, description="Null to take every sky for clear.")
 
     @model_validator(mode="before")
     @classmethod
@@ -233,8 +261,14 @@ class ScenarioSummary(Stored):
     quality: QualityIn = QualityIn()
     objective: ObjectiveIn = ObjectiveIn()
     allow_old_elements: bool
+    forecast_id: str | None = Field(
+        None, description="Where clear skies came from; null where the file had them, or none."
+    )
+    has_forecast: bool = False
     counts: Counts
-    warnings: tuple[str, ...] = Field(description="About the age of orbits, for people.")
+    warnings: tuple[str, ...] = Field(
+        description="About old orbits and what is nearly always a mistake, for people."
+    )
     created_at: Instant
     links: dict[str, str]
 
