@@ -48,7 +48,7 @@ from planner_core.problem import (
 )
 from planner_core.problem.delivery import with_objective
 from planner_core.problem.pointing import Path, Pointing
-from planner_core.worth import quality_of, worth_of_collects
+from planner_core.valuation import worth_of_opportunities
 
 Longs = npt.NDArray[np.int64]
 Codes = npt.NDArray[np.int8]
@@ -56,6 +56,7 @@ Floats = npt.NDArray[np.float64]
 
 LEO_PERIOD_S = 128 * 60.0
 OLD_ELEMENTS_DAYS = 3.0
+_GENERIC = ("generic_optical", "generic_sar")
 REFUSED_ELEMENTS_DAYS = 30.0
 
 _REASONS = np.array(
@@ -314,7 +315,7 @@ def build_problem(scenario: Scenario, computed: ScenarioOpportunities, budget: B
         continuous_starts=has_continuous_starts(scenario),
         pointing=_pointing(scenario) if has_continuous_starts(scenario) else None,
         target_ids=tuple(target.id for target in scenario.targets),
-        worth=_worth(scenario, computed.opportunities),
+        worth=worth_of_opportunities(scenario, computed.opportunities),
         target_access=computed.target_access,
         station_ids=tuple(station.id for station in stations),
         station_antennas=np.array([s.antennas for s in stations], dtype=np.int32),
@@ -323,18 +324,6 @@ def build_problem(scenario: Scenario, computed: ScenarioOpportunities, budget: B
         satellites=tuple(satellites),
     )
     return pinned_problem(scenario, with_objective(problem, scenario.objective))
-
-
-def _worth(scenario: Scenario, table: Opportunities) -> Floats:
-    """Return what each opportunity earns alone; contacts nothing."""
-    target_reward = np.array([target.reward for target in scenario.targets], dtype=np.float64)
-    collects = np.flatnonzero(table.kind == COLLECT)
-    worth = np.zeros(len(table))
-    quality = quality_of(
-        scenario.quality, table.off_nadir_deg[collects], table.sun_elevation_deg[collects]
-    )
-    worth[collects] = worth_of_collects(target_reward, table.place[collects], quality)
-    return worth
 
 
 def has_continuous_starts(scenario: Scenario) -> bool:
@@ -394,6 +383,12 @@ def orbit_warnings(scenario: Scenario) -> tuple[str, ...]:
     """Return what a reader should know about element sets, the Earth's orientation and starts."""
     ages = (_age_warning(satellite, scenario.horizon) for satellite in scenario.satellites)
     warnings = [warning for warning in ages if warning is not None]
+    generic = sorted({s.spacecraft for s in scenario.satellites if s.spacecraft in _GENERIC})
+    if generic:
+        warnings.append(
+            f"Satellites plan with the figures of the built-in type {' and '.join(generic)}, "
+            "which are those of a class: give your own agility, sensor and resources."
+        )
     if not shipped().covers(scenario.horizon):
         warnings.append(
             "The horizon reaches outside the table of the Earth's orientation: its end values "

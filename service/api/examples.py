@@ -24,6 +24,8 @@ _HORIZON: Final = {"start": "2019-01-01T00:00:00Z", "end": "2019-01-01T12:00:00Z
 
 BODIES: Final[dict[str, Any]] = {
     "SatelliteIn": {"name": "Polar-500", "omm": _OMM},
+    "SpacecraftIn": {"name": "Our bus", "agility": {"slew_rate_deg_s": 2.0}},
+    "SpacecraftPatch": {"sensor": {"off_nadir_max_deg": 40.0}},
     "OrbitIn": {"omm": _OMM | {"EPOCH": "2019-01-01T06:00:00", "MEAN_ANOMALY": 92}},
     "GroundStationIn": {"name": "Svalbard", "lat_deg": 78.22983, "lon_deg": 15.39244},
     "SatellitePatch": {"agility": {"slew_rate_deg_s": 2.0, "settle_s": 5.0}},
@@ -104,6 +106,11 @@ FILES: Final[dict[tuple[str, str], Any]] = {
     ("/v1/ground-stations/import", "application/geo+json"): _FEATURES,
     ("/v1/ground-stations/import", "text/csv"): (
         "name,lat_deg,lon_deg,min_elevation_deg\nTromsø,69.66,18.94,5\n"
+    ),
+    ("/v1/forecasts", "text/csv"): (
+        "time,lat_deg,lon_deg,clear_probability\n"
+        "2026-01-31T00:00:00Z,46,7,0.8\n2026-01-31T00:00:00Z,46,8,0.7\n"
+        "2026-01-31T00:00:00Z,47,7,0.5\n2026-01-31T00:00:00Z,47,8,0.4\n"
     ),
     ("/v1/target-catalogs", "application/geo+json"): _FEATURES,
     ("/v1/target-catalogs", "text/csv"): "id,lat_deg,lon_deg,reward\nbern,46.948,7.447,1\n",

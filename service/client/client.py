@@ -13,12 +13,14 @@ import httpx
 
 import planner_core
 from service.client.comparisons import Comparisons
+from service.client.forecasts import Forecasts
 from service.client.ground_stations import GroundStations
 from service.client.jobs import Jobs
 from service.client.outages import Outages
 from service.client.plans import Plans
 from service.client.satellites import Satellites
 from service.client.scenarios import Scenarios
+from service.client.spacecraft import SpacecraftTypes
 from service.client.target_catalogs import TargetCatalogs
 from service.client.transport import Transport, held, path_of
 from service.client.webhooks import Webhooks
@@ -45,8 +47,10 @@ class Client:
 
     satellites: Satellites
     ground_stations: GroundStations
+    spacecraft: SpacecraftTypes
     outages: Outages
     target_catalogs: TargetCatalogs
+    forecasts: Forecasts
     scenarios: Scenarios
     jobs: Jobs
     comparisons: Comparisons
@@ -75,8 +79,10 @@ class Client:
         self._transport = Transport(self._http, patience_s=patience_s)
         self.satellites = Satellites(self._transport)
         self.ground_stations = GroundStations(self._transport)
+        self.spacecraft = SpacecraftTypes(self._transport)
         self.outages = Outages(self._transport)
         self.target_catalogs = TargetCatalogs(self._transport)
+        self.forecasts = Forecasts(self._transport)
         self.scenarios = Scenarios(self._transport)
         self.jobs = Jobs(self._transport)
         self.comparisons = Comparisons(self._transport)

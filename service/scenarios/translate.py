@@ -12,7 +12,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 from pydantic import ValidationError
 
@@ -33,9 +33,18 @@ from planner_core.errors import InvalidScenario, PlannerError
 from planner_core.orbits.omm import elements_from_omm, omm_from_elements
 from planner_core.orbits.tle import read_tle
 from service.problems.faults import faults_of_validation
+from service.scenarios.forecast_inputs import forecast_from
 from service.scenarios.pin_inputs import outage_from, pins_from
 from service.wire.places import GroundStationIn, TargetIn
-from service.wire.satellites import OrbitIn, Preset, PresetResourcesIn, ResourcesIn, SatelliteIn
+from service.wire.satellites import (
+    AgilityIn,
+    OrbitIn,
+    Preset,
+    PresetResourcesIn,
+    ResourcesIn,
+    SensorIn,
+    WholeSatellite,
+)
 from service.wire.scenarios import (
     FileGroundStation,
     FileSatellite,
@@ -120,9 +129,12 @@ def _with_ids(items: Sequence[FileSatellite | FileGroundStation]) -> list[object
 
 def canonical_of_file(file: ScenarioFile) -> str:
     """Return the canonical form of a file that `read_file` has made."""
-    document = file.model_dump(mode="json", exclude={"name"})
+    document = file.model_dump(mode="json", exclude={"name", "release"})
     for satellite in document["satellites"]:
         del satellite["omm" if satellite["omm"] is None else "tle"]
+        if satellite["spacecraft"] not in (None, "paper", "paper_code"):
+            continue  # what it leaves out would be its type's
+        del satellite["spacecraft"]
         _without_unset(satellite["sensor"], "sensor_type", "sun_exclusion_deg")
         _without_unset(satellite["agility"], "sun_exclusion_deg")
         if satellite["agility"]["slew_model"] == "rest":
@@ -132,7 +144,8 @@ def canonical_of_file(file: ScenarioFile) -> str:
     for station in document["ground_stations"]:
         _without(station, setup_s=0.0, downlink_gain=1.0)
     for target in document["targets"]:
-        _without_unset(target, "catalog_id", "release", "due", "sensor_type")
+        _without_unset(target, "catalog_id", "release", "due", "sensor_type", "reward_half_life_s")
+    _without_unset(document, "forecast")
     if document["collect_alignment"] == "access":
         del document["collect_alignment"]
     if not _counts_delivery(document["objective"]):
@@ -186,6 +199,7 @@ def scenario_from_file(file: ScenarioFile) -> Scenario:
         collect_alignment=file.collect_alignment,
         continuous_starts=file.continuous_starts,
         quality=quality_from(file.quality),
+        forecast=forecast_from(file),
         objective=Objective(**file.objective.model_dump()),
         allow_old_elements=file.allow_old_elements,
         pins=pins_from(file.pins),
@@ -264,15 +278,10 @@ def orbit_from(body: OrbitIn) -> Orbit:
     return Orbit(elements=elements, stored={"omm": omm_from_elements(elements)})
 
 
-def satellite_from(body: SatelliteIn, satellite_id: str) -> Satellite:
+def satellite_from(body: WholeSatellite, satellite_id: str) -> Satellite:
     """Return the satellite of one body."""
     elements = orbit_from(body).elements
-    with inside("/agility"):
-        agility = Agility(**body.agility.model_dump())
-    with inside("/sensor"):
-        sensor = Sensor(**body.sensor.model_dump())
-    with inside("/resources"):
-        resources = resources_from(body.resources, elements.period_s)
+    agility, sensor, resources = figures_from(body, elements.period_s)
     return Satellite(
         id=satellite_id,
         name=body.name,
@@ -280,7 +289,34 @@ def satellite_from(body: SatelliteIn, satellite_id: str) -> Satellite:
         agility=agility,
         sensor=sensor,
         resources=resources,
+        spacecraft=body.spacecraft,
     )
+
+
+class _WithFigures(Protocol):
+    @property
+    def agility(self) -> AgilityIn: ...
+    @property
+    def sensor(self) -> SensorIn: ...
+    @property
+    def resources(self) -> Preset | PresetResourcesIn | ResourcesIn: ...
+
+
+def figures_from(body: _WithFigures, period_s: float) -> tuple[Agility, Sensor, Resources]:
+    """Return what a spacecraft in an orbit of this period can do.
+
+    Raises
+    ------
+    InvalidScenario
+        With a pointer into the body.
+    """
+    with inside("/agility"):
+        agility = Agility(**body.agility.model_dump())
+    with inside("/sensor"):
+        sensor = Sensor(**body.sensor.model_dump())
+    with inside("/resources"):
+        resources = resources_from(body.resources, period_s)
+    return agility, sensor, resources
 
 
 _FIELDS_OF_RATES = {

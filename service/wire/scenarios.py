@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Final, Literal
+from typing import Annotated, Final, Literal, get_args
 
-from pydantic import BeforeValidator, FailFast, Field
+from pydantic import BeforeValidator, FailFast, Field, GetJsonSchemaHandler, model_validator
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
 
 from service.wire.base import Body, Duration, Id, Instant, Name, Open, Stored, Wire
 from service.wire.pins import PinsIn, PlacedOutage
 from service.wire.places import GroundStationIn, TargetIn
-from service.wire.satellites import Nadir, SatelliteIn
+from service.wire.satellites import Nadir, WholeSatellite
+from service.wire.spacecraft_types import BuiltIn, filled_file_satellite
 
 Dynamics = Literal["physical", "paper"]
 CollectAlignment = Literal["access", "horizon"]
@@ -80,10 +83,20 @@ def _objective_named(value: object) -> object:
     return _NAMED.get(value, value) if isinstance(value, str) else value
 
 
-AnyObjective = Annotated[
-    ObjectiveIn,
-    BeforeValidator(_objective_named, json_schema_input_type=ObjectiveIn | ObjectiveName),
-]
+class _OrShortName:
+    """Shows the short names in the schema of what is sent and of what is answered alike.
+
+    Two schemas of one thing would give it two names, and generated clients would lose both.
+    """
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        names = {"type": "string", "enum": list(get_args(ObjectiveName))}
+        return {"anyOf": [handler(schema), names]}
+
+
+AnyObjective = Annotated[ObjectiveIn, BeforeValidator(_objective_named), _OrShortName()]
 
 
 class Question(Body):
@@ -114,6 +127,7 @@ class Question(Body):
         ObjectiveIn(),
         description="What a plan is to earn. `collected` is short for a collected_share of 1, "
         "`delivered` for 0; `paper` is the same as `collected`.",
+        json_schema_extra={"default": "collected"},
     )
     allow_old_elements: bool = Field(
         False,
@@ -135,10 +149,18 @@ class ScenarioIn(Question):
     satellite_ids: list[Id] = Field(min_length=1, max_length=10_000)
     target_catalog_ids: list[Id] = Field(min_length=1, max_length=1000)
     ground_station_ids: list[Id] = Field([], max_length=10_000)
+    forecast_id: Id | None = Field(
+        None, description="What it says of the targets is frozen with the scenario."
+    )
 
 
-class FileSatellite(SatelliteIn):
-    """A satellite of a scenario file."""
+class FileSatellite(WholeSatellite):
+    """A satellite of a scenario file.
+
+    Of a `spacecraft` that is built in, and in files of release 2, it takes what it leaves out.
+    """
+
+    spacecraft: BuiltIn | None = Field(None, description="A type that is built in.")
 
     id: Id | None = Field(None, description="Its name by default, made unique.")
 
@@ -147,6 +169,30 @@ class FileGroundStation(GroundStationIn):
     """A ground station of a scenario file."""
 
     id: Id | None = Field(None, description="Its name by default, made unique.")
+
+
+class SkySeriesIn(Body):
+    """Probabilities of a clear sky over some targets at the same instants; linear between them."""
+
+    times: Annotated[list[Instant], FailFast()] = Field(
+        min_length=1, max_length=100_000, description="Ascending."
+    )
+    clear_probability: Annotated[
+        dict[Id, Annotated[list[Annotated[float, Field(ge=0, le=1)]], FailFast()]], FailFast()
+    ] = Field(
+        min_length=1,
+        max_length=1_000_000,
+        description="By id of the target, one for each of `times`.",
+    )
+
+
+class FileForecast(Body):
+    """What a forecast says of the targets, frozen with the question."""
+
+    default_clear_probability: float | None = Field(
+        None, ge=0, le=1, description="Of targets and instants that no series covers."
+    )
+    series: Annotated[list[SkySeriesIn], FailFast()] = Field([], max_length=1_000_000)
 
 
 class FileTarget(TargetIn):
@@ -158,10 +204,28 @@ class FileTarget(TargetIn):
 class ScenarioFile(Question):
     """A self-contained scenario, as ``GET /v1/scenarios/{id}?expand=true`` answers it."""
 
+    release: Literal[1, 2] = Field(
+        1,
+        description="Of the file's form. In files of the first release satellites have the paper's "
+        "figures where they leave them out, from the second on those of `generic_optical`.",
+    )
     # The first thing that is wrong is told: of a whole file of them each would take memory.
     satellites: Annotated[list[FileSatellite], FailFast()] = Field(min_length=1, max_length=10_000)
     targets: Annotated[list[FileTarget], FailFast()] = Field(min_length=1, max_length=1_000_000)
     ground_stations: Annotated[list[FileGroundStation], FailFast()] = Field([], max_length=10_000)
+    forecast: FileForecast | None = Field(None, description="Null to take every sky for clear.")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_types(cls, value: object) -> object:
+        """Give satellites the figures of their types; what is no such file is told later."""
+        if not isinstance(value, dict) or not isinstance(value.get("satellites"), list):
+            return value
+        satellites = [
+            filled_file_satellite(one, value.get("release")) if isinstance(one, dict) else one
+            for one in value["satellites"]
+        ]
+        return {**value, "satellites": satellites}
 
 
 class HorizonOut(Wire):
@@ -197,8 +261,14 @@ class ScenarioSummary(Stored):
     quality: QualityIn = QualityIn()
     objective: ObjectiveIn = ObjectiveIn()
     allow_old_elements: bool
+    forecast_id: str | None = Field(
+        None, description="Where clear skies came from; null where the file had them, or none."
+    )
+    has_forecast: bool = False
     counts: Counts
-    warnings: tuple[str, ...] = Field(description="About the age of orbits, for people.")
+    warnings: tuple[str, ...] = Field(
+        description="About old orbits and what is nearly always a mistake, for people."
+    )
     created_at: Instant
     links: dict[str, str]
 

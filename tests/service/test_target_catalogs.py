@@ -66,6 +66,7 @@ def test_a_json_catalogue_fills_in_defaults(client: httpx.Client) -> None:
         "release": None,
         "due": None,
         "sensor_type": None,
+        "reward_half_life_s": None,
     }
 
 
@@ -224,9 +225,9 @@ def test_an_unreadable_file_is_refused(service: Service, text: str | bytes, code
 @pytest.mark.parametrize(
     "data",
     [
-        "id;lat;lon;reward;name\na;48,5;-3,25;2;x,y\nb;-1;10;1,5;\n".encode(),
-        "id;lat;lon;reward;name\na;48.5;-3.25;2;x,y\nb;-1;10;1.5;\n".encode(),
-        "id\tlat\tlon\treward\na\t48,5\t-3,25\t2\nb\t-1\t10\t1,5\n".encode(),
+        b"id;lat;lon;reward;name\na;48,5;-3,25;2;x,y\nb;-1;10;1,5;\n",
+        b"id;lat;lon;reward;name\na;48.5;-3.25;2;x,y\nb;-1;10;1.5;\n",
+        b"id\tlat\tlon\treward\na\t48,5\t-3,25\t2\nb\t-1\t10\t1,5\n",
         "id,lat,lon,reward\r\na,48.5,-3.25,2\r\nb,-1,10,1.5\r\n".encode("utf-16"),
         b"\xfe\xff" + "id;lat;lon;reward\na;48,5;-3,25;2\nb;-1;10;1,5\n".encode("utf-16-be"),
     ],

@@ -37,6 +37,10 @@ def new_station(client: httpx.Client) -> str:
     return post(client, "/v1/ground-stations", ground_station())
 
 
+def new_spacecraft(client: httpx.Client) -> str:
+    return post(client, "/v1/spacecraft", {"name": "Bus"})
+
+
 def new_catalog(client: httpx.Client) -> str:
     return post(client, "/v1/target-catalogs", {"name": "c", "targets": [target()]})
 
@@ -141,6 +145,13 @@ CHANGES: dict[tuple[str, str], tuple[Callable[[httpx.Client], str], str, str]] =
     ("delete", "/v1/satellites/{satellite_id}"): (
         delete(new_satellite, "/v1/satellites"), "delete", "satellite",
     ),
+    ("post", "/v1/spacecraft"): (new_spacecraft, "create", "spacecraft"),
+    ("patch", "/v1/spacecraft/{spacecraft_id}"): (
+        rename(new_spacecraft, "/v1/spacecraft"), "update", "spacecraft",
+    ),
+    ("delete", "/v1/spacecraft/{spacecraft_id}"): (
+        delete(new_spacecraft, "/v1/spacecraft"), "delete", "spacecraft",
+    ),
     ("post", "/v1/ground-stations"): (new_station, "create", "ground_station"),
     ("post", "/v1/ground-stations/import"): (import_stations, "create", "ground_station"),
     ("patch", "/v1/ground-stations/{station_id}"): (
@@ -155,6 +166,14 @@ CHANGES: dict[tuple[str, str], tuple[Callable[[httpx.Client], str], str, str]] =
     ),
     ("post", "/v1/scenarios"): (
         lambda client: post(client, "/v1/scenarios", question(client)), "create", "scenario",
+    ),
+    ("delete", "/v1/scenarios/{scenario_id}"): (
+        delete(lambda client: post(client, "/v1/scenarios", question(client)), "/v1/scenarios"),
+        "delete", "scenario",
+    ),
+    ("delete", "/v1/jobs/{job_id}"): (delete(cancel, "/v1/jobs"), "delete", "job"),
+    ("delete", "/v1/comparisons/{comparison_id}"): (
+        delete(compare, "/v1/comparisons"), "delete", "comparison",
     ),
     ("post", "/v1/jobs"): (new_job, "create", "job"),
     ("post", "/v1/jobs/{job_id}/rerun"): (rerun, "create", "job"),
