@@ -170,8 +170,8 @@ def test_a_share_for_images_on_board_bounds_every_plan(
 
 def test_what_stays_on_board_lowers_the_bound() -> None:
     """Two images, and a contact that takes down one: half of the other's worth is out of reach."""
-    tasks = [collect(0, 100.0), collect(1, 200.0), contact(330.0, 374.0)]
-    bare = replace(ROOMY, telemetry_per_s=0.0, downlink_per_s=0.002)
+    tasks = [collect(0, 100.0), collect(1, 200.0), contact(330.0, 346.0)]
+    bare = replace(ROOMY, telemetry_per_s=0.0, initial_recorder_fraction=0.0)
     problem = make_problem(tasks, num_targets=2, resources=bare)
     problem = with_objective(problem, Objective(collected_share=0.5))
     assert best_reward(problem) == 1.5
