@@ -11,6 +11,7 @@ from planner_core.domain.horizon import Horizon
 from planner_core.domain.outages import Outage
 from planner_core.domain.places import GroundStation, Target
 from planner_core.domain.quality import Quality
+from planner_core.domain.replan import Replan
 from planner_core.domain.spacecraft import Satellite
 from planner_core.errors import InvalidScenario
 from planner_core.pins import Pins
@@ -34,6 +35,8 @@ class Scenario:
         Plan with element sets of any age (see ``build.check_element_age``).
     outages
         What is known to be out, and when.
+    replan
+        The plan to go on from, where there is one.
     """
 
     horizon: Horizon
@@ -49,6 +52,7 @@ class Scenario:
     allow_old_elements: bool = False
     pins: Pins = field(default_factory=Pins)
     outages: tuple[Outage, ...] = ()
+    replan: Replan | None = None
     warnings: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
@@ -107,6 +111,13 @@ class Scenario:
         )
         for position, outage in enumerate(self.outages):
             outage.check(f"/outages/{position}", satellite_ids, station_ids)
+        if self.replan is not None:
+            require(
+                not self.continuous_starts,
+                "continuous_starts",
+                "a plan to go on from has opportunities at fixed starts",
+            )
+            self.replan.check(satellite_ids, {t.id for t in self.targets}, station_ids)
 
 
 def _first_duplicate(ids: Iterable[str]) -> tuple[int, str] | None:

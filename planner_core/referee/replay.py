@@ -33,7 +33,16 @@ from planner_core.referee.sight import turn_between
 
 Mode = Literal["collect", "contact", "sunpoint", "hold"]
 ViolationCode = Literal[
-    "window", "overlap", "slew", "station", "duplicate", "battery", "recorder", "pin", "outage"
+    "window",
+    "overlap",
+    "slew",
+    "station",
+    "duplicate",
+    "battery",
+    "recorder",
+    "pin",
+    "outage",
+    "frozen",
 ]
 _AMOUNT_TOLERANCE = 1e-9  # of a recorder's capacity, in comparing sums of many pieces
 
