@@ -14,6 +14,7 @@ import numpy.typing as npt
 from planner_core.access import opportunities as tasks
 from planner_core.access.eligibility import Eligibility
 from planner_core.access.limits import Limits, TargetLimits
+from planner_core.access.passes import contacts_of, downlinks_of
 from planner_core.access.windows import Accesses, find_accesses
 from planner_core.budget import Budget, Progress
 from planner_core.domain import (
@@ -157,7 +158,7 @@ def compute_opportunities(scenario: Scenario, budget: Budget) -> ScenarioOpportu
                 found, placed = collects.placed(satellite.sensor, path, budget)
             else:
                 found = find_accesses(path, places[kind], contact, budget.stop)
-                placed = tasks.place_contacts(found, scenario.ground_stations)
+                placed = contacts_of(scenario, satellite, path, places[kind], found)
             parts.append(tasks.rows_of(index, kind, found, num_accesses, placed))
             num_accesses += len(found)
             num_rows += len(placed[0])
@@ -285,6 +286,7 @@ def build_problem(scenario: Scenario, computed: ScenarioOpportunities, budget: B
     """
     satellites = []
     sun = sun_path(scenario.horizon)
+    downlinks = downlinks_of(scenario, computed.opportunities)
     for index, satellite in enumerate(scenario.satellites):
         _go_on(budget, index / len(scenario.satellites), "compile")
         sees_shadow = scenario.use_resources and satellite.resources.eclipse_aware
@@ -297,6 +299,7 @@ def build_problem(scenario: Scenario, computed: ScenarioOpportunities, budget: B
                 name=satellite.name,
                 agility=satellite.agility,
                 resources=satellite.resources,
+                downlinks=downlinks,
                 sunlight=computed.sunlight[index] if sees_shadow else everywhere,
                 sun=sun,
             )
@@ -314,6 +317,7 @@ def build_problem(scenario: Scenario, computed: ScenarioOpportunities, budget: B
         target_access=computed.target_access,
         station_ids=tuple(station.id for station in stations),
         station_antennas=np.array([s.antennas for s in stations], dtype=np.int32),
+        downlinks=downlinks,
         opportunities=computed.opportunities,
         satellites=tuple(satellites),
     )

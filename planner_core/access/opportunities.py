@@ -137,13 +137,22 @@ def _on_grid(row: Longs, start_ms: Longs, room_ms: Longs, step_ms: float) -> tup
 
 
 def place_contacts(accesses: Accesses, stations: Sequence[GroundStation]) -> Placed:
-    """Return the contacts: whole accesses of at least the station's ``min_contact_s``."""
+    """Return the contacts: whole accesses of at least the station's ``min_contact_s``.
+
+    One that is no longer than the station's setup is none: nothing would come down.
+    """
     shortest_ms = np.array(
-        [math.ceil(station.min_contact_s * _MS_PER_S - 1e-6) for station in stations],
+        [
+            max(
+                math.ceil(station.min_contact_s * _MS_PER_S - 1e-6),
+                math.floor(station.setup_s * _MS_PER_S) + 1,
+            )
+            for station in stations
+        ],
         dtype=np.int64,
     )[accesses.place]
     start_ms, end_ms = _ms(accesses.start_s), _ms(accesses.end_s)
-    row = np.flatnonzero(end_ms - start_ms >= np.maximum(shortest_ms, 1))
+    row = np.flatnonzero(end_ms - start_ms >= shortest_ms)
     return row, start_ms[row], end_ms[row]
 
 

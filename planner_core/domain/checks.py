@@ -81,3 +81,16 @@ def check_sensor_type(sensor_type: str | None) -> None:
         "sensor_type",
         f"must be 1 to {_LONGEST_SENSOR_TYPE} printable characters, or null for none",
     )
+
+
+def check_downlink(knots: tuple[tuple[float, float], ...]) -> None:
+    """Check the knots of a downlink's rate: elevations ascend, rates are magnitudes."""
+    before_deg = -math.inf
+    for row, (elevation_deg, per_s) in enumerate(knots):
+        where = f"downlink_by_elevation/{row}"
+        require(0.0 <= elevation_deg <= 90.0, where, "the elevation must be between 0 and 90")
+        require(
+            elevation_deg > before_deg, where, "the elevation must be greater than the one before"
+        )
+        require(math.isfinite(per_s) and per_s >= 0.0, where, "the rate must be 0 or more")
+        before_deg = elevation_deg

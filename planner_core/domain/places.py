@@ -71,6 +71,13 @@ class GroundStation:
 
     ``elevation_mask`` is a tuple of (azimuth_deg, elevation_deg) knots, linear between
     them and round the compass; the higher of mask and ``min_elevation_deg`` holds.
+
+    Attributes
+    ----------
+    setup_s
+        At the beginning of each contact, in which nothing comes down.
+    downlink_gain
+        Factor on the downlink's rate of each satellite.
     """
 
     id: str
@@ -82,6 +89,8 @@ class GroundStation:
     min_contact_s: float = 0.0
     elevation_mask: tuple[tuple[float, float], ...] = ()
     antennas: int = 1
+    setup_s: float = 0.0
+    downlink_gain: float = 1.0
 
     def __post_init__(self) -> None:
         require_finite(self, "lat_deg", "lon_deg", "alt_m", "min_elevation_deg", "min_contact_s")
@@ -90,3 +99,6 @@ class GroundStation:
         require(0 <= self.min_elevation_deg < 90, "min_elevation_deg", "must be from 0 to below 90")
         require(self.min_contact_s >= 0, "min_contact_s", "must be 0 or more")
         require(self.antennas >= 1, "antennas", "must be 1 or more")
+        require_finite(self, "setup_s", "downlink_gain")
+        require(self.setup_s >= 0, "setup_s", "must be 0 or more")
+        require(self.downlink_gain > 0, "downlink_gain", "must be greater than 0")

@@ -6,6 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Literal
 
+import numpy as np
+
 from planner_core.domain.checks import require
 from planner_core.domain.horizon import Horizon
 from planner_core.domain.outages import Outage
@@ -88,6 +90,8 @@ class Scenario:
             "dynamics",
             "paper knows neither turns to the sun nor idle_power_w: use sun_pointing free without",
         )
+        if self.use_resources:
+            self._check_downlinks()
         for what, ids in (
             ("satellite", [s.id for s in self.satellites]),
             ("target", [t.id for t in self.targets]),
@@ -118,6 +122,28 @@ class Scenario:
                 "a plan to go on from has opportunities at fixed starts",
             )
             self.replan.check(satellite_ids, {t.id for t in self.targets}, station_ids)
+
+    def _check_downlinks(self) -> None:
+        """Refuse passes in which telemetry may fill the recorder faster than it is emptied.
+
+        Where data begins to flow the recorder must not fill again until the contact's end, so
+        that one number tells what it takes down.
+        """
+        for index, satellite in enumerate(self.satellites):
+            resources = satellite.resources
+            if not resources.downlink_by_elevation:
+                continue
+            knots_deg = [elevation_deg for elevation_deg, _ in resources.downlink_by_elevation]
+            for station in self.ground_stations:
+                lowest_deg = station.min_elevation_deg
+                seen_deg = [lowest_deg, 90.0, *(deg for deg in knots_deg if deg > lowest_deg)]
+                slowest = station.downlink_gain * resources.downlink_at(np.array(seen_deg)).min()
+                require(
+                    bool(slowest >= resources.telemetry_per_s),
+                    f"satellites/{index}/resources/downlink_rate_mbit_s",
+                    f"above {lowest_deg:g} deg at {station.name!r} it falls below the rate of "
+                    "telemetry: raise the station's min_elevation_deg to where data comes down",
+                )
 
 
 def _first_duplicate(ids: Iterable[str]) -> tuple[int, str] | None:

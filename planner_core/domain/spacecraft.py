@@ -6,7 +6,11 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Literal
 
+import numpy as np
+import numpy.typing as npt
+
 from planner_core.domain.checks import (
+    check_downlink,
     check_light,
     check_sensor_type,
     check_sun_exclusion,
@@ -19,6 +23,7 @@ LookSide = Literal["left", "right", "any"]
 OrbitDirection = Literal["ascending", "descending", "any"]
 SunPointing = Literal["free", "slew"]
 SlewModel = Literal["rest", "moving"]
+Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -161,6 +166,9 @@ class Resources:
         Net draw of the two modes.
     collect_fill_per_s, downlink_per_s, telemetry_per_s
         What a collect writes, a contact takes down, and telemetry adds at all times.
+    downlink_by_elevation
+        Knots of a station's elevation in degrees and the downlink's rate per second there, linear
+        between and constant beyond; ``downlink_per_s`` where there are none.
     recorder_capacity_mbit
         Size of the recorder, or None where only fractions are known (the presets).
     sun_pointing
@@ -187,6 +195,14 @@ class Resources:
     sun_pointing: SunPointing = "free"
     panel_angle_deg: float = 180.0
     idle_drain_per_s: float = 0.0
+    downlink_by_elevation: tuple[tuple[float, float], ...] = ()
+
+    def downlink_at(self, elevation_deg: Floats) -> Floats:
+        """Return the downlink's rate per second by the elevation at a station of gain 1."""
+        if not self.downlink_by_elevation:
+            return np.full_like(elevation_deg, self.downlink_per_s)
+        knots = np.array(self.downlink_by_elevation, dtype=np.float64)
+        return np.interp(elevation_deg, knots[:, 0], knots[:, 1])
 
     @property
     def knows_free_charge_alone(self) -> bool:
@@ -259,6 +275,7 @@ class Resources:
         for name in rates:
             require(getattr(self, name) >= 0, name, "must be 0 or more")
         require(0 <= self.panel_angle_deg <= 180, "panel_angle_deg", "must be between 0 and 180")
+        check_downlink(self.downlink_by_elevation)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

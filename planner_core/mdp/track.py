@@ -125,8 +125,12 @@ def compile_track(problem: Problem, satellite: SatelliteProblem, blocked: Bytes)
     is_contact = (satellite.kind == CONTACT).astype(np.uint8)
     is_kept = np.zeros(m, dtype=np.bool_)
     is_kept[problem.kept_local(satellite)] = True
-    fallbacks = np.flatnonzero((is_contact == 1) & (blocked == 0) | is_kept).astype(np.int32)
     access = problem.opportunities.access[satellite.rows]
+    contacts = np.flatnonzero((is_contact == 1) & (blocked == 0))
+    # Of the parts of a pass the whole one begins first.
+    fallbacks = np.union1d(
+        contacts[np.unique(access[contacts], return_index=True)[1]], np.flatnonzero(is_kept)
+    ).astype(np.int32)
     _, first_of_access, access_of = np.unique(access, return_index=True, return_inverse=True)
     first_offer = first_of_access[access_of].astype(np.int32)
     columns = _resource_columns(problem, satellite, is_contact)
@@ -168,7 +172,9 @@ def with_counted_resources(problem: Problem, satellite: SatelliteProblem) -> Sat
     if problem.use_resources:
         return satellite
     none = np.zeros(len(satellite))
-    return replace(satellite, resources=Resources.limitless(), turns=SunTurns(none, none))
+    return replace(
+        satellite, resources=Resources.limitless(), turns=SunTurns(none, none), volume=none
+    )
 
 
 def _next_of(is_such: Bools) -> Ints:
@@ -210,6 +216,10 @@ def _resource_columns(
     contact = is_contact == 1
     previous_start_s = satellite.previous_event_s
     telemetry = r.telemetry_per_s * duration_s
+    # Telemetry fills the recorder until the setup of a contact is over.
+    setup_s = np.zeros(len(satellite))
+    setup_s[contact] = problem.downlinks.stations.setup_s[satellite.place[contact]]
+    setup_s = np.minimum(setup_s, duration_s)
     physical = problem.dynamics == "physical"
     sunlit = satellite.sunlight.seconds_until
     idle = idle_energy(satellite, problem.horizon_s)
@@ -220,13 +230,13 @@ def _resource_columns(
         "charge_top_s": np.maximum.accumulate(charge_to_s),
         "data_from_s": end_s if physical else start_s,
         "data_to_s": start_s,
-        "data_peak_s": start_s if physical else previous_start_s,
+        "data_peak_s": start_s + setup_s if physical else previous_start_s,
         "battery_full": idle.full,
         "battery_floor": r.battery_min_fraction + idle.reserve,
         "battery_floor_least": r.battery_min_fraction + idle.least_reserve,
         "battery_cost": duration_s
         * (np.where(contact, r.contact_drain_per_s, r.collect_drain_per_s) + r.idle_drain_per_s),
-        "recorder_gain": duration_s * np.where(contact, -r.downlink_per_s, r.collect_fill_per_s)
+        "recorder_gain": np.where(contact, -satellite.volume, duration_s * r.collect_fill_per_s)
         + (telemetry if physical else 0.0),
         "data_end_s": problem.horizon_s
         if physical

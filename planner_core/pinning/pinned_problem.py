@@ -179,23 +179,24 @@ def rows_skipped(
 ) -> list[int]:
     """Return the opportunities that a skip means: of a span all that overlap it.
 
-    A span that is some opportunity's own, give or take a second, means that one alone.
+    A span that is some opportunity's own, give or take a second, means that one alone; of a pass
+    it means every part.
     """
     nearest = row_of(scenario, table, pin, pointer)
     if pin.start is None or pin.end is None:
-        return [nearest]
+        return _meant_by(table, nearest, pin)
     start_s, end_s = (scenario.horizon.offset_s(instant) for instant in (pin.start, pin.end))
     is_its_own = (
         abs(table.start_s[nearest] - start_s) <= _NEARLY_S
         and abs(table.end_s[nearest] - end_s) <= _NEARLY_S
     )
     if is_its_own:
-        return [nearest]
+        return _meant_by(table, nearest, pin)
     overlaps = (table.start_s < end_s - TIME_TOLERANCE_S) & (
         table.end_s > start_s + TIME_TOLERANCE_S
     )
     rows: list[int] = np.flatnonzero(_named_by(scenario, table, pin) & overlaps).tolist()
-    return rows or [nearest]
+    return rows or _meant_by(table, nearest, pin)
 
 
 def _named_by(scenario: Scenario, table: Opportunities, pin: PinnedAction) -> Bools:
@@ -229,6 +230,8 @@ def row_of(scenario: Scenario, table: Opportunities, pin: PinnedAction, pointer:
         raise InvalidScenario(
             "pin_without_opportunity", _why_none(scenario, table, named, pin), pointer=pointer
         )
+    if pin.start is None and len(rows) > 1 and _are_parts(table, rows):
+        return int(rows[np.argmax(table.end_s[rows] - table.start_s[rows])])
     if pin.start is None and len(rows) > 1:
         raise InvalidScenario(
             "pin_ambiguous",
@@ -236,6 +239,20 @@ def row_of(scenario: Scenario, table: Opportunities, pin: PinnedAction, pointer:
             pointer=pointer,
         )
     return int(rows[np.argmin(np.abs(table.start_s[rows] - start_s))])
+
+
+def _are_parts(table: Opportunities, rows: Longs) -> bool:
+    """Return whether these are parts of one and the same pass."""
+    is_contact = bool((table.kind[rows] == CONTACT).all())
+    return is_contact and len(np.unique(table.access[rows])) == 1
+
+
+def _meant_by(table: Opportunities, row: int, pin: PinnedAction) -> list[int]:
+    """Return all rows that skipping one of them means: of a pass every part."""
+    if table.kind[row] != CONTACT or pin.opportunity_id is not None:
+        return [row]
+    rows: list[int] = np.flatnonzero(table.access == table.access[row]).tolist()
+    return rows
 
 
 def _number_of(opportunity_id: str) -> int:

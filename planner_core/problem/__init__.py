@@ -1,5 +1,6 @@
 """The frozen problem, all that a solver and the referee ever see, and what it is made of."""
 
+from planner_core.problem.downlink import Downlinks, PassRate, StationLinks
 from planner_core.problem.problem import (
     ACCESS_FOUND,
     ACCESS_TOO_SHORT,
@@ -44,15 +45,18 @@ __all__ = [
     "Blocked",
     "Bools",
     "Bytes",
+    "Downlinks",
     "Floats",
     "Ints",
     "Kept",
     "Longs",
     "Opportunities",
+    "PassRate",
     "Pinned",
     "Problem",
     "SatelliteProblem",
     "Singles",
+    "StationLinks",
     "Struck",
     "Sunlight",
     "Transitions",

@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from planner_core.domain import Agility, Dynamics, Resources
+from planner_core.problem.downlink import Downlinks
 from planner_core.problem.pointing import Pointing, Vector, sight
 from planner_core.problem.slew import TIME_TOLERANCE_S
 from planner_core.problem.sun_turns import SunPath, SunTurns
@@ -155,6 +156,8 @@ class SatelliteProblem:
         Where the sun stands. None serves where pointing at it is free.
     turns
         Of each row to the sun and back; no time where pointing at the sun is free.
+    volume
+        What each contact takes down, in recorder capacities; 0 for collects. Shape ``(m,)``.
     """
 
     id: str
@@ -172,6 +175,7 @@ class SatelliteProblem:
     event: Ints
     sun: SunPath | None
     turns: SunTurns
+    volume: Floats
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -288,6 +292,8 @@ class Problem:
         Why a target has no opportunity, or ``ACCESS_FOUND``. Shape ``(num_targets,)``.
     station_antennas
         How many satellites each station serves at a time. Shape ``(num_stations,)``.
+    downlinks
+        How fast each contact takes data down.
     continuous_starts
         Whether a collect may start anywhere in its access, at a whole millisecond.
     pointing
@@ -307,6 +313,7 @@ class Problem:
     target_access: npt.NDArray[np.int8]
     station_ids: tuple[str, ...]
     station_antennas: Ints
+    downlinks: Downlinks
     opportunities: Opportunities
     satellites: tuple[SatelliteProblem, ...]
     pointing: Pointing | None = None

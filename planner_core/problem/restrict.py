@@ -75,6 +75,7 @@ def with_table(
                 agility=satellite.agility,
                 resources=satellite.resources,
                 sunlight=satellite.sunlight,
+                downlinks=problem.downlinks,
                 sun=satellite.sun,
                 events=own,
             )

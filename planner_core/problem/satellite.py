@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from planner_core.domain import Agility, Resources
+from planner_core.problem.downlink import Downlinks
 from planner_core.problem.problem import (
+    CONTACT,
     Floats,
     Ints,
     Opportunities,
@@ -25,6 +27,7 @@ def build_satellite_problem(
     agility: Agility,
     resources: Resources,
     sunlight: Sunlight,
+    downlinks: Downlinks,
     sun: SunPath | None = None,
     events: tuple[Floats, Ints] | None = None,
 ) -> SatelliteProblem:
@@ -42,6 +45,16 @@ def build_satellite_problem(
     own = rows if agility.tracks else rows[:0]
     moves = opportunities.los_rate_start[own].astype(np.float64)
     moved = opportunities.los_rate_end[own].astype(np.float64)
+    is_contact = opportunities.kind[rows] == CONTACT
+    contacts = rows[is_contact]
+    volume = np.zeros(len(rows))
+    volume[is_contact] = downlinks.volumes(
+        resources.downlink_per_s,
+        opportunities.access[contacts],
+        opportunities.place[contacts],
+        start_s[is_contact],
+        end_s[is_contact],
+    )
     return SatelliteProblem(
         id=id,
         name=name,
@@ -79,4 +92,5 @@ def build_satellite_problem(
             moves=moves,
             moved=moved,
         ),
+        volume=volume,
     )

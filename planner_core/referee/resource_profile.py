@@ -7,6 +7,7 @@ trust them: it integrates every second here, piece by piece, in its own way.
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -20,6 +21,7 @@ from planner_core.problem import (
     SatelliteProblem,
 )
 from planner_core.problem.plan import Action
+from planner_core.referee.contact_flow import flow
 from planner_core.referee.idle_time import Idle, idle_spans
 
 
@@ -80,12 +82,21 @@ def _integrate_physical(
 
     change: dict[float, list[int]] = {0.0: [0] * 4, horizon_s: [0] * 4}
 
+    flows: dict[float, list[tuple[float, float]]] = {}
+
     def note(start_s: float, end_s: float, column: int) -> None:
         change.setdefault(clip(start_s), [0] * 4)[column] += 1
         change.setdefault(clip(end_s), [0] * 4)[column] -= 1
 
     for action in actions:
-        note(action.start_s, action.end_s, 1 if kind[action.opportunity] == CONTACT else 0)
+        is_contact = kind[action.opportunity] == CONTACT
+        note(action.start_s, action.end_s, 1 if is_contact else 0)
+        if is_contact:
+            for from_s, to_s, per_s in flow(problem, satellite, action):
+                if from_s < horizon_s:
+                    change.setdefault(clip(from_s), [0] * 4)
+                    change.setdefault(clip(to_s), [0] * 4)
+                    flows.setdefault(clip(from_s), []).append((clip(to_s), per_s))
     for enter_s, exit_s in zip(satellite.sunlight.enter_s, satellite.sunlight.exit_s, strict=True):
         note(float(enter_s), float(exit_s), 2)
     idle = idle_spans(problem, satellite, actions)
@@ -97,6 +108,7 @@ def _integrate_physical(
     points = [point]
     at = {0.0: point}
     collects = contacts = sunlit = at_sun = 0
+    flowing: list[tuple[float, float]] = []
     times = sorted(change)
     for t_s, until_s in itertools.pairwise(times):
         collects += change[t_s][0]
@@ -109,7 +121,8 @@ def _integrate_physical(
             power = r.sunpoint_charge_per_s if sunlit and at_sun else 0.0
         power -= r.idle_drain_per_s
         fill = r.telemetry_per_s + collects * r.collect_fill_per_s
-        drain = contacts * r.downlink_per_s
+        flowing = [f for f in flowing if f[0] > t_s] + flows.get(t_s, [])
+        drain = sum(per_s for _, per_s in flowing)
         while point.time_s < until_s:
             point = _advance(point, until_s, power, fill, drain)
             points.append(point)
@@ -207,7 +220,8 @@ def _book(
     duration_s = action.end_s - action.start_s
     if problem.opportunities.kind[action.opportunity] == CONTACT:
         held = point.recorder + telemetry
-        removed = min(held, r.downlink_per_s * duration_s)
+        pieces = flow(problem, satellite, action)
+        removed = min(held, math.fsum((until - since) * per_s for since, until, per_s in pieces))
         return Point(
             t_s,
             max(0.0, point.battery - r.contact_drain_per_s * duration_s),

@@ -127,7 +127,9 @@ def canonical_of_file(file: ScenarioFile) -> str:
         if satellite["agility"]["slew_model"] == "rest":
             del satellite["agility"]["slew_model"]
         if isinstance(satellite["resources"], dict):
-            _without_defaults(satellite["resources"])
+            _without(satellite["resources"], **_YOUNGER)
+    for station in document["ground_stations"]:
+        _without(station, setup_s=0.0, downlink_gain=1.0)
     for target in document["targets"]:
         _without_unset(target, "catalog_id", "release", "due", "sensor_type")
     if document["collect_alignment"] == "access":
@@ -149,14 +151,18 @@ def _without_unset(part: dict[str, Any], *names: str) -> None:
             del part[name]
 
 
-_YOUNGER: Final = {"sun_pointing": "free", "panel_angle_deg": 180.0, "idle_power_w": 0.0}
+_YOUNGER: Final[Mapping[str, object]] = {
+    "sun_pointing": "free",
+    "panel_angle_deg": 180.0,
+    "idle_power_w": 0.0,
+}
 
 
-def _without_defaults(resources: dict[str, Any]) -> None:
-    """Leave out what questions older than the field did not say, where it says the same."""
-    for name, value in _YOUNGER.items():
-        if resources.get(name) == value:
-            del resources[name]
+def _without(part: dict[str, Any], **plain: object) -> None:
+    """Leave out fields at these values, which questions older than the field had without it."""
+    for name, value in plain.items():
+        if part.get(name) == value:
+            del part[name]
 
 
 def scenario_from_file(file: ScenarioFile) -> Scenario:
@@ -294,6 +300,8 @@ def resources_from(body: Preset | PresetResourcesIn | ResourcesIn, period_s: flo
     assert isinstance(body, ResourcesIn)
     battery_ws = body.battery_capacity_wh * _SECONDS_PER_HOUR
     recorder_mbit = body.recorder_capacity_mbit
+    rate = body.downlink_rate_mbit_s
+    knots = tuple((deg, mbit_s / recorder_mbit) for deg, mbit_s in _knots(rate))
     try:
         return Resources(
             battery_min_fraction=body.battery_min_fraction,
@@ -304,7 +312,10 @@ def resources_from(body: Preset | PresetResourcesIn | ResourcesIn, period_s: flo
             recorder_max_fraction=body.recorder_max_fraction,
             initial_recorder_fraction=body.initial_recorder_fraction,
             collect_fill_per_s=body.collect_rate_mbit_s / recorder_mbit,
-            downlink_per_s=body.downlink_rate_mbit_s / recorder_mbit,
+            downlink_per_s=max(per_s for _, per_s in knots)
+            if isinstance(rate, list)
+            else rate / recorder_mbit,
+            downlink_by_elevation=knots,
             telemetry_per_s=body.telemetry_rate_mbit_s / recorder_mbit,
             eclipse_aware=body.eclipse_aware,
             recorder_capacity_mbit=recorder_mbit,
@@ -313,9 +324,15 @@ def resources_from(body: Preset | PresetResourcesIn | ResourcesIn, period_s: flo
             idle_drain_per_s=body.idle_power_w / battery_ws,
         )
     except InvalidScenario as error:
-        pointer = error.fault.pointer or ""
+        pointer = (error.fault.pointer or "").replace(
+            "/downlink_by_elevation", "/downlink_rate_mbit_s"
+        )
         error.fault = replace(error.fault, pointer=_FIELDS_OF_RATES.get(pointer, pointer))
         raise
+
+
+def _knots(rate: float | list[list[float]]) -> list[list[float]]:
+    return rate if isinstance(rate, list) else []
 
 
 def target_from(body: TargetIn, catalog_id: str | None = None) -> Target:

@@ -15,6 +15,7 @@ from service.wire.base import (
     NonNegative,
     Open,
     Patch,
+    Positive,
     Stored,
     Wire,
 )
@@ -45,6 +46,12 @@ class GroundStationIn(Body):
         "min_elevation_deg holds.",
     )
     antennas: int = Field(1, ge=1, le=100, description="Satellites served at a time.")
+    setup_s: NonNegative = Field(
+        0.0, description="At the beginning of each contact, in which nothing comes down."
+    )
+    downlink_gain: Positive = Field(
+        1.0, description="Factor on the downlink_rate_mbit_s of each satellite."
+    )
 
 
 class GroundStationPatch(Patch):
@@ -63,6 +70,8 @@ class GroundStationPatch(Patch):
         | None
     ) = Field(None, description="Replaces the mask as a whole.")
     antennas: Annotated[int, Field(ge=1, le=100)] | None = None
+    setup_s: NonNegative | None = None
+    downlink_gain: Positive | None = None
 
 
 class GroundStationOut(GroundStationIn, Stored):

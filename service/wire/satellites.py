@@ -26,6 +26,8 @@ from service.wire.imports import RejectedRow
 Fraction = Annotated[float, Field(ge=0, le=1)]
 SunExclusion = Annotated[float | None, Field(ge=0, le=180)]
 PanelAngle = Annotated[float, Field(ge=0, le=180)]
+DownlinkKnot = Annotated[list[NonNegative], Field(min_length=2, max_length=2)]
+DownlinkRate = NonNegative | Annotated[list[DownlinkKnot], Field(min_length=1, max_length=100)]
 SunElevation = Annotated[float | None, Field(ge=-90, le=90)]
 LocalTime = Annotated[float | None, Field(ge=0, le=24)]
 SensorType = Annotated[str, StringConstraints(min_length=1, max_length=100, pattern=TEXT)]
@@ -108,7 +110,10 @@ class ResourcesIn(Body):
     recorder_max_fraction: Fraction = 0.75
     initial_recorder_fraction: Fraction = 0.0
     collect_rate_mbit_s: NonNegative = Field(description="What a collect writes.")
-    downlink_rate_mbit_s: NonNegative = Field(description="What a contact takes down.")
+    downlink_rate_mbit_s: DownlinkRate = Field(
+        description="What a contact takes down: a number, or knots [elevation_deg, mbit_s] by the "
+        "elevation at the station, ascending, linear between them and constant beyond."
+    )
     telemetry_rate_mbit_s: NonNegative = Field(description="What telemetry writes at all times.")
     eclipse_aware: bool = Field(False, description="Charge only in sunlight.")
     sun_pointing: SunPointing = Field(

@@ -14,9 +14,11 @@ from planner_core.problem import (
     COLLECT,
     CONTACT,
     NEVER_VISIBLE,
+    Downlinks,
     Floats,
     Opportunities,
     Problem,
+    StationLinks,
     Sunlight,
     build_satellite_problem,
 )
@@ -68,6 +70,7 @@ def make_problem(
     sunlight: Sunlight | None = None,
     sun: SunPath | None = None,
     antennas: int = 1,
+    downlinks: Downlinks | None = None,
 ) -> Problem:
     """Return a problem whose lines of sight lie in a plane, at the tasks' angles."""
     ordered = sorted(tasks, key=lambda t: (t.start_s, t.end_s, t.satellite, t.kind, t.place))
@@ -109,6 +112,7 @@ def make_problem(
         sun_elevation_deg=np.zeros(n, dtype=np.float32),
         in_eclipse=np.zeros(n, dtype=np.bool_),
     )
+    links = downlinks or Downlinks(stations=StationLinks.plain(num_stations))
     whole = Sunlight(enter_s=np.array([0.0]), exit_s=np.array([horizon_s]))
     reward = column(rewards if rewards is not None else [1.0] * num_targets, num_targets)
     quality = column([t.quality for t in ordered])
@@ -127,6 +131,7 @@ def make_problem(
         ),
         station_ids=tuple(f"g{i}" for i in range(num_stations)),
         station_antennas=np.full(num_stations, antennas, dtype=np.int32),
+        downlinks=links,
         opportunities=table,
         satellites=tuple(
             build_satellite_problem(
@@ -137,6 +142,7 @@ def make_problem(
                 agility=agility,
                 resources=resources,
                 sunlight=sunlight or whole,
+                downlinks=links,
                 sun=sun,
             )
             for index in range(num_satellites)

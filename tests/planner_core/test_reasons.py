@@ -72,6 +72,7 @@ def with_settings(problem: Problem, change: Change) -> Problem:
                 agility=agility,
                 resources=resources,
                 sunlight=satellite.sunlight,
+                downlinks=problem.downlinks,
                 events=(satellite.event_s, satellite.event),
             )
         )

@@ -341,3 +341,30 @@ def test_turns_in_motion_and_angles_to_the_sun_keep_the_hash_of_questions_withou
     with pytest.raises(InvalidScenario) as refused:
         scenario_from_content(other)
     assert refused.value.fault.pointer == "/satellites/0/agility/slew_model"
+
+
+def test_a_downlink_follows_the_elevation_and_questions_without_keep_their_hash() -> None:
+    own = {
+        "battery_capacity_wh": 100.0, "sunpoint_power_w": 36.0, "collect_power_w": 72.0,
+        "contact_power_w": 18.0, "recorder_capacity_mbit": 4000.0, "collect_rate_mbit_s": 400.0,
+        "downlink_rate_mbit_s": [[5.0, 100.0], [40.0, 300.0]], "telemetry_rate_mbit_s": 0.004,
+    }  # fmt: skip
+    varied = file(
+        satellites=[satellite(resources=own)],
+        ground_stations=[ground_station(setup_s=30.0, downlink_gain=1.5)],
+    )
+    text = canonical(varied)
+    assert canonical(json.loads(text)) == text
+    scenario = scenario_from_content(varied)
+    resources, (station,) = scenario.satellites[0].resources, scenario.ground_stations
+    assert resources.downlink_by_elevation == ((5.0, 0.025), (40.0, 0.075))
+    assert (station.setup_s, station.downlink_gain) == (30.0, 1.5)
+    plain = file(ground_stations=[ground_station()])
+    same = file(ground_stations=[ground_station(setup_s=0.0, downlink_gain=1.0)])
+    assert canonical(plain) == canonical(same)
+    assert "setup_s" not in canonical(plain)
+    own["downlink_rate_mbit_s"] = [[40.0, 100.0], [5.0, 300.0]]
+    with pytest.raises(InvalidScenario) as refused:
+        scenario_from_content(file(satellites=[satellite(resources=own)]))
+    pointer = "/satellites/0/resources/downlink_rate_mbit_s/1"
+    assert refused.value.fault.pointer == pointer

@@ -196,8 +196,8 @@ def _task_totals(satellite: SatelliteProblem) -> tuple[Floats, Floats]:
     duration_s = satellite.end_s - satellite.start_s
     is_contact = satellite.kind == CONTACT
     draw = np.where(is_contact, r.contact_drain_per_s, r.collect_drain_per_s) + r.idle_drain_per_s
-    gain = np.where(is_contact, -r.downlink_per_s, r.collect_fill_per_s)
-    return duration_s * draw, duration_s * gain
+    gain = np.where(is_contact, -satellite.volume, duration_s * r.collect_fill_per_s)
+    return duration_s * draw, gain
 
 
 def _floor_of_any(

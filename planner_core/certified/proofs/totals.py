@@ -6,12 +6,13 @@ horizon's end the battery must be above its minimum and the recorder below its m
 .. math::
 
     d_i T + d_c C &< b_0 - b_{min} + c \, \min(S, H - T - C) \\
-    f T + t H - w C &< r_{max} - r_0 , \qquad C \le C_{max},
+    f T + t H - W(C) &< r_{max} - r_0 , \qquad C \le C_{max},
 
 with the drains of images and contacts, the charge :math:`c` in at most :math:`S` sunlit seconds of
-the :math:`H`, fill, telemetry and downlink. A battery that is full or a recorder that is empty
-only wastes. The greatest :math:`T` of all satellites together is a knapsack for the targets.
-Starts do not matter, so it holds for continuous ones too.
+the :math:`H`, fill, telemetry, and the most :math:`W` that so many seconds of contacts take down:
+the passes one after another, those with the highest rate first. A battery that is full or a
+recorder that is empty only wastes. The greatest :math:`T` of all satellites together is a knapsack
+for the targets. Starts do not matter, so it holds for continuous ones too.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from planner_core.certified.proofs.bound import Bound, rounded_bound
 from planner_core.problem import (
     COLLECT,
     CONTACT,
+    Floats,
     Problem,
     SatelliteProblem,
 )
@@ -51,23 +53,23 @@ def totals_bound(problem: Problem) -> Bound | None:
 def _image_room_s(problem: Problem, satellite: SatelliteProblem) -> float:
     """Return the most seconds of images that a satellite's battery and recorder allow."""
     r, horizon_s = satellite.resources, problem.horizon_s
-    contacts = satellite.kind == CONTACT
-    most_s = float((satellite.end_s[contacts] - satellite.start_s[contacts]).sum())
+    contact_s, down = _most_down(problem, satellite)
+    most_s = float(contact_s[-1])
     sunlit_s = float(satellite.sunlight.seconds_until(np.array([horizon_s]))[0])
     energy = r.initial_battery_fraction - r.battery_min_fraction
     data = r.recorder_max_fraction - r.initial_recorder_fraction - r.telemetry_per_s * horizon_s
     charge = r.sunpoint_charge_per_s
 
-    def room_s(contact_s: float) -> float:
+    def room_s(used_s: float) -> float:
         rooms = [horizon_s]
         if r.collect_drain_per_s > 0.0:
-            left = energy + charge * sunlit_s - r.contact_drain_per_s * contact_s
+            left = energy + charge * sunlit_s - r.contact_drain_per_s * used_s
             rooms.append(left / r.collect_drain_per_s)
         if r.collect_drain_per_s + charge > 0.0:
-            left = energy + charge * (horizon_s - contact_s) - r.contact_drain_per_s * contact_s
+            left = energy + charge * (horizon_s - used_s) - r.contact_drain_per_s * used_s
             rooms.append(left / (r.collect_drain_per_s + charge))
         if r.collect_fill_per_s > 0.0:
-            rooms.append((data + r.downlink_per_s * contact_s) / r.collect_fill_per_s)
+            rooms.append((data + float(np.interp(used_s, contact_s, down))) / r.collect_fill_per_s)
         return min(rooms)
 
     # Contacts make room on board and cost energy: the least of rising and falling lines.
@@ -80,3 +82,22 @@ def _image_room_s(problem: Problem, satellite: SatelliteProblem) -> float:
             high_s -= third_s
     ends = (low_s, high_s, 0.0, most_s)
     return max(0.0, *(room_s(s) for s in ends)) + 1e-6
+
+
+def _most_down(problem: Problem, satellite: SatelliteProblem) -> tuple[Floats, Floats]:
+    """Return seconds of contacts, ascending, and the most that so many of them take down.
+
+    Of the contacts that one access offers only one is taken. It takes down no more than the
+    fullest of them, and no faster than the fastest.
+    """
+    contacts = np.flatnonzero(satellite.kind == CONTACT)
+    volume, length_s = satellite.volume[contacts], (satellite.end_s - satellite.start_s)[contacts]
+    access = problem.opportunities.access[satellite.rows[contacts]]
+    _, group = np.unique(access, return_inverse=True)
+    most, fastest = np.zeros(2 * len(contacts)).reshape(2, -1)
+    np.maximum.at(most, group, volume)
+    np.maximum.at(fastest, group, volume / length_s)
+    used = np.flatnonzero(fastest > 0.0)
+    used = used[np.argsort(-fastest[used], kind="stable")]
+    contact_s = np.concatenate([[0.0], np.cumsum(most[used] / fastest[used])])
+    return contact_s, np.concatenate([[0.0], np.cumsum(most[used])])

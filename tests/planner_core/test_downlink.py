@@ -1,0 +1,311 @@
+"""Downlinks by elevation: volumes, parts of passes, and that every method counts the same."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from planner_core.budget import Budget
+from planner_core.build import build_problem, compute_opportunities
+from planner_core.certified.proofs.resource_bound import quick_bound, resource_value
+from planner_core.certified.proofs.totals import totals_bound
+from planner_core.domain import Dynamics, GroundStation, Resources, Scenario, Target
+from planner_core.errors import InvalidScenario
+from planner_core.mdp.track import NO_TASK, STRICT, compile_track, take
+from planner_core.pins import PinnedAction, Pins
+from planner_core.problem import (
+    COLLECT,
+    CONTACT,
+    Downlinks,
+    PassRate,
+    Problem,
+    StationLinks,
+)
+from planner_core.problem.plan import Plan
+from planner_core.referee.contact_flow import flow
+from planner_core.referee.replay import replay
+from planner_core.solvers.registry import SOLVERS, Certified, Milp
+from tests.examples import examples
+from tests.geometry import Ground, SkyfieldPath, elevation_deg, hours, orbit, satellite
+from tests.planner_core.brute_force import best_reward
+from tests.planner_core.problems import TIGHT, Task, make_problem
+
+SEEDS = st.integers(0, 10**6)
+KNOTS = ((5.0, 0.001), (20.0, 0.002), (60.0, 0.005))
+BY_ELEVATION = replace(Resources.paper(5668.7), downlink_by_elevation=KNOTS, downlink_per_s=0.005)
+SVALBARD = GroundStation(id="sv", name="Svalbard", lat_deg=78.23, lon_deg=15.39)
+TROLL = GroundStation(
+    id="tr", name="Troll", lat_deg=-72.02, lon_deg=2.53, setup_s=60.0, downlink_gain=0.5
+)
+
+
+def _mission(**changes: Any) -> Scenario:
+    flown = replace(satellite(orbit()), resources=BY_ELEVATION)
+    return replace(
+        Scenario(
+            horizon=hours(6),
+            satellites=(flown,),
+            targets=(Target(id="a", lat_deg=10.0, lon_deg=20.0),),
+            ground_stations=(SVALBARD, TROLL),
+        ),
+        **changes,
+    )
+
+
+def _built(scenario: Scenario) -> Problem:
+    return build_problem(scenario, compute_opportunities(scenario, Budget()), Budget())
+
+
+def passes_problem(seed: int, dynamics: Dynamics = "physical") -> Problem:
+    """Return a small crowded problem: passes at drawn rates, each as a whole and in two parts."""
+    rng = np.random.default_rng(seed)
+    tasks = []
+    for _ in range(7):
+        start_s = round(float(rng.uniform(0, 940)), 3)
+        tasks.append(
+            Task(kind=COLLECT, place=int(rng.integers(5)), start_s=start_s, end_s=start_s + 30.0,
+                 angle_deg=float(rng.uniform(-55, 55)))
+        )  # fmt: skip
+    rates = []
+    for number in range(2):
+        start_s, length_s = round(float(rng.uniform(0, 850)), 3), float(rng.integers(60, 140))
+        time_s = np.linspace(start_s, start_s + length_s, 12)
+        # Never slower than telemetry comes in.
+        rates.append(PassRate(time_s=time_s, per_s=rng.uniform(3e-5, 1 / 100, 12)))
+        for cut in (0.0, 0.15, 0.3):
+            begin_s, end_s = (round(start_s + part * length_s, 3) for part in (cut, 1.0 - cut))
+            tasks.append(
+                Task(kind=CONTACT, place=number % 2, start_s=begin_s, end_s=end_s,
+                     angle_deg=float(rng.uniform(-60, 60)), access=number)
+            )  # fmt: skip
+    links = StationLinks(gain=rng.uniform(0.5, 2.0, 2), setup_s=rng.choice([0.0, 12.0, 25.0], 2))
+    passes = {len(tasks) + number: rate for number, rate in enumerate(rates)}
+    if rng.integers(4) == 0:
+        passes = {}
+    resources = replace(
+        TIGHT,
+        recorder_max_fraction=float(rng.choice([0.25037, 0.40037])),
+        telemetry_per_s=float(rng.choice([0.0, 2e-5])),
+    )
+    return make_problem(
+        tasks,
+        num_targets=5,
+        num_stations=2,
+        dynamics=dynamics,
+        resources=resources,
+        downlinks=Downlinks(stations=links, passes=passes),
+        rewards=[float(r) for r in rng.integers(1, 9, 5)],
+    )
+
+
+@given(seed=SEEDS)
+def test_a_pass_adds_up_to_what_many_small_steps_do(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    time_s = np.sort(rng.uniform(0.0, 600.0, 20))
+    rate = PassRate(time_s=time_s, per_s=rng.uniform(0.0, 1.0, 20))
+    ends_s = np.sort(rng.uniform(time_s[0], time_s[-1], 2))
+    middle_s = ends_s[0] + (np.arange(20_000) + 0.5) * (ends_s[1] - ends_s[0]) / 20_000
+    steps = np.interp(middle_s, time_s, rate.per_s) * (ends_s[1] - ends_s[0]) / 20_000
+    assert float(np.diff(rate.until(ends_s))[0]) == pytest.approx(steps.sum(), rel=1e-4, abs=1e-6)
+    amount = rng.uniform(0.0, float(rate.until(time_s[-1:])[0]), 3)
+    assert rate.until(rate.when(amount)) == pytest.approx(amount, abs=1e-3)
+
+
+@pytest.mark.parametrize("dynamics", ["physical", "paper"])
+@examples(150)
+@given(seed=SEEDS)
+def test_steps_and_referee_agree_on_the_recorder(dynamics: Dynamics, seed: int) -> None:
+    problem = passes_problem(seed, dynamics)
+    own = problem.satellites[0]
+    rng = np.random.default_rng(seed)
+    chosen: list[int] = []
+    for row in range(len(own)):
+        if own.transitions.allows(chosen[-1] if chosen else -1, row) and rng.random() < 0.6:
+            chosen.append(row)
+    timeline = replay(problem, Plan.of(problem, [int(own.rows[row]) for row in chosen]))
+    judged = [a for a in timeline.satellites[0].actions if a.opportunity is not None]
+    track = compile_track(problem, own, np.zeros(len(own), dtype=np.uint8))
+    last, battery, recorder = NO_TASK, track.battery_start, track.recorder_start
+    stays_within = True
+    for action in judged:
+        assert action.opportunity is not None
+        row = int(problem.local_row[action.opportunity])
+        battery, recorder, is_within = take(track, last, row, battery, recorder)
+        stays_within = stays_within and is_within
+        last = row
+        assert recorder == pytest.approx(action.recorder_end, abs=1e-9)
+    waits_s = track.data_end_s - (track.data_from_s[last] if last >= 0 else 0.0)
+    stays_within &= recorder + track.telemetry_per_s * waits_s < track.recorder_max - STRICT
+    if stays_within:
+        assert timeline.is_valid
+    if any(v.code == "recorder" for v in timeline.violations):
+        assert not stays_within
+
+
+@examples(200)
+@given(seed=SEEDS)
+def test_no_plan_beats_the_bounds(seed: int) -> None:
+    problem = passes_problem(seed)
+    best = best_reward(problem)
+    totals = totals_bound(problem)
+    assert totals is not None
+    assert totals.value >= best - 1e-6
+    assert quick_bound(problem, 0.0).value >= best - 1e-6
+    assert resource_value(problem, np.zeros(5), 1.0) >= best - 1e-6
+
+
+@pytest.mark.parametrize("name", SOLVERS)
+@examples(30)
+@given(seed=SEEDS, dynamics=st.sampled_from(["physical", "paper"]))
+def test_every_solver_plans_what_the_referee_accepts(
+    name: str, seed: int, dynamics: Dynamics
+) -> None:
+    problem = passes_problem(seed, dynamics)
+    timeline = replay(problem, SOLVERS[name]().solve(problem, Budget(), seed).plan)
+    if name == "graph":  # which knows no limits
+        assert all(v.code in ("battery", "recorder", "duplicate") for v in timeline.violations)
+    else:
+        assert timeline.is_valid
+
+
+@pytest.mark.parametrize("solver", [Milp(), Milp(formulation="pairwise"), Certified()])
+@examples(40)
+@given(seed=SEEDS, dynamics=st.sampled_from(["physical", "paper"]))
+def test_exact_solvers_find_the_best_plan(
+    solver: Milp | Certified, seed: int, dynamics: Dynamics
+) -> None:
+    problem = passes_problem(seed, dynamics)
+    best = best_reward(problem)
+    solution = solver.solve(problem, Budget(), seed)
+    assert solution.proven is None or solution.proven.value >= best - 1e-6
+    assert replay(problem, solution.plan).reward == pytest.approx(best)
+
+
+def test_nothing_comes_down_during_setup() -> None:
+    contact = Task(kind=CONTACT, place=0, start_s=100.0, end_s=200.0)
+    links = StationLinks(gain=np.array([0.5]), setup_s=np.array([60.0]))
+    full = replace(TIGHT, initial_recorder_fraction=0.4, telemetry_per_s=0.0)
+    problem = make_problem(
+        [contact], num_targets=1, resources=full, downlinks=Downlinks(stations=links)
+    )
+    down = 40.0 * full.downlink_per_s * 0.5
+    assert problem.satellites[0].volume[0] == pytest.approx(down)
+    (timeline,) = replay(problem, Plan.of(problem, (0,))).satellites
+    assert timeline.resources is not None
+    levels = np.interp(
+        [100.0, 160.0, 200.0], timeline.resources.time_s, timeline.resources.recorder
+    )
+    assert levels == pytest.approx([0.4, 0.4, 0.4 - down])
+
+
+def test_volumes_follow_the_elevation_that_another_library_sees() -> None:
+    scenario = _mission()
+    problem = _built(scenario)
+    table, volume = problem.opportunities, problem.satellites[0].volume
+    contacts = np.flatnonzero(table.kind == CONTACT)
+    assert len(contacts) > 6
+    path = SkyfieldPath(scenario.satellites[0].orbit, scenario.horizon)
+    for row in contacts.tolist():
+        station = scenario.ground_stations[int(table.place[row])]
+        begin_s = float(table.start_s[row]) + station.setup_s
+        steps_s = np.linspace(begin_s, float(table.end_s[row]), 201)
+        ground = Ground.at(station.lat_deg, station.lon_deg)
+        seen_deg = elevation_deg(path.position_m(steps_s), ground)
+        rate = station.downlink_gain * np.interp(seen_deg, *np.array(KNOTS).T)
+        assert volume[row] == pytest.approx(np.trapezoid(rate, steps_s), rel=2e-3)
+
+
+def test_a_pass_is_offered_whole_and_in_two_parts() -> None:
+    problem = _built(_mission())
+    table, volume = problem.opportunities, problem.satellites[0].volume
+    contacts = np.flatnonzero(table.kind == CONTACT)
+    for access in np.unique(table.access[contacts]):
+        rows = contacts[table.access[contacts] == access]
+        whole = rows[np.argmax(table.end_s[rows] - table.start_s[rows])]
+        assert whole == rows[0]
+        shares = sorted((volume[rows] / volume[whole]).tolist())
+        assert shares == pytest.approx([0.3, 0.6, 1.0], abs=1e-4)
+        top_s = table.start_s[rows].max(), table.end_s[rows].min()
+        assert table.access_start_s[whole] < top_s[0] < top_s[1] < table.access_end_s[whole]
+
+
+def test_plain_passes_are_offered_whole_alone() -> None:
+    plain = replace(satellite(orbit()), resources=Resources.paper(5668.7))
+    problem = _built(_mission(satellites=(plain,), ground_stations=(SVALBARD,)))
+    table = problem.opportunities
+    contacts = np.flatnonzero(table.kind == CONTACT)
+    assert len(np.unique(table.access[contacts])) == len(contacts)
+    lasts_s = table.end_s[contacts] - table.start_s[contacts]
+    rate = plain.resources.downlink_per_s
+    assert (problem.satellites[0].volume[contacts] == lasts_s * rate).all()
+
+
+def test_a_pin_on_a_pass_means_all_of_it() -> None:
+    scenario = _mission()
+    table = _built(scenario).opportunities
+    first = int(np.flatnonzero(table.kind == CONTACT)[0])
+    station = scenario.ground_stations[int(table.place[first])].id
+    then = scenario.horizon.instant(float(table.start_s[first]))
+    named = PinnedAction(satellite_id=scenario.satellites[0].id, station_id=station, start=then)
+    skipped = _built(replace(scenario, pins=Pins(skip=(named,)))).opportunities
+    assert int(table.access[first]) not in skipped.access
+    kept = _built(replace(scenario, pins=Pins(keep=(named,))))
+    assert [k.row for k in kept.pinned.kept] == [
+        int(np.flatnonzero(kept.opportunities.start_s == table.start_s[first])[0])
+    ]
+
+
+def test_flows_are_empty_while_a_contact_is_set_up() -> None:
+    problem = passes_problem(3)
+    for row in np.flatnonzero(problem.opportunities.kind == CONTACT).tolist():
+        (action,) = Plan.of(problem, (row,)).actions
+        pieces = flow(problem, problem.satellites[0], action)
+        setup_s = problem.downlinks.stations.setup_s[problem.opportunities.place[row]]
+        assert pieces[0].from_s == pytest.approx(action.start_s + setup_s)
+        assert pieces[-1].to_s == action.end_s
+
+
+def test_a_rate_below_telemetry_is_refused() -> None:
+    slow = replace(BY_ELEVATION, downlink_by_elevation=((5.0, 0.0), (10.0, 0.001)))
+    flown = replace(satellite(orbit()), resources=slow)
+    with pytest.raises(InvalidScenario, match="falls below the rate of telemetry"):
+        _mission(satellites=(flown,))
+    high = tuple(replace(s, min_elevation_deg=8.0) for s in (SVALBARD, TROLL))
+    _mission(satellites=(flown,), ground_stations=high)
+
+
+@pytest.mark.parametrize(
+    "knots", [((91.0, 1.0),), ((5.0, 1.0), (5.0, 2.0)), ((5.0, -1.0),), ((5.0, float("inf")),)]
+)
+def test_knots_ascend_and_are_magnitudes(knots: tuple[tuple[float, float], ...]) -> None:
+    with pytest.raises(InvalidScenario, match="downlink_by_elevation"):
+        replace(BY_ELEVATION, downlink_by_elevation=knots)
+
+
+def test_telemetry_may_fill_the_recorder_while_a_contact_is_set_up() -> None:
+    contact = Task(kind=CONTACT, place=0, start_s=10.0, end_s=110.0)
+    for setup_s, is_within in ((20.0, True), (60.0, False)):
+        nearly = replace(
+            TIGHT,
+            initial_recorder_fraction=0.395,
+            recorder_max_fraction=0.4,
+            telemetry_per_s=1e-4,
+            downlink_per_s=0.01,
+        )
+        links = StationLinks(gain=np.ones(1), setup_s=np.array([setup_s]))
+        problem = make_problem(
+            [contact],
+            num_targets=1,
+            resources=nearly,
+            downlinks=Downlinks(stations=links),
+            horizon_s=200.0,
+        )
+        track = compile_track(problem, problem.satellites[0], np.zeros(1, dtype=np.uint8))
+        step = take(track, NO_TASK, 0, track.battery_start, track.recorder_start)
+        assert step[2] == is_within
+        assert replay(problem, Plan.of(problem, (0,))).is_valid == is_within
