@@ -9,6 +9,7 @@ from pydantic import FailFast, Field
 from service.wire.base import Body, Duration, Id, Instant, Name, Open, Stored, Wire
 from service.wire.pins import PinsIn, PlacedOutage
 from service.wire.places import GroundStationIn, TargetIn
+from service.wire.plan_before import ReplanOfFile
 from service.wire.satellites import Nadir, SatelliteIn
 
 Dynamics = Literal["physical", "paper"]
@@ -119,6 +120,9 @@ class ScenarioFile(Question):
     satellites: Annotated[list[FileSatellite], FailFast()] = Field(min_length=1, max_length=10_000)
     targets: Annotated[list[FileTarget], FailFast()] = Field(min_length=1, max_length=1_000_000)
     ground_stations: Annotated[list[FileGroundStation], FailFast()] = Field([], max_length=10_000)
+    replan: ReplanOfFile | None = Field(
+        None, description="The plan that this one goes on from, as a replan makes it."
+    )
 
 
 class HorizonOut(Wire):
