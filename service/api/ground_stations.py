@@ -8,6 +8,7 @@ from typing import Final, Literal
 
 import sqlalchemy as sa
 from fastapi import APIRouter, Response
+from pydantic import ValidationError
 from sqlalchemy.orm import Session
 
 from planner_core.errors import Fault
@@ -19,6 +20,7 @@ from service.api.imports import OnError, OnErrorQuery, body_schemas, imported, r
 from service.api.paging import PagingDep, newest_first, size_of
 from service.db.ids import new_id
 from service.db.rows import GroundStationRow
+from service.problems.faults import faults_of_validation, refuse
 from service.problems.kinds import ServiceError
 from service.scenarios.records import Checked, check, read_csv, read_geojson
 from service.scenarios.translate import ground_station_from
@@ -30,6 +32,7 @@ from service.wire.places import (
     GroundStationPatch,
     ImportedStation,
 )
+from service.wire.stored import from_store
 
 router = APIRouter(prefix="/v1/ground-stations", tags=["ground stations"])
 
@@ -130,7 +133,11 @@ def change_ground_station(
         row = _find(session, station_id, to_change=True)
         require_match(call.request, lambda: _shown(row))
         changes = body.model_dump(mode="json", exclude_none=True)
-        changed = GroundStationIn(**row.body | changes)
+        whole = row.body | changes
+        try:
+            changed = GroundStationIn(**whole)
+        except ValidationError as error:  # a stored value may be out of today's range
+            raise refuse(faults_of_validation(error, whole)) from None
         ground_station_from(changed, station_id)
         if _change(row, changed):
             call.audit.record(session, "update", "ground_station", station_id)
@@ -197,8 +204,8 @@ def _change(row: GroundStationRow, body: GroundStationIn) -> bool:
 
 
 def _body(row: GroundStationRow) -> str:
-    return GroundStationIn(**row.body).model_dump_json()
+    return from_store(GroundStationIn, row.body).model_dump_json()
 
 
 def _shown(row: GroundStationRow) -> GroundStationOut:
-    return GroundStationOut(id=row.id, created_at=row.created_at, **row.body)
+    return from_store(GroundStationOut, {"id": row.id, "created_at": row.created_at, **row.body})

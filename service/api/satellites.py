@@ -36,6 +36,7 @@ from service.wire.satellites import (
     SatellitePatch,
     SensorIn,
 )
+from service.wire.stored import from_store
 
 router = APIRouter(prefix="/v1/satellites", tags=["satellites"])
 
@@ -222,18 +223,21 @@ def _require_same_object(row: SatelliteRow, norad_cat_id: int, body: OrbitIn) ->
 def _shown(session: Session, rows: Sequence[SatelliteRow]) -> list[SatelliteOut]:
     elements = store.in_force(session, [row.id for row in rows])
     return [
-        SatelliteOut(
-            id=row.id,
-            name=row.name,
-            norad_cat_id=row.norad_cat_id,
-            epoch=elements[row.id].epoch,
-            tle=elements[row.id].orbit.get("tle"),
-            omm=elements[row.id].orbit.get("omm"),
-            agility=AgilityIn(**row.agility),
-            sensor=SensorIn(**row.sensor),
-            resources=row.resources,
-            created_at=row.created_at,
-            links={"elements": f"/v1/satellites/{row.id}/elements"},
+        from_store(
+            SatelliteOut,
+            {
+                "id": row.id,
+                "name": row.name,
+                "norad_cat_id": row.norad_cat_id,
+                "epoch": elements[row.id].epoch,
+                "tle": elements[row.id].orbit.get("tle"),
+                "omm": elements[row.id].orbit.get("omm"),
+                "agility": row.agility,
+                "sensor": row.sensor,
+                "resources": row.resources,
+                "created_at": row.created_at,
+                "links": {"elements": f"/v1/satellites/{row.id}/elements"},
+            },
         )
         for row in rows
     ]

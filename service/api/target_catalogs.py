@@ -26,6 +26,7 @@ from service.scenarios.records import Record, Records, check, first_of_each, rea
 from service.scenarios.translate import target_from
 from service.wire.base import Body, Listed, Name
 from service.wire.places import MAX_TARGETS, CreatedCatalog, TargetCatalogOut, TargetIn
+from service.wire.stored import from_store
 
 router = APIRouter(prefix="/v1/target-catalogs", tags=["target catalogues"])
 
@@ -194,7 +195,7 @@ def list_targets(catalog_id: str, database: DatabaseDep, paging: PagingDep) -> L
     with database.reading() as session:
         _find(session, catalog_id)
         page = paging.answer(session.scalars(query).all(), lambda row: row.position)
-    return Listed(items=[TargetIn(**row.body) for row in page.rows], next=page.next)
+    return Listed(items=[from_store(TargetIn, row.body) for row in page.rows], next=page.next)
 
 
 @router.delete("/{catalog_id}", status_code=204, responses=problem_responses(404, 412))

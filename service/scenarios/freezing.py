@@ -10,6 +10,7 @@ from datetime import UTC, datetime
 from typing import Any, TypeVar
 
 import sqlalchemy as sa
+from pydantic import BaseModel, ValidationError
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
@@ -18,6 +19,7 @@ from planner_core.errors import InvalidScenario, PlannerError
 from service.db.ids import new_id
 from service.db.rows import GroundStationRow, SatelliteRow, ScenarioRow, TargetCatalogRow, TargetRow
 from service.db.session import Database
+from service.problems.faults import faults_of_validation
 from service.scenarios.pin_inputs import refuse_duplicate_pins
 from service.scenarios.scenario_limits import ScenarioLimits
 from service.scenarios.translate import (
@@ -38,6 +40,7 @@ from service.wire.scenarios import (
     ScenarioIn,
 )
 
+M = TypeVar("M", bound=BaseModel)
 R = TypeVar("R", SatelliteRow, TargetCatalogRow, GroundStationRow)
 
 
@@ -179,7 +182,8 @@ def _satellites(session: Session, ids: Sequence[str]) -> list[FileSatellite]:
     rows = _find(session, SatelliteRow, "satellite", ids)
     elements = satellite_store.in_force(session, ids)
     return [
-        FileSatellite.model_validate(
+        _of_today(
+            FileSatellite,
             {
                 "id": row.id,
                 "name": row.name,
@@ -187,9 +191,10 @@ def _satellites(session: Session, ids: Sequence[str]) -> list[FileSatellite]:
                 "sensor": row.sensor,
                 "resources": row.resources,
                 **elements[row.id].orbit,
-            }
+            },
+            f"/satellite_ids/{position}",
         )
-        for row in rows
+        for position, row in enumerate(rows)
     ]
 
 
@@ -216,13 +221,29 @@ def targets_by_catalog(
     for position, catalog_id in enumerate(catalog_ids):
         of_catalog = sa.select(TargetRow).where(TargetRow.catalog_id == catalog_id)
         for row in session.scalars(of_catalog.order_by(TargetRow.position)):
-            targets.append((position, FileTarget(**row.body, catalog_id=catalog_id)))
+            body = row.body | {"catalog_id": catalog_id}
+            target = _of_today(FileTarget, body, f"/target_catalog_ids/{position}")
+            targets.append((position, target))
     return targets
 
 
 def _ground_stations(session: Session, ids: Sequence[str]) -> list[FileGroundStation]:
     rows = _find(session, GroundStationRow, "ground_station", ids)
-    return [FileGroundStation(id=row.id, **row.body) for row in rows]
+    return [
+        _of_today(FileGroundStation, {"id": row.id, **row.body}, f"/ground_station_ids/{position}")
+        for position, row in enumerate(rows)
+    ]
+
+
+def _of_today(model: type[M], body: dict[str, Any], pointer: str) -> M:
+    """Return something stored as it is planned with; its values may be of an earlier release."""
+    try:
+        return model.model_validate(body)
+    except ValidationError as error:
+        first = faults_of_validation(error, body)[0]
+        name = body.get("name") or body["id"]
+        detail = f"What is stored of {name!r} has to be changed, {first.pointer}: {first.detail}"
+        raise InvalidScenario(first.code, detail, pointer=pointer) from None
 
 
 def _find(session: Session, table: type[R], what: str, ids: Sequence[str]) -> list[R]:

@@ -25,6 +25,7 @@ from service.scenarios.translate import (
 from service.wire.pins import PinsIn, PlacedOutage
 from service.wire.plan_before import ReplanOfFile
 from service.wire.scenarios import FileGroundStation, FileSatellite, FileTarget, HorizonIn
+from service.wire.stored import from_store
 
 _TARGETS: Final = "targets"
 
@@ -46,7 +47,7 @@ class StoredQuestion:
         """Return what is pinned."""
         if '"pins":' not in self._content:
             return PinsIn()
-        return PinsIn.model_validate(self._before_targets[0].get("pins", {}))
+        return from_store(PinsIn, self._before_targets[0].get("pins", {}))
 
     @cached_property
     def outages(self) -> tuple[PlacedOutage, ...]:
@@ -65,17 +66,14 @@ class StoredQuestion:
     @cached_property
     def satellites(self) -> tuple[Satellite, ...]:
         """Return the satellites."""
-        bodies = (
-            FileSatellite.model_validate(one) for one in self._before_targets[0]["satellites"]
-        )
+        bodies = (from_store(FileSatellite, one) for one in self._before_targets[0]["satellites"])
         return tuple(satellite_from(body, str(body.id)) for body in bodies)
 
     @cached_property
     def ground_stations(self) -> tuple[GroundStation, ...]:
         """Return the stations."""
         bodies = (
-            FileGroundStation.model_validate(one)
-            for one in self._before_targets[0]["ground_stations"]
+            from_store(FileGroundStation, one) for one in self._before_targets[0]["ground_stations"]
         )
         return tuple(ground_station_from(body, str(body.id)) for body in bodies)
 
@@ -84,7 +82,7 @@ class StoredQuestion:
         _, at = self._before_targets
         while self._content[at] != "]":
             fields, at = self._decoder.raw_decode(self._content, at)
-            body = FileTarget.model_validate(fields)
+            body = from_store(FileTarget, fields)
             yield target_from(body, body.catalog_id)
             at += self._content[at] == ","
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import sys
 from datetime import UTC, datetime, timedelta
@@ -15,6 +16,7 @@ from pydantic import (
     PlainSerializer,
     PrivateAttr,
     StringConstraints,
+    ValidationError,
     ValidationInfo,
     ValidatorFunctionWrapHandler,
     WithJsonSchema,
@@ -24,6 +26,7 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from service.wire.instants import instant_text
+from service.wire.stored import beyond_ranges
 
 T = TypeVar("T")
 M = TypeVar("M", bound=BaseModel)
@@ -185,7 +188,16 @@ def dumped(model: BaseModel, include: set[str] | None = None) -> Json:
 
 def read(model: type[M], text: str | bytes) -> M:
     """Return what an answer says: fields and words that are not known here do no harm."""
-    return model.model_validate_json(text, extra="ignore", context=_READING)
+
+    def validate(text: str | bytes) -> M:
+        return model.model_validate_json(text, extra="ignore", context=_READING)
+
+    try:
+        return validate(text)
+    except ValidationError as error:
+        if error.errors(include_url=False)[0]["type"] == "json_invalid":
+            raise
+        return beyond_ranges(lambda values: validate(json.dumps(values)), json.loads(text), error)
 
 
 class Body(Wire):

@@ -138,7 +138,7 @@ def test_every_container_has_a_memory_limit_that_its_jobs_fit_into(compose: dict
     assert int(most_mb) + 500 <= 1000 * int(worker[1])
 
 
-def test_base_images_can_be_fixed_by_digest(compose: dict[str, Any]) -> None:
+def test_base_images_are_fixed_by_digest(compose: dict[str, Any]) -> None:
     stages = [rest.split()[0] for word, rest in instructions() if word == "FROM"]
     assert stages == ["${PYTHON_IMAGE}"] * 2
     (build,) = {
@@ -147,8 +147,12 @@ def test_base_images_can_be_fixed_by_digest(compose: dict[str, Any]) -> None:
         if name in OURS
     }
     (default,) = (rest for word, rest in instructions() if word == "ARG")
-    assert variables(build) == {"PYTHON_IMAGE": f":-{default.partition('=')[2]}"}
-    assert set(variables(compose["services"]["database"]["image"])) == {"POSTGRES_IMAGE"}
+    python = default.partition("=")[2]
+    assert variables(build) == {"PYTHON_IMAGE": f":-{python}"}
+    database = variables(compose["services"]["database"]["image"])
+    assert set(database) == {"POSTGRES_IMAGE"}
+    for image in (python, database["POSTGRES_IMAGE"].removeprefix(":-")):
+        assert re.fullmatch(r"[a-z]+:[\w.-]+@sha256:[0-9a-f]{64}", image), image
     told = (DOCKER / "example.env").read_text()
     assert "#POSTGRES_IMAGE=" in told
     assert "#PYTHON_IMAGE=" in told

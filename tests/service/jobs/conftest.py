@@ -6,9 +6,10 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import httpx
@@ -133,13 +134,15 @@ class Workers:
     jobs: Jobs
     processes: list[subprocess.Popen[bytes]] = field(default_factory=list)
 
-    def start(self) -> subprocess.Popen[bytes]:
+    def start(
+        self, environment: Mapping[str, str] = MappingProxyType({})
+    ) -> subprocess.Popen[bytes]:
         """Start a worker and return when it is ready to claim jobs."""
         before = len(self.jobs.workers())
         command = [sys.executable, "-m", "service.jobs"]
         command += ["--work", WORK.function, "--preload", WORK.preload]
-        environment = os.environ | environment_of(self.jobs.settings)
-        process = subprocess.Popen(command, env=environment)
+        whole = os.environ | environment_of(self.jobs.settings) | dict(environment)
+        process = subprocess.Popen(command, env=whole)
         self.processes.append(process)
         self.jobs.until(lambda: process.poll() is not None or len(self.jobs.workers()) > before)
         assert process.returncode is None, "the worker ended at once"
