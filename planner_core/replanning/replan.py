@@ -30,8 +30,8 @@ from planner_core.replanning.repair import conflicts, repaired
 from planner_core.replanning.undo import parts_of, undone, value, within_share
 from planner_core.solvers.base import Solution, Solver
 
-_MOVES_A_TASK: Final = 3.0
-_LEAST_MOVES: Final = 1000
+_MOVES_A_TASK: Final = 0.3
+_LEAST_MOVES: Final = 600
 _SHARE: Final = 0.4  # of the time, for the search that counts changes
 _REST: Final = 0.8  # of what is left then, for the proof
 _EQUAL: Final = 1e-9
