@@ -160,9 +160,7 @@ def main() -> None:
     for name in chosen:
         day = day_of(*MISSIONS[name])
         print(f"\n{name}: {replay(day.problem, day.plan).reward:g} before\n")
-        print(
-            "| event | reward / bound | changed | forced | CPU s | anew: reward / bound | changed | CPU s |"
-        )
+        print("| event | reward / bound | changed | forced | CPU s | anew | changed | CPU s |")
         print("|---|---|---|---|---|---|---|---|")
         for event, scenario in events_of(day):
             print(measure(event, scenario), flush=True)

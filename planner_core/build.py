@@ -46,6 +46,7 @@ from planner_core.problem import (
     Sunlight,
     build_satellite_problem,
 )
+from planner_core.problem.delivery import with_objective
 from planner_core.problem.pointing import Path, Pointing
 from planner_core.worth import quality_of, worth_of_collects
 
@@ -321,7 +322,7 @@ def build_problem(scenario: Scenario, computed: ScenarioOpportunities, budget: B
         opportunities=computed.opportunities,
         satellites=tuple(satellites),
     )
-    return pinned_problem(scenario, problem)
+    return pinned_problem(scenario, with_objective(problem, scenario.objective))
 
 
 def _worth(scenario: Scenario, table: Opportunities) -> Floats:
@@ -383,7 +384,8 @@ def check_element_age(scenario: Scenario) -> None:
             raise InvalidScenario(
                 "elements_too_old",
                 f"Satellite {satellite.name!r}: the element set is up to {age_days:.0f} days from "
-                f"its epoch, more than {REFUSED_ELEMENTS_DAYS:.0f}.",
+                f"its epoch, more than {REFUSED_ELEMENTS_DAYS:.0f}. Store newer elements, or set "
+                "allow_old_elements.",
                 pointer=f"/satellites/{index}",
             )
 

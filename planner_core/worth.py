@@ -3,7 +3,9 @@ r"""What images earn: the one place that says so.
 A target earns :math:`W_i(S)` from the images :math:`S` that a plan takes of it. Today every target
 is of the kind *once*: it earns the best worth of its images, :math:`W_i(S) = \max_{o \in S} v_o`,
 and a second image adds what it is better by. Each collect has its own :math:`v_o`, the reward of
-the target times the quality of the image.
+the target times the quality of the image, and of that the part that the objective lets it earn
+(``share_earned``). Which part that is hangs on the whole plan where delivery counts: solvers and
+bounds go by the most that it can be, the referee by what it is.
 
 Bounds price targets. At a multiplier :math:`\lambda_i \ge 0` a path is paid
 :math:`w_o = \max(0, v_o - \lambda_i)` for a collect, and the target keeps its *surplus*
@@ -21,7 +23,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from planner_core.domain import Quality
+from planner_core.domain import Objective, Quality
 
 Floats = npt.NDArray[np.float64]
 _Indices = npt.NDArray[np.integer]
@@ -51,6 +53,25 @@ def quality_of(
 def worth_of_collects(target_reward: Floats, target: _Indices, quality: Floats) -> Floats:
     """Return what each collect earns alone: the reward of its target times its quality."""
     return target_reward[target] * quality
+
+
+def share_earned(objective: Objective, age_s: Floats) -> Floats:
+    """Return which part of its worth an image earns that is on the ground at this age.
+
+    Parameters
+    ----------
+    age_s
+        From the end of the collect to its last bit on the ground; infinite for never.
+
+    >>> share_earned(Objective(collected_share=0.5, half_life_s=3600.0), np.array([3600.0, np.inf]))
+    array([0.75, 0.5 ])
+    """
+    a, half_life_s = objective.collected_share, objective.half_life_s
+    if half_life_s is None:
+        left = np.isfinite(age_s).astype(np.float64)
+    else:
+        left = np.exp2(-age_s / half_life_s)
+    return a + (1.0 - a) * left
 
 
 def best_worths(target: _Indices, worth: Floats, num_targets: int) -> Floats:

@@ -14,9 +14,9 @@ from planner_core.certified.proofs.bound import (
     reward_unit,
     rounded_bound,
 )
-from planner_core.problem import Problem
+from planner_core.problem import CONTACT, Problem
 from planner_core.problem.plan import Plan
-from planner_core.referee.replay import replay
+from planner_core.referee.replay import Timeline, replay
 from planner_core.solvers.base import Solution
 
 TOLERANCE: Final = 1e-6
@@ -36,6 +36,27 @@ def is_optimal(reward: float, bound: float, unit: float) -> bool:
         An amount of which what any plan earns is a multiple; 0 where there is none.
     """
     return bound < reward + max(unit, TOLERANCE * reward, _LEAST)
+
+
+def _in_its_best_form(problem: Problem, plan: Plan) -> tuple[Plan, Timeline]:
+    """Return a plan without images that only take room and earn nothing, judged by the referee."""
+    timeline = replay(problem, plan)
+    if not problem.counts_delivery or not timeline.is_valid:
+        return plan, timeline
+    earning = {image.position for image in timeline.collected.values() if image.worth > 0.0}
+    kind, kept = problem.opportunities.kind, set(problem.kept_rows.tolist())
+    actions = tuple(
+        action
+        for position, action in enumerate(plan.actions)
+        if kind[action.opportunity] == CONTACT or position in earning or action.opportunity in kept
+    )
+    if len(actions) == len(plan.actions):
+        return plan, timeline
+    freed = Plan(actions)
+    judged = replay(problem, freed)
+    # A slow satellite may turn by way of an image that earns nothing.
+    is_better = judged.is_valid and judged.reward >= timeline.reward
+    return (freed, judged) if is_better else (plan, timeline)
 
 
 class Incumbent:
@@ -72,8 +93,7 @@ class Incumbent:
     ) -> None:
         self.problem, self.budget, self.gap = problem, budget, gap
         self.unit = reward_unit(problem)
-        self.plan = (plan or Plan()).with_kept(problem)
-        timeline = replay(problem, self.plan)
+        self.plan, timeline = _in_its_best_form(problem, (plan or Plan()).with_kept(problem))
         self.is_valid, self.reward = timeline.is_valid, timeline.reward
         self.bound = bound or accessible(problem)
         self._is_proof = covers_starts or not problem.continuous_starts
@@ -111,8 +131,7 @@ class Incumbent:
 
         What must be taken is taken as well. A valid plan is better than any other.
         """
-        plan = plan.with_kept(self.problem)
-        timeline = replay(self.problem, plan)
+        plan, timeline = _in_its_best_form(self.problem, plan.with_kept(self.problem))
         if (timeline.is_valid, timeline.reward) <= (self.is_valid, self.reward):
             return False
         self.plan, self.is_valid, self.reward = plan, timeline.is_valid, timeline.reward

@@ -16,6 +16,8 @@ Epoch
     The instant an element set is given for.
 Reward, quality, worth
     What a perfect image of a target earns; how good an image is, from 0 to 1; their product.
+Objective
+    Which part of that an image earns when it is taken, and which when it is on the ground.
 Outage
     A span in which a satellite or a station is not to be had.
 Pin
@@ -31,6 +33,7 @@ Every type is immutable and checks itself when made.
 from __future__ import annotations
 
 from planner_core.domain.horizon import Horizon
+from planner_core.domain.objective import Objective
 from planner_core.domain.outages import Outage
 from planner_core.domain.places import GroundStation, Target
 from planner_core.domain.quality import Curve, Quality
@@ -58,6 +61,7 @@ __all__ = [
     "Horizon",
     "LookSide",
     "Nadir",
+    "Objective",
     "OrbitDirection",
     "OrbitElements",
     "Outage",

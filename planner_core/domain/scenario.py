@@ -10,6 +10,7 @@ import numpy as np
 
 from planner_core.domain.checks import require
 from planner_core.domain.horizon import Horizon
+from planner_core.domain.objective import Objective
 from planner_core.domain.outages import Outage
 from planner_core.domain.places import GroundStation, Target
 from planner_core.domain.quality import Quality
@@ -33,6 +34,9 @@ class Scenario:
         from the horizon's start.
     quality
         What part of its target's reward an image earns, by how it is taken.
+    objective
+        What of that it earns when it is taken, and what when it is on the ground. Without
+        resources there are no contacts, and images earn all when they are taken.
     allow_old_elements
         Plan with element sets of any age (see ``build.check_element_age``).
     outages
@@ -51,6 +55,7 @@ class Scenario:
     collect_alignment: CollectAlignment = "access"
     continuous_starts: bool = False
     quality: Quality = field(default_factory=Quality)
+    objective: Objective = field(default_factory=Objective)
     allow_old_elements: bool = False
     pins: Pins = field(default_factory=Pins)
     outages: tuple[Outage, ...] = ()

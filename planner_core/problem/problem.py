@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from planner_core.domain import Agility, Dynamics, Resources
+from planner_core.domain import Agility, Dynamics, Objective, Resources
 from planner_core.problem.downlink import Downlinks
 from planner_core.problem.pointing import Pointing, Vector, sight
 from planner_core.problem.slew import TIME_TOLERANCE_S
@@ -286,8 +286,13 @@ class Problem:
     Attributes
     ----------
     worth
-        What an image by each opportunity earns alone, 0 for contacts (see ``planner_core.worth``).
+        What an image by each opportunity earns alone at most, 0 for contacts (see
+        ``planner_core.worth``).
         With continuous starts all collects of an access are worth the same. Shape ``(n,)``.
+    full_worth
+        The same for an image that is on the ground at once; None where that is ``worth``.
+    objective
+        What of its full worth an image earns when.
     target_access
         Why a target has no opportunity, or ``ACCESS_FOUND``. Shape ``(num_targets,)``.
     station_antennas
@@ -316,6 +321,8 @@ class Problem:
     downlinks: Downlinks
     opportunities: Opportunities
     satellites: tuple[SatelliteProblem, ...]
+    full_worth: Floats | None = None
+    objective: Objective = field(default_factory=Objective)
     pointing: Pointing | None = None
     pinned: Pinned = Pinned()
     origin: Ints | None = None
@@ -358,10 +365,28 @@ class Problem:
     @cached_property
     def reward_unit(self) -> float:
         """Return an amount of which what any plan earns is a multiple; 0 where there is none."""
-        return common_unit(self.worth)
+        if not self.counts_delivery or self.objective.is_delivered:
+            return common_unit(self.worth)
+        if self.objective.half_life_s is not None:
+            return 0.0
+        shares = (1.0, self.objective.collected_share)
+        return common_unit(np.concatenate([share * self.worth_on_ground for share in shares]))
+
+    @property
+    def counts_delivery(self) -> bool:
+        """Whether what an image earns hangs on when it is on the ground."""
+        return self.use_resources and self.objective.counts_delivery
+
+    @property
+    def worth_on_ground(self) -> Floats:
+        """Return what each image earns alone that is on the ground at once. Shape ``(n,)``."""
+        return self.worth if self.full_worth is None else self.full_worth
 
     def worth_of(self, rows: npt.NDArray[np.integer]) -> float:
-        """Return what a plan earns that takes these opportunities and breaks nothing."""
+        """Return what a plan earns at most that takes these opportunities and breaks nothing.
+
+        It earns that where all that it takes is on the ground as early as it can be.
+        """
         images = rows[self.opportunities.kind[rows] == COLLECT]
         return worth_of(self.opportunities.place[images], self.worth[images])
 

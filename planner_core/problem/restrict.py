@@ -64,6 +64,7 @@ def with_table(
         problem,
         opportunities=table,
         worth=problem.worth[origin],
+        full_worth=None if problem.full_worth is None else problem.full_worth[origin],
         pinned=pinned,
         origin=(origin if problem.origin is None else problem.origin[origin]).astype(np.int32),
         satellites=tuple(

@@ -53,6 +53,7 @@ class PlanView:
                     )
                 )
         modes = [action.mode for action in actions]
+        age_s = [c.age_s for c in timeline.collected.values() if c.age_s is not None]
         return cls(
             actions=tuple(sorted(actions)),
             totals={
@@ -60,6 +61,8 @@ class PlanView:
                 "collects": float(modes.count("collect")),
                 "contacts": float(modes.count("contact")),
                 "targets": float(len(timeline.collected)),
+                "delivered": float(len(age_s)) if problem.use_resources else None,
+                "age_mean_s": round(sum(age_s) / len(age_s), 3) if age_s else None,
                 "downlinked_fraction": sum(timeline.downlinked) if problem.use_resources else None,
                 "battery_min_fraction": timeline.battery_min,
                 "recorder_max_fraction": timeline.recorder_max,

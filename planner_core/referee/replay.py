@@ -11,7 +11,9 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
+
+import numpy as np
 
 from planner_core.problem import (
     COLLECT,
@@ -21,6 +23,7 @@ from planner_core.problem import (
 )
 from planner_core.problem.plan import Action, Plan
 from planner_core.problem.slew import TIME_TOLERANCE_S
+from planner_core.referee.delivery import delivered_s
 from planner_core.referee.idle_time import Idle
 from planner_core.referee.pinned_plan import breaches
 from planner_core.referee.resource_profile import (
@@ -30,6 +33,7 @@ from planner_core.referee.resource_profile import (
     thin,
 )
 from planner_core.referee.sight import turn_between
+from planner_core.worth import share_earned
 
 Mode = Literal["collect", "contact", "sunpoint", "hold"]
 ViolationCode = Literal[
@@ -44,7 +48,6 @@ ViolationCode = Literal[
     "outage",
     "frozen",
 ]
-_AMOUNT_TOLERANCE = 1e-9  # of a recorder's capacity, in comparing sums of many pieces
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,6 +91,10 @@ class JudgedAction:
 
     Attributes
     ----------
+    worth
+        Of a collect: what its image earns by itself.
+    delivered_s
+        Of a collect: when its last bit is on the ground; None for never.
     turn_to_s, turn_back_s
         Of sun-pointing: the turn to the sun that ends at its start, and the one from its end.
     """
@@ -101,6 +108,8 @@ class JudgedAction:
     reward: float
     battery_end: float | None
     recorder_end: float | None
+    worth: float | None = None
+    delivered_s: float | None = None
     turn_to_s: float | None = None
     turn_back_s: float | None = None
 
@@ -130,12 +139,20 @@ class Collected:
     ----------
     worth
         What the image earns.
+    delivered_s, age_s
+        When its last bit is on the ground, and how long after the collect; None for never.
     """
 
     position: int
     satellite: int
-    is_downlinked: bool
     worth: float
+    delivered_s: float | None
+    age_s: float | None
+
+    @property
+    def is_downlinked(self) -> bool:
+        """Whether the image is on the ground by the end of the horizon."""
+        return self.delivered_s is not None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -148,8 +165,9 @@ class Timeline:
         Sum over targets of the best worth of their collects by actions that break nothing.
     collected
         By target index.
-    downlinked
-        What contacts took down, by satellite, in recorder capacities.
+    downlinked, on_board
+        What contacts took down, and what is in the recorder at the end, by satellite, in recorder
+        capacities.
     battery_min, recorder_max
         The lowest battery and the highest recorder of any satellite at any instant.
     """
@@ -159,6 +177,7 @@ class Timeline:
     reward: float
     collected: Mapping[int, Collected]
     downlinked: tuple[float, ...]
+    on_board: tuple[float, ...]
     battery_min: float | None
     recorder_max: float | None
 
@@ -224,19 +243,24 @@ def replay(problem: Problem, plan: Plan) -> Timeline:
             violations += _limits(problem, index, positions, profile)
 
     blamed = {p for v in violations for p in v.blamed}
-    collected, duplicates = _collected(problem, plan, blamed, by_satellite, profiles)
+    down_s = _delivered(problem, plan, by_satellite, profiles)
+    worth = _worth(problem, plan, down_s)
+    collected, duplicates = _collected(problem, plan, blamed, worth, down_s)
     violations += duplicates
     earned = {c.position: c.worth for c in collected.values()}
     points = [point for profile in profiles if profile for point in profile.points]
     return Timeline(
         satellites=tuple(
-            _satellite_timeline(problem, plan, positions, slews, earned, profile)
+            _satellite_timeline(
+                problem, plan, positions, slews, _Images(earned, worth, down_s), profile
+            )
             for positions, profile in zip(by_satellite, profiles, strict=True)
         ),
         violations=tuple(sorted(violations, key=lambda v: (v.at_s, v.satellite, v.code))),
         reward=math.fsum(earned.values()),
         collected=collected,
         downlinked=tuple(profile.points[-1].removed if profile else 0.0 for profile in profiles),
+        on_board=tuple(profile.points[-1].recorder if profile else 0.0 for profile in profiles),
         battery_min=min((p.battery for p in points), default=None),
         recorder_max=max((p.recorder for p in points), default=None),
     )
@@ -410,18 +434,13 @@ def _excursions(
 
 
 def _collected(
-    problem: Problem,
-    plan: Plan,
-    blamed: set[int],
-    by_satellite: Sequence[Sequence[int]],
-    profiles: Sequence[Profile | None],
+    problem: Problem, plan: Plan, blamed: set[int], worth: Floats, down_s: Floats
 ) -> tuple[dict[int, Collected], list[Violation]]:
     """Return the best unbroken collect of each target, and a warning for each other one.
 
     Of equal ones the first is the best.
     """
     table = problem.opportunities
-    is_down = _downlinked(by_satellite, profiles)
     images: dict[int, list[int]] = {}
     for position in sorted(range(len(plan.actions)), key=lambda p: plan.actions[p]):
         i = plan.actions[position].opportunity
@@ -430,14 +449,16 @@ def _collected(
     collected: dict[int, Collected] = {}
     duplicates = []
     for target, positions in images.items():
-        worth = [float(problem.worth[plan.actions[p].opportunity]) for p in positions]
-        best = worth.index(max(worth))
+        best = int(np.argmax(worth[positions]))
         satellites = [int(table.satellite[plan.actions[p].opportunity]) for p in positions]
+        image_down_s = float(down_s[positions[best]])
+        is_down = not math.isnan(image_down_s)
         collected[target] = Collected(
             position=positions[best],
             satellite=satellites[best],
-            is_downlinked=is_down.get(positions[best], False),
-            worth=worth[best],
+            worth=float(worth[positions[best]]),
+            delivered_s=image_down_s if is_down else None,
+            age_s=image_down_s - plan.actions[positions[best]].end_s if is_down else None,
         )
         for order, position in enumerate(positions):
             if order == best:
@@ -451,16 +472,39 @@ def _collected(
     return collected, duplicates
 
 
-def _downlinked(
-    by_satellite: Sequence[Sequence[int]], profiles: Sequence[Profile | None]
-) -> dict[int, bool]:
-    """First in, first out: an image is down once all that was recorded by its end is down."""
-    return {
-        position: after.recorded <= profile.points[-1].removed + _AMOUNT_TOLERANCE
-        for positions, profile in zip(by_satellite, profiles, strict=True)
-        if profile
-        for position, after in zip(positions, profile.after, strict=True)
-    }
+def _delivered(
+    problem: Problem,
+    plan: Plan,
+    by_satellite: Sequence[Sequence[int]],
+    profiles: Sequence[Profile | None],
+) -> Floats:
+    """Return when the image of each action is on the ground; NaN for never, and for contacts."""
+    found = np.full(len(plan.actions), np.nan)
+    for satellite, positions, profile in zip(
+        problem.satellites, by_satellite, profiles, strict=True
+    ):
+        if profile is not None and len(positions):
+            own = [plan.actions[p] for p in positions]
+            found[positions] = delivered_s(problem, satellite, own, profile)
+    return found
+
+
+def _worth(problem: Problem, plan: Plan, down_s: Floats) -> Floats:
+    """Return what the image of each action earns by itself, 0 for contacts."""
+    rows = np.array([action.opportunity for action in plan.actions], dtype=np.int64)
+    if not problem.counts_delivery:
+        return problem.worth[rows]
+    end_s = np.array([action.end_s for action in plan.actions])
+    age_s = np.where(np.isnan(down_s), np.inf, down_s - end_s)
+    return problem.worth_on_ground[rows] * share_earned(problem.objective, age_s)
+
+
+class _Images(NamedTuple):
+    """What the image of each action earns in the plan and by itself, and when it is down."""
+
+    earned: Mapping[int, float]
+    worth: Floats
+    delivered_s: Floats
 
 
 def _satellite_timeline(
@@ -468,7 +512,7 @@ def _satellite_timeline(
     plan: Plan,
     positions: Sequence[int],
     slews: Mapping[int, Slew | None],
-    earned: Mapping[int, float],
+    images: _Images,
     profile: Profile | None,
 ) -> SatelliteTimeline:
     table = problem.opportunities
@@ -476,15 +520,19 @@ def _satellite_timeline(
     for order, position in enumerate(positions):
         action = plan.actions[position]
         level = profile.after[order] if profile else None
+        is_contact = table.kind[action.opportunity] == CONTACT
+        down_s = float(images.delivered_s[position])
         actions.append(
             JudgedAction(
-                mode="contact" if table.kind[action.opportunity] == CONTACT else "collect",
+                mode="contact" if is_contact else "collect",
                 start_s=action.start_s,
                 end_s=action.end_s,
                 opportunity=action.opportunity,
                 position=position,
                 slew=slews[position],
-                reward=earned.get(position, 0.0),
+                reward=images.earned.get(position, 0.0),
+                worth=None if is_contact else float(images.worth[position]),
+                delivered_s=None if math.isnan(down_s) else down_s,
                 battery_end=level.battery if level else None,
                 recorder_end=level.recorder if level else None,
             )

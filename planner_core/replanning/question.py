@@ -56,8 +56,13 @@ class Question:
         """
         dear = 1.0 + float(self.problem.best_worth.sum()) + float(self.bonus.sum())
         table = self.problem.opportunities
-        worth = np.where(table.kind == CONTACT, 0.0, self.problem.worth + self.bonus)
-        return replace(self.problem, worth=worth + dear * self.is_promised)
+        more = np.where(table.kind == CONTACT, 0.0, self.bonus + dear * self.is_promised)
+        full = self.problem.full_worth
+        return replace(
+            self.problem,
+            worth=self.problem.worth + more,
+            full_worth=None if full is None else full + more,
+        )
 
     def stable_worth(self, plan: Plan) -> float:
         """Return what the kept actions of a plan count."""

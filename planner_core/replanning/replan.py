@@ -179,12 +179,13 @@ def _solution(question: Question, plan: Plan, best: Incumbent, budget: Budget) -
     kept = question.stable_worth(plan)
     table = problem.opportunities
     contacts = question.bonus[table.kind == CONTACT].sum()
-    # What contacts may count is the same for every plan: the bound of the images, and all of it.
-    images = replace(question, promised=()).searched
-    summed = min(
-        _quick_bound(images, replay(images, plan).reward).value + contacts,
-        last.bound.value + question.bonus.sum(),
-    )
+    # No plan counts more than the best and all that may be kept; with time left, the images with
+    # what they count are bounded themselves, and contacts count the same in every plan.
+    summed = last.bound.value + question.bonus.sum()
+    if not budget.is_spent():
+        images = replace(question, promised=()).searched
+        own = _quick_bound(images, replay(images, plan).reward)
+        summed = min(summed, own.value + contacts)
     return replace(
         solution,
         statistics={

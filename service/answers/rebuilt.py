@@ -20,7 +20,7 @@ from service.scenarios.opportunities import Described
 from service.wire.timelines import IDLE_MODES, TimelineOut
 
 _FIGURES: Final = (
-    "reward", "collects", "contacts", "downlinked_mbit", "downlinked_fraction",
+    "reward", "collects", "contacts", "delivered", "downlinked_mbit", "downlinked_fraction",
     "battery_min_fraction", "recorder_max_fraction",
 )  # fmt: skip
 
@@ -73,7 +73,11 @@ def view_of(timeline: TimelineOut) -> PlanView:
     imaged = totals.targets["downlinked"] + totals.targets["collected"]
     return PlanView(
         actions=tuple(sorted(planned(timeline))),
-        totals={**{name: getattr(totals, name) for name in _FIGURES}, "targets": float(imaged)},
+        totals={
+            **{name: getattr(totals, name) for name in _FIGURES},
+            "targets": float(imaged),
+            "age_mean_s": None if totals.age_s is None else totals.age_s.mean,
+        },
     )
 
 

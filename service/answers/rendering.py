@@ -25,6 +25,7 @@ from planner_core.referee.replay import (
 )
 from planner_core.run import Judged
 from planner_core.worth import quality_of
+from service.answers.figures import ages_of, num_delivered, on_board_mbit, satellite_totals
 from service.wire.base import Json
 from service.wire.jobs import FiguresOut
 from service.wire.scenarios import HorizonOut
@@ -52,7 +53,7 @@ def figures_of(timeline: Json) -> Json:
     """Return the numbers of a timeline (its head will do) that a table of several plans shows."""
     runtime_s = timeline["runtime_s"]
     figures = FiguresOut(
-        **{name: timeline["totals"][name] for name in _OF_TOTALS},
+        **{name: timeline["totals"].get(name) for name in _OF_TOTALS},
         solve_s=runtime_s["solve"],
         runtime_s=round(sum(runtime_s.values()), 6),
         validity=timeline["validity"],
@@ -70,6 +71,7 @@ class Wording:
     def __init__(self, scenario: Scenario, problem: Problem, timeline: Timeline):
         self.scenario = scenario
         self.problem = problem
+        self._timeline = timeline
         self.instant = scenario.horizon.instant
         actions = [a for s in timeline.satellites for a in s.actions]
         self.action_ids = {
@@ -101,6 +103,7 @@ class Wording:
         """Return what became of a target."""
         target = self.scenario.targets[found.target]
         satellite = None if found.satellite is None else self.problem.satellites[found.satellite]
+        collected = self._timeline.collected.get(found.target)
         return TargetItem(
             target_id=target.id,
             target_catalog_id=target.catalog_id,
@@ -108,6 +111,7 @@ class Wording:
             action_id=None if found.position is None else self.action_ids[found.position],
             satellite_id=None if satellite is None else satellite.id,
             satellite_name=None if satellite is None else satellite.name,
+            worth=None if collected is None else collected.worth,
             reason=None if found.reason is None else self._reason(found.reason, target.reward),
         )
 
@@ -178,18 +182,20 @@ class Documents(Wording):
     def satellites(self) -> Iterator[tuple[SatelliteTimelineOut, Iterator[ActionOut]]]:
         """Yield what the timeline says of each satellite, and apart from that its actions."""
         judged, numbers = self._judged, count(1)
-        for satellite, line, lit in zip(
+        parts = zip(
             judged.problem.satellites,
             judged.timeline.satellites,
             judged.opportunities.sunlight,
             strict=True,
-        ):
+        )
+        for index, (satellite, line, lit) in enumerate(parts):
             gaps = lit.gaps(judged.problem.horizon_s)
             limits = satellite.resources
             about = SatelliteTimelineOut(
                 id=satellite.id,
                 name=satellite.name,
                 actions=(),
+                totals=satellite_totals(self.scenario, self.problem, judged.timeline, index),
                 eclipses=[HorizonOut(start=self.instant(a), end=self.instant(b)) for a, b in gaps],
                 resources=None
                 if line.resources is None
@@ -234,6 +240,9 @@ class Documents(Wording):
             battery_min_fraction=timeline.battery_min,
             recorder_max_fraction=timeline.recorder_max,
             quality_mean=self._quality_mean(),
+            delivered=num_delivered(self.problem, timeline.collected.values()),
+            age_s=ages_of(timeline.collected.values()),
+            on_board_mbit_end=on_board_mbit(self.scenario, self.problem, timeline.on_board),
         )
 
     def _quality_mean(self) -> float | None:
@@ -244,15 +253,15 @@ class Documents(Wording):
         return round(float(self._quality[rows].mean()), 9) if rows else None
 
     def _action(self, action_id: str, action: JudgedAction) -> ActionOut:
-        table, row = self.problem.opportunities, action.opportunity
-        target_id = station = off_nadir_deg = azimuth_deg = worth = quality = None
+        table, row, down_s = self.problem.opportunities, action.opportunity, action.delivered_s
+        target_id = station = off_nadir_deg = azimuth_deg = quality = None
         if row is not None:
             own = table.off_nadir_deg[row], table.azimuth_deg[row]
             off_nadir_deg, azimuth_deg = self._seen.get(action.position, own)
             place = int(table.place[row])
             if action.mode == "collect":
                 target_id = self.scenario.targets[place].id
-                worth, quality = float(self.problem.worth[row]), self._quality[row]
+                quality = self._quality[row]
             else:
                 station = self.scenario.ground_stations[place]
         return ActionOut(
@@ -270,8 +279,10 @@ class Documents(Wording):
             turn_to_s=_rounded(action.turn_to_s, 3),
             turn_back_s=_rounded(action.turn_back_s, 3),
             reward=action.reward,
-            worth=worth,
+            worth=action.worth,
             quality=_rounded(quality, 9),
+            delivered_at=None if down_s is None else self.instant(down_s),
+            age_s=None if down_s is None else round(down_s - action.end_s, 3),
             battery_fraction_end=_rounded(action.battery_end, 9),
             recorder_fraction_end=_rounded(action.recorder_end, 9),
         )

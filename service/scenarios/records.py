@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import csv
 import difflib
-import io
 import json
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Generic, TypeVar
 
@@ -15,6 +13,7 @@ from pydantic import BaseModel, ValidationError
 
 from planner_core.errors import Fault, PlannerError
 from service.problems.faults import faults_of_validation, refuse
+from service.scenarios.tables import Table, decoded, read_table
 
 B = TypeVar("B", bound=BaseModel)
 
@@ -149,12 +148,14 @@ def read_csv(
 
     Columns may stand in any order; ``lat``, ``latitude``, ``lon``, ``lng``, ``long`` and
     ``longitude`` are taken too. Other columns are ignored, unless they look like a misspelt
-    one. An empty cell means the default.
+    one. An empty cell means the default. Cells are parted by commas, or by semicolons or tabs where
+    the header shows it; there a comma may be the decimal sign.
     """
-    text = _decoded(data)
+    text = decoded(data)
     if isinstance(text, Fault):
         return Records(faults=(text,))
-    rows = _csv_rows(text)
+    table = read_table(text, _columns_of, required)
+    rows = table.rows
     first = next(rows, None)
     if first is None:
         return Records(faults=(Fault(code="empty_file", detail="The file is empty."),))
@@ -163,7 +164,7 @@ def read_csv(
     if len(first[1]) > _MOST_COLUMNS:
         detail = f"The header has {len(first[1])} columns; {_MOST_COLUMNS} are the most."
         return Records(faults=(Fault(code="malformed_csv", detail=detail, row=first[0]),))
-    columns = [_ALIASES.get(c.strip().lower(), c.strip().lower()) for c in first[1]]
+    columns = _columns_of(first[1])
     faults = _faults_of_header(first[0], columns, known, required)
     if faults:
         return Records(faults=tuple(faults))
@@ -178,7 +179,9 @@ def read_csv(
             faults.append(Fault(code="malformed_csv", detail=detail, row=row[0]))
         else:
             cells = zip(columns, (cell.strip() for cell in row[1]), strict=True)
-            fields = {name: _value(name, cell) for name, cell in cells if cell and name in known}
+            fields = {
+                name: _value(name, cell, table) for name, cell in cells if cell and name in known
+            }
             records.append(Record(fields=fields, row=row[0]))
     if not records and not faults:
         faults.append(Fault(code="empty_file", detail="The file has a header and no records."))
@@ -186,32 +189,14 @@ def read_csv(
     return Records(records=tuple(records), faults=tuple(faults), ignored=ignored)
 
 
+def _columns_of(header: Sequence[str]) -> list[str]:
+    names = (cell.strip().lower() for cell in header)
+    return [_ALIASES.get(name, name) for name in names]
+
+
 def _too_many_rows(most: int) -> Records:
     detail = f"The file holds more than {most} records; split it."
     return Records(faults=(Fault(code="too_many_rows", detail=detail),))
-
-
-def _decoded(data: bytes) -> str | Fault:
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        return Fault(code="not_utf8", detail=f"Byte {error.start} is no UTF-8.")
-
-
-def _csv_rows(text: str) -> Iterator[tuple[int, list[str]] | Fault]:
-    """Yield the line where each record starts, and its cells; blank lines are left out."""
-    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
-    while True:
-        start = reader.line_num + 1
-        try:
-            cells = next(reader)
-        except StopIteration:
-            return
-        except csv.Error as error:
-            yield Fault(code="malformed_csv", detail=f"{str(error).capitalize()}.", row=start)
-            continue
-        if any(cell.strip() for cell in cells):
-            yield start, cells
 
 
 def _faults_of_header(
@@ -235,9 +220,10 @@ def _faults_of_header(
     return faults
 
 
-def _value(column: str, cell: str) -> object:
+def _value(column: str, cell: str, table: Table) -> object:
     if column in _TEXT_COLUMNS:
         return cell
+    cell = table.number(cell)
     if column == "antennas" and _WHOLE.fullmatch(cell):
         return int(cell)
     # What is no number stays text, which the schema refuses by name.
@@ -249,7 +235,7 @@ def read_geojson(data: bytes, known: Collection[str], *, most: int) -> Records:
 
     Of a feature's properties those that are fields of ours count; others are ignored.
     """
-    text = _decoded(data)
+    text = decoded(data)
     if isinstance(text, Fault):
         return Records(faults=(text,))
     try:

@@ -20,6 +20,7 @@ from planner_core.domain import (
     Agility,
     GroundStation,
     Horizon,
+    Objective,
     OrbitElements,
     Quality,
     Resources,
@@ -137,6 +138,8 @@ def canonical_of_file(file: ScenarioFile) -> str:
     _without_unset(document, "replan")
     for action in document.get("replan", {}).get("base", ()):
         _without_unset(action, *tuple(action))
+    if not _counts_delivery(document["objective"]):
+        del document["objective"]
     for outage in document["outages"]:
         _without_unset(outage, "id", "satellite_id", "station_id", "reason")
     if not document["outages"]:
@@ -145,6 +148,11 @@ def canonical_of_file(file: ScenarioFile) -> str:
         if not any(document[part].values()):
             del document[part]
     return json.dumps(document, sort_keys=True, separators=(",", ":"), allow_nan=False)
+
+
+def _counts_delivery(objective: Mapping[str, Any]) -> bool:
+    """Whether images earn less than all when they are taken; a half-life is of what is left."""
+    return bool(objective["collected_share"] < 1.0)
 
 
 def _without_unset(part: dict[str, Any], *names: str) -> None:
@@ -181,6 +189,7 @@ def scenario_from_file(file: ScenarioFile) -> Scenario:
         collect_alignment=file.collect_alignment,
         continuous_starts=file.continuous_starts,
         quality=quality_from(file.quality),
+        objective=Objective(**file.objective.model_dump()),
         allow_old_elements=file.allow_old_elements,
         pins=pins_from(file.pins),
         outages=tuple(outage_from(outage) for outage in file.outages),

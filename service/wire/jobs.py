@@ -9,6 +9,7 @@ from pydantic import Discriminator, Field, Tag
 from service.wire.base import Body, Free, Id, Instant, Json, Name, Open, Stored, Wire
 from service.wire.changes import ChangeIn
 from service.wire.scenarios import ScenarioFile, ScenarioIn
+from service.wire.timelines import AgesOut
 
 JobState = Literal["queued", "running", "cancelling", "succeeded", "failed", "cancelled", "expired"]
 ACTIVE: Final[tuple[JobState, ...]] = ("queued", "running", "cancelling")
@@ -169,6 +170,8 @@ class FiguresOut(Wire):
         None, description="Null too where a recorder has no capacity in megabits."
     )
     downlinked_fraction: float | None = Field(None, description="In recorder capacities.")
+    delivered: int | None = Field(None, description="Images on the ground by the end.")
+    age_s: AgesOut | None = Field(None, description="Of those images, when they are down.")
     solve_s: float | None = Field(None, description="Of the search alone.")
     runtime_s: float | None = Field(None, description="Of the whole job's work.")
     validity: str | None = None

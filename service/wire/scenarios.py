@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
-from pydantic import FailFast, Field
+from pydantic import BeforeValidator, FailFast, Field
 
 from service.wire.base import Body, Duration, Id, Instant, Name, Open, Stored, Wire
 from service.wire.pins import PinsIn, PlacedOutage
@@ -49,6 +49,44 @@ class QualityIn(Body):
     )
 
 
+class ObjectiveIn(Body):
+    """What a plan earns for an image when it is taken, and what when it is on the ground."""
+
+    collected_share: float = Field(
+        1.0,
+        ge=0.0,
+        le=1.0,
+        description="The part of its worth that an image earns when it is taken. The rest it earns "
+        "when its last bit is on the ground. Without resources images earn all when taken.",
+    )
+    half_life_s: float | None = Field(
+        None,
+        gt=0.0,
+        allow_inf_nan=False,
+        description="The rest halves with every such time between the end of the collect and its "
+        "last bit on the ground; null for no decay.",
+    )
+
+
+ObjectiveName = Literal["collected", "delivered", "paper"]
+_NAMED: Final = {
+    "collected": ObjectiveIn(),
+    "delivered": ObjectiveIn(collected_share=0.0),
+    "paper": ObjectiveIn(),
+}
+
+
+def _objective_named(value: object) -> object:
+    """Return the objective that a short name stands for; anything else as it is."""
+    return _NAMED.get(value, value) if isinstance(value, str) else value
+
+
+AnyObjective = Annotated[
+    ObjectiveIn,
+    BeforeValidator(_objective_named, json_schema_input_type=ObjectiveIn | ObjectiveName),
+]
+
+
 class Question(Body):
     """What scenarios and scenario files share."""
 
@@ -73,6 +111,11 @@ class Question(Body):
         description="A solver may place a collect anywhere inside its access; not with `quality`.",
     )
     quality: QualityIn = QualityIn()
+    objective: AnyObjective = Field(
+        ObjectiveIn(),
+        description="What a plan is to earn. `collected` is short for a collected_share of 1, "
+        "`delivered` for 0; `paper` is the same as `collected`.",
+    )
     allow_old_elements: bool = Field(
         False,
         description="Plan with element sets that are more than 30 days from their epoch "
@@ -156,6 +199,7 @@ class ScenarioSummary(Stored):
     collect_alignment: Open[CollectAlignment] = "access"
     continuous_starts: bool
     quality: QualityIn = QualityIn()
+    objective: ObjectiveIn = ObjectiveIn()
     allow_old_elements: bool
     counts: Counts
     warnings: tuple[str, ...] = Field(description="About the age of orbits, for people.")

@@ -51,6 +51,15 @@ class ViolationOut(Wire):
     inherited: bool = Field(False, description="It held at the start; no action has a part in it.")
 
 
+class AgesOut(Wire):
+    """How old images are when their last bit is on the ground, in seconds."""
+
+    mean: float
+    median: float
+    p90: float = Field(description="Nine of ten are no older.")
+    max: float
+
+
 class TotalsOut(Wire):
     """The plan in numbers, as the referee found them."""
 
@@ -73,6 +82,19 @@ class TotalsOut(Wire):
     recorder_max_fraction: float | None = Field(description="The highest fill of any recorder.")
     quality_mean: float | None = Field(
         None, description="Of the images that earn, one of each target; null where there is none."
+    )
+    delivered: int | None = Field(
+        None,
+        description="How many of these images are on the ground by the end of the horizon; null "
+        "without resources, as there are no contacts.",
+    )
+    age_s: AgesOut | None = Field(
+        None, description="Of those, from the end of the collect to the last bit on the ground."
+    )
+    on_board_mbit_end: float | None = Field(
+        None,
+        description="What recorders hold at the end, telemetry included; null where a recorder "
+        "has no capacity in megabits.",
     )
 
 
@@ -109,11 +131,19 @@ class ActionOut(Wire):
     )
     reward: float = Field(description="What the plan earns with it.")
     worth: float | None = Field(
-        None, description="Of a collect: what its image is worth by itself, reward times quality."
+        None,
+        description="Of a collect: what its image is worth by itself in this plan: reward times "
+        "quality, and of that what the `objective` lets it earn.",
     )
     quality: float | None = Field(
         None, description="Of a collect: what part of its target's reward its image is worth."
     )
+    delivered_at: Instant | None = Field(
+        None,
+        description="Of a collect: when the last bit of its image is on the ground, first in, "
+        "first out; null for never.",
+    )
+    age_s: float | None = Field(None, description="From the end of the collect to that instant.")
     battery_fraction_end: float | None
     recorder_fraction_end: float | None
 
@@ -128,12 +158,24 @@ class ResourceCurvesOut(Wire):
     recorder_max_fraction: float
 
 
+class SatelliteTotalsOut(Wire):
+    """What one satellite has a part in."""
+
+    reward: float
+    collects: int
+    contacts: int
+    delivered: int | None = Field(description="As in the totals of all.")
+    age_s: AgesOut | None
+    on_board_mbit_end: float | None
+
+
 class SatelliteTimelineOut(Wire):
     """What one satellite does, in order."""
 
     id: str
     name: str
     actions: tuple[ActionOut, ...]
+    totals: SatelliteTotalsOut | None = None
     eclipses: tuple[HorizonOut, ...] = Field((), description="Spans in the Earth's shadow.")
     resources: ResourceCurvesOut | None = Field(description="Null without resources.")
 
@@ -202,6 +244,7 @@ class TargetItem(Wire):
     action_id: str | None = None
     satellite_id: str | None = None
     satellite_name: str | None = None
+    worth: float | None = Field(None, description="What the plan earns for it.")
     reason: ReasonOut | None = Field(None, description="Why it is not collected.")
 
 
@@ -282,8 +325,9 @@ class DiffOut(Wire):
     removed: tuple[PlannedOut, ...]
     moved: tuple[MovedOut, ...]
     totals: dict[str, TotalDiff] = Field(
-        description="`reward`, `collects`, `contacts`, `targets` (imaged and counted), what is "
-        "downlinked, the lowest battery and the fullest recorder; only those that differ."
+        description="`reward`, `collects`, `contacts`, `targets` (imaged and counted), "
+        "`delivered`, `age_mean_s`, what is downlinked, the lowest battery and the fullest "
+        "recorder; only those that differ."
     )
 
 

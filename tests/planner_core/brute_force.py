@@ -20,7 +20,8 @@ def best_plan(problem: Problem) -> Plan | None:
     """Return a valid plan of the highest reward, judged by the referee, if there is any.
 
     The referee first says which two tasks a satellite cannot do one right after the other.
-    Plans without such a pair are judged from the one that would earn most downwards.
+    Plans without such a pair are judged from the one that could earn most downwards, until no
+    other can earn more.
     """
     table = problem.opportunities
     free = replace(problem, use_resources=False, pinned=Pinned())
@@ -41,11 +42,15 @@ def best_plan(problem: Problem) -> Plan | None:
         return sum(best.values())
 
     plans = sorted(_chains(problem, may_follow, (), 0), key=worth, reverse=True)
+    best, reward = None, 0.0
     for rows in plans:
+        if best is not None and worth(rows) <= reward:
+            break
         plan = Plan.of(problem, rows)
-        if replay(problem, plan).is_valid:
-            return plan
-    return None
+        timeline = replay(problem, plan)
+        if timeline.is_valid and (best is None or timeline.reward > reward):
+            best, reward = plan, timeline.reward
+    return best
 
 
 def _chains(

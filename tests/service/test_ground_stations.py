@@ -140,7 +140,7 @@ def test_a_bad_feature_is_reported_and_the_good_one_stored(
         ("{}", "malformed_geojson"),
         ('{"type": "FeatureCollection"}', "malformed_geojson"),
         (collection(), "empty_file"),
-        (b"\xff\xfe", "not_utf8"),
+        (b"\xff\xfa", "not_utf8"),
     ],
 )
 def test_what_is_no_collection_is_refused(client: httpx.Client, text: str, code: str) -> None:

@@ -120,6 +120,36 @@ def test_every_collect_tells_its_worth_and_its_quality() -> None:
     assert totals["reward"] == pytest.approx(sum(a["reward"] for a in actions))
 
 
+@pytest.mark.parametrize("objective", ["collected", {"collected_share": 0.5, "half_life_s": 7200}])
+def test_every_collect_tells_when_it_is_on_the_ground(objective: object) -> None:
+    answer = run(paper_mission(drawn_targets(150), objective=objective), "rule")
+    timeline = json.loads(answer.timeline)
+    totals, line = timeline["totals"], timeline["satellites"][0]
+    collects = [a for a in line["actions"] if a["mode"] == "collect"]
+    ages_s = []
+    for action in collects:
+        share = 0.0
+        if action["delivered_at"] is not None:
+            down, end = (independent.instant(action[name]) for name in ("delivered_at", "end"))
+            assert action["age_s"] == pytest.approx((down - end).total_seconds(), abs=0.002)
+            ages_s.append(action["age_s"])
+            share = 2 ** (-action["age_s"] / 7200)
+        expected = 1.0 if objective == "collected" else 0.5 + 0.5 * share
+        assert action["worth"] == pytest.approx(expected, abs=1e-6)
+    assert 10 < len(ages_s) < len(collects)
+    assert totals["delivered"] == totals["targets"]["downlinked"] == len(ages_s)
+    ages = {
+        "mean": np.mean(ages_s), "median": np.median(ages_s),
+        "p90": np.quantile(ages_s, 0.9), "max": np.max(ages_s),
+    }  # fmt: skip
+    assert totals["age_s"] == pytest.approx(ages, abs=0.01)
+    assert totals["reward"] == pytest.approx(sum(a["reward"] for a in collects))
+    assert line["totals"] == {name: totals[name] for name in line["totals"]}
+    worth = {t["target_id"]: t["worth"] for t in json.loads(answer.targets)}
+    assert sum(filter(None, worth.values())) == pytest.approx(totals["reward"])
+    assert totals["bound"] >= totals["reward"]
+
+
 def test_what_is_left_out_tells_what_an_image_would_be_worth() -> None:
     targets = [target | {"reward": 2.0} for target in drawn_targets(300)]
     scenario = paper_mission(targets, quality=QUALITY)

@@ -208,7 +208,9 @@ def test_a_bad_row_is_named_by_its_line_and_nothing_is_stored(
         ("id,lat_deg\na,1\n", "missing_field"),
         ("id,lat,lat_deg,lon\na,1,1,1\n", "malformed_csv"),
         ("id,lat,lon,rewards\na,1,1,1\n", "unknown_field"),
-        ("id;lat;lon\na;1;1\n", "missing_field"),
+        ("id|lat|lon\na|1|1\n", "missing_field"),
+        ("id;lat;lon\na;1.234,5;1\n", "invalid_value"),
+        ("id;lat;lon\na;1,2,3;1\n", "invalid_value"),
         (HEADER + '"a', "malformed_csv"),
         (HEADER + "a\x00,1,1,1", "invalid_value"),
         (b"\xff\xfe\x00", "not_utf8"),
@@ -217,6 +219,24 @@ def test_a_bad_row_is_named_by_its_line_and_nothing_is_stored(
 def test_an_unreadable_file_is_refused(service: Service, text: str | bytes, code: str) -> None:
     assert_problem(send(service.client, PATH, text, "text/csv"), 422, code)
     assert stored(service) == (0, 0)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"id;lat;lon;reward;name\na;48,5;-3,25;2;x,y\nb;-1;10;1,5;\n",
+        b"id;lat;lon;reward;name\na;48.5;-3.25;2;x,y\nb;-1;10;1.5;\n",
+        b"id\tlat\tlon\treward\na\t48,5\t-3,25\t2\nb\t-1\t10\t1,5\n",
+        "id,lat,lon,reward\r\na,48.5,-3.25,2\r\nb,-1,10,1.5\r\n".encode("utf-16"),
+        b"\xfe\xff" + "id;lat;lon;reward\na;48,5;-3,25;2\nb;-1;10;1,5\n".encode("utf-16-be"),
+    ],
+)
+def test_files_of_spreadsheets_are_read_as_they_come(client: httpx.Client, data: bytes) -> None:
+    answer = send(client, PATH, data, "text/csv")
+    assert answer.status_code == 201, answer.text
+    targets = client.get(f"{PATH}/{answer.json()['id']}/targets").json()["items"]
+    places = [(one["lat_deg"], one["lon_deg"], one["reward"]) for one in targets]
+    assert places == [(48.5, -3.25, 2.0), (-1.0, 10.0, 1.5)]
 
 
 def test_every_bad_row_is_named_up_to_a_hundred(service: Service) -> None:

@@ -12,9 +12,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner_core.domain import Quality, Resources
+from planner_core.domain import Objective, Quality, Resources
 from planner_core.errors import InvalidScenario, PlannerError
-from service.scenarios.translate import canonical, scenario_from_content, sha256_of
+from service.scenarios.translate import canonical, read_file, scenario_from_content, sha256_of
 from service.wire.base import MOST
 from tests.service.factories import ground_station, satellite, target, tle
 
@@ -89,6 +89,10 @@ def test_the_canonical_form_is_its_own_canonical_form() -> None:
         {"collect_alignment": "access"},
         {"quality": {}},
         {"quality": {"off_nadir_deg": [], "sun_elevation_deg": []}},
+        {"objective": "collected"},
+        {"objective": "paper"},
+        {"objective": {}},
+        {"objective": {"collected_share": 1, "half_life_s": 3600}},
     ],
 )
 def test_the_same_question_has_the_same_hash(same: dict[str, Any]) -> None:
@@ -111,6 +115,9 @@ def test_the_same_question_has_the_same_hash(same: dict[str, Any]) -> None:
         {"collect_spacing_s": 5.0, "collect_alignment": "horizon"},
         {"ground_stations": [ground_station()]},
         {"quality": {"off_nadir_deg": [[0, 1]]}},
+        {"objective": "delivered"},
+        {"objective": {"collected_share": 0.5}},
+        {"objective": {"collected_share": 0.5, "half_life_s": 3600}},
     ],
 )
 def test_another_question_has_another_hash(other: dict[str, Any]) -> None:
@@ -132,6 +139,24 @@ def test_curves_survive_their_file() -> None:
     curve = ((10.0, 0.5), (40.0, 1.0))
     made = scenario_from_content(json.loads(text))
     assert made.quality == Quality(sun_elevation_deg=curve)
+
+
+def test_an_objective_survives_its_file() -> None:
+    text = canonical(file(objective={"collected_share": 0.5, "half_life_s": 7200}))
+    assert canonical(json.loads(text)) == text
+    made = scenario_from_content(json.loads(text))
+    assert made.objective == Objective(collected_share=0.5, half_life_s=7200.0)
+    named, spelled = ({"objective": o} for o in ("delivered", {"collected_share": 0}))
+    assert canonical(file(**named)) == canonical(file(**spelled))
+
+
+@pytest.mark.parametrize(
+    "objective", ["downlinked", {"collected_share": 1.1}, {"half_life_s": 0}, {"share": 1}]
+)
+def test_an_objective_that_cannot_be_is_refused(objective: object) -> None:
+    with pytest.raises(InvalidScenario) as refused:
+        read_file(file(objective=objective))
+    assert str(refused.value.fault.pointer).startswith("/objective")
 
 
 def test_times_types_and_alignment_survive_their_file() -> None:

@@ -54,7 +54,8 @@ ACTION = {
     "station_name": None, "turn_to_s": None, "turn_back_s": None, "opportunity_id": "o1",
     "off_nadir_deg": 10.0, "azimuth_deg": 90.0,
     "slew": {"angle_deg": 1.0, "needed_s": 1.0, "available_s": 2.0}, "reward": 0.8,
-    "worth": 0.8, "quality": 0.8, "battery_fraction_end": None, "recorder_fraction_end": None,
+    "worth": 0.8, "quality": 0.8, "delivered_at": NOW, "age_s": 60.0,
+    "battery_fraction_end": None, "recorder_fraction_end": None,
 }  # fmt: skip
 JOB = {
     "id": "j1", "state": "running", "scenario": {"id": "s1", "sha256": "0"}, "solver": "rule",

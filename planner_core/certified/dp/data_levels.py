@@ -17,13 +17,18 @@ _ROUNDING: Final = 1e-6  # of a level: tasks of "the same" length differ by as m
 
 @bundle
 class DataLevels(NamedTuple):
-    """The data columns of a ``Network`` in levels from 0; shape ``(m,)``."""
+    """The data columns of a ``Network`` in levels from 0; shape ``(m,)``.
+
+    ``end`` is the highest at the end, whatever the last image is; ``delivered`` where it must be
+    down.
+    """
 
     num_levels: int
     gain: Ints
     floor: Ints
     before: Ints
     after: Ints
+    delivered: Ints
     start: int
     end: int
 
@@ -56,12 +61,19 @@ def data_levels(network: Network, per_collect: int, *, is_optimistic: bool) -> D
     def limit(data: Floats | float) -> Ints:
         return np.floor(np.asarray(data) / unit + room).astype(np.int32) - base
 
+    floor = rounded(network.data_floor, -abs(room)) - base
+    delivered = limit(network.delivered)
+    if not is_optimistic:
+        # A contact that empties the recorder must do, though its level is rounded up.
+        emptied = np.where(network.is_contact == 1, floor, 0)
+        delivered = np.maximum(delivered, np.maximum.accumulate(emptied[::-1])[::-1])
     return DataLevels(
         num_levels=int(limit(highest)) + 1,
         gain=rounded(network.data_gain, _ROUNDING),
-        floor=rounded(network.data_floor, -abs(room)) - base,
+        floor=floor,
         before=limit(network.data_before),
         after=limit(network.data_after),
+        delivered=delivered.astype(np.int32),
         start=int(rounded(network.data_start, _ROUNDING)) - base,
         end=int(limit(network.data_end)),
     )
@@ -76,6 +88,7 @@ def levels_of_part(levels: DataLevels, rows: Ints) -> DataLevels:
         levels.floor[rows],
         levels.before[rows],
         levels.after[rows],
+        levels.delivered[rows],
         levels.start,
         levels.end,
     )

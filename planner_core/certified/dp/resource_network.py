@@ -29,8 +29,14 @@ from planner_core.bundles import bundle
 from planner_core.jit import inlined, kernel
 from planner_core.mdp.track import STRICT, compile_track
 from planner_core.precedence.arcs import Arcs, reversed_arcs
-from planner_core.precedence.relation import Precedence, comes_before, direct_precedence
+from planner_core.precedence.relation import (
+    Precedence,
+    comes_before,
+    direct_precedence,
+    is_transitive,
+)
 from planner_core.problem import (
+    COLLECT,
     Floats,
     Ints,
     Longs,
@@ -40,6 +46,7 @@ from planner_core.problem import (
 from planner_core.problem.slew import TIME_TOLERANCE_S
 
 _SLACK = 1e-9  # of capacity; above the referee's rounding, far below any task
+_ANY_LEVEL = 2.0  # of capacity: no limit
 
 
 @bundle
@@ -51,6 +58,11 @@ class Network(NamedTuple):
     the later row. ``by_idle`` has all rows in order of ``idle_from``. A path that passes by a row
     with ``is_kept`` is none. ``energy_from`` and ``energy_to`` are what idle time adds up to
     before it begins after a task, and when it ends at one.
+
+    Where images count on the ground alone, no best plan takes one that stays on board: without it
+    no other comes down later. With row ``i`` as the last image its data may end at ``delivered[i]``
+    at most, which is telemetry younger than that image. ``must_deliver`` says so where dropping
+    an image makes no turn impossible.
     """
 
     place: Ints
@@ -73,9 +85,11 @@ class Network(NamedTuple):
     data_floor: Floats
     data_before: Floats
     data_after: Floats
+    delivered: Floats
     energy_start: float
     data_start: float
     data_end: float
+    must_deliver: bool
 
 
 def network_of(problem: Problem, satellite: SatelliteProblem) -> Network:
@@ -131,10 +145,32 @@ def _network(problem: Problem, satellite: SatelliteProblem, slack: float) -> Net
         data_floor=-data_from,
         data_before=top - track.telemetry_per_s * track.data_peak_s,
         data_after=top - data_from,
+        delivered=_delivered(problem, satellite, -data_from, max(slack, 0.0)),
         energy_start=track.battery_start,
         data_start=track.recorder_start,
         data_end=top - track.telemetry_per_s * track.data_end_s,
+        must_deliver=must_deliver(problem),
     )
+
+
+def must_deliver(problem: Problem) -> bool:
+    """Return whether some best plan holds only images that come down, and what it must take."""
+    return problem.counts_delivery and problem.objective.is_delivered and is_transitive(problem)
+
+
+def _delivered(
+    problem: Problem, satellite: SatelliteProblem, emptied: Floats, slack: float
+) -> Floats:
+    """Return the data at the end with each row as the last image; see ``Network``."""
+    fill = (satellite.end_s - satellite.start_s) * satellite.resources.collect_fill_per_s
+    kept = problem.kept_local(satellite)
+    kept = kept[satellite.kind[kept] == COLLECT]
+    if slack == 0.0:
+        # A plan brings down what it must take, too, where that is possible.
+        kept = kept[problem.worth[satellite.rows[kept]] == 0.0]
+    delivered = emptied + float(fill[kept].sum()) + 3.0 * slack
+    delivered[kept] = _ANY_LEVEL
+    return delivered
 
 
 def _sources(first: Longs) -> Ints:
@@ -241,7 +277,9 @@ def part_of(network: Network, rows: Ints) -> Network:
         network.data_floor[rows],
         network.data_before[rows],
         network.data_after[rows],
+        network.delivered[rows],
         network.energy_start,
         network.data_start,
         network.data_end,
+        network.must_deliver,
     )

@@ -32,6 +32,8 @@ _OPENED: Final = 0.3  # the largest share of the collected targets that a move o
 _MOST_UNITS: Final = 2500
 _MOST_ROWS: Final = 1200  # open ones, in a move
 _LARGER_STEP: Final = 0.03
+_CLOSINGS: Final = 4  # contacts that are tried as the last of a plan
+_OTHER_CLOSING: Final = 0.3  # of moves may end with a later one
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -73,12 +75,18 @@ class SatelliteChoices:
 
         Answers -1 and no tasks where there is none. Targets may be collected again and again.
         """
+        if self.network.must_deliver:
+            allowed = allowed & ((self.target < 0) | self._comes_down(allowed))
         rows = np.flatnonzero(allowed | self.network.is_kept).astype(np.int32)
         nothing = rows[:0]
         if len(rows) == 0:
             return (0, nothing) if goal <= 0 else (-1, nothing)
         network, levels = part_of(self.network, rows), levels_of_part(self.levels, rows)
         weight = self.weight[rows]
+        images = np.flatnonzero(weight > 0)
+        if self.network.must_deliver and len(images):
+            end = min(levels.end, int(levels.delivered[images[-1]]))
+            levels = levels._replace(end=end)
         limit = int(1.15 * max(goal, 0)) + 16 + int(weight.max(initial=0))
         idle, after = least_energy(network, weight, limit)
         top = int(np.flatnonzero(idle[0] <= network.energy_start)[-1])
@@ -92,6 +100,18 @@ class SatelliteChoices:
         if value < 0:
             return -1, nothing
         return value, rows[path_of(network, levels, weight, labels, value)]
+
+    def _comes_down(self, allowed: Bools) -> Bools:
+        """Return the tasks that lie before an allowed contact."""
+        contacts = np.flatnonzero(allowed & (self.target < 0))
+        last = contacts[-1] if len(contacts) else 0
+        before: Bools = np.arange(len(allowed)) < last
+        return before
+
+    def closings(self) -> Ints:
+        """Return contacts that may be the last of a plan, the latest first."""
+        contacts = np.flatnonzero(self.target < 0).astype(np.int32)
+        return contacts[::-1][:_CLOSINGS]
 
 
 class ChoiceSearch:
@@ -151,17 +171,28 @@ class ChoiceSearch:
             allowed &= ~others[satellite.target]
             self._let_contacts(allowed, index, satellite)
             goal = int(first_goal * satellite.weight[allowed].sum())
-            value = -1
-            while value < 0 and not self._stop[0]:
-                value, path = self._settled(satellite, allowed, goal)
-                if goal == 0:
-                    break
-                goal = int(goal * (1.0 - _LARGER_STEP))
+            value, path = self._first(satellite, allowed, goal)
             if value >= 0:
                 self.taken[satellite.rows[path]] = True
         self.reward = self._worth(self.taken)
         if self.reward < before[1]:
             self.taken, self.reward = before
+
+    def _first(self, satellite: SatelliteChoices, allowed: Bools, goal: int) -> tuple[int, Ints]:
+        """Return units and tasks of a plan of allowed tasks, the best over its last contact."""
+        best, path = -1, np.empty(0, dtype=np.int32)
+        for closing in satellite.closings() if satellite.network.must_deliver else (None,):
+            part, wanted, value = allowed.copy(), goal, -1
+            if closing is not None:
+                part[closing + 1 :] &= satellite.target[closing + 1 :] >= 0
+            while value < 0 and not self._stop[0]:
+                value, found = self._settled(satellite, part, max(wanted, best + 1))
+                if wanted <= max(best, 0):
+                    break
+                wanted = int(wanted * (1.0 - _LARGER_STEP))
+            if value > best:
+                best, path = value, found
+        return best, path
 
     def move(self) -> None:
         """Replan one satellite with some of its targets open; keep what is worth no less."""
@@ -179,6 +210,7 @@ class ChoiceSearch:
         is_open &= self._rng.random(len(is_open)) < share
         allowed = kept | is_open | (own & (satellite.target >= 0))
         self._let_contacts(allowed, index, satellite)
+        self._close(satellite, allowed, own)
         goal = int(satellite.weight[own].sum())
         value, path = self._settled(satellite, allowed, goal)
         if value < 0:
@@ -226,6 +258,19 @@ class ChoiceSearch:
         taken = [int(row) for row in np.flatnonzero(others)]
         blocked = blocked_rows(self._problem, self._problem.satellites[index], taken)
         allowed[(satellite.target < 0) & (blocked == 0)] = True
+
+    def _close(self, satellite: SatelliteChoices, allowed: Bools, own: Bools) -> None:
+        """Where images must come down: mostly let the plan end with the contact that it ends with.
+
+        Images offered after it would have to come down, too.
+        """
+        last = np.flatnonzero(own & (satellite.target < 0))
+        if not satellite.network.must_deliver or len(last) == 0:
+            return
+        closing = last[-1]
+        if self._rng.random() < _OTHER_CLOSING:
+            closing = max(closing, self._rng.choice(satellite.closings()))
+        allowed[closing + 1 :] &= satellite.target[closing + 1 :] >= 0
 
     def _mask(self, targets: Ints) -> Bools:
         """Return which targets these are; the last entry stands for contacts."""

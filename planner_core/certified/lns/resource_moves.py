@@ -51,7 +51,7 @@ def make_moves(
         while right < m and not taken.is_taken[ground.rows[right]]:
             right += 1
         energy, data, is_kept_to = _state_after(ground, taken, left)
-        need, bears = _wanted_before(ground, taken, right)
+        need, bears = _wanted_before(ground, taken, right, _data_end(ground, taken, high))
         if low >= high or not is_kept_to:
             continue
         _weigh(ground, taken, room, low, high, draws)
@@ -120,10 +120,30 @@ def _state_after(ground: Ground, taken: Taken, last: int) -> tuple[float, float,
 
 
 @borrowing
-def _wanted_before(ground: Ground, taken: Taken, first: int) -> tuple[float, float]:
+def _data_end(ground: Ground, taken: Taken, high: int) -> float:
+    """Return the most data that may be left at the end, where tasks from ``high`` on stay.
+
+    Where the last image must come down that hangs on which one it is. In the window it may be any.
+    """
+    network = ground.network
+    if not network.must_deliver:
+        return float(network.data_end)
+    last = len(ground.rows) - 1
+    while last >= 0:
+        is_possible = last < high or taken.is_taken[ground.rows[last]]
+        if is_possible and ground.worth[ground.rows[last]] > 0.0:
+            return float(min(network.data_end, network.delivered[last]))
+        last -= 1
+    return float(network.data_end)
+
+
+@borrowing
+def _wanted_before(
+    ground: Ground, taken: Taken, first: int, data_end: float
+) -> tuple[float, float]:
     """Return the least energy and the most data with which the plan's tasks from one on fit."""
     network = ground.network
-    need, bears = -np.inf, network.data_end
+    need, bears = -np.inf, data_end
     k = len(ground.rows) - 1
     after = -1
     while k >= first:

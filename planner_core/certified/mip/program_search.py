@@ -186,9 +186,11 @@ class ProgramSearch:
 
 def _overflow(network: Network, path: Sequence[int] | Ints) -> float:
     """Return by how much the recorder passes its limits on a path, at most; 0 if it does not."""
-    data, most = network.data_start, 0.0
+    data, most, end = network.data_start, 0.0, network.data_end
     for k in path:
         most = max(most, data - network.data_before[k])
         data = max(network.data_floor[k], data + network.data_gain[k])
         most = max(most, data - network.data_after[k])
-    return float(max(most, data - network.data_end))
+        if network.must_deliver and not network.is_contact[k]:
+            end = min(end, network.delivered[k])
+    return float(max(most, data - end))

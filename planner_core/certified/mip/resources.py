@@ -23,10 +23,12 @@ from typing import Final
 
 import numpy as np
 
+from planner_core.certified.dp.resource_network import must_deliver, network_of
 from planner_core.certified.mip.program import Program, Rows
 from planner_core.mdp.idle_energy import IdleEnergy, idle_energy
 from planner_core.precedence.relation import comes_before, direct_precedence
 from planner_core.problem import (
+    COLLECT,
     CONTACT,
     Floats,
     Ints,
@@ -90,6 +92,8 @@ class ResourceTerms:
         Highest level before the first task.
     given
         What is given back to pairs of tasks.
+    delivered
+        Highest level at the end with each task as the last image, where images must come down.
     """
 
     energy_cost: Floats
@@ -103,6 +107,7 @@ class ResourceTerms:
     recorder_top: Floats
     recorder_top_first: float
     given: Given = NOTHING_GIVEN
+    delivered: Floats | None = None
 
     def of_part(self, rows: Ints) -> ResourceTerms:
         """Return the terms where only some of the tasks may be taken, in ascending order.
@@ -121,17 +126,24 @@ class ResourceTerms:
         )
 
     def _at(self, rows: Ints) -> ResourceTerms:
-        others = ("recorder_top_first", "given")
+        others = ("recorder_top_first", "given", "delivered")
         names = [f.name for f in fields(self) if f.name not in others]
         part = {name: getattr(self, name)[rows] for name in names}
-        return replace(self, given=self.given.of_part(rows, len(self.full)), **part)
+        delivered = None if self.delivered is None else self.delivered[rows]
+        given = self.given.of_part(rows, len(self.full))
+        return replace(self, given=given, delivered=delivered, **part)
 
 
 def resource_terms(problem: Problem, satellite: SatelliteProblem) -> ResourceTerms:
     """Return the terms of a satellite that has opportunities."""
-    if problem.dynamics == "physical":
-        return physical_terms(problem, satellite)
-    return event_terms(satellite)
+    terms = (
+        physical_terms(problem, satellite)
+        if problem.dynamics == "physical"
+        else event_terms(satellite)
+    )
+    if not must_deliver(problem):
+        return terms
+    return replace(terms, delivered=network_of(problem, satellite).delivered)
 
 
 def physical_terms(problem: Problem, satellite: SatelliteProblem) -> ResourceTerms:
@@ -351,3 +363,19 @@ def _add_recorder(
             (level[high], 1.0), (taken[high], -rise[high]), lower=terms.recorder_floor[high]
         )
     )
+    if terms.delivered is not None:
+        _add_delivery(program, satellite, terms.delivered, level, taken)
+
+
+def _add_delivery(
+    program: Program, satellite: SatelliteProblem, delivered: Floats, level: Ints, taken: Ints
+) -> None:
+    """Let no image be taken that does not come down.
+
+    Without images nothing is written but telemetry, and the level is that of the start or below.
+    """
+    images = np.flatnonzero(satellite.kind == COLLECT)
+    highest = max(satellite.resources.initial_recorder_fraction, float(delivered.max()))
+    last = np.full(len(images), level[-1])
+    less = highest - delivered[images]
+    program.add_rows(Rows.aligned((last, 1.0), (taken[images], less), upper=highest))

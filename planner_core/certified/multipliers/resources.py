@@ -32,6 +32,7 @@ _SHORTER: Final = 0.6
 _NEAR: Final = 0.99
 _AFRESH: Final = 1.0  # length of the steps from given prices
 _KEPT_PATHS: Final = 30
+_NOTHING: Final = 1e-15  # of the most that a target is worth: all that a step could move
 
 
 class PriceSearch:
@@ -106,7 +107,7 @@ class PriceSearch:
         scale = np.where(most > 0.0, most, 1.0)
         self._direction = (1.0 - _DEFLECTION) * gradient + _DEFLECTION * self._direction
         norm = float(self._direction @ (scale * self._direction))
-        if norm == 0.0:
+        if norm <= _NOTHING * float(scale.max()):
             return False
         length = self.theta * (value - max(level, _NEAR * self.value)) / norm
         self._now = np.clip(self._now + length * scale * self._direction, 0.0, most)

@@ -46,6 +46,7 @@ _TRIED: Final = 2
 _FEW: Final = 1000  # opportunities whose programme takes no time
 _TRIAL_UNITS: Final = 24  # of an image, in the search for a price of data
 _ROUNDING: Final = 1e-9  # of a unit
+_SPAN: Final = 0.6  # of an image: telemetry in a span of the last image
 FINE: Final = 8
 """Levels of the recorder that the smallest collect fills, where a proof counts."""
 COARSE: Final = 2
@@ -58,6 +59,9 @@ class SatelliteRelaxation:
 
     Attributes
     ----------
+    classes
+        The levels with the last image in one span after another, from the last one on, where it
+        must come down: what may be left at the end hangs on that. The same levels otherwise.
     data_price
         What the data of a collect is worth, about, in typical collects.
     """
@@ -65,6 +69,7 @@ class SatelliteRelaxation:
     satellite: SatelliteProblem
     network: Network
     levels: DataLevels
+    classes: tuple[DataLevels, ...]
     data_price: float = 0.0
 
     @classmethod
@@ -74,7 +79,8 @@ class SatelliteRelaxation:
         """Return the relaxation of a satellite that has opportunities."""
         network = network_of(problem, satellite)
         levels = data_levels(network, levels_per_collect, is_optimistic=True)
-        return cls(satellite=satellite, network=network, levels=levels)
+        classes = _classes(problem, satellite, network, levels)
+        return cls(satellite=satellite, network=network, levels=levels, classes=classes)
 
     def with_data_price(self, num_images: int) -> SatelliteRelaxation:
         """Return the same with the price of data at which the battery alone allows least.
@@ -100,8 +106,11 @@ class SatelliteRelaxation:
 
     def without(self, is_shut: Bools) -> SatelliteRelaxation:
         """Return the same where some tasks cannot be taken. Shape ``(m,)``."""
-        before = np.where(is_shut, -1, self.levels.before).astype(np.int32)
-        return replace(self, levels=self.levels._replace(before=before))
+
+        def shut(levels: DataLevels) -> DataLevels:
+            return levels._replace(before=np.where(is_shut, -1, levels.before).astype(np.int32))
+
+        return replace(self, levels=shut(self.levels), classes=tuple(map(shut, self.classes)))
 
     def most(
         self,
@@ -127,27 +136,58 @@ class SatelliteRelaxation:
             Whether to answer the path.
         """
         weight = worth[self.satellite.rows]
-        needs = _Needs.of(self.network, self.levels, weight, self._price_in(weight), near)
+        best, path = UNREACHED, None
+        for number, levels in enumerate(self.classes):
+            least = max(enough, best + 1)
+            own = np.where(levels.before < 0, 0, weight).astype(np.int32)
+            if number and _Needs.of(self.network, levels, own, 0.0, near).top < least:
+                break  # there is no more to gain by images that lie earlier still
+            gained, found = self._most_of_class(levels, own, least, stop, near, keeps_path)
+            if gained == STOPPED:
+                return max(_Needs.of(self.network, self.levels, weight, 0.0, near).top, 0), None
+            if gained != UNREACHED:
+                best, path = gained, found
+        return (max(enough, 0), None) if best == UNREACHED else (best, path)
+
+    def _most_of_class(
+        self,
+        levels: DataLevels,
+        weight: Ints,
+        least: int,
+        stop: Bytes,
+        near: int | None,
+        keeps_path: bool,
+    ) -> tuple[int, Ints | None]:
+        """Return the most units and a path, ``UNREACHED`` if that is below ``least``, ``STOPPED``.
+
+        Parameters
+        ----------
+        levels
+            The recorder where the last image lies in a certain span.
+        weight
+            In units, of each task of the satellite. Shape ``(m,)``.
+        """
+        needs = _Needs.of(self.network, levels, weight, self._price_in(weight), near)
         top = needs.top
         step = max(1, int(_FIRST_STEP * top))
         goal = top
         if near is not None and near < top:
             goal = min(top, near + step)
-        while goal >= enough:
+        while goal >= least:
             # Labels that cannot reach the goal are dropped: the higher, the quicker.
-            goal, ceiling = max(enough, goal - step, 0), goal
+            goal = max(least, goal - step, 0)
             most, labels = most_value(
-                self.network, self.levels, weight, needs.idle, needs.after, needs.credit,
+                self.network, levels, weight, needs.idle, needs.after, needs.credit,
                 top, goal, keeps_path, stop,
             )  # fmt: skip
             if most == STOPPED:
-                return min(ceiling, top), None
+                return STOPPED, None
             if most != UNREACHED:
                 if not keeps_path:
                     return most, None
-                return most, path_of(self.network, self.levels, weight, labels, most)
+                return most, path_of(self.network, levels, weight, labels, most)
             goal, step = goal - 1, 2 * step
-        return max(enough, 0), None
+        return UNREACHED, None
 
     def _price_in(self, weight: Ints) -> float:
         """Return the price of a level in units, at which the least collect costs whole units."""
@@ -155,6 +195,35 @@ class SatelliteRelaxation:
         filled = self.levels.gain[self.levels.gain > 0]
         least = int(filled.min()) if len(filled) else 1
         return float(np.round(self.data_price * typical)) / least
+
+
+def _classes(
+    problem: Problem, satellite: SatelliteProblem, network: Network, levels: DataLevels
+) -> tuple[DataLevels, ...]:
+    """Return the levels with the last image in each span; see ``SatelliteRelaxation``.
+
+    A span is as long as telemetry takes to fill a part of the smallest image.
+    """
+    if not network.must_deliver:
+        return (levels,)
+    is_image = (network.is_contact == 0) & (problem.worth[satellite.rows] > 0.0)
+    is_free = is_image & ~network.is_kept
+    telemetry_per_s = satellite.resources.telemetry_per_s
+    length_s = np.inf
+    if telemetry_per_s > 0.0 and is_image.any():
+        length_s = _SPAN * float(network.data_gain[is_image].min()) / telemetry_per_s
+    is_shut = (network.is_contact == 0) & ~is_image & ~network.is_kept
+    classes = []
+    while is_free.any():
+        end_s = satellite.end_s[is_free]
+        is_last = is_free & (satellite.end_s > end_s.max() - length_s)
+        before = np.where(is_shut, -1, levels.before).astype(np.int32)
+        end = min(levels.end, int(levels.delivered[is_last].max()))
+        classes.append(levels._replace(before=before, end=end))
+        is_free, is_shut = is_free & ~is_last, is_shut | is_last
+    # With what must be taken alone everything may stay on board.
+    before = np.where(is_shut, -1, levels.before).astype(np.int32)
+    return (*classes, levels._replace(before=before))
 
 
 class _Needs(NamedTuple):
@@ -325,6 +394,6 @@ def leaving_whole_units(
 
 
 def _is_alike(problem: Problem) -> bool:
-    """Return whether all images earn the same."""
-    collects, _ = problem.target_opportunities
-    return len(collects) == 0 or bool(np.ptp(problem.worth[collects]) == 0.0)
+    """Return whether all images that can earn anything earn the same."""
+    worth = problem.worth[problem.worth > 0.0]
+    return len(worth) == 0 or bool(np.ptp(worth) == 0.0)

@@ -202,7 +202,7 @@ def test_what_is_wrong_with_a_row_is_told_with_its_line(
     [
         (b"", "empty_file"),
         (b"start,end\r\n", "missing_field"),
-        (b"\xff\xfe", "not_utf8"),
+        (b"\xff\xfa", "not_utf8"),
     ],
 )
 def test_what_is_no_table_is_refused(

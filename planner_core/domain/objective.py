@@ -1,0 +1,57 @@
+"""What a plan is to earn: images taken, images on the ground, and how soon."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Self
+
+from planner_core.domain.checks import require
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Objective:
+    """Which part of its worth an image earns when, see ``planner_core.worth``.
+
+    Attributes
+    ----------
+    collected_share
+        The part that an image earns when it is taken, 0 to 1. The rest it earns when its last bit
+        is on the ground, first in, first out.
+    half_life_s
+        The rest halves with every such time between the end of the collect and that instant; None
+        for no decay.
+    """
+
+    collected_share: float = 1.0
+    half_life_s: float | None = None
+
+    def __post_init__(self) -> None:
+        require(
+            0.0 <= self.collected_share <= 1.0, "objective/collected_share", "must be from 0 to 1"
+        )
+        require(
+            self.half_life_s is None or 0.0 < self.half_life_s < math.inf,
+            "objective/half_life_s",
+            "must be greater than 0, or null for no decay",
+        )
+
+    @classmethod
+    def collected(cls) -> Self:
+        """Return the paper's objective: an image earns all of its worth when it is taken."""
+        return cls()
+
+    @classmethod
+    def delivered(cls) -> Self:
+        """Return the objective of images on the ground: before that they earn nothing."""
+        return cls(collected_share=0.0)
+
+    @property
+    def counts_delivery(self) -> bool:
+        """Whether it matters what becomes of an image after it was taken."""
+        return self.collected_share < 1.0
+
+    @property
+    def is_delivered(self) -> bool:
+        """Whether an image is worth all on the ground by the end, and nothing on board."""
+        return self.collected_share == 0.0 and self.half_life_s is None

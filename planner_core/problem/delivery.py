@@ -1,0 +1,85 @@
+"""What images can earn at most, where it counts when they are on the ground."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from planner_core.domain import Objective
+from planner_core.problem.problem import COLLECT, CONTACT, Floats, Longs, Problem, SatelliteProblem
+from planner_core.problem.slew import TIME_TOLERANCE_S
+from planner_core.worth import share_earned
+
+_ROUNDING_S: Final = 1e-5  # the referee forgives a recorder 1e-9 of its capacity
+
+
+def with_objective(problem: Problem, objective: Objective) -> Problem:
+    """Return the problem under an objective, with the most that each image can earn.
+
+    Parameters
+    ----------
+    problem
+        One in which images earn all when they are taken.
+    """
+    if not problem.use_resources or not objective.counts_delivery:
+        return problem
+    age_s = least_age_s(problem)
+    worth = problem.worth * share_earned(objective, age_s)
+    return replace(problem, objective=objective, worth=worth, full_worth=problem.worth)
+
+
+def least_age_s(problem: Problem) -> Floats:
+    """Return the age at which each image is on the ground at the earliest, whatever else is done.
+
+    That is where the first contact after it takes down nothing but this image. Infinite where no
+    contact follows, and for contacts. With continuous starts it holds for each start in the
+    access. Shape ``(n,)``.
+    """
+    table = problem.opportunities
+    first_end_s, last_end_s = table.end_s, table.end_s
+    if problem.continuous_starts:
+        length_s = table.end_s - table.start_s
+        first_end_s, last_end_s = table.access_start_s + length_s, table.access_end_s
+    age_s = np.full(len(table), np.inf)
+    for satellite in problem.satellites:
+        own = satellite.rows[satellite.kind == COLLECT]
+        down_s = _first_down_s(
+            problem, satellite, first_end_s[own], table.end_s[own] - table.start_s[own]
+        )
+        age_s[own] = np.maximum(down_s - last_end_s[own] - _ROUNDING_S, 0.0)
+    return age_s
+
+
+def _first_down_s(
+    problem: Problem, satellite: SatelliteProblem, end_s: Floats, length_s: Floats
+) -> Floats:
+    """Return when images that end then can be down; infinite for never."""
+    r, links = satellite.resources, problem.downlinks
+    contacts = np.flatnonzero(satellite.kind == CONTACT)
+    contacts = contacts[np.argsort(satellite.start_s[contacts], kind="stable")]
+    fastest_per_s = _fastest_per_s(problem, satellite, contacts)
+    if fastest_per_s <= 0.0:
+        return np.full(len(end_s), np.inf)
+    starts_s = satellite.start_s[contacts]
+    ready_s = starts_s + links.stations.setup_s[satellite.place[contacts]]
+    # Of the contacts from each on, the first that is set up.
+    ready_s = np.append(np.minimum.accumulate(ready_s[::-1])[::-1], np.inf)
+    following = np.searchsorted(starts_s, end_s - TIME_TOLERANCE_S)
+    down_s = ready_s[following] + length_s * r.collect_fill_per_s / fastest_per_s
+    last_s = float(satellite.end_s[contacts].max())
+    return np.where(down_s <= last_s + _ROUNDING_S, down_s, np.inf)
+
+
+def _fastest_per_s(problem: Problem, satellite: SatelliteProblem, contacts: Longs) -> float:
+    """Return the highest rate at any instant of these contacts; 0 without any."""
+    links = problem.downlinks
+    access = problem.opportunities.access[satellite.rows[contacts]]
+    gain = links.stations.gain[satellite.place[contacts]]
+    rates = (satellite.resources.downlink_per_s * gain).tolist()
+    passes = [links.passes.get(int(number)) for number in access]
+    known = zip(passes, rates, strict=True)
+    return max(
+        (rate if own is None else float(own.per_s.max()) for own, rate in known), default=0.0
+    )

@@ -1,0 +1,105 @@
+"""When images are on the ground: the recorder's queue, first in, first out.
+
+Telemetry waits in the queue as images do. An image is down with its last bit, that is once as
+much was removed from the recorder as had been recorded when the image ended.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from planner_core.problem import CONTACT, Floats, Problem, SatelliteProblem
+from planner_core.problem.plan import Action
+from planner_core.referee.contact_flow import Piece, flow
+from planner_core.referee.resource_profile import Profile
+
+_AMOUNT_TOLERANCE: Final = 1e-9  # of a recorder's capacity, in comparing sums of many pieces
+
+
+def delivered_s(
+    problem: Problem, satellite: SatelliteProblem, actions: Sequence[Action], profile: Profile
+) -> Floats:
+    """Return when each action's image is on the ground; NaN for never, and for contacts.
+
+    Parameters
+    ----------
+    actions
+        Of the satellite, in order of start.
+    profile
+        Its resources under them.
+
+    Returns
+    -------
+    Seconds from the start of the horizon. Shape ``(len(actions),)``.
+    """
+    kind = problem.opportunities.kind
+    queued = np.array([point.recorded for point in profile.after])
+    time_s, removed = _removal(problem, satellite, actions, profile)
+    found = down_s(queued, time_s, removed)
+    is_contact = [kind[action.opportunity] == CONTACT for action in actions]
+    found[np.array(is_contact, dtype=np.bool_)] = np.nan
+    return found
+
+
+def down_s(queued: Floats, time_s: Floats, removed: Floats) -> Floats:
+    """Return when so much is down.
+
+    Parameters
+    ----------
+    queued
+        What had been recorded when something was written, it included: what a recorder holds at
+        the start counts from 0 too, oldest first. Any order; shape ``(k,)``.
+    time_s, removed
+        What has been taken down by when, in order of time and linear in between. Shape ``(n,)``.
+
+    Returns
+    -------
+    Instants, NaN for never. Shape ``(k,)``.
+
+    >>> down_s(np.array([2.0, 5.0]), np.array([0.0, 10.0, 14.0]), np.array([0.0, 0.0, 4.0]))
+    array([12., nan])
+    """
+    after = np.searchsorted(removed, queued - _AMOUNT_TOLERANCE)
+    is_down = after < len(removed)
+    after = np.clip(after, 1, len(removed) - 1)
+    before = after - 1
+    step = removed[after] - removed[before]
+    share = (queued - removed[before]) / np.where(step > 0.0, step, 1.0)
+    share = np.where(step > 0.0, np.clip(share, 0.0, 1.0), 0.0)
+    return np.where(is_down, time_s[before] + share * (time_s[after] - time_s[before]), np.nan)
+
+
+def _removal(
+    problem: Problem, satellite: SatelliteProblem, actions: Sequence[Action], profile: Profile
+) -> tuple[Floats, Floats]:
+    """Return what has been removed by when, linear in between."""
+    if problem.dynamics == "physical":
+        points = [(point.time_s, point.removed) for point in profile.points]
+    else:
+        # Events book a contact at its start: its bits come down one after another from there.
+        points = [(0.0, 0.0)]
+        for action, before, after in zip(actions, profile.before, profile.after, strict=True):
+            if after.removed > before.removed:
+                pieces = flow(problem, satellite, action)
+                points += _one_after_another(pieces, before.removed, after.removed)
+    time_s, removed_by = np.array(points).T
+    return time_s, removed_by
+
+
+def _one_after_another(
+    pieces: Sequence[Piece], before: float, after: float
+) -> list[tuple[float, float]]:
+    """Return what a contact has removed by when, from its first bit to its last."""
+    points = [(pieces[0].from_s, before)]
+    removed = before
+    for from_s, to_s, per_s in pieces:
+        whole = (to_s - from_s) * per_s
+        if removed + whole >= after:
+            points.append((from_s + (after - removed) / per_s, after))
+            return points
+        removed += whole
+        points.append((to_s, removed))
+    return [*points[:-1], (points[-1][0], after)]

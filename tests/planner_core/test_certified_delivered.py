@@ -1,0 +1,111 @@
+"""Plans of images on the ground: the bound holds, and "optimal" is what brute force finds."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import Literal
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from planner_core.budget import Budget, Termination
+from planner_core.certified.solver import Certified
+from planner_core.domain import Objective
+from planner_core.problem import COLLECT, Problem
+from planner_core.problem.delivery import with_objective
+from planner_core.referee.replay import replay
+from planner_core.solvers.milp import Milp
+from tests.examples import examples
+from tests.planner_core.brute_force import best_reward
+from tests.planner_core.problems import TIGHT, make_problem, random_problem, varied_problem
+from tests.planner_core.test_delivery import ROOMY, collect, contact
+
+SEEDS = st.integers(0, 10**6)
+STARVED = replace(TIGHT, battery_min_fraction=0.5, initial_battery_fraction=0.62)
+
+_problem = partial(varied_problem, scarce=STARVED)
+
+
+def _is_optimum(problem: Problem, best: float) -> bool:
+    """Check what `certified` says against the best plan; return whether it found that."""
+    solution = Certified().solve(problem, Budget(), 0)
+    timeline = replay(problem, solution.plan)
+    assert solution.bound is not None
+    assert solution.bound >= best - 1e-6
+    assert timeline.is_valid
+    assert timeline.reward <= best + 1e-6
+    if solution.termination == Termination.OPTIMAL:
+        assert timeline.reward == pytest.approx(best, rel=1e-6)
+    return timeline.reward >= best - 1e-6
+
+
+@pytest.mark.parametrize("dynamics", ["physical", "paper"])
+@examples(500)
+@given(seed=SEEDS, num_satellites=st.integers(1, 2), has_quality=st.booleans())
+def test_delivered_is_the_best_of_all_plans(
+    dynamics: Literal["physical", "paper"], seed: int, num_satellites: int, has_quality: bool
+) -> None:
+    problem = _problem(seed, dynamics, num_satellites, num_contacts=3, has_quality=has_quality)
+    problem = with_objective(problem, Objective.delivered())
+    _is_optimum(problem, best_reward(problem))
+
+
+@examples(500)
+@given(
+    seed=SEEDS,
+    dynamics=st.sampled_from(["physical", "paper"]),
+    collected_share=st.floats(0.0, 0.95),
+    half_life_s=st.one_of(st.none(), st.floats(60.0, 2000.0)),
+)
+def test_no_plan_beats_the_bound_whatever_delivery_counts(
+    dynamics: Literal["physical", "paper"],
+    seed: int,
+    collected_share: float,
+    half_life_s: float | None,
+) -> None:
+    objective = Objective(collected_share=collected_share, half_life_s=half_life_s)
+    problem = with_objective(_problem(seed, dynamics, 1, num_contacts=3), objective)
+    _is_optimum(problem, best_reward(problem))
+
+
+def test_small_problems_end_at_the_optimum() -> None:
+    reached = 0
+    for seed in range(40):
+        problem = _problem(seed, "physical" if seed % 2 else "paper", 1, num_contacts=3)
+        problem = with_objective(problem, Objective.delivered())
+        reached += _is_optimum(problem, best_reward(problem))
+    assert reached >= 38
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_highs_finds_the_same(seed: int) -> None:
+    problem = _problem(seed, "physical" if seed % 2 else "paper", 1, num_contacts=3)
+    problem = with_objective(problem, Objective.delivered())
+    solution = Milp().solve(problem, Budget(), 0)
+    best = best_reward(problem)
+    assert replay(problem, solution.plan).reward == pytest.approx(best)
+    assert solution.bound == pytest.approx(best, abs=1e-4)
+
+
+def test_no_image_of_the_plan_stays_on_board() -> None:
+    problem = random_problem(3, num_collects=60, num_targets=30, num_contacts=4, span_s=900.0)
+    problem = with_objective(problem, Objective.delivered())
+    timeline = replay(problem, Certified().solve(problem, Budget(), 0).plan)
+    assert timeline.reward > 0.0
+    assert all(image.is_downlinked for image in timeline.collected.values())
+
+
+def test_telemetry_younger_than_the_last_image_may_stay_on_board() -> None:
+    """A contact too short for all: it closes behind the first image, but not behind both."""
+    tasks = [collect(0, 100.0), collect(1, 290.0), contact(330.0, 374.0)]
+    problem = make_problem(tasks, num_targets=2, resources=ROOMY)
+    made = with_objective(problem, Objective.delivered())
+    assert 44 * 0.002 >= 0.05 + 130e-5 + 0.03
+    assert 44 * 0.002 < 0.05 + 320e-5 + 0.06
+    solution = Certified().solve(made, Budget(), 0)
+    assert solution.termination == Termination.OPTIMAL
+    assert replay(made, solution.plan).reward == 1.0
+    kinds = [made.opportunities.kind[a.opportunity] for a in solution.plan.actions]
+    assert kinds.count(COLLECT) == 1
