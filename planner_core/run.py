@@ -20,6 +20,7 @@ from planner_core.problem import Problem
 from planner_core.reasons.explain import explain
 from planner_core.reasons.reason import Search, TargetOutcome
 from planner_core.referee.replay import Timeline, replay
+from planner_core.replanning.replan import question_of, solve_replan
 from planner_core.solvers.base import Solution, Solver
 
 log = logging.getLogger(__name__)
@@ -88,7 +89,10 @@ def plan_scenario(
     problem = build_problem(scenario, opportunities, budget)
     clock.append(time.perf_counter())
     budget.report(Progress(phase="solve", fraction=0.0))
-    solution = solver.solve(problem, budget, seed)
+    if scenario.replan is None:
+        solution = solver.solve(problem, budget, seed)
+    else:
+        solution = solve_replan(question_of(scenario, problem), solver, budget, seed)
     if problem.continuous_starts:
         solution = with_own_starts(problem, solution, budget)
     clock.append(time.perf_counter())

@@ -38,6 +38,7 @@ from planner_core.domain.objective import Objective
 from planner_core.domain.outages import Outage
 from planner_core.domain.places import GroundStation, Target
 from planner_core.domain.quality import Curve, Quality
+from planner_core.domain.replan import Promise, Replan, Stability
 from planner_core.domain.scenario import CollectAlignment, Dynamics, Scenario
 from planner_core.domain.spacecraft import (
     Agility,
@@ -66,13 +67,16 @@ __all__ = [
     "OrbitDirection",
     "OrbitElements",
     "Outage",
+    "Promise",
     "Quality",
+    "Replan",
     "Resources",
     "Satellite",
     "Scenario",
     "Sensor",
     "SkySeries",
     "SlewModel",
+    "Stability",
     "SunPointing",
     "Target",
 ]

@@ -15,6 +15,7 @@ from planner_core.domain.objective import Objective
 from planner_core.domain.outages import Outage
 from planner_core.domain.places import GroundStation, Target
 from planner_core.domain.quality import Quality
+from planner_core.domain.replan import Replan
 from planner_core.domain.spacecraft import Satellite
 from planner_core.errors import InvalidScenario
 from planner_core.pins import Pins
@@ -43,6 +44,8 @@ class Scenario:
         Plan with element sets of any age (see ``build.check_element_age``).
     outages
         What is known to be out, and when.
+    replan
+        The plan to go on from, where there is one.
     """
 
     horizon: Horizon
@@ -60,6 +63,7 @@ class Scenario:
     allow_old_elements: bool = False
     pins: Pins = field(default_factory=Pins)
     outages: tuple[Outage, ...] = ()
+    replan: Replan | None = None
     warnings: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
@@ -128,6 +132,13 @@ class Scenario:
         )
         for position, outage in enumerate(self.outages):
             outage.check(f"/outages/{position}", satellite_ids, station_ids)
+        if self.replan is not None:
+            require(
+                not self.continuous_starts,
+                "continuous_starts",
+                "a plan to go on from has opportunities at fixed starts",
+            )
+            self.replan.check(satellite_ids, {t.id for t in self.targets}, station_ids)
 
     def _check_downlinks(self) -> None:
         """Refuse passes in which telemetry may fill the recorder faster than it is emptied.

@@ -16,7 +16,7 @@ from itertools import groupby
 
 import numpy as np
 
-from planner_core.domain import Scenario
+from planner_core.domain import Replan, Scenario
 from planner_core.errors import InvalidScenario
 from planner_core.pinning.limits import check_limits
 from planner_core.pinning.pinned_starts import whole_accesses, with_pinned_starts
@@ -52,7 +52,7 @@ def pinned_problem(scenario: Scenario, problem: Problem) -> Problem:
         ``pin_without_opportunity``, ``pin_ambiguous``, ``pins_conflict`` or
         ``pin_breaks_limits``, with a pointer into ``/pins``.
     """
-    if not scenario.pins and not scenario.outages:
+    if not (scenario.pins or scenario.outages or scenario.replan):
         return problem
     pins, table = scenario.pins, problem.opportunities
     whole = table if problem.pointing is None else whole_accesses(problem)
@@ -66,7 +66,71 @@ def pinned_problem(scenario: Scenario, problem: Problem) -> Problem:
         skipped = [
             np.flatnonzero(np.isin(problem.opportunities.access, own)).tolist() for own in accesses
         ]
-    return apply_pins(problem, resolve(scenario, kept, skipped))
+    pinned = resolve(scenario, kept, skipped)
+    if scenario.replan is not None:
+        pinned = with_frozen(scenario, problem, pinned, scenario.replan)
+    return apply_pins(problem, pinned)
+
+
+def with_frozen(scenario: Scenario, problem: Problem, pinned: Pinned, replan: Replan) -> Pinned:
+    """Return the pins with what starts before the freeze, and promises with a date.
+
+    An action of the base that an outage takes, or that is no longer offered, is not kept.
+    """
+    table = problem.opportunities
+    frozen_until_s = scenario.horizon.offset_s(replan.freeze_until)
+    in_outage = _in_outages(problem, pinned)
+    rows = rows_of_base(scenario, table, replan)
+    targets = {target.id: i for i, target in enumerate(scenario.targets)}
+    late = {
+        int(row): f"/replan/promises/{i}"
+        for i, promise in enumerate(replan.promises)
+        if promise.image_by is not None
+        for row in problem.collects_of(targets[promise.target_id])
+        if table.end_s[row] > scenario.horizon.offset_s(promise.image_by) + TIME_TOLERANCE_S
+    }
+    pinned = replace(pinned, frozen_until_s=frozen_until_s, skipped={**late, **pinned.skipped})
+    return replace(
+        pinned,
+        kept=(
+            *pinned.kept,
+            *(
+                Kept(row=row, pointer=f"/replan/base/{i}")
+                for i, row in rows.items()
+                if pinned.is_frozen(table.start_s[row]) and not in_outage[row]
+            ),
+        ),
+    )
+
+
+def rows_of_base(scenario: Scenario, table: Opportunities, replan: Replan) -> dict[int, int]:
+    """Return the opportunities that the actions of the plan before are, by their number.
+
+    What is no longer offered is left out.
+    """
+    satellites = {satellite.id: i for i, satellite in enumerate(scenario.satellites)}
+    targets = {target.id: i for i, target in enumerate(scenario.targets)}
+    stations = {station.id: i for i, station in enumerate(scenario.ground_stations)}
+    there: dict[tuple[int, int, int], list[int]] = {}
+    for row, key in enumerate(
+        zip(table.satellite.tolist(), table.kind.tolist(), table.place.tolist(), strict=True)
+    ):
+        there.setdefault(key, []).append(row)
+    found: dict[int, int] = {}
+    for i, action in enumerate(replan.base):
+        assert action.satellite_id is not None
+        assert action.start is not None
+        kind, place = (
+            (COLLECT, targets[action.target_id])
+            if action.target_id is not None
+            else (CONTACT, stations[action.station_id or ""])
+        )
+        start_s = scenario.horizon.offset_s(action.start)
+        rows = there.get((satellites[action.satellite_id], kind, place), [])
+        nearest = min(rows, key=lambda row: abs(table.start_s[row] - start_s), default=None)
+        if nearest is not None and abs(table.start_s[nearest] - start_s) <= _NEARLY_S:
+            found[i] = nearest
+    return found
 
 
 def resolve(scenario: Scenario, kept: Sequence[int], skipped: Sequence[Sequence[int]]) -> Pinned:
@@ -295,6 +359,10 @@ def _ruled_out(problem: Problem, pinned: Pinned) -> Bools:
     """Return the opportunities that are forbidden, skipped, blocked or in an outage."""
     table = problem.opportunities
     is_out: Bools = _in_outages(problem, pinned)
+    if pinned.frozen_until_s > 0.0:
+        is_frozen = table.start_s < pinned.frozen_until_s - TIME_TOLERANCE_S
+        is_frozen[[kept.row for kept in pinned.kept]] = False
+        is_out |= is_frozen
     is_out |= (table.kind == COLLECT) & np.isin(table.place, sorted(pinned.forbidden))
     for _, rows in _pins_that_rule_out(problem, pinned):
         is_out[rows] = True

@@ -18,6 +18,7 @@ import numpy.typing as npt
 from planner_core.domain import Agility, Dynamics, Objective, Resources
 from planner_core.problem.downlink import Downlinks
 from planner_core.problem.pointing import Pointing, Vector, sight
+from planner_core.problem.slew import TIME_TOLERANCE_S
 from planner_core.problem.sun_turns import SunPath, SunTurns
 from planner_core.problem.transitions import Transitions
 from planner_core.worth import best_worths, common_unit, worth_of
@@ -262,6 +263,8 @@ class Pinned:
         Targets that no plan may collect.
     struck
         By target, the collects that were ruled out.
+    frozen_until_s
+        What starts before it is kept or not taken at all.
     """
 
     kept: tuple[Kept, ...] = ()
@@ -269,6 +272,11 @@ class Pinned:
     blocked: tuple[Blocked, ...] = ()
     forbidden: frozenset[int] = frozenset()
     struck: Mapping[int, tuple[Struck, ...]] = field(default_factory=dict)
+    frozen_until_s: float = 0.0
+
+    def is_frozen(self, start_s: float) -> bool:
+        """Return whether a task that starts then may neither be added nor dropped."""
+        return start_s < self.frozen_until_s - TIME_TOLERANCE_S
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -8,6 +8,8 @@ from planner_core.problem import COLLECT, Problem
 from planner_core.problem.plan import Plan
 from planner_core.problem.slew import TIME_TOLERANCE_S
 
+BreachCode = Literal["pin", "outage", "frozen"]
+
 
 class Breach(NamedTuple):
     """A pin or an outage that a plan breaks; ``blamed`` are positions in ``plan.actions``."""
@@ -18,7 +20,7 @@ class Breach(NamedTuple):
     available: float
     detail: str
     blamed: tuple[int, ...]
-    code: Literal["pin", "outage"] = "pin"
+    code: BreachCode = "pin"
 
 
 def breaches(problem: Problem, plan: Plan) -> list[Breach]:
@@ -33,6 +35,7 @@ def breaches(problem: Problem, plan: Plan) -> list[Breach]:
             available=0.0,
             detail=f"The action that {kept.pointer} keeps is missing.",
             blamed=(),
+            code="frozen" if kept.pointer.startswith("/replan/") else "pin",
         )
         for kept in pinned.kept
         if kept.row not in starts
@@ -41,6 +44,7 @@ def breaches(problem: Problem, plan: Plan) -> list[Breach]:
             and abs(starts[kept.row] - table.start_s[kept.row]) > TIME_TOLERANCE_S
         )
     ]
+    kept_rows = {kept.row for kept in pinned.kept}
     for position, action in enumerate(plan.actions):
         row = action.opportunity
         satellite, kind = int(table.satellite[row]), int(table.kind[row])
@@ -61,12 +65,14 @@ def breaches(problem: Problem, plan: Plan) -> list[Breach]:
             why.append("Its target is forbidden.")
         if row in pinned.skipped:
             why.append(f"It is what {pinned.skipped[row]} skips.")
-        codes: list[tuple[Literal["pin", "outage"], str]] = [("pin", detail) for detail in why]
+        codes: list[tuple[BreachCode, str]] = [("pin", detail) for detail in why]
         codes += [
             ("outage", f"It lies in the outage {blocked.pointer}.")
             for blocked in spans
             if blocked.is_outage
         ]
+        if pinned.is_frozen(action.start_s) and row not in kept_rows:
+            codes.append(("frozen", "It starts before the freeze, and was not planned there."))
         found += [
             Breach(
                 satellite=satellite, at_s=action.start_s, needed=0.0, available=1.0,

@@ -37,7 +37,16 @@ from planner_core.worth import share_earned
 
 Mode = Literal["collect", "contact", "sunpoint", "hold"]
 ViolationCode = Literal[
-    "window", "overlap", "slew", "station", "duplicate", "battery", "recorder", "pin", "outage"
+    "window",
+    "overlap",
+    "slew",
+    "station",
+    "duplicate",
+    "battery",
+    "recorder",
+    "pin",
+    "outage",
+    "frozen",
 ]
 
 

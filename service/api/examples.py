@@ -52,6 +52,11 @@ BODIES: Final[dict[str, Any]] = {
     "OutageIn": {"satellite_id": _ID, **_HORIZON, "modes": ["collect"], "reason": "safe mode"},
     "PlanIn": {"job_id": _ID, "name": "Monday"},
     "TransitionIn": {"to": "approved", "reason": "Checked by the shift lead."},
+    "ReplanIn": {
+        "now": "2026-03-01T09:12:00Z",
+        "freeze_until": "2026-03-01T09:30:00Z",
+        "promises": [{"target_id": "bern"}],
+    },
     "WebhookIn": {"url": "https://ops.example/slewline", "events": ["job.succeeded"]},
 }
 """By the name of the schema."""

@@ -42,8 +42,18 @@ def shown(job: JobRow, scenario_sha256: str) -> JobOut:
             "scenario": f"/v1/scenarios/{job.scenario_id}",
         }
         | ({} if job.rerun_of is None else {"rerun_of": f"/v1/jobs/{job.rerun_of}"})
-        | ({} if job.what_if_of is None else {"what_if_of": f"/v1/jobs/{job.what_if_of}"}),
+        | ({} if job.what_if_of is None else {"what_if_of": f"/v1/jobs/{job.what_if_of}"})
+        | _links_of_replan(job.change),
     )
+
+
+def _links_of_replan(change: dict[str, Any] | None) -> dict[str, str]:
+    if change is None or "replan_of" not in change:
+        return {}
+    return {
+        "plan": f"/v1/plans/{change['plan_id']}",
+        "replan_of": f"/v1/plans/{change['replan_of']}",
+    }
 
 
 def etag_of_job(job: JobRow | sa.Row[Any]) -> str:

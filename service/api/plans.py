@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from datetime import datetime
 from typing import Annotated, Any, cast
 
@@ -12,7 +13,7 @@ from planner_core.errors import Fault
 from service.access.callers import Caller, Scope
 from service.api import job_intake as intake
 from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
-from service.api.deps import CallDep
+from service.api.deps import Call, CallDep
 from service.api.errors import problem_responses
 from service.api.etags import etagged
 from service.api.examples import EXECUTIONS
@@ -121,7 +122,7 @@ def _instant(session: Session, at: str | None) -> datetime | None:
 def get_plan(plan_id: str, call: CallDep) -> PlanOut | Response:
     """Return one plan."""
     with call.database.reading() as session:
-        shown = _shown(session, _find(session, plan_id, call.caller))
+        shown = _shown(session, find_plan(session, plan_id, call.caller))
     return unless_known(call.request, call.response, shown)
 
 
@@ -129,7 +130,7 @@ def get_plan(plan_id: str, call: CallDep) -> PlanOut | Response:
 def delete_plan(plan_id: str, call: CallDep) -> None:
     """Delete a plan for good: not an approved or published one, nor one that has changes."""
     with call.database.transaction() as session:
-        plan = _find(session, plan_id, call.caller)
+        plan = find_plan(session, plan_id, call.caller, to_change=True)
         require_match(call.request, lambda: _shown(session, plan))
         deletion.delete_plan(session, plan)
         call.audit.record(session, "delete", "plan", plan_id)
@@ -149,8 +150,8 @@ def move_plan(plan_id: str, body: TransitionIn, call: CallDep, once: OnceDep) ->
     with once.transaction() as session:
         if body.to == "published":
             # Before the plan itself is locked, so that two publishers come one after the other.
-            plan_store.lock_publishing(session, _find(session, plan_id, call.caller).owner)
-        plan = _find(session, plan_id, call.caller, to_change=True)
+            plan_store.lock_publishing(session, find_plan(session, plan_id, call.caller).owner)
+        plan = find_plan(session, plan_id, call.caller, to_change=True)
         require_match(call.request, lambda: _shown(session, plan))
         lifecycle.move(session, call.caller, plan, body)
         call.audit.record(session, body.to, "plan", plan.id)
@@ -163,7 +164,7 @@ def move_plan(plan_id: str, body: TransitionIn, call: CallDep, once: OnceDep) ->
 def list_history(plan_id: str, call: CallDep) -> Listed[PlanEventOut]:
     """List a plan's transitions in their order: who, when and why."""
     with call.database.reading() as session:
-        _find(session, plan_id, call.caller)
+        find_plan(session, plan_id, call.caller)
         events = plan_store.history(session, plan_id)
     return Listed(
         items=[PlanEventOut.model_validate(event, from_attributes=True) for event in events],
@@ -180,12 +181,12 @@ def list_actions(
 ) -> Listed[PlanActionOut]:
     """List a plan's collects and contacts, and what became of them as far as it was reported."""
     with call.database.reading() as session:
-        _find(session, plan_id, call.caller)
+        find_plan(session, plan_id, call.caller)
         found = plan_store.actions(
             session, plan_id, paging.after_number(), paging.limit + 1, satellite_id
         )
     page = paging.answer(found, lambda pair: pair[0].position)
-    return Listed(items=[_action_out(row, last) for row, last in page.rows], next=page.next)
+    return Listed(items=[action_out(row, last) for row, last in page.rows], next=page.next)
 
 
 @router.post("/{plan_id}/executions", status_code=201, responses=problem_responses(404, 409, 422))
@@ -200,30 +201,38 @@ def report_executions(
 ) -> ReportedOut:
     """Report what became of actions. Reports are added, never changed: the last one counts."""
     with once.transaction() as session:
-        plan = _find(session, plan_id, call.caller)
-        if plan.state in ("draft", "approved"):
-            raise ServiceError(
-                "invalid_transition", f"The plan is {plan.state}: it has not been published yet."
-            )
-        unknown = plan_store.unknown_actions(session, plan_id, [r.action_id for r in reports])
-        faults = [
-            Fault(code="unknown_action", detail=f"The plan has no action {each.action_id!r}.",
-                  pointer=f"/{i}/action_id")
-            for i, each in enumerate(reports)
-            if each.action_id in unknown
-        ]  # fmt: skip
-        if faults:
-            raise refuse(faults)
-        rows = plan_store.report(session, call.caller, plan_id, reports)
-        call.audit.record(session, "report", "plan", plan_id)
+        plan = find_plan(session, plan_id, call.caller)
+        rows = take_down(session, call, plan, reports)
         return once.keep(session, ReportedOut(executions=tuple(map(_execution_out, rows))))
+
+
+def take_down(
+    session: Session, call: Call, plan: PlanRow, reports: Sequence[ExecutionIn], at: str = ""
+) -> list[ExecutionRow]:
+    """Store what was reported of a plan that has been published; errors point from ``at`` on."""
+    if plan.state in ("draft", "approved"):
+        raise ServiceError(
+            "invalid_transition", f"The plan is {plan.state}: it has not been published yet."
+        )
+    unknown = plan_store.unknown_actions(session, plan.id, [r.action_id for r in reports])
+    faults = [
+        Fault(code="unknown_action", detail=f"The plan has no action {each.action_id!r}.",
+              pointer=f"{at}/{i}/action_id")
+        for i, each in enumerate(reports)
+        if each.action_id in unknown
+    ]  # fmt: skip
+    if faults:
+        raise refuse(faults)
+    rows = plan_store.report(session, call.caller, plan.id, reports)
+    call.audit.record(session, "report", "plan", plan.id)
+    return rows
 
 
 @router.get("/{plan_id}/executions", responses=problem_responses(404))
 def list_executions(plan_id: str, call: CallDep, paging: PagingDep) -> Listed[ExecutionOut]:
     """List what was reported of a plan, newest first."""
     with call.database.reading() as session:
-        _find(session, plan_id, call.caller)
+        find_plan(session, plan_id, call.caller)
         query = plan_store.executions(plan_id)
         page = newest_first(session, query, ExecutionRow.id, paging)
     return Listed(items=[_execution_out(row) for row in page.rows], next=page.next)
@@ -235,11 +244,14 @@ def list_executions(plan_id: str, call: CallDep, paging: PagingDep) -> Listed[Ex
 def get_plan_as(plan_id: str, suffix: Suffix, call: CallDep) -> Response:
     """Return the plan in the form that the suffix names, as of its job."""
     with call.database.reading() as session:
-        job = session.get_one(JobRow, _find(session, plan_id, call.caller).job_id)
+        job = session.get_one(JobRow, find_plan(session, plan_id, call.caller).job_id)
     return timeline_answer(call, job, suffix)
 
 
-def _find(session: Session, plan_id: str, caller: Caller, *, to_change: bool = False) -> PlanRow:
+def find_plan(
+    session: Session, plan_id: str, caller: Caller, *, to_change: bool = False
+) -> PlanRow:
+    """Return a plan; 404 where there is none that the caller may see."""
     plan = session.get(PlanRow, plan_id, with_for_update=to_change, populate_existing=to_change)
     if plan is None or caller.visible_owner not in (None, plan.owner):
         raise ServiceError("not_found", f"There is no plan {plan_id!r}.")
@@ -262,6 +274,7 @@ def _plan_out(plan: PlanRow, satellites: list[PlanSatelliteRow]) -> PlanOut:
     }
     if plan.parent_id is not None:
         links["parent"] = f"/v1/plans/{plan.parent_id}"
+        links["changes"] = f"{address}/changes"
     return PlanOut(
         id=plan.id,
         name=plan.name,
@@ -286,7 +299,8 @@ def _execution_out(row: ExecutionRow) -> ExecutionOut:
     return ExecutionOut.model_validate(row, from_attributes=True)
 
 
-def _action_out(row: PlanActionRow, outcome: str | None) -> PlanActionOut:
+def action_out(row: PlanActionRow, outcome: str | None) -> PlanActionOut:
+    """Return an action, and what became of it."""
     fields = {
         name: getattr(row, name) for name in PlanActionOut.model_fields.keys() - {"id", "outcome"}
     }

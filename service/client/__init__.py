@@ -31,6 +31,7 @@ from service.wire.plans import ExecutionOut as Execution
 from service.wire.plans import PlanActionOut as PlanAction
 from service.wire.plans import PlanEventOut as PlanEvent
 from service.wire.plans import PlanOut as Plan
+from service.wire.replans import PlanChangesOut as PlanChanges
 from service.wire.satellites import SatelliteOut as Satellite
 from service.wire.scenarios import OpportunityOut as Opportunity
 from service.wire.scenarios import ScenarioOut as Scenario
@@ -66,6 +67,7 @@ __all__ = [
     "Outage",
     "Plan",
     "PlanAction",
+    "PlanChanges",
     "PlanDiff",
     "PlanEvent",
     "Progress",

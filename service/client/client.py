@@ -86,7 +86,7 @@ class Client:
         self.scenarios = Scenarios(self._transport)
         self.jobs = Jobs(self._transport)
         self.comparisons = Comparisons(self._transport)
-        self.plans = Plans(self._transport)
+        self.plans = Plans(self._transport, self.jobs)
         self.webhooks = Webhooks(self._transport)
 
     @property

@@ -171,6 +171,15 @@ class Jobs:
         path = path_of("jobs", job_id, "rerun")
         return self._own(self._transport.post(path, Job, idempotency_key=idempotency_key))
 
+    def replan(
+        self, plan_id: str, happened: Mapping[str, Any], *, idempotency_key: str | None = None
+    ) -> Job:
+        """Queue the plan that follows another one; see ``Plans.replan``."""
+        path = path_of("plans", plan_id, "replans")
+        return self._own(
+            self._transport.post(path, Job, json=dict(happened), idempotency_key=idempotency_key)
+        )
+
     def timeline(self, job_id: str) -> Timeline:
         """Return a job's plan, judged; ``not_ready`` before there is one."""
         return self._transport.get(path_of("jobs", job_id, "timeline"), Timeline)

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import datetime
 from typing import Any, Literal
 
+from service.client.jobs import Job, Jobs
 from service.client.transport import Transport, path_of
 from service.wire.instants import instant_text
 from service.wire.plans import ExecutionOut as Execution
@@ -13,6 +14,7 @@ from service.wire.plans import PlanActionOut as PlanAction
 from service.wire.plans import PlanEventOut as PlanEvent
 from service.wire.plans import PlanOut as Plan
 from service.wire.plans import ReportedOut
+from service.wire.replans import PlanChangesOut as PlanChanges
 
 At = datetime | Literal["now"]
 
@@ -20,8 +22,9 @@ At = datetime | Literal["now"]
 class Plans:
     """The plans of the key's owner."""
 
-    def __init__(self, transport: Transport):
+    def __init__(self, transport: Transport, jobs: Jobs):
         self._transport = transport
+        self._jobs = jobs
 
     def create(
         self, job_id: str, *, name: str | None = None, idempotency_key: str | None = None
@@ -114,6 +117,27 @@ class Plans:
     def executions(self, plan_id: str) -> Iterator[Execution]:
         """Yield what was reported, newest first."""
         return self._transport.pages(path_of("plans", plan_id, "executions"), Execution)
+
+    def replan(self, plan_id: str, *, idempotency_key: str | None = None, **happened: Any) -> Job:
+        """Queue the plan that follows this one; ``happened`` is the body of the call.
+
+        ``freeze_until``, ``outages``, ``promises``, ``add_targets``, ``stability`` and the like,
+        as the API takes them; ``now``, ``freeze_until`` and ``horizon_end`` may be aware
+        datetimes. Once the job has succeeded, the draft is ``draft_of(job)``.
+        """
+        body = {
+            name: instant_text(value) if isinstance(value, datetime) else value
+            for name, value in happened.items()
+        }
+        return self._jobs.replan(plan_id, body, idempotency_key=idempotency_key)
+
+    def draft_of(self, job: Job) -> Plan:
+        """Return the draft that the job of a replan has left."""
+        return self._transport.get(job.links["plan"], Plan)
+
+    def changes(self, plan_id: str) -> PlanChanges:
+        """Return what a replan has changed, and why."""
+        return self._transport.get(path_of("plans", plan_id, "changes"), PlanChanges)
 
     def _move(self, plan_id: str, to: str, if_match: str | None, **fields: Any) -> Plan:
         return self._transport.post(

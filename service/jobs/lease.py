@@ -19,9 +19,12 @@ from service.answers.blocks import Block
 from service.db.clock import utc_now
 from service.db.rows import JobRow
 from service.jobs.queue import JobQueue
+from service.plans import replans
 from service.stores import usage_store
 from service.webhooks import outbox
+from service.wire.base import read
 from service.wire.jobs import JobState
+from service.wire.timelines import TimelineOut
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -131,10 +134,19 @@ def finish(session: Session, lease: Lease, outcome: Outcome) -> bool:
     )
     if changed and outcome.blocks:
         answer_store.save(session, lease.job_id, outcome.blocks, outcome.figures)
+        _adopt_replan(session, lease.job_id)
         owner = session.scalars(sa.select(JobRow.tenant).where(JobRow.id == lease.job_id)).one()
         num_bytes = outcome.num_shared_bytes + sum(len(block.text) for block in outcome.blocks)
         usage_store.add(session, owner, num_rows=1 + len(outcome.blocks), num_bytes=num_bytes)
     return changed
+
+
+def _adopt_replan(session: Session, job_id: str) -> None:
+    """Make a draft of the plan of a job that replans another one."""
+    job = session.get_one(JobRow, job_id, populate_existing=True)
+    text = answer_store.timeline_of(session, job_id) if replans.is_replan(job.change) else None
+    if text is not None:
+        replans.adopt(session, job, read(TimelineOut, text))
 
 
 def hand_back(session: Session, queue: JobQueue, lease: Lease) -> None:

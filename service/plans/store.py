@@ -32,11 +32,12 @@ def now(session: Session) -> datetime:
 
 def add(
     session: Session, caller: Caller, owner: str, job_id: str, name: str | None,
-    timeline: TimelineOut, parent_id: str | None = None,
+    timeline: TimelineOut, parent_id: str | None = None, plan_id: str | None = None,
 ) -> PlanRow:  # fmt: skip
     """Store a job's plan as a draft: its actions as rows."""
     plan = PlanRow(
-        id=new_id(), owner=owner, name=name, job_id=job_id, parent_id=parent_id, state="draft",
+        id=plan_id or new_id(), owner=owner, name=name, job_id=job_id, parent_id=parent_id,
+        state="draft",
         plan_sha256=timeline.plan_sha256, horizon_start=timeline.horizon.start,
         horizon_end=timeline.horizon.end, validity=timeline.validity,
         violations=[dumped(each) for each in timeline.violations if each.code != "duplicate"],

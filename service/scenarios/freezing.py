@@ -217,21 +217,31 @@ def _satellites(session: Session, ids: Sequence[str]) -> list[FileSatellite]:
 
 
 def _targets(session: Session, catalog_ids: Sequence[str]) -> list[FileTarget]:
-    _find(session, TargetCatalogRow, "target_catalog", catalog_ids)
-    targets: list[FileTarget] = []
+    targets = targets_by_catalog(session, catalog_ids)
     seen: set[str] = set()
+    for position, target in targets:
+        if target.id in seen:
+            raise InvalidScenario(
+                "duplicate_target_id",
+                f"Target {target.id!r} is in an earlier catalogue too.",
+                pointer=f"/target_catalog_ids/{position}",
+            )
+        seen.add(target.id)
+    return [target for _, target in targets]
+
+
+def targets_by_catalog(
+    session: Session, catalog_ids: Sequence[str]
+) -> list[tuple[int, FileTarget]]:
+    """Return the targets of catalogues, each with the number of its own; none may be missing."""
+    _find(session, TargetCatalogRow, "target_catalog", catalog_ids)
+    targets: list[tuple[int, FileTarget]] = []
     for position, catalog_id in enumerate(catalog_ids):
         of_catalog = sa.select(TargetRow).where(TargetRow.catalog_id == catalog_id)
         for row in session.scalars(of_catalog.order_by(TargetRow.position)):
-            if row.target_id in seen:
-                raise InvalidScenario(
-                    "duplicate_target_id",
-                    f"Target {row.target_id!r} is in an earlier catalogue too.",
-                    pointer=f"/target_catalog_ids/{position}",
-                )
-            seen.add(row.target_id)
             body = row.body | {"catalog_id": catalog_id}
-            targets.append(_of_today(FileTarget, body, f"/target_catalog_ids/{position}"))
+            target = _of_today(FileTarget, body, f"/target_catalog_ids/{position}")
+            targets.append((position, target))
     return targets
 
 

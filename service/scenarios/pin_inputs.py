@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from planner_core.domain import Outage
+from planner_core.domain import Outage, Promise, Replan, Stability
 from planner_core.errors import InvalidScenario
 from planner_core.pins import BlockedInterval, PinnedAction, Pins
 from service.wire.pins import BlockedIn, OutageIn, PinnedActionIn, PinsIn
+from service.wire.plan_before import ReplanOfFile
 
 
 def pins_from(body: PinsIn) -> Pins:
@@ -35,6 +36,19 @@ def outage_from(body: OutageIn) -> Outage:
         end=body.end,
         modes=tuple(dict.fromkeys(body.modes)),
         reason=body.reason,
+    )
+
+
+def replan_from(body: ReplanOfFile) -> Replan:
+    """Return the plan to go on from; what cannot be points into ``/replan``."""
+    return Replan(
+        base=tuple(action_from(action) for action in body.base),
+        freeze_until=body.freeze_until,
+        promises=tuple(
+            Promise(target_id=promise.target_id, image_by=promise.image_by)
+            for promise in body.promises
+        ),
+        stability=Stability(**body.stability.model_dump()),
     )
 
 

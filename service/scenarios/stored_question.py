@@ -23,6 +23,7 @@ from service.scenarios.translate import (
     target_from,
 )
 from service.wire.pins import PinsIn, PlacedOutage
+from service.wire.plan_before import ReplanOfFile
 from service.wire.scenarios import FileGroundStation, FileSatellite, FileTarget, HorizonIn
 from service.wire.stored import from_store
 
@@ -55,6 +56,12 @@ class StoredQuestion:
             return ()
         found = self._before_targets[0].get("outages", ())
         return tuple(PlacedOutage.model_validate(one) for one in found)
+
+    @cached_property
+    def replan(self) -> ReplanOfFile | None:
+        """Return the plan to go on from."""
+        found = self._before_targets[0].get("replan")
+        return None if found is None else ReplanOfFile.model_validate(found)
 
     @cached_property
     def satellites(self) -> tuple[Satellite, ...]:

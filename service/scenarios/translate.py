@@ -34,7 +34,7 @@ from planner_core.orbits.omm import elements_from_omm, omm_from_elements
 from planner_core.orbits.tle import read_tle
 from service.problems.faults import faults_of_validation
 from service.scenarios.forecast_inputs import forecast_from
-from service.scenarios.pin_inputs import outage_from, pins_from
+from service.scenarios.pin_inputs import outage_from, pins_from, replan_from
 from service.wire.places import GroundStationIn, TargetIn
 from service.wire.satellites import (
     AgilityIn,
@@ -148,6 +148,9 @@ def canonical_of_file(file: ScenarioFile) -> str:
     _without_unset(document, "forecast")
     if document["collect_alignment"] == "access":
         del document["collect_alignment"]
+    _without_unset(document, "replan")
+    for action in document.get("replan", {}).get("base", ()):
+        _without_unset(action, *tuple(action))
     if not _counts_delivery(document["objective"]):
         del document["objective"]
     for outage in document["outages"]:
@@ -204,6 +207,7 @@ def scenario_from_file(file: ScenarioFile) -> Scenario:
         allow_old_elements=file.allow_old_elements,
         pins=pins_from(file.pins),
         outages=tuple(outage_from(outage) for outage in file.outages),
+        replan=None if file.replan is None else replan_from(file.replan),
     )
 
 

@@ -139,7 +139,9 @@ class JobOut(Stored):
     )
     warnings: tuple[str, ...] = Field((), description="About its plan, for people.")
     change: Json | None = Field(
-        None, description="Of a what-if: what was to be different from the job it varies."
+        None,
+        description="Of a what-if: what was to be different from the job it varies. Of a replan: "
+        "the plan it follows (`replan_of`), its draft (`plan_id`) and `freeze_until`.",
     )
     links: dict[str, str]
 

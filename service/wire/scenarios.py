@@ -11,6 +11,7 @@ from pydantic_core import CoreSchema
 from service.wire.base import Body, Duration, Id, Instant, Name, Open, Stored, Wire
 from service.wire.pins import PinsIn, PlacedOutage
 from service.wire.places import GroundStationIn, TargetIn
+from service.wire.plan_before import ReplanOfFile
 from service.wire.satellites import Nadir, WholeSatellite
 from service.wire.spacecraft_types import BuiltIn, filled_file_satellite
 
@@ -214,6 +215,9 @@ class ScenarioFile(Question):
     targets: Annotated[list[FileTarget], FailFast()] = Field(min_length=1, max_length=1_000_000)
     ground_stations: Annotated[list[FileGroundStation], FailFast()] = Field([], max_length=10_000)
     forecast: FileForecast | None = Field(None, description="Null to take every sky for clear.")
+    replan: ReplanOfFile | None = Field(
+        None, description="The plan that this one goes on from, as a replan makes it."
+    )
 
     @model_validator(mode="before")
     @classmethod

@@ -206,6 +206,9 @@ def live_a_plan(client: Client) -> None:
     actions = client.http.get(plan["links"]["actions"]).json()["items"]
     reports = [{"action_id": each["id"], "outcome": "executed"} for each in actions]
     assert client.http.post(done, json=reports).status_code == 201
+    again = f"{plan['links']['self']}/replans"
+    asked = client.http.post(again, json={"now": plan["horizon"]["start"]})
+    assert asked.status_code == 202, asked.text
 
 
 def delete_for_good(client: Client) -> None:

@@ -31,7 +31,9 @@ from service.wire import (
     jobs,
     operations,
     places,
+    plan_before,
     plans,
+    replans,
     satellites,
     scenarios,
     timelines,
@@ -44,8 +46,8 @@ from service.wire.base import Wire, dumped, read
 from tests.service.jobs.mission import small_mission
 
 MODULES = (
-    base, changes, forecasts, imports, jobs, operations, wire_pins, places, plans, satellites,
-    scenarios, timelines, webhooks,
+    base, changes, forecasts, imports, jobs, operations, wire_pins, places, plan_before, plans,
+    replans, satellites, scenarios, timelines, webhooks,
 )  # fmt: skip
 NOW = "2026-03-01T00:00:00.000Z"
 ACTION = {

@@ -1,0 +1,170 @@
+"""What a day's events do to a plan, replanned and planned anew (``python -m benchmarks.replan``).
+
+Prints for each mission and event what a replan of ``LIMIT_S`` CPU seconds came to: reward and bound
+after the freeze, the share of the plan's later actions that it moved or removed, and what of that
+was forced. Beside it what solver ``certified`` makes of the same problem from scratch. Access and
+compilation are not counted. One run each, on one core, after a warm-up on a small mission.
+
+``python -m benchmarks.replan one`` or ``four`` picks the mission.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from datetime import timedelta
+from typing import Final
+
+import numpy as np
+
+from benchmarks.cpu_budget import CpuBudget
+from benchmarks.missions import ORBIT, START, paper_scenario, problem_of
+from planner_core.domain import Outage, Replan, Resources, Satellite, Scenario, Target
+from planner_core.pins import PinnedAction
+from planner_core.problem import COLLECT, Problem
+from planner_core.problem.plan import Plan
+from planner_core.referee.replay import replay
+from planner_core.replanning.replan import question_of, solve_replan
+from planner_core.solvers.registry import Certified
+
+LIMIT_S: Final = 2.0
+SCRATCH_S: Final = 30.0
+NOW: Final = START + timedelta(hours=9, minutes=12)
+FREEZE: Final = NOW + timedelta(minutes=18)
+OUT: Final = timedelta(hours=6)
+MISSIONS: Final = {"one": (1, 1000), "four": (4, 2000)}
+_URGENT_REWARD: Final = 10.0
+_NEW: Final = 0.05  # of the targets, that come in at once
+_DRAWS: Final = 6  # of urgent requests
+
+
+@dataclass(frozen=True, kw_only=True)
+class Day:
+    """A mission, and the plan that is in force."""
+
+    scenario: Scenario
+    problem: Problem
+    plan: Plan
+    later_targets: tuple[Target, ...]
+
+    @property
+    def base(self) -> tuple[PinnedAction, ...]:
+        """Return the plan in words."""
+        table, scenario = self.problem.opportunities, self.scenario
+        found = []
+        for action in self.plan.actions:
+            row = action.opportunity
+            place = int(table.place[row])
+            is_image = table.kind[row] == COLLECT
+            found.append(
+                PinnedAction(
+                    satellite_id=self.problem.satellites[int(table.satellite[row])].id,
+                    target_id=self.problem.target_ids[place] if is_image else None,
+                    station_id=None if is_image else self.problem.station_ids[place],
+                    start=scenario.horizon.instant(action.start_s),
+                )
+            )
+        return tuple(found)
+
+
+def day_of(num_satellites: int, num_targets: int) -> Day:
+    """Return a mission, planned; a few targets are held back for later."""
+    num_new = int(_NEW * num_targets)
+    whole = paper_scenario(num_targets + num_new, 0, use_resources=True)
+    orbits = [
+        replace(ORBIT, raan_deg=360.0 * i / num_satellites, norad_cat_id=i + 1)
+        for i in range(num_satellites)
+    ]
+    scenario = replace(
+        whole,
+        satellites=tuple(
+            Satellite(
+                id=f"s{i}", name=f"S{i}", orbit=orbit, resources=Resources.paper(orbit.period_s)
+            )
+            for i, orbit in enumerate(orbits)
+        ),
+        targets=whole.targets[:num_targets],
+    )
+    problem = problem_of(scenario)
+    solution = Certified().solve(problem, CpuBudget(SCRATCH_S, time.time() + 300.0), 0)
+    return Day(
+        scenario=scenario, problem=problem, plan=solution.plan,
+        later_targets=whole.targets[num_targets:],
+    )  # fmt: skip
+
+
+def events_of(day: Day) -> Iterator[tuple[str, Scenario]]:
+    """Yield what happens, and the question that it leaves."""
+    asked = replace(day.scenario, replan=Replan(base=day.base, freeze_until=FREEZE))
+    rng = np.random.default_rng(7)
+    for draw, i in enumerate(rng.permutation(len(day.later_targets))[:_DRAWS]):
+        urgent = replace(day.later_targets[i], reward=_URGENT_REWARD)
+        yield f"urgent request {draw}", replace(asked, targets=(*asked.targets, urgent))
+    contacts = [
+        action
+        for action in day.base
+        if action.station_id and action.start is not None and action.start > FREEZE
+    ]
+    for contact in contacts[:2]:
+        assert contact.start is not None
+        lost = Outage(
+            satellite_id=contact.satellite_id, modes=("contact",),
+            start=contact.start, end=contact.start + timedelta(minutes=1),
+        )  # fmt: skip
+        yield "contact lost", replace(asked, outages=(lost,))
+    station = Outage(station_id="svalbard", start=FREEZE, end=FREEZE + OUT)
+    yield "station out for 6 h", replace(asked, outages=(station,))
+    safe = Outage(satellite_id=day.scenario.satellites[0].id, start=FREEZE, end=FREEZE + OUT)
+    yield "safe mode for 6 h", replace(asked, outages=(safe,))
+    yield "5 % new targets", replace(asked, targets=(*asked.targets, *day.later_targets))
+
+
+def measure(name: str, scenario: Scenario) -> str:
+    """Return a line of the table."""
+    problem = problem_of(scenario)
+    question = question_of(scenario, problem)
+    began = time.process_time()
+    budget = CpuBudget(LIMIT_S, time.time() + 60.0)
+    solution = solve_replan(question, Certified(), budget, 0)
+    cpu_s = time.process_time() - began
+    timeline = replay(problem, solution.plan)
+    assert timeline.is_valid, timeline.violations
+    start_s = problem.opportunities.start_s
+    still = sum(not problem.pinned.is_frozen(start_s[row]) for row in question.base)
+    forced = (question.num_base - still) / question.num_base
+    changed = question.changed(solution.plan) / question.num_base
+    began = time.process_time()
+    scratch = Certified().solve(problem, CpuBudget(SCRATCH_S, time.time() + 300.0), 0)
+    scratch_s = time.process_time() - began
+    anew = question.changed(scratch.plan) / question.num_base
+    return (
+        f"| {name} | {timeline.reward:g} / {solution.bound:g} | {changed:.1%} | {forced:.1%} "
+        f"| {cpu_s:.2f} | {replay(problem, scratch.plan).reward:g} / {scratch.bound:g} "
+        f"| {anew:.0%} | {scratch_s:.1f} |"
+    )
+
+
+def main() -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("missions", nargs="*", choices=[*MISSIONS, []], default=[])
+    chosen = parser.parse_args().missions or list(MISSIONS)
+    warm = day_of(2, 60)
+    for _, scenario in events_of(warm):
+        problem = problem_of(scenario)
+        solve_replan(
+            question_of(scenario, problem), Certified(), CpuBudget(1.0, time.time() + 9), 0
+        )
+    for name in chosen:
+        day = day_of(*MISSIONS[name])
+        print(f"\n{name}: {replay(day.problem, day.plan).reward:g} before\n")
+        print("| event | reward / bound | changed | forced | CPU s | anew | changed | CPU s |")
+        print("|---|---|---|---|---|---|---|---|")
+        for event, scenario in events_of(day):
+            print(measure(event, scenario), flush=True)
+
+
+if __name__ == "__main__":
+    main()

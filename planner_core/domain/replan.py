@@ -1,0 +1,102 @@
+"""What a plan that follows another one has to respect: what is flown, and what is promised."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, field
+from datetime import datetime
+
+from planner_core.domain.checks import require
+from planner_core.errors import InvalidScenario
+from planner_core.pins import PinnedAction
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Promise:
+    """A target that every plan images, at whatever time.
+
+    Attributes
+    ----------
+    image_by
+        When the image must have ended, where that matters.
+    """
+
+    target_id: str
+    image_by: datetime | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stability:
+    """How dear it is to leave an action of the plan before.
+
+    Attributes
+    ----------
+    weight, contact_weight
+        What keeping a collect, or a contact, counts in the search: shares of a typical reward.
+    max_changed_share
+        Of the actions after the freeze, the most that may be moved or removed; None for any.
+        What is lost anyway counts too, and cannot be helped.
+    """
+
+    weight: float = 0.03
+    contact_weight: float = 0.05
+    max_changed_share: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("weight", "contact_weight", "max_changed_share"):
+            value = getattr(self, name)
+            require(value is None or 0.0 <= value <= 1.0, name, "must be between 0 and 1")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Replan:
+    """A plan to go on from.
+
+    Attributes
+    ----------
+    base
+        The actions of the plan before, less what failed; each named by satellite, place and start.
+    freeze_until
+        What starts before it is flown, or as good as: it stays, and nothing is added to it.
+    promises
+        Targets that must be imaged.
+    """
+
+    base: tuple[PinnedAction, ...]
+    freeze_until: datetime
+    promises: tuple[Promise, ...] = ()
+    stability: Stability = field(default_factory=Stability)
+
+    def check(
+        self,
+        satellite_ids: Collection[str],
+        target_ids: Collection[str],
+        station_ids: Collection[str],
+    ) -> None:
+        """Check that the scenario holds what is named.
+
+        Raises
+        ------
+        InvalidScenario
+            With a pointer into ``/replan``.
+        """
+        for i, action in enumerate(self.base):
+            at = f"/replan/base/{i}"
+            is_one = (action.target_id is None) != (action.station_id is None)
+            if not is_one or action.satellite_id is None or action.start is None:
+                raise InvalidScenario(
+                    "value_out_of_range",
+                    "Name the satellite, the start, and either the target or the station.",
+                    pointer=at,
+                )
+            _known(action.satellite_id, satellite_ids, "satellite", f"{at}/satellite_id")
+            _known(action.target_id, target_ids, "target", f"{at}/target_id")
+            _known(action.station_id, station_ids, "ground_station", f"{at}/station_id")
+        for i, promise in enumerate(self.promises):
+            _known(promise.target_id, target_ids, "target", f"/replan/promises/{i}/target_id")
+
+
+def _known(name: str | None, names: Collection[str], what: str, pointer: str) -> None:
+    if name is not None and name not in names:
+        detail = f"The scenario has no {what.replace('_', ' ')} {name!r}."
+        raise InvalidScenario(f"unknown_{what}", detail, pointer=pointer)

@@ -1,0 +1,90 @@
+"""A replan in terms of its problem: the rows of the base, and what they count in the search."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from planner_core.domain import Stability
+from planner_core.problem import COLLECT, CONTACT, Bools, Floats, Ints, Problem
+from planner_core.problem.plan import Plan
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Question:
+    """What a search for a replan is given.
+
+    Attributes
+    ----------
+    base
+        Rows of the plan before that are still offered, ascending. Shape ``(k,)``.
+    num_base
+        How many actions it had after the freeze, those that are lost included.
+    promised
+        Targets that must be imaged, in the order of the promises.
+    """
+
+    problem: Problem
+    base: Ints
+    num_base: int
+    promised: tuple[int, ...]
+    stability: Stability
+
+    @cached_property
+    def bonus(self) -> Floats:
+        """What keeping each row counts in the search, beside its worth. Shape ``(n,)``."""
+        kind = self.problem.opportunities.kind[self.base]
+        shares = np.where(kind == COLLECT, self.stability.weight, self.stability.contact_weight)
+        bonus = np.zeros(len(self.problem.opportunities))
+        bonus[self.base] = shares * self.problem.typical_worth
+        return bonus
+
+    @cached_property
+    def is_promised(self) -> Bools:
+        """Whether each row is an image of a promised target. Shape ``(n,)``."""
+        table = self.problem.opportunities
+        is_promised: Bools = np.isin(table.place, self.promised) & (table.kind == COLLECT)
+        return is_promised
+
+    @cached_property
+    def searched(self) -> Problem:
+        """The problem whose images are worth what they count in the search.
+
+        A promised target is worth more than all that is not.
+        """
+        dear = 1.0 + float(self.problem.best_worth.sum()) + float(self.bonus.sum())
+        table = self.problem.opportunities
+        more = np.where(table.kind == CONTACT, 0.0, self.bonus + dear * self.is_promised)
+        full = self.problem.full_worth
+        return replace(
+            self.problem,
+            worth=self.problem.worth + more,
+            full_worth=None if full is None else full + more,
+        )
+
+    def stable_worth(self, plan: Plan) -> float:
+        """Return what the kept actions of a plan count."""
+        return float(self.bonus[[action.opportunity for action in plan.actions]].sum())
+
+    def changed(self, plan: Plan) -> int:
+        """Return how many actions of the base after the freeze a plan has moved or removed."""
+        taken = {action.opportunity for action in plan.actions}
+        start_s = self.problem.opportunities.start_s
+        kept = sum(
+            1
+            for row in self.base.tolist()
+            if row in taken and not self.problem.pinned.is_frozen(start_s[row])
+        )
+        return self.num_base - kept
+
+    def missing(self, plan: Plan) -> frozenset[int]:
+        """Return the promised targets that a plan does not image."""
+        table = self.problem.opportunities
+        imaged = {
+            int(table.place[action.opportunity])
+            for action in plan.actions
+            if table.kind[action.opportunity] == COLLECT
+        }
+        return frozenset(self.promised) - imaged

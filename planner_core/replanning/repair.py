@@ -1,0 +1,109 @@
+"""The plan before, made to keep the limits again where something of it is lost."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import Final
+
+from planner_core.precedence.relation import excluded_by
+from planner_core.problem import COLLECT, CONTACT, Problem
+from planner_core.problem.plan import Plan
+from planner_core.problem.slew import TIME_TOLERANCE_S
+from planner_core.referee.replay import Violation, replay
+
+_LIMITS: Final = ("battery", "recorder")
+_MOST_TRIED: Final = 30  # contacts in place of a lost one
+
+
+def repaired(problem: Problem, rows: Collection[int], protected: Collection[int]) -> Plan:
+    """Return a plan that is valid, by contacts added and images dropped, as far as that goes.
+
+    Parameters
+    ----------
+    rows
+        The plan to repair; what must be taken is taken as well.
+    protected
+        Rows that are dropped last.
+    """
+    plan = Plan.of(problem, set(rows)).with_kept(problem)
+    for _ in range(len(plan.actions) + 1):
+        timeline = replay(problem, plan)
+        broken = [v for v in timeline.violations if v.code != "duplicate" and not v.inherited]
+        if not broken:
+            return plan
+        first = min(broken, key=lambda v: v.at_s)
+        found = _with_contact(problem, plan, first) if first.code == "recorder" else None
+        found = found or _shed(problem, plan, first, protected)
+        if found is None:
+            return plan
+        plan = found
+    return plan
+
+
+def _with_contact(problem: Problem, plan: Plan, broken: Violation) -> Plan | None:
+    """Return the plan with one more contact before the recorder is full, where one helps."""
+    table = problem.opportunities
+    taken = [action.opportunity for action in plan.actions]
+    own = problem.satellites[broken.satellite].rows
+    free = [
+        int(row)
+        for row in own[::-1]
+        if table.kind[row] == CONTACT and table.start_s[row] < broken.at_s and row not in taken
+    ]
+    before = replay(problem, plan)
+    for row in [row for row in free if not conflicts(problem, row, taken)][:_MOST_TRIED]:
+        trial = Plan.of(problem, [*taken, row])
+        after = replay(problem, trial)
+        own_broken = [v for v in after.violations if v.satellite == broken.satellite]
+        if all(v.at_s > broken.at_s for v in own_broken if v.code in _LIMITS) and len(
+            after.violations
+        ) <= len(before.violations):
+            return trial
+    return None
+
+
+def _shed(
+    problem: Problem, plan: Plan, broken: Violation, protected: Collection[int]
+) -> Plan | None:
+    """Return the plan without one action that has a part in what breaks; None for none left."""
+    table, kept = problem.opportunities, set(problem.kept_rows.tolist())
+    blamed = [plan.actions[p].opportunity for p in broken.blamed]
+    ahead = [
+        action.opportunity
+        for action in reversed(plan.actions)
+        if table.satellite[action.opportunity] == broken.satellite
+        and action.start_s <= broken.at_s + TIME_TOLERANCE_S
+        and (table.kind[action.opportunity] == COLLECT or broken.code == "battery")
+    ]
+    candidates = ahead if broken.code in _LIMITS else [*blamed, *ahead]
+    loose = [row for row in candidates if row not in kept]
+    if not loose:
+        return None
+    gone = next((row for row in loose if row not in protected), loose[0])
+    return Plan.of(problem, [a.opportunity for a in plan.actions if a.opportunity != gone])
+
+
+def conflicts(problem: Problem, row: int, taken: Collection[int]) -> list[int]:
+    """Return which of these rows cannot stand beside ``row``: no time to turn, or no antenna."""
+    table, local = problem.opportunities, problem.local_row
+    satellite = int(table.satellite[row])
+    excluded = excluded_by(problem.satellites[satellite], int(local[row]))
+    found = [
+        other
+        for other in taken
+        if other != row and table.satellite[other] == satellite and excluded[local[other]]
+    ]
+    if table.kind[row] == CONTACT:
+        station = table.place[row]
+        there = [
+            other
+            for other in taken
+            if other != row
+            and table.kind[other] == CONTACT
+            and table.place[other] == station
+            and table.start_s[other] < table.end_s[row] - TIME_TOLERANCE_S
+            and table.end_s[other] > table.start_s[row] + TIME_TOLERANCE_S
+        ]
+        if len(there) >= problem.station_antennas[station]:
+            found += [other for other in there if other not in found]
+    return found

@@ -1,0 +1,199 @@
+"""A plan that follows another one, and what no such plan exceeds.
+
+The search begins with the plan before, as far as it still holds, and is paid for each of its
+actions that it keeps: a move is made only where it gains more than the changes cost. What was asked
+for is proven afterwards, on the problem as it is: the bound is of the reward alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from planner_core.budget import Budget, ignored
+from planner_core.certified.incumbent import Incumbent
+from planner_core.certified.lns.resource_search import ResourceWindows
+from planner_core.certified.lns.search import WindowSearch
+from planner_core.certified.proofs.bound import Bound
+from planner_core.certified.proofs.lagrangian import lagrangian_bound
+from planner_core.certified.proofs.resource_bound import quick_bound
+from planner_core.domain import Scenario
+from planner_core.errors import InvalidScenario
+from planner_core.pinning.pinned_problem import rows_of_base
+from planner_core.problem import CONTACT, Problem
+from planner_core.problem.plan import Plan
+from planner_core.referee.replay import replay
+from planner_core.replanning.question import Question
+from planner_core.replanning.repair import conflicts, repaired
+from planner_core.replanning.undo import parts_of, undone, value, within_share
+from planner_core.solvers.base import Solution, Solver
+
+_MOVES_A_TASK: Final = 0.3
+_LEAST_MOVES: Final = 600
+_SHARE: Final = 0.4  # of the time, for the search that counts changes
+_REST: Final = 0.8  # of what is left then, for the proof
+_EQUAL: Final = 1e-9
+
+
+def question_of(scenario: Scenario, problem: Problem) -> Question:
+    """Return the replan of a scenario in terms of its problem."""
+    replan = scenario.replan
+    assert replan is not None
+    freeze_s = scenario.horizon.offset_s(replan.freeze_until)
+    rows = set(rows_of_base(scenario, problem.opportunities, replan).values())
+    later = [
+        action
+        for action in replan.base
+        if action.start is not None and scenario.horizon.offset_s(action.start) >= freeze_s
+    ]
+    targets = {target.id: i for i, target in enumerate(scenario.targets)}
+    return Question(
+        problem=problem,
+        base=np.array(sorted(rows), dtype=np.int32),
+        num_base=len(later),
+        promised=tuple(targets[promise.target_id] for promise in replan.promises),
+        stability=replan.stability,
+    )
+
+
+def solve_replan(question: Question, solver: Solver, budget: Budget, seed: int) -> Solution:
+    """Return the plan that follows the base.
+
+    Raises
+    ------
+    InvalidScenario
+        ``promise_not_kept``: no plan was found that images a promised target.
+    """
+    problem = question.problem
+    protected = set(np.flatnonzero(question.is_promised).tolist())
+    start = with_promised(question, repaired(problem, question.base.tolist(), protected))
+    plan = improved(question, start, budget.part(_SHARE), seed)
+    best = Incumbent(problem, budget, getattr(solver, "gap", 0.0), plan)
+    best.lower(_quick_bound(problem, best.reward))
+    best.report("kept")
+    if not best.is_done or not best.is_valid:
+        # Where plan and bound are apart another search may earn more, and proves how much.
+        found = solver.solve(problem, budget.part(_REST, ignored), seed)
+        if found.proven is not None:
+            best.lower(found.proven)
+        plan = _better_of(question, plan, found.plan, budget, seed)
+    plan = within_share(question, plan, budget)
+    _require_promises(question, plan)
+    return _solution(question, plan, best, budget)
+
+
+def improved(question: Question, start: Plan, budget: Budget, seed: int) -> Plan:
+    """Return a plan whose worth, kept actions counted, is no less than that of ``start``."""
+    problem, searched = question.problem, question.searched
+    num_moves = int(max(_LEAST_MOVES, _MOVES_A_TASK * len(problem.opportunities)))
+    windows: ResourceWindows | WindowSearch
+    if problem.use_resources or problem.turns_in_motion:
+        windows = ResourceWindows(searched, seed)
+        windows.adopt(start)
+        windows.make_moves(num_moves, budget)
+    else:
+        windows = WindowSearch(searched, seed)
+        windows.adopt(start)
+        windows.make_moves(num_moves, budget)
+    found = windows.plan.with_kept(problem)
+    return undone(question, _best(question, start, found), budget)
+
+
+def _better_of(question: Question, plan: Plan, other: Plan, budget: Budget, seed: int) -> Plan:
+    """Return the plan, or what its search makes of one that earns more, changes counted."""
+    problem = question.problem
+    before, after = replay(problem, plan), replay(problem, other)
+    if (after.is_valid, after.reward) <= (before.is_valid, before.reward + _EQUAL):
+        return plan
+    nearer = undone(
+        question, improved(question, with_promised(question, other), budget, seed), budget
+    )
+    return _best(question, plan, nearer)
+
+
+def _best(question: Question, *plans: Plan) -> Plan:
+    """Return the plan that is valid, misses no promise and is worth most; of equals the first."""
+
+    def rank(plan: Plan) -> tuple[bool, int, float]:
+        is_valid = replay(question.problem, plan).is_valid
+        return is_valid, -len(question.missing(plan)), value(question, plan)
+
+    best = plans[0]
+    for plan in plans[1:]:
+        mine, other = rank(best), rank(plan)
+        if other[:2] > mine[:2] or (other[:2] == mine[:2] and other[2] > mine[2] + _EQUAL):
+            best = plan
+    return best
+
+
+def with_promised(question: Question, plan: Plan) -> Plan:
+    """Return the plan with an image of each promised target, where one can be made room for."""
+    problem = question.problem
+    kept = set(problem.kept_rows.tolist())
+    protected = set(np.flatnonzero(question.is_promised).tolist())
+    for target in sorted(question.missing(plan)):
+        taken = [action.opportunity for action in plan.actions]
+        trials = []
+        for row in problem.collects_of(target).tolist():
+            gone = set(conflicts(problem, row, taken))
+            if gone & (kept | protected):
+                continue
+            trial = repaired(problem, [*(set(taken) - gone), row], protected)
+            if target not in question.missing(trial) and replay(problem, trial).is_valid:
+                trials.append(trial)
+        fewer = [t for t in trials if len(question.missing(t)) < len(question.missing(plan))]
+        plan = max(fewer, key=lambda trial: value(question, trial), default=plan)
+    return plan
+
+
+def _require_promises(question: Question, plan: Plan) -> None:
+    problem, missing = question.problem, question.missing(plan)
+    for i, target in enumerate(question.promised):
+        if target not in missing:
+            continue
+        why = (
+            "each of its opportunities takes the place of something else promised or flown, or "
+            "breaks battery or recorder"
+            if len(problem.collects_of(target)) > 0
+            else "nothing is left that could image it"
+        )
+        raise InvalidScenario(
+            "promise_not_kept",
+            f"The promised target {problem.target_ids[target]!r} is not imaged: {why}.",
+            pointer=f"/replan/promises/{i}",
+        )
+
+
+def _quick_bound(problem: Problem, reward: float) -> Bound:
+    if problem.use_resources:
+        return quick_bound(problem, reward)
+    return lagrangian_bound(problem, reward)
+
+
+def _solution(question: Question, plan: Plan, best: Incumbent, budget: Budget) -> Solution:
+    problem = question.problem
+    last = Incumbent(problem, budget, best.gap, plan, best.bound)
+    solution = last.solution()
+    kept = question.stable_worth(plan)
+    table = problem.opportunities
+    contacts = question.bonus[table.kind == CONTACT].sum()
+    # No plan counts more than the best and all that may be kept; with time left, the images with
+    # what they count are bounded themselves, and contacts count the same in every plan.
+    summed = last.bound.value + question.bonus.sum()
+    if not budget.is_spent():
+        images = replace(question, promised=()).searched
+        own = _quick_bound(images, replay(images, plan).reward)
+        summed = min(summed, own.value + contacts)
+    return replace(
+        solution,
+        statistics={
+            **solution.statistics,
+            "stability": kept,
+            "stability_bound": float(max(summed, last.reward + kept)),
+            "changed": float(question.changed(plan)),
+            "base": float(question.num_base),
+            "parts": float(len(parts_of(question, plan))),
+        },
+    )

@@ -1,0 +1,110 @@
+"""Changes taken back that gain nothing.
+
+A change is a connected part of the symmetric difference of two plans: actions that image the same
+target, or that cannot stand in one plan. The smallest parts are tried first. Each is taken back
+where the referee finds the plan as valid and its worth, changes counted, no less.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from planner_core.budget import Budget
+from planner_core.problem import COLLECT
+from planner_core.problem.plan import Plan
+from planner_core.referee.replay import replay
+from planner_core.replanning.question import Question
+from planner_core.replanning.repair import conflicts
+
+_EQUAL = 1e-9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Part:
+    """A connected part of the difference: rows that a plan has anew, and rows that it dropped."""
+
+    added: frozenset[int]
+    removed: frozenset[int]
+
+    def __len__(self) -> int:
+        return len(self.added) + len(self.removed)
+
+
+def parts_of(question: Question, plan: Plan) -> list[Part]:
+    """Return what tells a plan from the base, in connected parts, the smallest first."""
+    taken = {action.opportunity for action in plan.actions}
+    base = set(question.base.tolist())
+    added, removed = taken - base, base - taken
+    left = added | removed
+    parts = []
+    while left:
+        found, open_ = set(), {min(left)}
+        while open_:
+            row = open_.pop()
+            found.add(row)
+            left.discard(row)
+            others = removed if row in added else added
+            open_ |= set(_linked(question, row, others & left))
+        parts.append(Part(added=frozenset(found & added), removed=frozenset(found & removed)))
+    return sorted(parts, key=lambda part: (len(part), min(part.added | part.removed)))
+
+
+def _linked(question: Question, row: int, others: set[int]) -> Iterator[int]:
+    """Yield the rows of the other plan that ``row`` came for, or gave way to."""
+    table = question.problem.opportunities
+    blocked = set(conflicts(question.problem, row, sorted(others)))
+    for other in others:
+        is_same = (
+            table.kind[row] == table.kind[other] == COLLECT
+            and table.place[row] == table.place[other]
+        )
+        if is_same or other in blocked:
+            yield other
+
+
+def undone(question: Question, plan: Plan, budget: Budget) -> Plan:
+    """Return the plan with every part of its difference taken back that gains nothing."""
+    is_better = True
+    while is_better:
+        is_better = False
+        for part in parts_of(question, plan):
+            if budget.is_spent():
+                return plan
+            trial = without(question, plan, part)
+            if trial is not None and value(question, trial) >= value(question, plan) - _EQUAL:
+                plan, is_better = trial, True
+    return plan
+
+
+def within_share(question: Question, plan: Plan, budget: Budget) -> Plan:
+    """Return the plan with changes taken back that gain least, until few enough are left."""
+    share = question.stability.max_changed_share
+    while share is not None and question.changed(plan) > share * question.num_base:
+        trials = (without(question, plan, part) for part in parts_of(question, plan))
+        fewer = [
+            trial
+            for trial in trials
+            if trial is not None and question.changed(trial) < question.changed(plan)
+        ]
+        if not fewer or budget.is_spent():
+            break
+        plan = max(fewer, key=lambda trial: value(question, trial))
+    return plan
+
+
+def without(question: Question, plan: Plan, part: Part) -> Plan | None:
+    """Return the plan without a part of its difference; None where that breaks something."""
+    problem = question.problem
+    if any(row in problem.kept_rows for row in part.added):
+        return None
+    taken = {action.opportunity for action in plan.actions}
+    trial = Plan.of(problem, (taken - part.added) | part.removed)
+    if len(question.missing(trial)) > len(question.missing(plan)):
+        return None
+    return trial if replay(problem, trial).is_valid else None
+
+
+def value(question: Question, plan: Plan) -> float:
+    """Return what a plan earns, and what its kept actions count."""
+    return replay(question.problem, plan).reward + question.stable_worth(plan)

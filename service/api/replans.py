@@ -1,0 +1,185 @@
+"""Replans: what happened to a plan, and the plan that follows it."""
+
+from __future__ import annotations
+
+import json
+from datetime import datetime
+
+from fastapi import APIRouter
+from sqlalchemy.orm import Session
+
+from planner_core.domain import Agility
+from planner_core.problem.slew import INSTANT, slew_s
+from planner_core.referee.plan_diff import PlannedAction
+from planner_core.replanning.changes import Changed, changes_of, share_of
+from service.api import job_intake as intake
+from service.api.deps import CallDep
+from service.api.errors import problem_responses
+from service.api.idempotency import OnceDep
+from service.api.plans import action_out, find_plan, take_down
+from service.db.rows import JobRow, PlanActionRow, PlanRow, ScenarioRow
+from service.jobs import submission
+from service.plans import replans
+from service.plans import store as plan_store
+from service.scenarios import freezing, replanning
+from service.scenarios.stored_question import StoredQuestion
+from service.scenarios.translate import read_file
+from service.stores import outage_store
+from service.wire.jobs import JobOut
+from service.wire.replans import PlanChangeItem, PlanChangesOut, ReplanIn
+
+router = APIRouter(prefix="/v1/plans", tags=["plans"])
+
+_WIDEST_TURN_DEG = 180.0
+_NEAR_S = 1.0  # as base actions are matched
+
+
+@router.post("/{plan_id}/replans", status_code=202, responses=problem_responses(404, 409, 422, 503))
+def create_replan(plan_id: str, body: ReplanIn, call: CallDep, once: OnceDep) -> JobOut:
+    """Queue the plan that follows this one: what starts before `freeze_until` stays as it is.
+
+    The job's scenario is that of the plan with what happened: outages, reports, other targets.
+    As few actions as possible change; promised targets stay imaged, or the job fails with
+    `promise_not_kept`. `links.plan` is the draft, there once the job has succeeded.
+    """
+    params = intake.all_params(body.solver, body.params)
+    time_s, memory_mb = intake.limits_of(body.limits, call.settings)
+    queue = intake.queue_with_room(call)
+    with call.database.reading() as session:
+        plan = find_plan(session, plan_id, call.caller)
+        scenario_id = session.get_one(JobRow, plan.job_id).scenario_id
+        content = session.get_one(ScenarioRow, scenario_id).content
+    file = read_file(json.loads(content))
+    with once.transaction() as session:
+        intake.require_room(session, call)
+        plan = find_plan(session, plan_id, call.caller)
+        if body.executions:
+            take_down(session, call, plan, body.executions, "/executions")
+        now = body.now or plan_store.now(session)
+        freeze_until = max(body.freeze_until or now, now)
+        happened = _happened(session, plan, body, freeze_until)
+        asked = replanning.replan_file(file, body, happened)
+        frozen = freezing.freeze_file(asked, call.settings.scenario_limits)
+        row, _ = intake.save(session, call, frozen, call.caller.owner)
+        spec = submission.JobSpec(
+            scenario_id=row.id,
+            solver=body.solver,
+            params=params,
+            seed=body.seed,
+            time_s=time_s,
+            memory_mb=memory_mb,
+            priority=body.priority,
+            label=body.label,
+            owner=call.caller.owner,
+            change=replans.note_of(plan, call.caller, body.name, freeze_until),
+        )
+        made = submission.submit(session, queue, spec)
+        call.audit.record(session, "create", "job", made.id)
+        return once.keep(session, intake.accepted(session, call.response, made))
+
+
+def _happened(
+    session: Session, plan: PlanRow, body: ReplanIn, freeze_until: datetime
+) -> replanning.Happened:
+    stations = {
+        row.station_id
+        for row in replans.all_actions(session, plan.id)
+        if row.station_id is not None
+    }
+    satellites = [row.satellite_id for row in plan_store.satellites(session, [plan.id])[plan.id]]
+    stored = outage_store.concerning(
+        session, satellites, stations, plan.horizon_start, body.horizon_end or plan.horizon_end
+    )
+    return replanning.Happened(
+        base=replans.base_of(session, plan.id),
+        freeze_until=freeze_until,
+        outages=[outage_store.placed(row) for row in stored],
+        targets=freezing.targets_by_catalog(session, body.add_target_catalog_ids),
+    )
+
+
+@router.get("/{plan_id}/changes", responses=problem_responses(404))
+def list_changes(plan_id: str, call: CallDep) -> PlanChangesOut:
+    """List what a replan has changed after its freeze, and why; nothing of any other plan."""
+    with call.database.reading() as session:
+        plan = find_plan(session, plan_id, call.caller)
+        job = session.get_one(JobRow, plan.job_id)
+        if plan.parent_id is None or not replans.is_replan(job.change):
+            return PlanChangesOut(
+                parent_id=None, freeze_until=None, changed_share=0.0, forced_share=0.0, items=()
+            )
+        content = session.get_one(ScenarioRow, job.scenario_id).content
+        rows = {own: replans.all_actions(session, own) for own in (plan.parent_id, plan.id)}
+    assert job.change is not None
+    freeze_until = datetime.fromisoformat(job.change["freeze_until"])
+    question = StoredQuestion(content)
+    before, after = (
+        {planned(row): row for row in rows[own] if row.start >= freeze_until}
+        for own in (plan.parent_id, plan.id)
+    )
+    found = changes_of(
+        list(before), list(after), lambda one: _is_lost(question, one),
+        {satellite.id: _longest_turn_s(satellite.agility) for satellite in question.satellites},
+    )  # fmt: skip
+    return PlanChangesOut(
+        parent_id=plan.parent_id,
+        freeze_until=freeze_until,
+        changed_share=share_of(found, len(before)),
+        forced_share=share_of(found, len(before), forced=True),
+        items=tuple(_item(one, before, after) for one in found),
+    )
+
+
+def planned(row: PlanActionRow) -> PlannedAction:
+    """Return an action in the terms that all plans share."""
+    return PlannedAction(
+        start=row.start,
+        end=row.end,
+        satellite_id=row.satellite_id,
+        mode="collect" if row.mode == "collect" else "contact",
+        place_id=row.target_id or row.station_id or "",
+    )
+
+
+def _is_lost(question: StoredQuestion, action: PlannedAction) -> bool:
+    """Return whether an outage, a failure or a dropped target took an action of the plan."""
+    if action.mode == "collect" and action.place_id in question.pins.forbid:
+        return True
+    is_in_base = question.replan is not None and any(
+        one.satellite_id == action.satellite_id
+        and (one.target_id or one.station_id) == action.place_id
+        and one.start is not None
+        and abs((one.start - action.start).total_seconds()) <= _NEAR_S
+        for one in question.replan.base
+    )
+    is_out = any(
+        action.start < outage.end
+        and action.end > outage.start
+        and (
+            (outage.satellite_id == action.satellite_id and action.mode in outage.modes)
+            or (outage.station_id is not None and outage.station_id == action.place_id
+                and action.mode == "contact")
+        )
+        for outage in question.outages
+    )  # fmt: skip
+    return is_out or not is_in_base
+
+
+def _longest_turn_s(agility: Agility) -> float:
+    acceleration = agility.acceleration_deg_s2 or INSTANT
+    return slew_s(_WIDEST_TURN_DEG, agility.slew_rate_deg_s, acceleration) + agility.settle_s
+
+
+def _item(
+    found: Changed,
+    before: dict[PlannedAction, PlanActionRow],
+    after: dict[PlannedAction, PlanActionRow],
+) -> PlanChangeItem:
+    is_moved = found.before is not None and found.after is not None
+    return PlanChangeItem(
+        change="moved" if is_moved else "added" if found.before is None else "removed",
+        action=None if found.after is None else action_out(after[found.after], None),
+        parent_action=None if found.before is None else action_out(before[found.before], None),
+        cause=found.cause,
+        because_of=tuple(after[one].action_id for one in found.because_of),
+    )

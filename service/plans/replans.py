@@ -1,0 +1,77 @@
+"""What a replan begins with, and the draft that it leaves."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Any, Final
+
+import sqlalchemy as sa
+from sqlalchemy.orm import Session
+
+from service.access.callers import Caller, Scope
+from service.db.ids import new_id
+from service.db.rows import ExecutionRow, JobRow, PlanActionRow, PlanRow
+from service.plans import store
+from service.webhooks import outbox
+from service.wire.base import Json
+from service.wire.instants import instant_text
+from service.wire.pins import PinnedActionIn
+from service.wire.timelines import TimelineOut
+
+_GONE: Final = ("failed", "skipped")
+
+
+def base_of(session: Session, plan_id: str) -> list[PinnedActionIn]:
+    """Return the actions of a plan, in words, less those that were reported as not done."""
+    gone = failed_actions(session, plan_id)
+    return [
+        PinnedActionIn(
+            satellite_id=row.satellite_id,
+            target_id=row.target_id,
+            station_id=row.station_id,
+            start=row.start,
+        )
+        for row in all_actions(session, plan_id)
+        if row.action_id not in gone
+    ]
+
+
+def all_actions(session: Session, plan_id: str) -> list[PlanActionRow]:
+    """Return the actions of a plan, in their order."""
+    wanted = sa.select(PlanActionRow).where(PlanActionRow.plan_id == plan_id)
+    return list(session.scalars(wanted.order_by(PlanActionRow.position)))
+
+
+def failed_actions(session: Session, plan_id: str) -> set[str]:
+    """Return the ids of the actions that were not done, by the last report of each."""
+    wanted = sa.select(ExecutionRow).where(ExecutionRow.plan_id == plan_id)
+    last = {row.action_id: row.outcome for row in session.scalars(wanted.order_by(ExecutionRow.id))}
+    return {action_id for action_id, outcome in last.items() if outcome in _GONE}
+
+
+def note_of(plan: PlanRow, caller: Caller, name: str | None, freeze_until: datetime) -> Json:
+    """Return what a job keeps of the replan that it works on: the draft's id among it."""
+    return {
+        "replan_of": plan.id,
+        "plan_id": new_id(),
+        "name": name,
+        "freeze_until": instant_text(freeze_until),
+        "key_name": caller.key_name,
+    }
+
+
+def is_replan(change: Json | None) -> bool:
+    """Return whether the change of a job is a replan."""
+    return change is not None and "replan_of" in change
+
+
+def adopt(session: Session, job: JobRow, timeline: TimelineOut) -> None:
+    """Store the plan that a replan's job has found as a draft."""
+    change: dict[str, Any] = job.change or {}
+    parent = session.get_one(PlanRow, change["replan_of"])
+    caller = Caller(owner=job.tenant, scope=Scope.SUBMIT, key_name=change["key_name"])
+    plan = store.add(
+        session, caller, parent.owner, job.id, change["name"], timeline,
+        parent_id=parent.id, plan_id=change["plan_id"],
+    )  # fmt: skip
+    outbox.tell_plan(session, plan, None, None)

@@ -1,0 +1,146 @@
+"""From the question that a plan answers to that of the plan which follows it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+
+from planner_core.errors import Fault
+from service.problems.faults import refuse
+from service.wire.pins import OutageIn, PinnedActionIn, PlacedOutage
+from service.wire.plan_before import PromiseIn, ReplanOfFile
+from service.wire.replans import ReplanIn
+from service.wire.scenarios import FileTarget, HorizonIn, ScenarioFile
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Happened:
+    """What a replan starts from, beside what its body says.
+
+    Attributes
+    ----------
+    base
+        The actions of the plan, less those that failed.
+    freeze_until
+        What starts before it stays.
+    outages
+        Those stored that concern the question.
+    targets
+        Those of catalogues to be added, by the number of the catalogue in the body.
+    """
+
+    base: Sequence[PinnedActionIn]
+    freeze_until: datetime
+    outages: Sequence[PlacedOutage]
+    targets: Sequence[tuple[int, FileTarget]]
+
+
+def replan_file(file: ScenarioFile, body: ReplanIn, happened: Happened) -> ScenarioFile:
+    """Return the scenario file of a replan.
+
+    Raises
+    ------
+    ServiceError
+        422, with all that cannot be and where it stands in the body.
+    """
+    targets = [*file.targets, *(FileTarget(**dict(t)) for t in body.add_targets)]
+    targets += [target for _, target in happened.targets]
+    end = body.horizon_end or file.horizon.end
+    flown = {
+        action.target_id
+        for action in happened.base
+        if action.start is not None and action.start < happened.freeze_until
+    }
+    faults = [
+        *_faults_of_times(file, end, happened.freeze_until),
+        *_faults_of_added(file, body, happened),
+        *_faults_of_dropped(file, body, flown),
+        *_faults_of_promises(body, {target.id for target in targets}),
+    ]
+    if faults:
+        raise refuse(faults)
+    known = {outage.id for outage in file.outages}
+    outages = [
+        *file.outages,
+        *(one for one in happened.outages if one.id not in known),
+        *(PlacedOutage(**dict(outage)) for outage in body.outages if not _is_among(outage, file)),
+    ]
+    forbid = dict.fromkeys((*file.pins.forbid, *body.drop_targets))
+    return file.model_copy(
+        update={
+            "name": None,
+            "horizon": HorizonIn(start=file.horizon.start, end=end),
+            "targets": targets,
+            "outages": outages,
+            "pins": file.pins.model_copy(update={"forbid": list(forbid)}),
+            "replan": ReplanOfFile(
+                base=list(happened.base),
+                freeze_until=happened.freeze_until,
+                promises=_promises(file, body),
+                stability=body.stability,
+            ),
+        }
+    )
+
+
+def _is_among(outage: OutageIn, file: ScenarioFile) -> bool:
+    return any(
+        dict(outage) == {name: getattr(other, name) for name in OutageIn.model_fields}
+        for other in file.outages
+    )
+
+
+def _promises(file: ScenarioFile, body: ReplanIn) -> list[PromiseIn]:
+    """Return the promises of the body, and those made before that it says nothing of."""
+    before = [] if file.replan is None else file.replan.promises
+    gone = {promise.target_id for promise in body.promises} | set(body.drop_targets)
+    return [*body.promises, *(one for one in before if one.target_id not in gone)]
+
+
+def _faults_of_times(file: ScenarioFile, end: datetime, freeze_until: datetime) -> list[Fault]:
+    if freeze_until < end and file.horizon.start < end:
+        return []
+    detail = "Nothing is left to plan: the horizon ends before freeze_until."
+    return [Fault(code="value_out_of_range", detail=detail, pointer="/horizon_end")]
+
+
+def _faults_of_added(file: ScenarioFile, body: ReplanIn, happened: Happened) -> list[Fault]:
+    seen = {target.id for target in file.targets}
+    added = [(f"/add_targets/{i}/id", target.id) for i, target in enumerate(body.add_targets)]
+    added += [(f"/add_target_catalog_ids/{i}", target.id) for i, target in happened.targets]
+    faults = []
+    for pointer, own_id in added:
+        if own_id in seen:
+            detail = f"The plan's scenario has a target {own_id!r} already."
+            faults.append(Fault(code="duplicate_target_id", detail=detail, pointer=pointer))
+        seen.add(own_id)
+    return faults
+
+
+def _faults_of_dropped(
+    file: ScenarioFile, body: ReplanIn, flown: Collection[str | None]
+) -> list[Fault]:
+    known, promised = ({t.id for t in file.targets}, {p.target_id for p in body.promises})
+    faults = []
+    for i, own_id in enumerate(body.drop_targets):
+        pointer = f"/drop_targets/{i}"
+        if own_id not in known:
+            detail = f"The plan's scenario has no target {own_id!r}."
+            faults.append(Fault(code="unknown_target", detail=detail, pointer=pointer))
+        elif own_id in flown:
+            detail = f"Target {own_id!r} is imaged before freeze_until: it cannot be dropped."
+            faults.append(Fault(code="invalid_value", detail=detail, pointer=pointer))
+        elif own_id in promised:
+            detail = f"Target {own_id!r} is promised in the same breath."
+            faults.append(Fault(code="invalid_value", detail=detail, pointer=pointer))
+    return faults
+
+
+def _faults_of_promises(body: ReplanIn, known: Collection[str]) -> list[Fault]:
+    return [
+        Fault(code="unknown_target", detail=f"There is no target {promise.target_id!r}.",
+              pointer=f"/promises/{i}/target_id")
+        for i, promise in enumerate(body.promises)
+        if promise.target_id not in known
+    ]  # fmt: skip

@@ -1,0 +1,46 @@
+"""The plan that a scenario's plans go on from."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from service.wire.base import Body, Id, Instant
+from service.wire.pins import PinnedActionIn
+
+Share = Annotated[float, Field(ge=0, le=1)]
+
+
+class PromiseIn(Body):
+    """A target that the plan images, at whatever time."""
+
+    target_id: Id
+    image_by: Instant | None = Field(None, description="When the image must have ended.")
+
+
+class StabilityIn(Body):
+    """How dear it is to leave an action of the plan before."""
+
+    weight: Share = Field(
+        0.03,
+        description="What keeping a collect counts in the search: a share of a typical reward.",
+    )
+    contact_weight: Share = Field(0.05, description="The same of a contact.")
+    max_changed_share: Share | None = Field(
+        None, description="Of the actions after the freeze, the most that may be moved or removed."
+    )
+
+
+class ReplanOfFile(Body):
+    """The plan that a scenario's plans go on from."""
+
+    base: list[PinnedActionIn] = Field(
+        max_length=1_000_000,
+        description="Its actions but for what failed: satellite, target or station, and start.",
+    )
+    freeze_until: Instant = Field(
+        description="What starts before it stays as it is, and nothing is added there."
+    )
+    promises: list[PromiseIn] = Field([], max_length=10_000)
+    stability: StabilityIn = StabilityIn()

@@ -1,0 +1,230 @@
+"""Replans: nothing frozen differs, nothing promised is bumped, and bounds hold."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from hypothesis import event, given
+from hypothesis import strategies as st
+
+from planner_core.budget import Budget
+from planner_core.domain import Stability
+from planner_core.errors import InvalidScenario
+from planner_core.pinning.pinned_problem import apply_pins
+from planner_core.problem import COLLECT, CONTACT, Blocked, Kept, Pinned, Problem
+from planner_core.problem.plan import Plan
+from planner_core.referee.replay import replay
+from planner_core.replanning.question import Question
+from planner_core.replanning.replan import solve_replan
+from planner_core.replanning.undo import parts_of, value, without
+from planner_core.solvers.registry import Certified, Rule
+from tests.examples import examples
+from tests.planner_core.brute_force import best_plan
+from tests.planner_core.problems import random_problem
+
+SEEDS = st.integers(0, 10**6)
+BETA = Stability()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Event:
+    """A plan in force, something that happens to it, and the question what to do now."""
+
+    whole: Problem
+    base: Plan
+    frozen: frozenset[int]
+    question: Question
+
+    def rows(self, plan: Plan) -> set[int]:
+        """Return a plan in rows of the whole table."""
+        return {self.question.problem.scenario_row(a.opportunity) for a in plan.actions}
+
+
+def event_at_random(
+    seed: int, *, use_resources: bool, size: int = 1, stability: Stability = BETA
+) -> Event | None:
+    """Return a plan that loses a span, is frozen to some instant and has promises."""
+    rng = np.random.default_rng(seed)
+    whole = random_problem(
+        seed, use_resources=use_resources, num_satellites=2, num_targets=5 * size,
+        num_collects=8 * size, num_contacts=3, num_stations=1,
+    )  # fmt: skip
+    base = Certified().solve(whole, Budget(), 0).plan
+    if not base.actions or not replay(whole, base).is_valid:
+        return None
+    table = whole.opportunities
+    frozen_until_s = float(rng.uniform(0, 500))
+    from_s = float(rng.uniform(frozen_until_s, 900))
+    lost = Blocked(
+        satellite=int(rng.integers(2)) if rng.random() < 0.6 else None, station=0, start_s=from_s,
+        end_s=from_s + float(rng.uniform(20, 300)), kinds=frozenset({COLLECT, CONTACT}),
+        pointer="/outages/0",
+    )  # fmt: skip
+    lost = replace(lost, station=None if lost.satellite is not None else 0)
+    taken = [action.opportunity for action in base.actions]
+    frozen = [row for row in taken if table.start_s[row] < frozen_until_s - 1e-3]
+    pinned = Pinned(
+        kept=tuple(Kept(row=row, pointer=f"/replan/base/{i}") for i, row in enumerate(frozen)),
+        blocked=(lost,),
+        frozen_until_s=frozen_until_s,
+    )
+    try:
+        problem = apply_pins(whole, pinned)
+    except InvalidScenario:
+        return None  # what is flown lies in the outage, or leaves no way to keep the limits
+    assert problem.origin is not None
+    still = np.flatnonzero(np.isin(problem.origin, taken))
+    imaged = problem.opportunities.place[still[problem.opportunities.kind[still] == COLLECT]]
+    promised = rng.permutation(np.unique(imaged))[: rng.integers(3)]
+    question = Question(
+        problem=problem, base=still.astype(np.int32), num_base=len(taken) - len(frozen),
+        promised=tuple(promised.tolist()), stability=stability,
+    )  # fmt: skip
+    return Event(whole=whole, base=base, frozen=frozenset(frozen), question=question)
+
+
+@examples(200)
+@given(seed=SEEDS, use_resources=st.booleans(), is_exact=st.booleans())
+def test_nothing_frozen_differs_and_nothing_promised_is_bumped(
+    seed: int, use_resources: bool, is_exact: bool
+) -> None:
+    happened = event_at_random(seed, use_resources=use_resources)
+    if happened is None:
+        return
+    question = happened.question
+    try:
+        solution = solve_replan(question, Certified() if is_exact else Rule(), Budget(), 0)
+    except InvalidScenario as error:
+        # What the plan imaged and can still image is dropped for the limits alone.
+        is_refusal = use_resources and error.fault.code == "promise_not_kept"
+        if not is_refusal:
+            raise
+        event("refused")
+        return
+    problem = question.problem
+    rows = happened.rows(solution.plan)
+    start_s = happened.whole.opportunities.start_s
+    assert {r for r in rows if problem.pinned.is_frozen(start_s[r])} == happened.frozen
+    assert not question.missing(solution.plan)
+    codes = {v.code for v in replay(problem, solution.plan).violations}
+    assert not codes & {"frozen", "outage", "slew", "station", "overlap"}
+    event(f"changed: {question.changed(solution.plan)}")
+
+
+@examples(100)
+@given(seed=SEEDS, use_resources=st.booleans())
+def test_no_plan_exceeds_the_bounds(seed: int, use_resources: bool) -> None:
+    """Brute force over what is left, for the reward and for the sum with the changes."""
+    happened = event_at_random(seed, use_resources=use_resources)
+    if happened is None:
+        return
+    question = replace(happened.question, promised=())
+    problem = question.problem
+    solution = solve_replan(question, Certified(), Budget(), 0)
+    timeline = replay(problem, solution.plan)
+    best = best_plan(problem)
+    if best is None:
+        return
+    assert timeline.is_valid
+    assert solution.bound is not None
+    assert solution.bound >= replay(problem, best).reward - 1e-6
+    summed = solution.statistics["stability_bound"]
+    assert summed >= value(question, solution.plan) - 1e-6
+    assert summed >= value(question, best) - 1e-6
+    searched = best_plan(question.searched)
+    assert searched is not None
+    assert summed >= value(question, searched) - 1e-6
+    # What it earns is what a plan from scratch earns, or less by what the changes would cost.
+    slack = float(question.bonus.sum())
+    assert timeline.reward >= replay(problem, best).reward - slack - 1e-6
+
+
+@examples(60)
+@given(seed=SEEDS, use_resources=st.booleans())
+def test_where_nothing_happens_nothing_changes(seed: int, use_resources: bool) -> None:
+    whole = random_problem(
+        seed, use_resources=use_resources, num_satellites=2, num_targets=10, num_collects=16,
+        num_contacts=4,
+    )  # fmt: skip
+    base = Certified().solve(whole, Budget(), 0).plan
+    if not replay(whole, base).is_valid:
+        return
+    rows = np.array(sorted(a.opportunity for a in base.actions), dtype=np.int32)
+    question = Question(
+        problem=whole, base=rows, num_base=len(rows), promised=(), stability=Stability()
+    )
+    plan = solve_replan(question, Certified(), Budget(), 1).plan
+    assert plan == base
+
+
+@examples(60)
+@given(seed=SEEDS, use_resources=st.booleans())
+def test_no_part_of_the_difference_gains_nothing(seed: int, use_resources: bool) -> None:
+    happened = event_at_random(seed, use_resources=use_resources, size=2)
+    if happened is None:
+        return
+    question = replace(happened.question, promised=())
+    plan = solve_replan(question, Rule(), Budget(), 0).plan
+    if not replay(question.problem, plan).is_valid:
+        return
+    for part in parts_of(question, plan):
+        trial = without(question, plan, part)
+        assert trial is None or value(question, trial) < value(question, plan)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_changes_stay_within_their_share_where_they_can(seed: int) -> None:
+    free = event_at_random(seed, use_resources=False, size=3)
+    assert free is not None
+    question = replace(
+        free.question, promised=(), stability=Stability(weight=0.0, max_changed_share=0.0)
+    )
+    plan = solve_replan(question, Certified(), Budget(), 0).plan
+    lost = question.num_base - sum(
+        not question.problem.pinned.is_frozen(question.problem.opportunities.start_s[row])
+        for row in question.base
+    )
+    assert question.changed(plan) == lost
+
+
+def test_a_target_worth_more_than_the_changes_is_taken_and_one_worth_less_is_not() -> None:
+    def left_by(plan: Plan) -> list[int]:
+        imaged = {int(whole.opportunities.place[a.opportunity]) for a in plan.actions}
+        return [t for t in range(12) if t not in imaged and len(whole.collects_of(t))]
+
+    for seed in range(50):
+        whole = random_problem(
+            seed, use_resources=False, num_targets=12, num_collects=14, num_contacts=0
+        )
+        base = Certified().solve(whole, Budget(), 0).plan
+        if left := left_by(base):
+            break
+    assert left
+    rows = np.array(sorted(a.opportunity for a in base.actions), dtype=np.int32)
+    for factor, is_taken in ((0.5, False), (50.0, True)):
+        worth = np.where(np.isin(whole.opportunities.place, left), factor, whole.worth)
+        question = Question(
+            problem=replace(whole, worth=worth), base=rows, num_base=len(rows), promised=(),
+            stability=Stability(),
+        )  # fmt: skip
+        plan = solve_replan(question, Certified(), Budget(), 0).plan
+        assert bool(set(left) - set(left_by(plan))) == is_taken
+        assert (plan == base) == (not is_taken)
+
+
+def test_a_promise_that_nothing_can_image_is_refused() -> None:
+    happened = next(
+        found
+        for seed in range(50)
+        if (found := event_at_random(seed, use_resources=False)) is not None
+        and (np.diff(found.question.problem.target_opportunities[1]) == 0).any()
+    )
+    problem = happened.question.problem
+    gone = int(np.flatnonzero(np.diff(problem.target_opportunities[1]) == 0)[0])
+    question = replace(happened.question, promised=(gone,))
+    with pytest.raises(InvalidScenario) as caught:
+        solve_replan(question, Certified(), Budget(), 0)
+    assert caught.value.fault.code == "promise_not_kept"
+    assert caught.value.fault.pointer == "/replan/promises/0"

@@ -1,0 +1,139 @@
+"""A day's plan that is published, hit by events and replanned, over a whole service."""
+
+from __future__ import annotations
+
+from datetime import datetime, timedelta
+from typing import Any
+
+import pytest
+
+from service.client import Client, JobFailed, Plan, PlanAction, ServiceError
+from service.wire.instants import instant_text
+from tests.missions import drawn_targets, paper_mission
+
+Task = tuple[str, str, str | None, str | None, datetime]
+
+
+@pytest.fixture(scope="module")
+def base(served: str) -> Plan:
+    """A published plan of a day."""
+    with Client(served) as client:
+        job = client.jobs.submit(paper_mission(drawn_targets(120)), "certified", time_s=20).wait()
+        plan = client.plans.create(job.id, name="Monday")
+        client.plans.approve(plan.id)
+        return client.plans.publish(plan.id, effective_from=plan.horizon.start)
+
+
+def tasks(client: Client, plan: Plan) -> dict[Task, PlanAction]:
+    return {
+        (a.satellite_id, a.mode, a.target_id, a.station_id, a.start): a
+        for a in client.plans.actions(plan.id)
+    }
+
+
+def noon(plan: Plan) -> datetime:
+    middle: datetime = plan.horizon.start + (plan.horizon.end - plan.horizon.start) / 3
+    return middle
+
+
+def replanned(client: Client, plan: Plan, **happened: Any) -> Plan:
+    job = client.plans.replan(plan.id, now=noon(plan), limits={"time_s": 20}, **happened).wait(120)
+    assert job.links["replan_of"] == f"/v1/plans/{plan.id}"
+    draft = client.plans.draft_of(job)
+    assert (draft.state, draft.parent_id, draft.job_id) == ("draft", plan.id, job.id)
+    return draft
+
+
+def test_a_replan_to_which_nothing_happened_is_the_plan(whole: Client, base: Plan) -> None:
+    draft = replanned(whole, base)
+    assert tasks(whole, draft).keys() == tasks(whole, base).keys()
+    changes = whole.plans.changes(draft.id)
+    assert (changes.changed_share, changes.forced_share, changes.items) == (0.0, 0.0, ())
+
+
+def test_a_lost_station_and_an_urgent_request(whole: Client, base: Plan) -> None:
+    before = tasks(whole, base)
+    later = [a for a in before.values() if a.start >= noon(base)]
+    contact = next(a for a in later if a.mode == "contact")
+    promised = [a.target_id for a in later if a.mode == "collect"][:3]
+    outage = {
+        "station_id": contact.station_id,
+        "start": instant_text(contact.start - timedelta(minutes=5)),
+        "end": instant_text(contact.end + timedelta(minutes=5)),
+        "reason": "antenna in service",
+    }
+    urgent = {"id": "urgent", "lat_deg": 20.0, "lon_deg": 10.0, "reward": 40.0}
+    draft = replanned(
+        whole, base, outages=[outage], add_targets=[urgent], name="Monday, second",
+        promises=[{"target_id": target_id} for target_id in promised],
+    )  # fmt: skip
+    assert draft.name == "Monday, second"
+    after = tasks(whole, draft)
+    frozen = {key: a for key, a in before.items() if a.start < noon(base)}
+    assert {key: a.end for key, a in after.items() if a.start < noon(base)} == {
+        key: a.end for key, a in frozen.items()
+    }
+    assert set(promised) <= {a.target_id for a in after.values()}
+    changes = whole.plans.changes(draft.id)
+    kept = before.keys() & after.keys()
+    moved_or_removed = [item for item in changes.items if item.parent_action is not None]
+    assert len(moved_or_removed) == len(before) - len(kept)
+    assert changes.changed_share == pytest.approx(len(moved_or_removed) / len(later))
+    assert 0.0 < changes.forced_share <= changes.changed_share < 0.2
+    lost = [item.parent_action for item in changes.items if item.cause == "lost"]
+    assert contact in lost
+    for item in changes.items:
+        assert (item.cause == "displaced_by") == bool(item.because_of)
+    # It may be published in place of its parent, and then be replanned itself.
+    whole.plans.approve(draft.id)
+    whole.plans.publish(draft.id, effective_from=noon(base))
+    again = replanned(whole, draft)
+    assert tasks(whole, again).keys() == after.keys()
+
+
+def test_what_failed_is_open_again(whole: Client, base: Plan) -> None:
+    flown = [a for a in whole.plans.actions(base.id) if a.start < noon(base)]
+    failed = next(a for a in flown if a.mode == "collect")
+    draft = replanned(whole, base, executions=[{"action_id": failed.id, "outcome": "failed"}])
+    after = tasks(whole, draft)
+    assert failed.id in {e.action_id for e in whole.plans.executions(base.id)}
+    before_noon = {a.target_id for a in after.values() if a.start < noon(base)}
+    assert failed.target_id not in before_noon
+    whole.plans.report(base.id, [{"action_id": failed.id, "outcome": "executed"}])
+
+
+def test_a_promise_that_cannot_be_kept_fails_with_its_reason(whole: Client, base: Plan) -> None:
+    later = [a for a in whole.plans.actions(base.id) if a.start >= noon(base)]
+    promised = next(a for a in later if a.mode == "collect")
+    end = instant_text(base.horizon.end)
+    job = whole.plans.replan(
+        base.id, now=noon(base), promises=[{"target_id": promised.target_id}],
+        outages=[{"satellite_id": promised.satellite_id, "start": instant_text(noon(base)),
+                  "end": end, "modes": ["collect"]}],
+    )  # fmt: skip
+    with pytest.raises(JobFailed) as caught:
+        job.wait(120)
+    error = caught.value.job.error
+    assert error is not None
+    assert error.code == "promise_not_kept"
+    with pytest.raises(ServiceError) as missing:
+        whole.plans.draft_of(job)
+    assert missing.value.code == "not_found"
+
+
+def test_what_cannot_be_asked_is_refused_with_its_place(whole: Client, base: Plan) -> None:
+    flown = [a for a in whole.plans.actions(base.id) if a.start < noon(base)]
+    imaged = next(a for a in flown if a.mode == "collect")
+    with pytest.raises(ServiceError) as caught:
+        whole.plans.replan(
+            base.id, now=noon(base), promises=[{"target_id": "nowhere"}],
+            drop_targets=["nowhere", imaged.target_id],
+            add_targets=[{"id": imaged.target_id, "lat_deg": 0.0, "lon_deg": 0.0}],
+        )  # fmt: skip
+    assert {fault.pointer for fault in caught.value.errors} == {
+        "/promises/0/target_id", "/drop_targets/0", "/drop_targets/1", "/add_targets/0/id",
+    }  # fmt: skip
+    with pytest.raises(ServiceError):
+        whole.plans.replan(base.id, now=base.horizon.end)
+    none = whole.plans.changes(base.id)
+    assert (none.parent_id, none.items) == (None, ())
