@@ -56,6 +56,7 @@ Floats = npt.NDArray[np.float64]
 
 LEO_PERIOD_S = 128 * 60.0
 OLD_ELEMENTS_DAYS = 3.0
+_GENERIC = ("generic_optical", "generic_sar")
 REFUSED_ELEMENTS_DAYS = 30.0
 
 _REASONS = np.array(
@@ -394,6 +395,12 @@ def orbit_warnings(scenario: Scenario) -> tuple[str, ...]:
     """Return what a reader should know about element sets, the Earth's orientation and starts."""
     ages = (_age_warning(satellite, scenario.horizon) for satellite in scenario.satellites)
     warnings = [warning for warning in ages if warning is not None]
+    generic = sorted({s.spacecraft for s in scenario.satellites if s.spacecraft in _GENERIC})
+    if generic:
+        warnings.append(
+            f"Satellites plan with the figures of the built-in type {' and '.join(generic)}, "
+            "which are those of a class: give your own agility, sensor and resources."
+        )
     if not shipped().covers(scenario.horizon):
         warnings.append(
             "The horizon reaches outside the table of the Earth's orientation: its end values "

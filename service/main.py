@@ -32,6 +32,7 @@ from service.api import (
     satellites,
     scenarios,
     solvers,
+    spacecraft,
     target_catalogs,
     timelines,
     webhooks,
@@ -65,6 +66,7 @@ DESCRIPTION = (
 ROUTERS = (
     element_exports.router,
     satellites.router,
+    spacecraft.router,
     ground_stations.router,
     outages.router,
     target_catalogs.router,

@@ -280,7 +280,13 @@ class Resources:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Satellite:
-    """A satellite: its orbit and what it can do."""
+    """A satellite: its orbit and what it can do.
+
+    Attributes
+    ----------
+    spacecraft
+        The type that its figures are from, where one is known.
+    """
 
     id: str
     name: str
@@ -288,3 +294,4 @@ class Satellite:
     agility: Agility = Agility()
     sensor: Sensor = Sensor()
     resources: Resources
+    spacecraft: str | None = None

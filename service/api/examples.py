@@ -24,6 +24,8 @@ _HORIZON: Final = {"start": "2019-01-01T00:00:00Z", "end": "2019-01-01T12:00:00Z
 
 BODIES: Final[dict[str, Any]] = {
     "SatelliteIn": {"name": "Polar-500", "omm": _OMM},
+    "SpacecraftIn": {"name": "Our bus", "agility": {"slew_rate_deg_s": 2.0}},
+    "SpacecraftPatch": {"sensor": {"off_nadir_max_deg": 40.0}},
     "OrbitIn": {"omm": _OMM | {"EPOCH": "2019-01-01T06:00:00", "MEAN_ANOMALY": 92}},
     "GroundStationIn": {"name": "Svalbard", "lat_deg": 78.22983, "lon_deg": 15.39244},
     "SatellitePatch": {"agility": {"slew_rate_deg_s": 2.0, "settle_s": 5.0}},

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from datetime import UTC, datetime
-from typing import Annotated, Final, TypeVar
+from typing import Annotated, Any, Final, TypeVar
 
 import sqlalchemy as sa
 from fastapi import APIRouter, Query, Response
@@ -23,6 +23,7 @@ from service.problems.faults import refuse
 from service.problems.kinds import ServiceError
 from service.scenarios.translate import orbit_from, satellite_from
 from service.stores import satellite_store as store
+from service.stores import spacecraft_store
 from service.wire.base import Listed
 from service.wire.imports import Imported
 from service.wire.satellites import (
@@ -35,7 +36,11 @@ from service.wire.satellites import (
     SatelliteOut,
     SatellitePatch,
     SensorIn,
+    TypedFigures,
+    WholeSatellite,
+    sent_by,
 )
+from service.wire.spacecraft_types import DEFAULT
 from service.wire.stored import from_store
 
 router = APIRouter(prefix="/v1/satellites", tags=["satellites"])
@@ -50,10 +55,11 @@ _IMPORT_TYPES = ("text/plain", "application/json", "text/csv", "application/xml"
 @router.post("", status_code=201)
 def create_satellite(body: SatelliteIn, once: OnceDep, call: CallDep) -> SatelliteOut:
     """Store one satellite. A second one with the same catalogue number is another satellite."""
-    satellite_from(body, "new")
     orbit = orbit_from(body)
     with once.transaction() as session:
-        row = store.add_satellite(session, body, orbit.elements, orbit.stored)
+        whole = spacecraft_store.completed(session, sent_by(body), WholeSatellite)
+        satellite_from(whole, "new")
+        row = store.add_satellite(session, whole, orbit.elements, orbit.stored)
         call.audit.record(session, "create", "satellite", row.id)
         shown = created(call.response, _shown(session, [row])[0], f"/v1/satellites/{row.id}")
         return once.keep(session, shown)
@@ -70,9 +76,15 @@ def create_satellite(body: SatelliteIn, once: OnceDep, call: CallDep) -> Satelli
     responses=problem_responses(413, 415),
 )
 def import_satellites(
-    call: CallDep, data: RawBodyDep, once: OnceDep, on_error: OnErrorQuery = OnError.SKIP
+    call: CallDep,
+    data: RawBodyDep,
+    once: OnceDep,
+    on_error: OnErrorQuery = OnError.SKIP,
+    spacecraft: Annotated[
+        str, Query(description="Id of the new satellites' type, or the name of one built in.")
+    ] = DEFAULT,
 ) -> Imported[ImportedSatellite]:
-    """Store the element sets of a file; satellites get the paper's agility, sensor and resources.
+    """Store the element sets of a file; new satellites are of one type of spacecraft.
 
     Importing the same file again changes nothing: a record whose catalogue number is stored
     joins that satellite, as a further element set where its epoch is new. Two records of one
@@ -82,7 +94,8 @@ def import_satellites(
     refuse_if_asked(len(found.entries), found.faults, on_error)
     with once.transaction() as session:
         call.count_stored(session, num_rows=len(found.entries), num_bytes=len(data))
-        items = [_imported(one) for one in store.import_entries(session, found.entries)]
+        figures = _figures_of(session, spacecraft)
+        items = [_imported(one) for one in store.import_entries(session, found.entries, figures)]
         for status, action in _ACTIONS.items():
             changed = [item.id for item in items if item.status == status]
             call.audit.record(session, action, "satellite", *changed)
@@ -128,7 +141,7 @@ def change_satellite(satellite_id: str, body: SatellitePatch, call: CallDep) -> 
         row = find_satellite(session, satellite_id, to_change=True)
         before = _shown(session, [row])[0]
         require_match(call.request, lambda: before)
-        changed = _changed(before, body)
+        changed = _changed(session, before, body)
         satellite_from(changed, satellite_id)
         changes = changed.model_dump(mode="json", include=set(SatellitePatch.model_fields))
         for name, value in changes.items():
@@ -187,14 +200,24 @@ def find_satellite(session: Session, satellite_id: str, *, to_change: bool = Fal
     return row
 
 
-def _changed(before: SatelliteOut, body: SatellitePatch) -> SatelliteIn:
-    return SatelliteIn(
+def _figures_of(session: Session, spacecraft_id: str) -> dict[str, Any]:
+    """Return all figures of a type, as satellites of it are stored."""
+    whole = spacecraft_store.completed(session, {"spacecraft": spacecraft_id}, TypedFigures)
+    return whole.model_dump(mode="json", include=set(store.FIGURES))
+
+
+def _changed(session: Session, before: SatelliteOut, body: SatellitePatch) -> WholeSatellite:
+    base: SatelliteOut | TypedFigures = before
+    if body.spacecraft is not None:
+        base = TypedFigures(**_figures_of(session, body.spacecraft))
+    return WholeSatellite(
         name=body.name or before.name,
         tle=None if before.tle is None else list(before.tle),
         omm=before.omm,
-        agility=_merged(before.agility, body.agility),
-        sensor=_merged(before.sensor, body.sensor),
-        resources=before.resources if body.resources is None else body.resources,
+        spacecraft=base.spacecraft,
+        agility=_merged(base.agility, body.agility),
+        sensor=_merged(base.sensor, body.sensor),
+        resources=base.resources if body.resources is None else body.resources,
     )
 
 
@@ -232,6 +255,7 @@ def _shown(session: Session, rows: Sequence[SatelliteRow]) -> list[SatelliteOut]
                 "epoch": elements[row.id].epoch,
                 "tle": elements[row.id].orbit.get("tle"),
                 "omm": elements[row.id].orbit.get("omm"),
+                "spacecraft": row.spacecraft,
                 "agility": row.agility,
                 "sensor": row.sensor,
                 "resources": row.resources,

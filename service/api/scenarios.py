@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from typing import Annotated, Any, cast
 
@@ -96,9 +95,7 @@ def get_scenario(
 
 
 def _file(request: Request, row: ScenarioRow) -> Response:
-    # The canonical content is JSON already; the name, which is not part of it, goes in front.
-    name = "" if row.name is None else f'"name":{json.dumps(row.name)},'
-    text = f"{{{name}{row.content[1:]}"
+    text = StoredQuestion(row.content).exported(row.name)
     etag = etag_of(text)
     if matches(request.headers.get("if-none-match"), etag):
         return Response(status_code=304, headers={"ETag": etag})

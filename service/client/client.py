@@ -19,6 +19,7 @@ from service.client.outages import Outages
 from service.client.plans import Plans
 from service.client.satellites import Satellites
 from service.client.scenarios import Scenarios
+from service.client.spacecraft import SpacecraftTypes
 from service.client.target_catalogs import TargetCatalogs
 from service.client.transport import Transport, held, path_of
 from service.client.webhooks import Webhooks
@@ -45,6 +46,7 @@ class Client:
 
     satellites: Satellites
     ground_stations: GroundStations
+    spacecraft: SpacecraftTypes
     outages: Outages
     target_catalogs: TargetCatalogs
     scenarios: Scenarios
@@ -75,6 +77,7 @@ class Client:
         self._transport = Transport(self._http, patience_s=patience_s)
         self.satellites = Satellites(self._transport)
         self.ground_stations = GroundStations(self._transport)
+        self.spacecraft = SpacecraftTypes(self._transport)
         self.outages = Outages(self._transport)
         self.target_catalogs = TargetCatalogs(self._transport)
         self.scenarios = Scenarios(self._transport)

@@ -28,15 +28,21 @@ class Satellites:
         agility: Mapping[str, Any] | None = None,
         sensor: Mapping[str, Any] | None = None,
         resources: str | Mapping[str, Any] | None = None,
+        spacecraft: str | None = None,
         idempotency_key: str | None = None,
     ) -> Satellite:
-        """Store a satellite; its orbit is ``tle``, two lines, or ``omm``, keywords."""
+        """Store a satellite; its orbit is ``tle``, two lines, or ``omm``, keywords.
+
+        It is of the type ``spacecraft``, an id or the name of one that is built in
+        (``generic_optical`` by default), but for the figures given.
+        """
         optional = {
             "tle": None if tle is None else list(tle),
             "omm": omm,
             "agility": agility,
             "sensor": sensor,
             "resources": resources,
+            "spacecraft": spacecraft,
         }
         body = {"name": name} | {k: v for k, v in optional.items() if v is not None}
         return self._transport.post(
@@ -49,6 +55,7 @@ class Satellites:
         form: str | None = None,
         *,
         reject_all: bool = False,
+        spacecraft: str | None = None,
         idempotency_key: str | None = None,
     ) -> Import[ImportedSatellite]:
         """Store the element sets of a file: ``tle``, ``kvn``, ``json``, ``csv`` or ``xml``.
@@ -62,12 +69,15 @@ class Satellites:
             The file, or its content and form.
         reject_all
             Whether one bad record refuses the file.
+        spacecraft
+            Type of the new satellites, ``generic_optical`` by default.
         """
         content, headers = upload(source, form)
         return self._transport.post(
             path_of("satellites", "import"),
             Import[ImportedSatellite],
-            params={"on_error": "reject_all" if reject_all else "skip"},
+            params={"on_error": "reject_all" if reject_all else "skip"}
+            | ({} if spacecraft is None else {"spacecraft": spacecraft}),
             content=content,
             headers=headers,
             idempotency_key=idempotency_key,

@@ -23,7 +23,7 @@ from service.settings import Settings
 
 Json = dict[str, Any]
 
-SEARCH_TIME_S: Final = 10.0
+SEARCH_TIME_S: Final = 20.0
 _ACTIVE: Final = ("queued", "running", "cancelling")
 _HOLD_S: Final = 10
 _READY: Final = "Slewline is ready at "
@@ -108,7 +108,7 @@ def create_mission(client: httpx.Client) -> Json:
         headers={"Content-Type": "text/csv"},
     )
     body = {
-        "name": "Paper mission",
+        "name": "Day of a polar satellite",
         "horizon": demo_mission.HORIZON,
         "satellite_ids": [satellite["id"]],
         "target_catalog_ids": [catalog["id"]],

@@ -1,7 +1,8 @@
-"""The mission of the demonstration: the one of the paper, as bodies for the HTTP API.
+"""The mission of the demonstration, as bodies for the HTTP API.
 
-One satellite on a circular polar orbit at 500 km, two polar ground stations, 1,000 targets
-drawn from the Landsat scenes on land, one day (arXiv:1910.08419, section Experiments).
+Orbit, stations, targets and day are those of arXiv:1910.08419 (section Experiments): a circular
+polar orbit at 500 km, two polar ground stations, 1,000 targets drawn from the Landsat scenes on
+land. The spacecraft is not the paper's but a generic optical one, whose plans can be flown.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ SATELLITE: Final[dict[str, Any]] = {
         "NORAD_CAT_ID": 1,
         "BSTAR": 0.0,
     },
-    "resources": "paper",
+    "spacecraft": "generic_optical",
 }
 
 GROUND_STATIONS: Final[tuple[dict[str, Any], ...]] = (

@@ -53,6 +53,19 @@ class SatelliteRow(Row):
     agility: Mapped[Json]
     sensor: Mapped[Json]
     resources: Mapped[Any] = mapped_column(sa.JSON)
+    spacecraft: Mapped[str | None] = mapped_column(sa.String(200))
+    created_at: Mapped[datetime]
+    deleted_at: Mapped[datetime | None]
+
+
+class SpacecraftRow(Row):
+    """A type of spacecraft; ``body`` holds its agility, sensor and resources."""
+
+    __tablename__ = "spacecraft"
+
+    id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
+    name: Mapped[str]
+    body: Mapped[Json]
     created_at: Mapped[datetime]
     deleted_at: Mapped[datetime | None]
 

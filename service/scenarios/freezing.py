@@ -39,6 +39,7 @@ from service.wire.scenarios import (
     ScenarioFile,
     ScenarioIn,
 )
+from service.wire.spacecraft_types import BUILT_IN
 
 M = TypeVar("M", bound=BaseModel)
 R = TypeVar("R", SatelliteRow, TargetCatalogRow, GroundStationRow)
@@ -187,6 +188,7 @@ def _satellites(session: Session, ids: Sequence[str]) -> list[FileSatellite]:
             {
                 "id": row.id,
                 "name": row.name,
+                "spacecraft": row.spacecraft if row.spacecraft in BUILT_IN else None,
                 "agility": row.agility,
                 "sensor": row.sensor,
                 "resources": row.resources,

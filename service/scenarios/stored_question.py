@@ -86,6 +86,25 @@ class StoredQuestion:
             yield target_from(body, body.catalog_id)
             at += self._content[at] == ","
 
+    def exported(self, name: str | None) -> str:
+        """Return the scenario as a file of release 2, in which satellites say all their figures.
+
+        Parameters
+        ----------
+        name
+            Of the scenario, for people; no part of its content.
+        """
+        members, at = self._before_targets
+        satellites = []
+        for one in members["satellites"]:
+            body = from_store(FileSatellite, one)
+            unset = {"omm", "spacecraft", "tle"} - body.model_fields_set
+            satellites.append(body.model_dump(mode="json", exclude=unset))
+        head: dict[str, Any] = {} if name is None else {"name": name}
+        head |= {**members, "release": 2, "satellites": satellites}
+        text = json.dumps(head, separators=(",", ":"), allow_nan=False)
+        return f'{text[:-1]},"{_TARGETS}":[{self._content[at:]}'
+
     @cached_property
     def _before_targets(self) -> tuple[dict[str, Any], int]:
         """Return what stands before the targets, and where their list begins.

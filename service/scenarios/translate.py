@@ -12,7 +12,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 from pydantic import ValidationError
 
@@ -35,7 +35,15 @@ from planner_core.orbits.tle import read_tle
 from service.problems.faults import faults_of_validation
 from service.scenarios.pin_inputs import outage_from, pins_from, replan_from
 from service.wire.places import GroundStationIn, TargetIn
-from service.wire.satellites import OrbitIn, Preset, PresetResourcesIn, ResourcesIn, SatelliteIn
+from service.wire.satellites import (
+    AgilityIn,
+    OrbitIn,
+    Preset,
+    PresetResourcesIn,
+    ResourcesIn,
+    SensorIn,
+    WholeSatellite,
+)
 from service.wire.scenarios import (
     FileGroundStation,
     FileSatellite,
@@ -120,9 +128,12 @@ def _with_ids(items: Sequence[FileSatellite | FileGroundStation]) -> list[object
 
 def canonical_of_file(file: ScenarioFile) -> str:
     """Return the canonical form of a file that `read_file` has made."""
-    document = file.model_dump(mode="json", exclude={"name"})
+    document = file.model_dump(mode="json", exclude={"name", "release"})
     for satellite in document["satellites"]:
         del satellite["omm" if satellite["omm"] is None else "tle"]
+        if satellite["spacecraft"] not in (None, "paper", "paper_code"):
+            continue  # what it leaves out would be its type's
+        del satellite["spacecraft"]
         _without_unset(satellite["sensor"], "sensor_type", "sun_exclusion_deg")
         _without_unset(satellite["agility"], "sun_exclusion_deg")
         if satellite["agility"]["slew_model"] == "rest":
@@ -268,15 +279,10 @@ def orbit_from(body: OrbitIn) -> Orbit:
     return Orbit(elements=elements, stored={"omm": omm_from_elements(elements)})
 
 
-def satellite_from(body: SatelliteIn, satellite_id: str) -> Satellite:
+def satellite_from(body: WholeSatellite, satellite_id: str) -> Satellite:
     """Return the satellite of one body."""
     elements = orbit_from(body).elements
-    with inside("/agility"):
-        agility = Agility(**body.agility.model_dump())
-    with inside("/sensor"):
-        sensor = Sensor(**body.sensor.model_dump())
-    with inside("/resources"):
-        resources = resources_from(body.resources, elements.period_s)
+    agility, sensor, resources = figures_from(body, elements.period_s)
     return Satellite(
         id=satellite_id,
         name=body.name,
@@ -284,7 +290,34 @@ def satellite_from(body: SatelliteIn, satellite_id: str) -> Satellite:
         agility=agility,
         sensor=sensor,
         resources=resources,
+        spacecraft=body.spacecraft,
     )
+
+
+class _WithFigures(Protocol):
+    @property
+    def agility(self) -> AgilityIn: ...
+    @property
+    def sensor(self) -> SensorIn: ...
+    @property
+    def resources(self) -> Preset | PresetResourcesIn | ResourcesIn: ...
+
+
+def figures_from(body: _WithFigures, period_s: float) -> tuple[Agility, Sensor, Resources]:
+    """Return what a spacecraft in an orbit of this period can do.
+
+    Raises
+    ------
+    InvalidScenario
+        With a pointer into the body.
+    """
+    with inside("/agility"):
+        agility = Agility(**body.agility.model_dump())
+    with inside("/sensor"):
+        sensor = Sensor(**body.sensor.model_dump())
+    with inside("/resources"):
+        resources = resources_from(body.resources, period_s)
+    return agility, sensor, resources
 
 
 _FIELDS_OF_RATES = {

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 import sqlalchemy as sa
 from sqlalchemy.orm import Session, aliased
@@ -14,9 +14,11 @@ from planner_core.domain import OrbitElements
 from planner_core.orbits.ingest import Entry
 from service.db.ids import new_id
 from service.db.rows import ElementSetRow, SatelliteRow
-from service.wire.satellites import AgilityIn, SatelliteIn, SensorIn
+from service.wire.satellites import WholeSatellite
 
-_LONGEST_NAME = 200
+FIGURES: Final = ("agility", "sensor", "resources", "spacecraft")
+"""What a satellite can do, and the type that it is of."""
+_LONGEST_NAME: Final = 200
 
 Status = Literal["created", "elements_added", "unchanged"]
 
@@ -36,10 +38,10 @@ def alive() -> sa.Select[SatelliteRow]:
 
 
 def add_satellite(
-    session: Session, body: SatelliteIn, elements: OrbitElements, orbit: dict[str, Any]
+    session: Session, body: WholeSatellite, elements: OrbitElements, orbit: dict[str, Any]
 ) -> SatelliteRow:
     """Store a new satellite with its first element set, parsed and in its tidy form."""
-    dumped = body.model_dump(mode="json", include={"agility", "sensor", "resources"})
+    dumped = body.model_dump(mode="json", include=set(FIGURES))
     row = SatelliteRow(
         id=new_id(),
         name=body.name,
@@ -89,13 +91,16 @@ def in_force(session: Session, satellite_ids: Iterable[str]) -> dict[str, Elemen
     return {row.satellite_id: row for row in rows}
 
 
-def import_entries(session: Session, entries: Sequence[Entry]) -> list[ImportedEntry]:
+def import_entries(
+    session: Session, entries: Sequence[Entry], figures: Mapping[str, Any]
+) -> list[ImportedEntry]:
     """Store the records of a file; a satellite that is known is never made twice.
 
     A catalogue number that is stored already gains the element set, unless it has one of
-    that epoch. Number 0 says nothing, so that there the name counts too.
+    that epoch. Number 0 says nothing, so that there the name counts too. New satellites get
+    these ``FIGURES``.
     """
-    batch = _Import(_known_satellites(session), _known_epochs(session))
+    batch = _Import(_known_satellites(session), _known_epochs(session), figures)
     results = [batch.take(entry) for entry in entries]
     session.add_all(batch.new_satellites)
     session.flush()  # the rows below refer to them
@@ -106,7 +111,13 @@ def import_entries(session: Session, entries: Sequence[Entry]) -> list[ImportedE
 class _Import:
     """What a file adds to what is known."""
 
-    def __init__(self, known: dict[tuple[int, str], SatelliteRow], epochs: set[tuple[str, int]]):
+    def __init__(
+        self,
+        known: dict[tuple[int, str], SatelliteRow],
+        epochs: set[tuple[str, int]],
+        figures: Mapping[str, Any],
+    ):
+        self._figures = figures
         self._known = known
         self._epochs = epochs
         self.new_satellites: list[SatelliteRow] = []
@@ -119,7 +130,7 @@ class _Import:
         key = _key(elements.norad_cat_id, name)
         status: Status = "elements_added"
         if key not in self._known:
-            self._known[key] = _new_satellite(name, elements.norad_cat_id)
+            self._known[key] = _new_satellite(name, elements.norad_cat_id, self._figures)
             self.new_satellites.append(self._known[key])
             status = "created"
         satellite = self._known[key]
@@ -141,15 +152,13 @@ def _element_set(satellite_id: str, epoch: datetime, orbit: dict[str, Any]) -> E
     )
 
 
-def _new_satellite(name: str, norad_cat_id: int) -> SatelliteRow:
+def _new_satellite(name: str, norad_cat_id: int, figures: Mapping[str, Any]) -> SatelliteRow:
     return SatelliteRow(
         id=new_id(),
         name=name,
         norad_cat_id=norad_cat_id,
-        agility=AgilityIn().model_dump(mode="json"),
-        sensor=SensorIn().model_dump(mode="json"),
-        resources="paper",
         created_at=datetime.now(UTC),
+        **figures,
     )
 
 

@@ -11,6 +11,7 @@ from service.wire.base import (
     TEXT,
     Body,
     Free,
+    Id,
     Instant,
     Json,
     Name,
@@ -190,24 +191,104 @@ class OrbitIn(Body):
         return self
 
 
-class SatelliteIn(OrbitIn):
-    """A satellite. Everything but its name and orbit defaults to the paper's spacecraft."""
+class OwnResources(Body):
+    """Battery and recorder as far as they differ from those of the spacecraft type."""
+
+    battery_capacity_wh: Positive | None = None
+    battery_min_fraction: Fraction | None = None
+    initial_battery_fraction: Fraction | None = None
+    sunpoint_power_w: NonNegative | None = None
+    idle_power_w: NonNegative | None = None
+    collect_power_w: NonNegative | None = None
+    contact_power_w: NonNegative | None = None
+    recorder_capacity_mbit: Positive | None = None
+    recorder_max_fraction: Fraction | None = None
+    initial_recorder_fraction: Fraction | None = None
+    collect_rate_mbit_s: NonNegative | None = None
+    downlink_rate_mbit_s: DownlinkRate | None = None
+    telemetry_rate_mbit_s: NonNegative | None = None
+    eclipse_aware: bool | None = None
+    sun_pointing: SunPointing | None = None
+    panel_angle_deg: PanelAngle | None = None
+
+
+OwnResourcesField = Annotated[
+    Annotated[Preset, Tag("preset")]
+    | Annotated[PresetResourcesIn, Tag("changed_preset")]
+    | Annotated[OwnResources, Tag("object")],
+    Discriminator(_form_of_resources),
+    AfterValidator(_shortest),
+]
+
+
+class Figures(Body):
+    """What a spacecraft can do, as far as it differs from its type."""
+
+    agility: AgilityIn = Field(
+        default_factory=AgilityIn, description="Settings that differ from those of the type."
+    )
+    sensor: SensorIn = Field(
+        default_factory=SensorIn, description="Settings that differ from those of the type."
+    )
+    resources: OwnResourcesField = Field(
+        default_factory=OwnResources,
+        description="Figures that differ from those of the type, or a preset: the paper's "
+        "normalised spacecraft with the rates of its text (paper) or of the authors' code "
+        '(paper_code); with fractions of your own as {"preset": "paper", '
+        '"battery_min_fraction": 0.2}.',
+    )
+
+
+def sent_by(body: Figures | Patch) -> Json:
+    """Return what a client has sent, and nothing else."""
+    sent = body.model_dump(mode="json", exclude_unset=True, exclude={"resources"})
+    if "resources" in body.model_fields_set:
+        resources = getattr(body, "resources", None)
+        if isinstance(resources, OwnResources):
+            resources = resources.model_dump(mode="json", exclude_none=True)
+        elif isinstance(resources, PresetResourcesIn):
+            resources = resources.model_dump(mode="json")
+        sent["resources"] = resources
+    return {name: value for name, value in sent.items() if value is not None}
+
+
+class SatelliteIn(OrbitIn, Figures):
+    """A satellite: a type of spacecraft in an orbit, and what is different about it."""
 
     name: Name
+    spacecraft: Id | None = Field(
+        None,
+        description="Id of a spacecraft type, or the name of one that is built in. By default "
+        "generic_optical, or the paper's where `resources` is a preset of the paper.",
+    )
+
+
+class TypedFigures(Body):
+    """All figures of a spacecraft; those left out are the paper's."""
+
+    spacecraft: Id | None = Field(
+        None, description="The type it was made from, id or built-in name."
+    )
     agility: AgilityIn = AgilityIn()
     sensor: SensorIn = SensorIn()
     resources: ResourcesField = Field(
-        "paper",
-        description="The satellite's own figures, or a preset: the paper's normalised spacecraft "
-        "with the rates of its text (paper) or of the authors' code (paper_code); with fractions "
-        'of your own as {"preset": "paper", "battery_min_fraction": 0.2}.',
+        "paper", description="The satellite's own figures, or a preset of the paper's spacecraft."
     )
+
+
+class WholeSatellite(OrbitIn, TypedFigures):
+    """A satellite with all its figures."""
+
+    name: Name
 
 
 class SatellitePatch(Patch):
     """What is to be different about a satellite; what is left out or null stays."""
 
     name: Name | None = None
+    spacecraft: Id | None = Field(
+        None, description="Gives it all figures of this type, before what stands beside it."
+    )
     agility: AgilityIn | None = Field(None, description="Only the settings given are changed.")
     sensor: SensorIn | None = Field(None, description="Only the settings given are changed.")
     resources: ResourcesField | None = Field(None, description="Replaces them as a whole.")
@@ -232,6 +313,9 @@ class SatelliteOut(Stored):
     epoch: Instant
     tle: tuple[str, ...] | None
     omm: Json | None
+    spacecraft: str | None = Field(
+        None, description="The type it was made from; its figures stay what they are."
+    )
     agility: AgilityIn
     sensor: SensorIn
     resources: ResourcesField

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import Annotated, Final, Literal
 
-from pydantic import BeforeValidator, FailFast, Field
+from pydantic import BeforeValidator, FailFast, Field, model_validator
 
 from service.wire.base import Body, Duration, Id, Instant, Name, Open, Stored, Wire
 from service.wire.pins import PinsIn, PlacedOutage
 from service.wire.places import GroundStationIn, TargetIn
 from service.wire.plan_before import ReplanOfFile
-from service.wire.satellites import Nadir, SatelliteIn
+from service.wire.satellites import Nadir, WholeSatellite
+from service.wire.spacecraft_types import BuiltIn, filled_file_satellite
 
 Dynamics = Literal["physical", "paper"]
 CollectAlignment = Literal["access", "horizon"]
@@ -138,8 +139,13 @@ class ScenarioIn(Question):
     ground_station_ids: list[Id] = Field([], max_length=10_000)
 
 
-class FileSatellite(SatelliteIn):
-    """A satellite of a scenario file."""
+class FileSatellite(WholeSatellite):
+    """A satellite of a scenario file.
+
+    Of a `spacecraft` that is built in, and in files of release 2, it takes what it leaves out.
+    """
+
+    spacecraft: BuiltIn | None = Field(None, description="A type that is built in.")
 
     id: Id | None = Field(None, description="Its name by default, made unique.")
 
@@ -159,6 +165,11 @@ class FileTarget(TargetIn):
 class ScenarioFile(Question):
     """A self-contained scenario, as ``GET /v1/scenarios/{id}?expand=true`` answers it."""
 
+    release: Literal[1, 2] = Field(
+        1,
+        description="Of the file's form. In files of the first release satellites have the paper's "
+        "figures where they leave them out, from the second on those of `generic_optical`.",
+    )
     # The first thing that is wrong is told: of a whole file of them each would take memory.
     satellites: Annotated[list[FileSatellite], FailFast()] = Field(min_length=1, max_length=10_000)
     targets: Annotated[list[FileTarget], FailFast()] = Field(min_length=1, max_length=1_000_000)
@@ -166,6 +177,18 @@ class ScenarioFile(Question):
     replan: ReplanOfFile | None = Field(
         None, description="The plan that this one goes on from, as a replan makes it."
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_types(cls, value: object) -> object:
+        """Give satellites the figures of their types; what is no such file is told later."""
+        if not isinstance(value, dict) or not isinstance(value.get("satellites"), list):
+            return value
+        satellites = [
+            filled_file_satellite(one, value.get("release")) if isinstance(one, dict) else one
+            for one in value["satellites"]
+        ]
+        return {**value, "satellites": satellites}
 
 
 class HorizonOut(Wire):

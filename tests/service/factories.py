@@ -31,8 +31,8 @@ def tle(norad_cat_id: int = 90001, **elements: Any) -> list[str]:
 
 
 def satellite(**fields: Any) -> dict[str, Any]:
-    """Return the body of a satellite."""
-    return {"name": "EYE-1", "tle": tle()} | fields
+    """Return the body of a satellite, by default with the figures of the paper's."""
+    return {"name": "EYE-1", "tle": tle(), "spacecraft": "paper"} | fields
 
 
 def target(**fields: Any) -> dict[str, Any]:

@@ -15,23 +15,21 @@ import { SchemaForm } from "./schema_form.js";
 export async function installSatelliteForm(onStored) {
   /** @type {{components: {schemas: Record<string, Schema>}}} */
   const { components } = await get("/openapi.json");
-  const part = (/** @type {string} */ name) => new SchemaForm(`one-${name}`, components.schemas[name] ?? {});
+  const part = (/** @type {string} */ name) =>
+    new SchemaForm(`one-${name}`, withoutDefaults(components.schemas[name] ?? {}));
   const agility = part("AgilityIn");
   const sensor = part("SensorIn");
-  const own = part("ResourcesIn");
+  const own = part("OwnResources");
   const name = h("input", { id: "one-name", maxlength: 200 });
   const tle = h("textarea", { id: "one-tle", rows: 3, spellcheck: "false" });
-  const preset = h(
+  /** @type {{items: {id: string, name: string}[]}} */
+  const { items } = await get("/v1/spacecraft?limit=500");
+  const type = h(
     "select",
-    { id: "one-preset" },
-    h("option", { value: "paper" }, "those of the paper"),
-    h("option", { value: "paper_code" }, "those of the paper's code"),
-    h("option", { value: "own" }, "own figures"),
+    { id: "one-type" },
+    ...items.map((one) => h("option", { value: one.id }, one.name)),
   );
-  const figures = h("div", { hidden: true }, own.element);
-  preset.addEventListener("change", () => {
-    figures.hidden = preset.value !== "own";
-  });
+  type.value = "generic_optical";
   const outcome = h("div", { role: "status" });
   const button = h("button", { type: "button", class: "needs-submit" }, "Store this satellite");
   button.addEventListener("click", () =>
@@ -39,9 +37,10 @@ export async function installSatelliteForm(onStored) {
       const body = {
         name: name.value.trim() || nameIn(tle.value),
         tle: linesOf(tle.value),
-        agility: agility.values(),
-        sensor: sensor.values(),
-        resources: preset.value === "own" ? own.values() : preset.value,
+        ...differing("agility", agility.values()),
+        ...differing("sensor", sensor.values()),
+        spacecraft: type.value,
+        ...differing("resources", own.values()),
       };
       /** @type {{id: string}} */
       const stored = await post("/v1/satellites", body);
@@ -51,13 +50,13 @@ export async function installSatelliteForm(onStored) {
   byId("satellite-form").append(
     field("one-name", "Name", name),
     field("one-tle", "TLE: line 1 and line 2", tle),
+    field("one-type", "Spacecraft: its figures hold where nothing is entered", type),
     h("h3", {}, "Agility"),
     agility.element,
     h("h3", {}, "Sensor"),
     sensor.element,
     h("h3", {}, "Battery and recorder"),
-    field("one-preset", "Figures", preset),
-    figures,
+    own.element,
     outcome,
     h("p", {}, button),
   );
@@ -70,6 +69,25 @@ export async function installSatelliteForm(onStored) {
  */
 function field(id, text, input) {
   return h("p", { class: "field" }, h("label", { for: id }, text), input);
+}
+
+/**
+ * What a field leaves out is the type's, not what the schema says of a satellite of the paper.
+ * @param {Schema} schema
+ * @returns {Schema}
+ */
+function withoutDefaults(schema) {
+  const named = Object.entries(schema.properties ?? {});
+  const properties = named.map(([name, one]) => [name, { ...one, default: "the type's" }]);
+  return { ...schema, properties: Object.fromEntries(properties) };
+}
+
+/**
+ * @param {string} part
+ * @param {Record<string, unknown>} values
+ */
+function differing(part, values) {
+  return Object.keys(values).length > 0 ? { [part]: values } : {};
 }
 
 /** @param {string} text */

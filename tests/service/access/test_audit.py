@@ -37,6 +37,10 @@ def new_station(client: httpx.Client) -> str:
     return post(client, "/v1/ground-stations", ground_station())
 
 
+def new_spacecraft(client: httpx.Client) -> str:
+    return post(client, "/v1/spacecraft", {"name": "Bus"})
+
+
 def new_catalog(client: httpx.Client) -> str:
     return post(client, "/v1/target-catalogs", {"name": "c", "targets": [target()]})
 
@@ -140,6 +144,13 @@ CHANGES: dict[tuple[str, str], tuple[Callable[[httpx.Client], str], str, str]] =
     ),
     ("delete", "/v1/satellites/{satellite_id}"): (
         delete(new_satellite, "/v1/satellites"), "delete", "satellite",
+    ),
+    ("post", "/v1/spacecraft"): (new_spacecraft, "create", "spacecraft"),
+    ("patch", "/v1/spacecraft/{spacecraft_id}"): (
+        rename(new_spacecraft, "/v1/spacecraft"), "update", "spacecraft",
+    ),
+    ("delete", "/v1/spacecraft/{spacecraft_id}"): (
+        delete(new_spacecraft, "/v1/spacecraft"), "delete", "spacecraft",
     ),
     ("post", "/v1/ground-stations"): (new_station, "create", "ground_station"),
     ("post", "/v1/ground-stations/import"): (import_stations, "create", "ground_station"),
