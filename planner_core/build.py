@@ -48,7 +48,7 @@ from planner_core.problem import (
 )
 from planner_core.problem.delivery import with_objective
 from planner_core.problem.pointing import Path, Pointing
-from planner_core.worth import quality_of, worth_of_collects
+from planner_core.valuation import worth_of_opportunities
 
 Longs = npt.NDArray[np.int64]
 Codes = npt.NDArray[np.int8]
@@ -315,7 +315,7 @@ def build_problem(scenario: Scenario, computed: ScenarioOpportunities, budget: B
         continuous_starts=has_continuous_starts(scenario),
         pointing=_pointing(scenario) if has_continuous_starts(scenario) else None,
         target_ids=tuple(target.id for target in scenario.targets),
-        worth=_worth(scenario, computed.opportunities),
+        worth=worth_of_opportunities(scenario, computed.opportunities),
         target_access=computed.target_access,
         station_ids=tuple(station.id for station in stations),
         station_antennas=np.array([s.antennas for s in stations], dtype=np.int32),
@@ -324,18 +324,6 @@ def build_problem(scenario: Scenario, computed: ScenarioOpportunities, budget: B
         satellites=tuple(satellites),
     )
     return pinned_problem(scenario, with_objective(problem, scenario.objective))
-
-
-def _worth(scenario: Scenario, table: Opportunities) -> Floats:
-    """Return what each opportunity earns alone; contacts nothing."""
-    target_reward = np.array([target.reward for target in scenario.targets], dtype=np.float64)
-    collects = np.flatnonzero(table.kind == COLLECT)
-    worth = np.zeros(len(table))
-    quality = quality_of(
-        scenario.quality, table.off_nadir_deg[collects], table.sun_elevation_deg[collects]
-    )
-    worth[collects] = worth_of_collects(target_reward, table.place[collects], quality)
-    return worth
 
 
 def has_continuous_starts(scenario: Scenario) -> bool:

@@ -3,9 +3,10 @@ r"""What images earn: the one place that says so.
 A target earns :math:`W_i(S)` from the images :math:`S` that a plan takes of it. Today every target
 is of the kind *once*: it earns the best worth of its images, :math:`W_i(S) = \max_{o \in S} v_o`,
 and a second image adds what it is better by. Each collect has its own :math:`v_o`, the reward of
-the target times the quality of the image, and of that the part that the objective lets it earn
-(``share_earned``). Which part that is hangs on the whole plan where delivery counts: solvers and
-bounds go by the most that it can be, the referee by what it is.
+the target when the collect starts, times the quality of the image and the probability that the sky
+is clear, and of that the part that the objective lets it earn (``share_earned``). Which part that
+is hangs on the whole plan where delivery counts: solvers and bounds go by the most that it can be,
+the referee by what it is.
 
 Bounds price targets. At a multiplier :math:`\lambda_i \ge 0` a path is paid
 :math:`w_o = \max(0, v_o - \lambda_i)` for a collect, and the target keeps its *surplus*
@@ -23,7 +24,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from planner_core.domain import Objective, Quality
+from planner_core.domain import Forecast, Objective, Quality, SkySeries
 
 Floats = npt.NDArray[np.float64]
 _Indices = npt.NDArray[np.integer]
@@ -50,9 +51,60 @@ def quality_of(
     return product
 
 
-def worth_of_collects(target_reward: Floats, target: _Indices, quality: Floats) -> Floats:
-    """Return what each collect earns alone: the reward of its target times its quality."""
-    return target_reward[target] * quality
+def clear_probability_of(
+    forecast: Forecast | None, target: _Indices, at_s: Floats, num_targets: int
+) -> Floats:
+    """Return how likely the sky over targets is clear; 1 without a forecast.
+
+    Parameters
+    ----------
+    target, at_s
+        Of each image, which target and when. Shape ``(n,)``.
+    """
+    if forecast is None:
+        return np.ones(len(target))
+    default = forecast.default_clear_probability
+    clear = np.full(len(target), np.nan if default is None else default)
+    series = np.full(num_targets, -1)
+    own_row = np.zeros(num_targets, dtype=np.int64)
+    for number, one in enumerate(forecast.series):
+        series[one.target] = number
+        own_row[one.target] = np.arange(len(one.target))
+    # Vendors' files may have as many series as targets: each is asked for its own images alone.
+    order = np.argsort(series[target], kind="stable")
+    cuts = np.searchsorted(series[target][order], np.arange(len(forecast.series) + 1))
+    for one, first, last in zip(forecast.series, cuts[:-1], cuts[1:], strict=True):
+        rows = order[first:last]
+        rows = rows[(at_s[rows] >= one.time_s[0]) & (at_s[rows] <= one.time_s[-1])]
+        clear[rows] = _between(one, own_row[target[rows]], at_s[rows])
+    return clear
+
+
+def _between(series: SkySeries, row: _Indices, at_s: Floats) -> Floats:
+    """Return the values of rows of a series at instants that it covers."""
+    time_s, values = series.time_s, series.clear_probability
+    if len(time_s) == 1:
+        return values[row, np.zeros(len(row), dtype=np.int64)]
+    left = np.clip(np.searchsorted(time_s, at_s, side="right") - 1, 0, len(time_s) - 2)
+    share = (at_s - time_s[left]) / (time_s[left + 1] - time_s[left])
+    return (1.0 - share) * values[row, left] + share * values[row, left + 1]
+
+
+def urgency_of(waited_s: Floats, half_life_s: Floats) -> Floats:
+    """Return what is left of rewards after some time; infinite half-lives leave them whole.
+
+    >>> urgency_of(np.array([0.0, 3600.0, 3600.0]), np.array([3600.0, 3600.0, np.inf]))
+    array([1. , 0.5, 1. ])
+    """
+    left: Floats = np.exp2(-waited_s / half_life_s)
+    return left
+
+
+def worth_of_collects(
+    target_reward: Floats, target: _Indices, urgency: Floats, quality: Floats, clear: Floats
+) -> Floats:
+    """Return what each collect earns alone: its target's reward times all that lessens it."""
+    return target_reward[target] * urgency * quality * clear
 
 
 def share_earned(objective: Objective, age_s: Floats) -> Floats:

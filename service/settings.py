@@ -61,6 +61,7 @@ class Settings(BaseSettings):
     max_stored_mb_per_tenant: float = Field(20_000.0, gt=0)
     webhook_private_addresses: bool = False
     idempotency_hours: float = Field(24.0, gt=0, le=8760)
+    retention_days: float | None = Field(None, gt=0, le=36500)
     otel: bool | None = None
     require_keys: bool = False
     api_keys: SecretStr = SecretStr("")

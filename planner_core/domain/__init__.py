@@ -32,6 +32,7 @@ Every type is immutable and checks itself when made.
 
 from __future__ import annotations
 
+from planner_core.domain.forecast import Forecast, SkySeries
 from planner_core.domain.horizon import Horizon
 from planner_core.domain.objective import Objective
 from planner_core.domain.outages import Outage
@@ -57,6 +58,7 @@ __all__ = [
     "CollectAlignment",
     "Curve",
     "Dynamics",
+    "Forecast",
     "GroundStation",
     "Horizon",
     "LookSide",
@@ -72,6 +74,7 @@ __all__ = [
     "Satellite",
     "Scenario",
     "Sensor",
+    "SkySeries",
     "SlewModel",
     "Stability",
     "SunPointing",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from datetime import datetime
 
@@ -22,6 +23,9 @@ class Target:
         Aware instants between which a collect lies as a whole. None for no limit.
     sensor_type
         Only satellites whose sensor has this very type may collect it. None for any satellite.
+    reward_half_life_s
+        The reward halves with every such time from ``release``, or the horizon's start, to the
+        start of the collect. None where it does not fall.
     """
 
     id: str
@@ -42,6 +46,7 @@ class Target:
     release: datetime | None = None
     due: datetime | None = None
     sensor_type: str | None = None
+    reward_half_life_s: float | None = None
     catalog_id: str | None = None
 
     def __post_init__(self) -> None:
@@ -63,6 +68,12 @@ class Target:
             "must be later than release",
         )
         check_sensor_type(self.sensor_type)
+        half_life_s = self.reward_half_life_s
+        require(
+            half_life_s is None or 0 < half_life_s < math.inf,
+            "reward_half_life_s",
+            "must be greater than 0",
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

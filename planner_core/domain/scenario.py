@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 
 from planner_core.domain.checks import require
+from planner_core.domain.forecast import Forecast
 from planner_core.domain.horizon import Horizon
 from planner_core.domain.objective import Objective
 from planner_core.domain.outages import Outage
@@ -34,6 +35,8 @@ class Scenario:
         from the horizon's start.
     quality
         What part of its target's reward an image earns, by how it is taken.
+    forecast
+        How likely the sky over each target is clear. None to take it for clear.
     objective
         What of that it earns when it is taken, and what when it is on the ground. Without
         resources there are no contacts, and images earn all when they are taken.
@@ -55,6 +58,7 @@ class Scenario:
     collect_alignment: CollectAlignment = "access"
     continuous_starts: bool = False
     quality: Quality = field(default_factory=Quality)
+    forecast: Forecast | None = None
     objective: Objective = field(default_factory=Objective)
     allow_old_elements: bool = False
     pins: Pins = field(default_factory=Pins)
@@ -80,6 +84,12 @@ class Scenario:
             not (self.quality and self.continuous_starts),
             "continuous_starts",
             "an image's quality would change with its start: use collect_spacing_s with quality",
+        )
+        # A start before its opportunity's would earn more than the bound knows of.
+        require(
+            not (self.continuous_starts and any(t.reward_half_life_s for t in self.targets)),
+            "continuous_starts",
+            "rewards would change with the starts: use collect_spacing_s with reward_half_life_s",
         )
         require(
             not (self.continuous_starts and any(s.agility.tracks for s in self.satellites)),
@@ -110,6 +120,8 @@ class Scenario:
                     f"The {what} id {value!r} appears twice.",
                     pointer=f"/{what}s/{position}/id",
                 )
+        if self.forecast is not None:
+            check_coverage(self.forecast, self.horizon, self.targets)
         satellite_ids = {s.id for s in self.satellites}
         station_ids = {g.id for g in self.ground_stations}
         self.pins.check(
@@ -149,6 +161,35 @@ class Scenario:
                     f"above {lowest_deg:g} deg at {station.name!r} it falls below the rate of "
                     "telemetry: raise the station's min_elevation_deg to where data comes down",
                 )
+
+
+def check_coverage(forecast: Forecast, horizon: Horizon, targets: Sequence[Target]) -> None:
+    """Refuse a forecast that has nothing to say of a time at which a target may be imaged.
+
+    Raises
+    ------
+    InvalidScenario
+        ``forecast_does_not_cover``, with the first target and the first instant of it.
+    """
+    if forecast.default_clear_probability is not None:
+        return
+    covered_s = forecast.coverage_s(len(targets))
+    for position, target in enumerate(targets):
+        first_s = 0.0 if target.release is None else max(0.0, horizon.offset_s(target.release))
+        last_s = horizon.duration_s
+        if target.due is not None:
+            last_s = min(last_s, horizon.offset_s(target.due))
+        begins_s, ends_s = covered_s[position]
+        if first_s >= last_s or (begins_s <= first_s and last_s <= ends_s):
+            continue
+        outside_s = first_s if first_s < begins_s else max(first_s, ends_s)
+        raise InvalidScenario(
+            "forecast_does_not_cover",
+            f"The forecast says nothing of target {target.id!r} at "
+            f"{horizon.instant(float(outside_s)):%Y-%m-%dT%H:%M:%SZ}; give the forecast a "
+            "default_clear_probability for what it does not cover.",
+            pointer=f"/targets/{position}",
+        )
 
 
 def _first_duplicate(ids: Iterable[str]) -> tuple[int, str] | None:

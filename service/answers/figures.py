@@ -10,7 +10,7 @@ import numpy as np
 from planner_core.domain import Scenario
 from planner_core.problem import Problem
 from planner_core.referee.replay import Collected, SatelliteTimeline, Timeline
-from service.wire.timelines import AgesOut, SatelliteTotalsOut
+from service.wire.timelines import AgesOut, ImageFiguresOut, SatelliteTotalsOut
 
 _QUANTILES = (0.5, 0.9, 1.0)
 
@@ -50,9 +50,9 @@ def on_board_mbit(scenario: Scenario, problem: Problem, on_board: Sequence[float
 
 
 def satellite_totals(
-    scenario: Scenario, problem: Problem, timeline: Timeline, index: int
+    scenario: Scenario, problem: Problem, timeline: Timeline, index: int, own: ImageFiguresOut
 ) -> SatelliteTotalsOut:
-    """Return what one satellite has a part in."""
+    """Return what one satellite has a part in; ``own`` is what there is to say of its images."""
     line: SatelliteTimeline = timeline.satellites[index]
     images = [image for image in timeline.collected.values() if image.satellite == index]
     capacity_mbit = scenario.satellites[index].resources.recorder_capacity_mbit
@@ -65,6 +65,7 @@ def satellite_totals(
         delivered=num_delivered(problem, images),
         age_s=ages_of(images),
         on_board_mbit_end=round(on_board * (capacity_mbit or 0.0), 6) if is_known else None,
+        **own.model_dump(),
     )
 
 

@@ -24,7 +24,7 @@ from planner_core.problem import (
 from planner_core.problem.plan import Action, Plan
 from planner_core.referee.plan_diff import PlannedAction
 from planner_core.spreadsheets import unguarded
-from service.scenarios.records import Checked, Record, Records, check, read_csv
+from service.files.records import Checked, Record, Records, check, read_csv
 from service.wire.base import Body, Id, Instant
 from service.wire.timelines import IDLE_MODES, Mode
 

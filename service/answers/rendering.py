@@ -11,6 +11,7 @@ import numpy as np
 
 from planner_core.build import view_at
 from planner_core.domain import Scenario
+from planner_core.mistakes import mistakes_of_accesses, usual_mistakes
 from planner_core.orbits.sgp4_record import GRAVITY
 from planner_core.problem import Problem
 from planner_core.problem.slew import TIME_TOLERANCE_S
@@ -24,8 +25,9 @@ from planner_core.referee.replay import (
     plan_sha256,
 )
 from planner_core.run import Judged
-from planner_core.worth import quality_of
+from planner_core.valuation import clear_probabilities
 from service.answers.figures import ages_of, num_delivered, on_board_mbit, satellite_totals
+from service.answers.image_figures import ImageFigures
 from service.wire.base import Json
 from service.wire.jobs import FiguresOut
 from service.wire.scenarios import HorizonOut
@@ -131,7 +133,12 @@ class Wording:
         """Return what the image of a reason would be worth, where that is less than the reward."""
         if row is None or self.problem.worth[row] >= reward:
             return ""
-        return f" An image then would be worth {self.problem.worth[row]:.3g} of {reward:g}."
+        sky = ""
+        if self.scenario.forecast is not None:
+            table, alone = self.problem.opportunities, np.array([row])
+            clear = float(clear_probabilities(self.scenario, table, alone)[0])
+            sky = f" (the sky is clear with {100.0 * clear:.0f} %)"
+        return f" An image then would be worth {self.problem.worth[row]:.3g} of {reward:g}{sky}."
 
     def _change(self, change: Change) -> Json:
         """Return a change in the words of a what-if's ``relax``."""
@@ -149,10 +156,7 @@ class Documents(Wording):
         super().__init__(judged.scenario, judged.problem, judged.timeline)
         self._judged = judged
         self._seen = _seen_at_own_starts(judged)
-        table = self.problem.opportunities
-        self._quality = quality_of(
-            judged.scenario.quality, table.off_nadir_deg, table.sun_elevation_deg
-        )
+        self._images = ImageFigures(judged, {p: seen[0] for p, seen in self._seen.items()})
 
     def head(self, *, job_id: str, scenario_sha256: str, solver: SolverUsed) -> TimelineHead:
         """Return the timeline but for its satellites."""
@@ -172,7 +176,11 @@ class Documents(Wording):
             validity=judged.timeline.validity,
             violations=[self.violation(v) for v in judged.timeline.violations],
             totals=self._totals(),
-            warnings=judged.opportunities.warnings,
+            warnings=(
+                *judged.opportunities.warnings,
+                *usual_mistakes(judged.scenario),
+                *mistakes_of_accesses(judged.scenario, judged.opportunities.opportunities),
+            ),
             models=ModelsOut(
                 gravity=GRAVITY,
                 nadir={s.id: s.sensor.nadir for s in self.scenario.satellites},
@@ -195,7 +203,9 @@ class Documents(Wording):
                 id=satellite.id,
                 name=satellite.name,
                 actions=(),
-                totals=satellite_totals(self.scenario, self.problem, judged.timeline, index),
+                totals=satellite_totals(
+                    self.scenario, self.problem, judged.timeline, index, self._images.of(index)
+                ),
                 eclipses=[HorizonOut(start=self.instant(a), end=self.instant(b)) for a, b in gaps],
                 resources=None
                 if line.resources is None
@@ -239,29 +249,23 @@ class Documents(Wording):
             downlinked_fraction=sum(timeline.downlinked) if use_resources else None,
             battery_min_fraction=timeline.battery_min,
             recorder_max_fraction=timeline.recorder_max,
-            quality_mean=self._quality_mean(),
+            **self._images.of().model_dump(),
             delivered=num_delivered(self.problem, timeline.collected.values()),
             age_s=ages_of(timeline.collected.values()),
             on_board_mbit_end=on_board_mbit(self.scenario, self.problem, timeline.on_board),
         )
 
-    def _quality_mean(self) -> float | None:
-        """Return the mean quality of the images that count, one of each target."""
-        judged = self._judged
-        actions = judged.solution.plan.actions
-        rows = [actions[c.position].opportunity for c in judged.timeline.collected.values()]
-        return round(float(self._quality[rows].mean()), 9) if rows else None
-
     def _action(self, action_id: str, action: JudgedAction) -> ActionOut:
         table, row, down_s = self.problem.opportunities, action.opportunity, action.delivered_s
-        target_id = station = off_nadir_deg = azimuth_deg = quality = None
+        target_id = station = off_nadir_deg = azimuth_deg = quality = clear = None
         if row is not None:
             own = table.off_nadir_deg[row], table.azimuth_deg[row]
             off_nadir_deg, azimuth_deg = self._seen.get(action.position, own)
             place = int(table.place[row])
             if action.mode == "collect":
                 target_id = self.scenario.targets[place].id
-                quality = self._quality[row]
+                quality = self._images.quality[row]
+                clear = None if self._images.clear is None else self._images.clear[row]
             else:
                 station = self.scenario.ground_stations[place]
         return ActionOut(
@@ -281,6 +285,7 @@ class Documents(Wording):
             reward=action.reward,
             worth=action.worth,
             quality=_rounded(quality, 9),
+            clear_probability=_rounded(clear, 9),
             delivered_at=None if down_s is None else self.instant(down_s),
             age_s=None if down_s is None else round(down_s - action.end_s, 3),
             battery_fraction_end=_rounded(action.battery_end, 9),

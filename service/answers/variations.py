@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from planner_core.budget import Budget
 from planner_core.build import ScenarioOpportunities, build_problem, compute_opportunities
-from planner_core.domain import Agility, Resources, Scenario
+from planner_core.domain import Agility, Quality, Resources, Scenario
 from planner_core.errors import InvalidScenario
 from planner_core.pins import PinnedAction, Pins
 from planner_core.problem.plan import Plan
@@ -123,6 +123,8 @@ def _geometry(scenario: Scenario) -> Scenario:
     return replace(
         scenario,
         pins=Pins(),
+        quality=Quality(),
+        forecast=None,
         satellites=tuple(
             replace(
                 satellite,
@@ -131,7 +133,9 @@ def _geometry(scenario: Scenario) -> Scenario:
             )
             for satellite in scenario.satellites
         ),
-        targets=tuple(replace(target, reward=1.0) for target in scenario.targets),
+        targets=tuple(
+            replace(target, reward=1.0, reward_half_life_s=None) for target in scenario.targets
+        ),
     )
 
 

@@ -63,9 +63,12 @@ class _Route:
     path_format: str
 
 
-def require_light(request: Request, num_targets: int, num_satellites: int) -> None:
+def require_light(
+    request: Request, num_targets: int, num_satellites: int, *, has_forecast: bool = False
+) -> None:
     """Leave this request to the process for heavy ones, if there is one and it is large."""
-    if request.scope.get(_IS_LIGHT) and num_targets + 10 * num_satellites > LIGHT_TARGETS:
+    is_large = has_forecast or num_targets + 10 * num_satellites > LIGHT_TARGETS
+    if request.scope.get(_IS_LIGHT) and is_large:
         raise Heavy
 
 
@@ -181,7 +184,11 @@ def _is_heavy(request: Request) -> bool:
     length = request.headers.get("content-length", "0")
     if "transfer-encoding" in request.headers or not length.isdecimal():
         return True
-    return int(length) > LIGHT_BYTES or _HEAVY.fullmatch(request.scope["path"]) is not None
+    path = request.scope["path"]
+    # Decoders of binary files work where memory is limited, however short the file.
+    if request.method == "POST" and path == "/v1/forecasts":
+        return True
+    return int(length) > LIGHT_BYTES or _HEAVY.fullmatch(path) is not None
 
 
 def _target(scope: Scope) -> httpcore.URL:

@@ -11,8 +11,8 @@ from sqlalchemy.orm import Session
 
 from service.api import ask_again
 from service.api import job_intake as intake
-from service.api.conditional import NOT_MODIFIED, created, unless_known
-from service.api.deps import CallDep
+from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
+from service.api.deps import Call, CallDep
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
 from service.api.paging import PagingDep, newest_first
@@ -21,7 +21,7 @@ from service.jobs import submission
 from service.problems.kinds import ServiceError
 from service.scenarios.translate import inside
 from service.stores import comparison_store as store
-from service.stores import job_store
+from service.stores import deletion, job_store
 from service.stores.comparison_store import Run
 from service.wire.base import Listed
 from service.wire.jobs import (
@@ -93,12 +93,26 @@ def list_comparisons(call: CallDep, paging: PagingDep) -> Listed[ComparisonOut]:
 def get_comparison(comparison_id: str, call: CallDep) -> ComparisonOut | Response:
     """Return the table as it stands: a line fills when its job has an answer."""
     with call.database.reading() as session:
-        row = session.get(ComparisonRow, comparison_id)
-        if row is None or call.caller.visible_owner not in (None, row.tenant):
-            raise ServiceError("not_found", f"There is no comparison {comparison_id!r}.")
-        shown = _shown(session, [row])[0]
+        shown = _shown(session, [_find(session, comparison_id, call)])[0]
     _describe(call.response, shown)
     return unless_known(call.request, call.response, shown)
+
+
+@router.delete("/{comparison_id}", status_code=204, responses=problem_responses(404, 412))
+def delete_comparison(comparison_id: str, call: CallDep) -> None:
+    """Delete a comparison. Its runs stay jobs like any other."""
+    with call.database.transaction() as session:
+        row = _find(session, comparison_id, call)
+        require_match(call.request, lambda: _shown(session, [row])[0])
+        deletion.delete_comparison(session, comparison_id)
+        call.audit.record(session, "delete", "comparison", comparison_id)
+
+
+def _find(session: Session, comparison_id: str, call: Call) -> ComparisonRow:
+    row = session.get(ComparisonRow, comparison_id)
+    if row is None or call.caller.visible_owner not in (None, row.tenant):
+        raise ServiceError("not_found", f"There is no comparison {comparison_id!r}.")
+    return row
 
 
 def _describe(response: Response, shown: ComparisonOut) -> None:

@@ -33,11 +33,14 @@ def require_match(request: Request, current: Callable[[], BaseModel]) -> None:
 
     Call it in the transaction of the change, with the row locked.
     """
+    if request.headers.get("if-match") is not None:
+        require_match_of(request, etagged(current()))
+
+
+def require_match_of(request: Request, etag: str) -> None:
+    """Refuse a change (412) where ``If-Match`` names another state than that of this ETag."""
     asked = request.headers.get("if-match")
-    if asked is None:
-        return
-    etag = etagged(current())
-    if not matches_strongly(asked, etag):
+    if asked is not None and not matches_strongly(asked, etag):
         raise ServiceError(
             "precondition_failed",
             f"If-Match is {asked[:200]}, but this is {etag} by now: somebody has changed it.",

@@ -112,6 +112,11 @@ FILES: Final[dict[tuple[str, str], Any]] = {
     ("/v1/ground-stations/import", "text/csv"): (
         "name,lat_deg,lon_deg,min_elevation_deg\nTromsø,69.66,18.94,5\n"
     ),
+    ("/v1/forecasts", "text/csv"): (
+        "time,lat_deg,lon_deg,clear_probability\n"
+        "2026-01-31T00:00:00Z,46,7,0.8\n2026-01-31T00:00:00Z,46,8,0.7\n"
+        "2026-01-31T00:00:00Z,47,7,0.5\n2026-01-31T00:00:00Z,47,8,0.4\n"
+    ),
     ("/v1/target-catalogs", "application/geo+json"): _FEATURES,
     ("/v1/target-catalogs", "text/csv"): "id,lat_deg,lon_deg,reward\nbern,46.948,7.447,1\n",
 }

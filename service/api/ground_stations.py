@@ -15,14 +15,15 @@ from planner_core.errors import Fault
 from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
 from service.api.deps import CallDep, DatabaseDep, RawBodyDep, require_media_type
 from service.api.errors import problem_responses
+from service.api.filters import NameQuery, by_name
 from service.api.idempotency import OnceDep
 from service.api.imports import OnError, OnErrorQuery, body_schemas, imported, refuse_if_asked
 from service.api.paging import PagingDep, newest_first, size_of
 from service.db.ids import new_id
 from service.db.rows import GroundStationRow
+from service.files.records import Checked, check, read_csv, read_geojson
 from service.problems.faults import faults_of_validation, refuse
 from service.problems.kinds import ServiceError
-from service.scenarios.records import Checked, check, read_csv, read_geojson
 from service.scenarios.translate import ground_station_from
 from service.wire.base import Listed
 from service.wire.imports import Imported
@@ -100,9 +101,12 @@ def read_stations(kind: str, data: bytes) -> tuple[list[Checked[GroundStationIn]
 
 
 @router.get("")
-def list_ground_stations(database: DatabaseDep, paging: PagingDep) -> Listed[GroundStationOut]:
+def list_ground_stations(
+    database: DatabaseDep, paging: PagingDep, name: NameQuery = None
+) -> Listed[GroundStationOut]:
     """List the ground stations, newest first."""
     query = sa.select(GroundStationRow).where(GroundStationRow.deleted_at.is_(None))
+    query = by_name(query, GroundStationRow.body["name"].as_string(), name)
     with database.reading() as session:
         weight = size_of(GroundStationRow.body)
         page = newest_first(session, query, GroundStationRow.id, paging, weight)

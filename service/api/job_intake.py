@@ -79,8 +79,12 @@ def freeze(call: Call, body: ScenarioIn) -> FrozenScenario:
     """Return a question over what is stored, ready to be stored: here, where it is not large."""
     with call.database.reading() as session:
         num_targets = freezing.num_targets(session, body.target_catalog_ids)
-    bulkhead.require_light(call.request, num_targets, len(body.satellite_ids))
-    return freezing.freeze(call.database, body, call.settings.scenario_limits)
+    has_forecast = body.forecast_id is not None
+    bulkhead.require_light(
+        call.request, num_targets, len(body.satellite_ids), has_forecast=has_forecast
+    )
+    limits = call.settings.scenario_limits
+    return freezing.freeze(call.database, body, limits, call.caller.visible_owner)
 
 
 def save(

@@ -9,10 +9,11 @@ from fastapi import APIRouter, Depends, Query, Response
 from sqlalchemy.exc import SQLAlchemyError
 
 from service.api import job_intake as intake
-from service.api.conditional import NOT_MODIFIED
+from service.api.conditional import NOT_MODIFIED, require_match_of
 from service.api.deps import CallDep, own_job_only
 from service.api.errors import problem_responses
 from service.api.etags import matches
+from service.api.filters import StoredDep
 from service.api.idempotency import OnceDep
 from service.api.job_shapes import etag_of_job, shown
 from service.api.job_wait import VersionsDep, wait_for_change
@@ -21,8 +22,8 @@ from service.db.rows import JobRow
 from service.jobs import lease, submission
 from service.jobs.queue import JobQueue
 from service.problems.kinds import ServiceError
+from service.stores import deletion, scenario_store
 from service.stores import job_store as store
-from service.stores import scenario_store
 from service.wire.base import Listed
 from service.wire.jobs import JobIn, JobOut, JobState
 
@@ -64,6 +65,7 @@ def create_job(body: JobIn, call: CallDep, once: OnceDep) -> JobOut:
 def list_jobs(
     call: CallDep,
     paging: PagingDep,
+    stored: StoredDep,
     state: Annotated[JobState | None, Query(description="Only jobs in this state.")] = None,
     solver: Annotated[str | None, Query(description="Only jobs of this solver.")] = None,
     scenario_id: Annotated[str | None, Query(description="Only jobs of this scenario.")] = None,
@@ -77,6 +79,7 @@ def list_jobs(
         label=label,
         tenant=call.caller.visible_owner,
     )
+    query = stored.narrow(query, JobRow.created_at)
     with call.database.reading() as session:
         page = newest_first(session, query, JobRow.id, paging, size_of(JobRow.change))
         hashes = store.scenario_hashes(session, page.rows)
@@ -131,6 +134,16 @@ def cancel_job(job_id: str, call: CallDep) -> JobOut:
         _forget(intake.queue_of(call.request), job)
     intake.describe(call.response, job)
     return answer
+
+
+@router.delete("/{job_id}", status_code=204, responses=problem_responses(404, 409, 412))
+def delete_job(job_id: str, call: CallDep) -> None:
+    """Delete a finished job with its answer, for good: not one that a plan or a comparison has."""
+    with call.database.transaction() as session:
+        job = intake.find_job(session, job_id)
+        require_match_of(call.request, etag_of_job(job))
+        deletion.delete_job(session, job)
+        call.audit.record(session, "delete", "job", job_id)
 
 
 @router.post("/{job_id}/rerun", status_code=202, responses=problem_responses(404, 503))

@@ -33,7 +33,7 @@ from service.plans import lifecycle
 from service.plans import store as plan_store
 from service.problems.faults import refuse
 from service.problems.kinds import ServiceError
-from service.stores import job_store
+from service.stores import deletion, job_store
 from service.webhooks import outbox
 from service.wire.base import Listed, parse_instant, read
 from service.wire.plans import (
@@ -124,6 +124,16 @@ def get_plan(plan_id: str, call: CallDep) -> PlanOut | Response:
     with call.database.reading() as session:
         shown = _shown(session, find_plan(session, plan_id, call.caller))
     return unless_known(call.request, call.response, shown)
+
+
+@router.delete("/{plan_id}", status_code=204, responses=problem_responses(404, 409, 412))
+def delete_plan(plan_id: str, call: CallDep) -> None:
+    """Delete a plan for good: not an approved or published one, nor one that has changes."""
+    with call.database.transaction() as session:
+        plan = find_plan(session, plan_id, call.caller)
+        require_match(call.request, lambda: _shown(session, plan))
+        deletion.delete_plan(session, plan)
+        call.audit.record(session, "delete", "plan", plan_id)
 
 
 @router.post("/{plan_id}/transitions", responses=problem_responses(403, 404, 409, 412, 422))

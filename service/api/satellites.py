@@ -15,6 +15,7 @@ from planner_core.orbits.ingest import read_elements
 from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
 from service.api.deps import CallDep, DatabaseDep, RawBodyDep, require_media_type
 from service.api.errors import problem_responses
+from service.api.filters import NameQuery, by_name
 from service.api.idempotency import OnceDep
 from service.api.imports import OnError, OnErrorQuery, body_schemas, imported, refuse_if_asked
 from service.api.paging import PagingDep, newest_first
@@ -109,9 +110,10 @@ def list_satellites(
     norad_cat_id: Annotated[
         int | None, Query(ge=0, le=999_999_999, description="Only this number.")
     ] = None,
+    name: NameQuery = None,
 ) -> Listed[SatelliteOut]:
     """List the satellites, newest first."""
-    query = store.alive()
+    query = by_name(store.alive(), SatelliteRow.name, name)
     if norad_cat_id is not None:
         query = query.where(SatelliteRow.norad_cat_id == norad_cat_id)
     with database.reading() as session:

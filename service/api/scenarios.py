@@ -15,17 +15,18 @@ from planner_core.orbits.places import View
 from planner_core.problem import COLLECT, CONTACT
 from service.access.callers import Caller
 from service.api import job_intake as intake
-from service.api.conditional import NOT_MODIFIED, created, unless_known
+from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
 from service.api.deps import CallDep
 from service.api.errors import problem_responses
 from service.api.etags import etag_of, matches
+from service.api.filters import NameQuery, StoredDep, by_name
 from service.api.idempotency import OnceDep
 from service.api.paging import PagingDep, newest_first, size_of
 from service.db.rows import ScenarioRow
 from service.problems.kinds import ServiceError
 from service.scenarios.opportunities import Described, OpportunityReader
 from service.scenarios.stored_question import StoredQuestion
-from service.stores import scenario_store
+from service.stores import deletion, scenario_store
 from service.wire.base import Listed
 from service.wire.scenarios import (
     Kind,
@@ -60,13 +61,16 @@ def create_scenario(body: ScenarioIn, call: CallDep, once: OnceDep) -> ScenarioO
 
 
 @router.get("")
-def list_scenarios(call: CallDep, paging: PagingDep) -> Listed[ScenarioSummary]:
+def list_scenarios(
+    call: CallDep, paging: PagingDep, stored: StoredDep, name: NameQuery = None
+) -> Listed[ScenarioSummary]:
     """List the scenarios, newest first, without their pins and outages.
 
     Those that were sent with a job, or made by a what-if, are their owner's and not listed for
     others; the scope `admin` sees all.
     """
     query = sa.select(ScenarioRow).where(scenario_store.seen_by(call.caller.visible_owner))
+    query = by_name(stored.narrow(query, ScenarioRow.created_at), ScenarioRow.name, name)
     with call.database.reading() as session:
         weight = size_of(ScenarioRow.summary)
         page = newest_first(session, query, ScenarioRow.id, paging, weight)
@@ -100,6 +104,16 @@ def _file(request: Request, row: ScenarioRow) -> Response:
     if matches(request.headers.get("if-none-match"), etag):
         return Response(status_code=304, headers={"ETag": etag})
     return Response(text, media_type="application/json", headers={"ETag": etag})
+
+
+@router.delete("/{scenario_id}", status_code=204, responses=problem_responses(404, 409, 412))
+def delete_scenario(scenario_id: str, call: CallDep) -> None:
+    """Delete a scenario for good, with its opportunities: not one that jobs have."""
+    with call.database.transaction() as session:
+        row = _find(session, scenario_id, call.caller)
+        require_match(call.request, lambda: _shown(row))
+        deletion.delete_scenario(session, row)
+        call.audit.record(session, "delete", "scenario", scenario_id)
 
 
 @router.get("/{scenario_id}/opportunities", responses=problem_responses(404, 503))

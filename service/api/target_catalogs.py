@@ -16,13 +16,14 @@ from planner_core.errors import Fault
 from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
 from service.api.deps import CallDep, DatabaseDep, RawBodyDep, require_media_type
 from service.api.errors import problem_responses
+from service.api.filters import NameQuery, by_name
 from service.api.idempotency import OnceDep
 from service.api.paging import PagingDep, newest_first
 from service.db.ids import new_id
 from service.db.rows import TargetCatalogRow, TargetRow
+from service.files.records import Record, Records, check, first_of_each, read_csv, read_geojson
 from service.problems.faults import faults_of_validation, refuse
 from service.problems.kinds import ServiceError
-from service.scenarios.records import Record, Records, check, first_of_each, read_csv, read_geojson
 from service.scenarios.translate import target_from
 from service.wire.base import Body, Listed, Name
 from service.wire.places import MAX_TARGETS, CreatedCatalog, TargetCatalogOut, TargetIn
@@ -163,9 +164,12 @@ def _add(session: Session, name: str, targets: Sequence[TargetIn]) -> TargetCata
 
 
 @router.get("")
-def list_target_catalogs(database: DatabaseDep, paging: PagingDep) -> Listed[TargetCatalogOut]:
+def list_target_catalogs(
+    database: DatabaseDep, paging: PagingDep, name: NameQuery = None
+) -> Listed[TargetCatalogOut]:
     """List the catalogues, newest first."""
     query = sa.select(TargetCatalogRow).where(TargetCatalogRow.deleted_at.is_(None))
+    query = by_name(query, TargetCatalogRow.name, name)
     with database.reading() as session:
         page = newest_first(session, query, TargetCatalogRow.id, paging)
     return Listed(items=[_shown(row) for row in page.rows], next=page.next)

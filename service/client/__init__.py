@@ -16,6 +16,7 @@ from service.client.errors import (
 )
 from service.client.jobs import Job
 from service.client.webhooks import Webhook
+from service.wire.forecasts import ForecastOut as Forecast
 from service.wire.imports import Imported as Import
 from service.wire.jobs import ComparedRun
 from service.wire.jobs import ComparisonOut as Comparison
@@ -57,6 +58,7 @@ __all__ = [
     "Execution",
     "Explanation",
     "Fault",
+    "Forecast",
     "GroundStation",
     "Import",
     "Job",

@@ -13,6 +13,7 @@ import httpx
 
 import planner_core
 from service.client.comparisons import Comparisons
+from service.client.forecasts import Forecasts
 from service.client.ground_stations import GroundStations
 from service.client.jobs import Jobs
 from service.client.outages import Outages
@@ -49,6 +50,7 @@ class Client:
     spacecraft: SpacecraftTypes
     outages: Outages
     target_catalogs: TargetCatalogs
+    forecasts: Forecasts
     scenarios: Scenarios
     jobs: Jobs
     comparisons: Comparisons
@@ -80,6 +82,7 @@ class Client:
         self.spacecraft = SpacecraftTypes(self._transport)
         self.outages = Outages(self._transport)
         self.target_catalogs = TargetCatalogs(self._transport)
+        self.forecasts = Forecasts(self._transport)
         self.scenarios = Scenarios(self._transport)
         self.jobs = Jobs(self._transport)
         self.comparisons = Comparisons(self._transport)

@@ -54,6 +54,10 @@ class Comparisons:
         """Return the table as it stands."""
         return self._transport.get(path_of("comparisons", comparison_id), Comparison)
 
+    def delete(self, comparison_id: str) -> None:
+        """Delete a comparison; its jobs stay."""
+        self._transport.delete(path_of("comparisons", comparison_id))
+
     def wait(self, comparison_id: str, timeout_s: float | None = None) -> Comparison:
         """Return the table once every job has ended, well or not.
 

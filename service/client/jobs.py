@@ -162,6 +162,10 @@ class Jobs:
         answer = self._transport.request("POST", path_of("jobs", job_id, "cancel"))
         return self._read(answer.text, answer.headers.get("etag"))
 
+    def delete(self, job_id: str) -> None:
+        """Delete a finished job with its answer, for good."""
+        self._transport.delete(path_of("jobs", job_id))
+
     def rerun(self, job_id: str, *, idempotency_key: str | None = None) -> Job:
         """Queue the same question again."""
         path = path_of("jobs", job_id, "rerun")

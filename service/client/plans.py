@@ -55,6 +55,10 @@ class Plans:
         """Return one plan."""
         return self._transport.get(path_of("plans", plan_id), Plan)
 
+    def delete(self, plan_id: str) -> None:
+        """Delete a plan that is neither approved nor published, for good."""
+        self._transport.delete(path_of("plans", plan_id))
+
     def approve(
         self,
         plan_id: str,

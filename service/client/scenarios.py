@@ -58,6 +58,10 @@ class Scenarios:
         """Return one scenario."""
         return self._transport.get(path_of("scenarios", scenario_id), Scenario)
 
+    def delete(self, scenario_id: str) -> None:
+        """Delete a scenario that no job has, for good."""
+        self._transport.delete(path_of("scenarios", scenario_id))
+
     def file(self, scenario_id: str) -> Json:
         """Return the self-contained scenario file, which ``slewline solve`` takes too."""
         path = path_of("scenarios", scenario_id)

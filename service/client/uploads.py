@@ -14,9 +14,10 @@ MEDIA_TYPES: Final = {
     "json": "application/json",
     "geojson": "application/geo+json",
     "csv": "text/csv",
+    "netcdf": "application/netcdf",
     "xml": "application/xml",
 }
-_SUFFIXES: Final = {".txt": "tle", ".2le": "tle", ".3le": "tle"}
+_SUFFIXES: Final = {".txt": "tle", ".2le": "tle", ".3le": "tle", ".nc": "netcdf", ".nc4": "netcdf"}
 
 
 def upload(source: Source, form: str | None) -> tuple[bytes, dict[str, str]]:

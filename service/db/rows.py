@@ -156,6 +156,26 @@ class ScenarioOwnerRow(Row):
     owner: Mapped[str] = mapped_column(sa.String(64), primary_key=True)
 
 
+class ForecastRow(Row):
+    """A forecast of clear skies; ``block`` is what it says, compressed (`forecasts.fields`).
+
+    ``summary`` is what readers are told of its size and of how it was read.
+    """
+
+    __tablename__ = "forecast"
+
+    id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
+    owner: Mapped[str] = mapped_column(sa.String(64), index=True)
+    name: Mapped[str]
+    sha256: Mapped[str] = mapped_column(sa.String(64))
+    first_at: Mapped[datetime]
+    last_at: Mapped[datetime]
+    default_clear_probability: Mapped[float | None] = mapped_column(sa.Double)
+    summary: Mapped[Json]
+    created_at: Mapped[datetime]
+    block: Mapped[bytes] = mapped_column(sa.LargeBinary, deferred=True)
+
+
 class OpportunitySetRow(Row):
     """The opportunities of a scenario, computed once, as a compressed columnar block."""
 

@@ -22,6 +22,7 @@ from service.wire.instants import instant_text
 TRACK_STEP_S = 30.0
 _DECIMALS = 4  # of a degree: eleven metres
 _CLASS_KM = 10.0
+_OF_IMAGES = ("worth", "quality", "clear_probability")
 _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 _MILLISECOND: Final = timedelta(milliseconds=1)
 
@@ -90,21 +91,30 @@ def _targets(answered: Answered) -> Iterator[Document]:
                 "start": start,
                 "end": end,
                 "reward": target.reward,
+                **spans.image_of(told["action_id"]),
             },
         )
 
 
 class _Spans:
-    """When each action begins and ends: 16 bytes of each, for there may be very many."""
+    """When each action begins and ends, and how good its image is.
+
+    As numbers alone, for there may be very many.
+    """
 
     def __init__(self, answered: Answered):
         spans = array("q")
+        images = array("d")
         # Action ids count through all satellites: a1, a2, ...
         for _, action in answered.each_action():
             for name in ("start", "end"):
                 moment = datetime.fromisoformat(action[name])
                 spans.append((moment - _EPOCH) // _MILLISECOND)
+            # Answers of the first release say nothing of it.
+            values = (action.get(name) for name in _OF_IMAGES)
+            images.extend(math.nan if value is None else value for value in values)
         self._spans = spans
+        self._images = images
 
     def of(self, action_id: str | None) -> tuple[str | None, str | None]:
         """Return the instants of an action, None of none."""
@@ -113,6 +123,17 @@ class _Spans:
         at = 2 * (int(action_id.removeprefix("a")) - 1)
         start, end = (_EPOCH + ms * _MILLISECOND for ms in self._spans[at : at + 2])
         return instant_text(start), instant_text(end)
+
+    def image_of(self, action_id: str | None) -> Document:
+        """Return how good the image of an action is; null where nothing is known of it."""
+        if action_id is None:
+            return dict.fromkeys(_OF_IMAGES)
+        at = len(_OF_IMAGES) * (int(action_id.removeprefix("a")) - 1)
+        values = self._images[at : at + len(_OF_IMAGES)]
+        return {
+            name: None if math.isnan(value) else value
+            for name, value in zip(_OF_IMAGES, values, strict=True)
+        }
 
 
 def _stations(answered: Answered) -> Iterator[Document]:

@@ -21,7 +21,7 @@ COLUMNS = (
     "target_id", "station_id", "opportunity_id", "off_nadir_deg", "azimuth_deg",
     "slew_angle_deg", "slew_needed_s", "slew_available_s", "reward",
     "battery_fraction_end", "recorder_fraction_end", "worth", "quality", "station_name",
-    "delivered_at", "age_s",
+    "delivered_at", "age_s", "clear_probability",
 )  # fmt: skip
 
 
@@ -34,8 +34,9 @@ def _lines(answered: Answered) -> Iterator[str]:
     yield _line(COLUMNS)
     for satellite, action in answered.each_action():
         station_name = guarded(_station_name(answered, action))
-        delivery = action.get("delivered_at"), action.get("age_s")
-        yield _line((*_cells(satellite, action), station_name, *delivery))
+        # Answers of earlier releases do not have them.
+        behind = (action.get(name) for name in ("delivered_at", "age_s", "clear_probability"))
+        yield _line((*_cells(satellite, action), station_name, *behind))
 
 
 def _station_name(answered: Answered, action: Document) -> str | None:

@@ -30,6 +30,7 @@ from service.jobs.plan_job import Parcel, PlanAnswer, PlanRequest
 from service.jobs.queue import DbosConsumer, DbosQueue
 from service.jobs.reconcile import Reconciler
 from service.jobs.renewal import Renewal
+from service.jobs.retention import Retention
 from service.jobs.runner import Abandoned, Limits, Lost, Order, Runner, Work
 from service.process import tracing
 from service.process.logs import about_job
@@ -71,6 +72,7 @@ class Worker:
             lease_s=settings.lease_s,
             max_attempts=settings.max_attempts,
         )
+        self._retention = Retention(self._database, settings.retention_days)
         self._courier = Courier(
             self._database,
             look_every_s=_COURIER_LOOKS_EVERY_S,
@@ -237,6 +239,7 @@ class Worker:
                 mine = sa.update(WorkerRow).where(WorkerRow.id == self.id)
                 session.execute(mine.values(seen_at=utc_now()))
             self._reconciler.run()
+            self._retention.run()
         except Exception:
             log.warning("could not look for stranded jobs", exc_info=True)
 

@@ -16,10 +16,12 @@ from sqlalchemy.orm import Session
 
 from planner_core.build import check_element_age, check_propagation, orbit_warnings
 from planner_core.errors import InvalidScenario, PlannerError
+from planner_core.mistakes import usual_mistakes
 from service.db.ids import new_id
 from service.db.rows import GroundStationRow, SatelliteRow, ScenarioRow, TargetCatalogRow, TargetRow
 from service.db.session import Database
 from service.problems.faults import faults_of_validation
+from service.scenarios.forecast_inputs import find_forecast, frozen_forecast
 from service.scenarios.pin_inputs import refuse_duplicate_pins
 from service.scenarios.scenario_limits import ScenarioLimits
 from service.scenarios.translate import (
@@ -63,8 +65,15 @@ class FrozenScenario:
     summary: dict[str, Any]
 
 
-def freeze(database: Database, body: ScenarioIn, limits: ScenarioLimits) -> FrozenScenario:
+def freeze(
+    database: Database, body: ScenarioIn, limits: ScenarioLimits, owner: str | None
+) -> FrozenScenario:
     """Return the frozen form of a question over what is stored. Stores nothing.
+
+    Parameters
+    ----------
+    owner
+        Whose forecasts it may name; None for anybody's.
 
     Raises
     ------
@@ -72,7 +81,8 @@ def freeze(database: Database, body: ScenarioIn, limits: ScenarioLimits) -> Froz
         ``unknown_satellite``, ``unknown_target_catalog``, ``unknown_ground_station``,
         ``duplicate_satellite_id``, ``duplicate_target_catalog_id``, ``duplicate_target_id``,
         ``duplicate_ground_station_id``, ``horizon_inverted``, ``horizon_too_long``,
-        ``scenario_too_large``, ``duplicate_pin``; with a pointer into the body.
+        ``scenario_too_large``, ``duplicate_pin``, ``unknown_forecast``,
+        ``forecast_does_not_cover``; with a pointer into the body.
     PropagationFailed
         SGP4 cannot carry a satellite through the horizon.
     """
@@ -80,9 +90,13 @@ def freeze(database: Database, body: ScenarioIn, limits: ScenarioLimits) -> Froz
         number = num_targets(session, body.target_catalog_ids)
         limits.check(horizon_from(body.horizon), len(body.satellite_ids), number)
         file = _expanded(session, body)
+        if body.forecast_id is not None:
+            stored = find_forecast(session, body.forecast_id, owner)
+            file = file.model_copy(update={"forecast": frozen_forecast(stored, file)})
     refuse_duplicate_pins(file.pins)
     with _named_by_ids():
-        return freeze_file(file, limits)
+        frozen = freeze_file(file, limits)
+    return replace(frozen, summary=frozen.summary | {"forecast_id": body.forecast_id})
 
 
 def freeze_file(file: ScenarioFile, limits: ScenarioLimits) -> FrozenScenario:
@@ -96,7 +110,7 @@ def freeze_file(file: ScenarioFile, limits: ScenarioLimits) -> FrozenScenario:
         name=file.name,
         content=content,
         sha256=sha256_of(content),
-        summary=_summary(file, orbit_warnings(scenario)),
+        summary=_summary(file, (*orbit_warnings(scenario), *usual_mistakes(scenario))),
     )
 
 
@@ -148,6 +162,8 @@ def _named_by_ids() -> Iterator[None]:
         yield
     except PlannerError as error:
         pointer = re.sub(r"^/satellites/(\d+).*", r"/satellite_ids/\1", error.fault.pointer or "")
+        if error.fault.code == "forecast_does_not_cover":
+            pointer = "/forecast_id"
         error.fault = replace(error.fault, pointer=pointer)
         raise
 
@@ -280,5 +296,6 @@ def _summary(file: ScenarioFile, warnings: Iterable[str]) -> dict[str, Any]:
             "targets": len(file.targets),
             "ground_stations": len(file.ground_stations),
         },
+        "has_forecast": file.forecast is not None,
         "warnings": list(warnings),
     }

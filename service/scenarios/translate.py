@@ -33,6 +33,7 @@ from planner_core.errors import InvalidScenario, PlannerError
 from planner_core.orbits.omm import elements_from_omm, omm_from_elements
 from planner_core.orbits.tle import read_tle
 from service.problems.faults import faults_of_validation
+from service.scenarios.forecast_inputs import forecast_from
 from service.scenarios.pin_inputs import outage_from, pins_from, replan_from
 from service.wire.places import GroundStationIn, TargetIn
 from service.wire.satellites import (
@@ -143,7 +144,8 @@ def canonical_of_file(file: ScenarioFile) -> str:
     for station in document["ground_stations"]:
         _without(station, setup_s=0.0, downlink_gain=1.0)
     for target in document["targets"]:
-        _without_unset(target, "catalog_id", "release", "due", "sensor_type")
+        _without_unset(target, "catalog_id", "release", "due", "sensor_type", "reward_half_life_s")
+    _without_unset(document, "forecast")
     if document["collect_alignment"] == "access":
         del document["collect_alignment"]
     _without_unset(document, "replan")
@@ -200,6 +202,7 @@ def scenario_from_file(file: ScenarioFile) -> Scenario:
         collect_alignment=file.collect_alignment,
         continuous_starts=file.continuous_starts,
         quality=quality_from(file.quality),
+        forecast=forecast_from(file),
         objective=Objective(**file.objective.model_dump()),
         allow_old_elements=file.allow_old_elements,
         pins=pins_from(file.pins),

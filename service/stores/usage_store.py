@@ -37,6 +37,21 @@ def add(session: Session, owner: str, *, num_rows: int, num_bytes: int) -> tuple
     return found[0], found[1]
 
 
+def give_back(session: Session, owner: str, *, num_rows: int, num_bytes: int) -> None:
+    """Take off what an owner has stored no longer."""
+    values = {}
+    for column, number in (("num_rows", num_rows), ("num_bytes", num_bytes)):
+        left = getattr(OwnerUsageRow, column) - number
+        # What was stored before anybody counted was never added.
+        values[column] = sa.case((left > 0, left), else_=0)
+    session.execute(
+        sa.update(OwnerUsageRow)
+        .where(OwnerUsageRow.owner == owner)
+        .values(**values)
+        .execution_options(synchronize_session=False)
+    )
+
+
 def used(session: Session, owner: str) -> tuple[int, int]:
     """Return how many rows and bytes an owner has stored."""
     row = session.get(OwnerUsageRow, owner)

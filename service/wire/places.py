@@ -120,6 +120,11 @@ class TargetIn(LightIn):
         None,
         description="Only satellites whose sensor has this very type collect it; null for any.",
     )
+    reward_half_life_s: Duration | None = Field(
+        None,
+        description="The reward halves with every such time between `release`, or the horizon's "
+        "start, and the start of the collect; null where it does not fall.",
+    )
 
 
 class TargetCatalogIn(Body):

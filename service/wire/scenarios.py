@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Final, Literal
+from typing import Annotated, Final, Literal, get_args
 
-from pydantic import BeforeValidator, FailFast, Field, model_validator
+from pydantic import BeforeValidator, FailFast, Field, GetJsonSchemaHandler, model_validator
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
 
 from service.wire.base import Body, Duration, Id, Instant, Name, Open, Stored, Wire
 from service.wire.pins import PinsIn, PlacedOutage
@@ -82,10 +84,20 @@ def _objective_named(value: object) -> object:
     return _NAMED.get(value, value) if isinstance(value, str) else value
 
 
-AnyObjective = Annotated[
-    ObjectiveIn,
-    BeforeValidator(_objective_named, json_schema_input_type=ObjectiveIn | ObjectiveName),
-]
+class _OrShortName:
+    """Shows the short names in the schema of what is sent and of what is answered alike.
+
+    Two schemas of one thing would give it two names, and generated clients would lose both.
+    """
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        names = {"type": "string", "enum": list(get_args(ObjectiveName))}
+        return {"anyOf": [handler(schema), names]}
+
+
+AnyObjective = Annotated[ObjectiveIn, BeforeValidator(_objective_named), _OrShortName()]
 
 
 class Question(Body):
@@ -116,6 +128,7 @@ class Question(Body):
         ObjectiveIn(),
         description="What a plan is to earn. `collected` is short for a collected_share of 1, "
         "`delivered` for 0; `paper` is the same as `collected`.",
+        json_schema_extra={"default": "collected"},
     )
     allow_old_elements: bool = Field(
         False,
@@ -137,6 +150,9 @@ class ScenarioIn(Question):
     satellite_ids: list[Id] = Field(min_length=1, max_length=10_000)
     target_catalog_ids: list[Id] = Field(min_length=1, max_length=1000)
     ground_station_ids: list[Id] = Field([], max_length=10_000)
+    forecast_id: Id | None = Field(
+        None, description="What it says of the targets is frozen with the scenario."
+    )
 
 
 class FileSatellite(WholeSatellite):
@@ -154,6 +170,30 @@ class FileGroundStation(GroundStationIn):
     """A ground station of a scenario file."""
 
     id: Id | None = Field(None, description="Its name by default, made unique.")
+
+
+class SkySeriesIn(Body):
+    """Probabilities of a clear sky over some targets at the same instants; linear between them."""
+
+    times: Annotated[list[Instant], FailFast()] = Field(
+        min_length=1, max_length=100_000, description="Ascending."
+    )
+    clear_probability: Annotated[
+        dict[Id, Annotated[list[Annotated[float, Field(ge=0, le=1)]], FailFast()]], FailFast()
+    ] = Field(
+        min_length=1,
+        max_length=1_000_000,
+        description="By id of the target, one for each of `times`.",
+    )
+
+
+class FileForecast(Body):
+    """What a forecast says of the targets, frozen with the question."""
+
+    default_clear_probability: float | None = Field(
+        None, ge=0, le=1, description="Of targets and instants that no series covers."
+    )
+    series: Annotated[list[SkySeriesIn], FailFast()] = Field([], max_length=1_000_000)
 
 
 class FileTarget(TargetIn):
@@ -177,6 +217,7 @@ class ScenarioFile(Question):
     replan: ReplanOfFile | None = Field(
         None, description="The plan that this one goes on from, as a replan makes it."
     )
+    forecast: FileForecast | None = Field(None, description="Null to take every sky for clear.")
 
     @model_validator(mode="before")
     @classmethod
@@ -224,8 +265,14 @@ class ScenarioSummary(Stored):
     quality: QualityIn = QualityIn()
     objective: ObjectiveIn = ObjectiveIn()
     allow_old_elements: bool
+    forecast_id: str | None = Field(
+        None, description="Where clear skies came from; null where the file had them, or none."
+    )
+    has_forecast: bool = False
     counts: Counts
-    warnings: tuple[str, ...] = Field(description="About the age of orbits, for people.")
+    warnings: tuple[str, ...] = Field(
+        description="About old orbits and what is nearly always a mistake, for people."
+    )
     created_at: Instant
     links: dict[str, str]
 

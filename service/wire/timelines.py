@@ -60,7 +60,30 @@ class AgesOut(Wire):
     max: float
 
 
-class TotalsOut(Wire):
+class SpreadOut(Wire):
+    """A figure over all images."""
+
+    mean: float
+    median: float
+
+
+class ImageFiguresOut(Wire):
+    """Of the images that earn, one of each target."""
+
+    images: int | None = Field(None, description="How many there are.")
+    expected_clear: float | None = Field(
+        None, description="How many of them are clear on average; null without a forecast."
+    )
+    night_images: int | None = Field(
+        None, description="Those with the sun below the target's horizon."
+    )
+    off_nadir_deg: SpreadOut | None = Field(
+        None, description="At the middle of each; null where there is none."
+    )
+    quality_mean: float | None = Field(None, description="Null where there is none.")
+
+
+class TotalsOut(ImageFiguresOut):
     """The plan in numbers, as the referee found them."""
 
     reward: float
@@ -80,9 +103,6 @@ class TotalsOut(Wire):
     downlinked_fraction: float | None = Field(description="In recorder capacities.")
     battery_min_fraction: float | None = Field(description="The lowest charge of any satellite.")
     recorder_max_fraction: float | None = Field(description="The highest fill of any recorder.")
-    quality_mean: float | None = Field(
-        None, description="Of the images that earn, one of each target; null where there is none."
-    )
     delivered: int | None = Field(
         None,
         description="How many of these images are on the ground by the end of the horizon; null "
@@ -132,11 +152,15 @@ class ActionOut(Wire):
     reward: float = Field(description="What the plan earns with it.")
     worth: float | None = Field(
         None,
-        description="Of a collect: what its image is worth by itself in this plan: reward times "
-        "quality, and of that what the `objective` lets it earn.",
+        description="Of a collect: what its image is worth by itself in this plan: the target's "
+        "reward when it starts times quality and clear_probability, and of that what the "
+        "`objective` lets it earn.",
     )
     quality: float | None = Field(
         None, description="Of a collect: what part of its target's reward its image is worth."
+    )
+    clear_probability: float | None = Field(
+        None, description="Of a collect: that the sky is clear; null without a forecast."
     )
     delivered_at: Instant | None = Field(
         None,
@@ -158,7 +182,7 @@ class ResourceCurvesOut(Wire):
     recorder_max_fraction: float
 
 
-class SatelliteTotalsOut(Wire):
+class SatelliteTotalsOut(ImageFiguresOut):
     """What one satellite has a part in."""
 
     reward: float

@@ -25,7 +25,7 @@ _WATCHED: Final = (
     "planner_core.orbits.omm_files",
     "planner_core.orbits.tle",
     "planner_core.orbits.tle_file",
-    "service.scenarios.records",
+    "service.files.records",
     "service.scenarios.translate",
 )
 

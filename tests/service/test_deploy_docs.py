@@ -14,7 +14,7 @@ from service.settings import Settings
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = (ROOT / "docs" / "deploy.md").read_text()
 ROWS = dict(re.findall(r"^\| `SLEWLINE_(\w+)` \| ([^|]+) \|", TEXT, re.MULTILINE))
-IN_WORDS = {"database_url", "otel", "rate_limit_per_s", "solver_threads"}
+IN_WORDS = {"database_url", "otel", "rate_limit_per_s", "retention_days", "solver_threads"}
 
 
 def test_the_table_has_every_setting_and_no_other() -> None:

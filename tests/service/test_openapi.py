@@ -9,6 +9,7 @@ from typing import Any
 import httpx
 import pytest
 
+from service.wire.jobs import ACTIVE
 from tests.patience import PATIENCE_S
 from tests.service.contract import Contract, Document
 from tests.service.serving import serving
@@ -23,6 +24,7 @@ RARE = {
     "500": "a fault of the service",
     "503": "a full queue, or a service without a worker",
 }
+FOR_GOOD = ("{plan_id}", "{comparison_id}", "{job_id}", "{scenario_id}")
 COLLECTIONS = {"other_id": "/v1/jobs"}
 
 
@@ -64,6 +66,8 @@ class Client:
         """Yield an example of each media type that the operation takes."""
         for media_type, content in operation["requestBody"]["content"].items():
             schema = content["schema"]
+            if schema.get("format") == "binary":
+                continue  # JSON has no way to show one
             if "$ref" in schema:
                 name = schema["$ref"].rpartition("/")[2]
                 schema = self.document["components"]["schemas"][name]
@@ -207,6 +211,37 @@ def live_a_plan(client: Client) -> None:
     assert asked.status_code == 202, asked.text
 
 
+def delete_for_good(client: Client) -> None:
+    """Delete plans, comparisons, jobs and scenarios, each as soon as nothing needs it."""
+
+    def all_of(what: str) -> list[Document]:
+        found: list[Document] = client.http.get(f"/v1/{what}", params={"limit": 500}).json()[
+            "items"
+        ]
+        return found
+
+    plan = next(each for each in all_of("plans") if each["state"] == "published")
+    job, scenario = f"/v1/jobs/{plan['job_id']}", f"/v1/scenarios/{all_of('scenarios')[0]['id']}"
+    for path in (plan["links"]["self"], job, scenario):
+        assert client.http.delete(path).status_code == 409, path
+    moves = f"{plan['links']['self']}/transitions"
+    assert client.http.post(moves, json={"to": "withdrawn"}).status_code == 200
+    for one in all_of("jobs"):
+        if one["state"] in ACTIVE:
+            client.http.post(f"/v1/jobs/{one['id']}/cancel")
+    deadline_s = time.monotonic() + PATIENCE_S
+    while any(one["state"] in ACTIVE for one in all_of("jobs")):
+        assert time.monotonic() < deadline_s
+        time.sleep(0.2)
+    for what in ("plans", "comparisons", "jobs", "scenarios"):
+        for one in all_of(what):
+            path = f"/v1/{what}/{one['id']}"
+            stale = client.http.delete(path, headers={"If-Match": '"stale"'})
+            assert stale.status_code == 412, (path, stale.text)
+            assert client.http.delete(path).status_code == 204, path
+        assert all_of(what) == []
+
+
 def cancel_one(client: Client) -> None:
     """Cancel a job before it ends, however quick the worker is."""
     job_id = client.http.get("/v1/jobs").json()["items"][0]["id"]
@@ -248,10 +283,13 @@ def test_a_client_of_the_document_alone_uses_every_operation(client: Client) -> 
     live_a_plan(client)
     cancel_one(client)
     for template, operation in client.operations("delete"):
+        if template.endswith(FOR_GOOD):
+            continue  # in their order, below
         path = client.path(template, operation)
         assert path is not None
         assert client.http.delete(path, headers={"If-Match": '"stale"'}).status_code == 412
         assert client.http.delete(path).status_code == 204
+    delete_for_good(client)
     declared = {
         (method.upper(), path, status)
         for path, operations in client.document["paths"].items()

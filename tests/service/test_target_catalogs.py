@@ -66,6 +66,7 @@ def test_a_json_catalogue_fills_in_defaults(client: httpx.Client) -> None:
         "release": None,
         "due": None,
         "sensor_type": None,
+        "reward_half_life_s": None,
     }
 
 

@@ -26,6 +26,7 @@ from service.settings import Settings
 from service.wire import (
     base,
     changes,
+    forecasts,
     imports,
     jobs,
     operations,
@@ -46,8 +47,8 @@ from service.wire.base import Wire, dumped, read
 from tests.service.jobs.mission import small_mission
 
 MODULES = (
-    base, changes, imports, jobs, operations, wire_pins, places, plan_before, plans, replans,
-    satellites, scenarios, spacecraft, timelines, webhooks,
+    base, changes, forecasts, imports, jobs, operations, wire_pins, places, plan_before, plans,
+    replans, satellites, scenarios, spacecraft, timelines, webhooks,
 )  # fmt: skip
 NOW = "2026-03-01T00:00:00.000Z"
 ACTION = {
@@ -55,7 +56,7 @@ ACTION = {
     "station_name": None, "turn_to_s": None, "turn_back_s": None, "opportunity_id": "o1",
     "off_nadir_deg": 10.0, "azimuth_deg": 90.0,
     "slew": {"angle_deg": 1.0, "needed_s": 1.0, "available_s": 2.0}, "reward": 0.8,
-    "worth": 0.8, "quality": 0.8, "delivered_at": NOW, "age_s": 60.0,
+    "worth": 0.8, "quality": 0.8, "clear_probability": None, "delivered_at": NOW, "age_s": 60.0,
     "battery_fraction_end": None, "recorder_fraction_end": None,
 }  # fmt: skip
 JOB = {

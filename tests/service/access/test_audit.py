@@ -167,6 +167,14 @@ CHANGES: dict[tuple[str, str], tuple[Callable[[httpx.Client], str], str, str]] =
     ("post", "/v1/scenarios"): (
         lambda client: post(client, "/v1/scenarios", question(client)), "create", "scenario",
     ),
+    ("delete", "/v1/scenarios/{scenario_id}"): (
+        delete(lambda client: post(client, "/v1/scenarios", question(client)), "/v1/scenarios"),
+        "delete", "scenario",
+    ),
+    ("delete", "/v1/jobs/{job_id}"): (delete(cancel, "/v1/jobs"), "delete", "job"),
+    ("delete", "/v1/comparisons/{comparison_id}"): (
+        delete(compare, "/v1/comparisons"), "delete", "comparison",
+    ),
     ("post", "/v1/jobs"): (new_job, "create", "job"),
     ("post", "/v1/jobs/{job_id}/rerun"): (rerun, "create", "job"),
     ("post", "/v1/jobs/{job_id}/what-if"): (what_if, "create", "job"),

@@ -306,3 +306,20 @@ def test_webhooks_and_the_audit_tell_of_transitions(desk: Desk) -> None:
     assert [each["action"] for each in audit][::-1] == [
         "create", "approved", "published", "report",
     ]  # fmt: skip
+
+
+def test_a_plan_that_is_not_in_force_is_deleted_for_good(desk: Desk) -> None:
+    key = desk.door.key("approve")
+    job_id = desk.answered_job(key)
+    plan = desk.draft(key, job_id)
+    own, job = f"/v1/plans/{plan['id']}", f"/v1/jobs/{job_id}"
+    client = desk.door.client
+    assert_problem(client.delete(job, headers=key), 409, "in_use")
+    stranger = desk.door.key("approve", "others")
+    assert_problem(client.delete(own, headers=stranger), 404, "not_found")
+    assert desk.move(plan, "approved", key).status_code == 200
+    assert_problem(client.delete(own, headers=key), 409, "invalid_transition")
+    assert desk.move(plan, "withdrawn", key).status_code == 200
+    assert client.delete(own, headers=key).status_code == 204
+    assert_problem(client.get(own, headers=key), 404, "not_found")
+    assert client.delete(job, headers=key).status_code == 204

@@ -12,8 +12,8 @@ from typing import Any, Generic, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from planner_core.errors import Fault, PlannerError
+from service.files.tables import Table, decoded, read_table
 from service.problems.faults import faults_of_validation, refuse
-from service.scenarios.tables import Table, decoded, read_table
 
 B = TypeVar("B", bound=BaseModel)
 
@@ -31,7 +31,7 @@ _ALIASES = {
     "longitude": "lon_deg",
 }
 _MISSPELT = 0.75
-_MOST_COLUMNS = 200
+MOST_COLUMNS = 200
 _MOST_FAULTS = 10_000
 
 
@@ -154,18 +154,18 @@ def read_csv(
     text = decoded(data)
     if isinstance(text, Fault):
         return Records(faults=(text,))
-    table = read_table(text, _columns_of, required)
+    table = read_table(text, column_names, required)
     rows = table.rows
     first = next(rows, None)
     if first is None:
         return Records(faults=(Fault(code="empty_file", detail="The file is empty."),))
     if isinstance(first, Fault):
         return Records(faults=(first,))
-    if len(first[1]) > _MOST_COLUMNS:
-        detail = f"The header has {len(first[1])} columns; {_MOST_COLUMNS} are the most."
+    if len(first[1]) > MOST_COLUMNS:
+        detail = f"The header has {len(first[1])} columns; {MOST_COLUMNS} are the most."
         return Records(faults=(Fault(code="malformed_csv", detail=detail, row=first[0]),))
-    columns = _columns_of(first[1])
-    faults = _faults_of_header(first[0], columns, known, required)
+    columns = column_names(first[1])
+    faults = faults_of_header(first[0], columns, known, required)
     if faults:
         return Records(faults=tuple(faults))
     records: list[Record] = []
@@ -189,7 +189,8 @@ def read_csv(
     return Records(records=tuple(records), faults=tuple(faults), ignored=ignored)
 
 
-def _columns_of(header: Sequence[str]) -> list[str]:
+def column_names(header: Sequence[str]) -> list[str]:
+    """Return our names of a file's columns."""
     names = (cell.strip().lower() for cell in header)
     return [_ALIASES.get(name, name) for name in names]
 
@@ -199,9 +200,10 @@ def _too_many_rows(most: int) -> Records:
     return Records(faults=(Fault(code="too_many_rows", detail=detail),))
 
 
-def _faults_of_header(
+def faults_of_header(
     row: int, columns: Sequence[str], known: Collection[str], required: Collection[str]
 ) -> list[Fault]:
+    """Return columns given twice, misspelt or missing; ``row`` is the line of the header."""
     faults = []
     for position, column in enumerate(columns):
         missing = [name for name in known if name not in columns]

@@ -1,0 +1,210 @@
+"""Forecasts as CSV: a full grid, or values by target."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from datetime import datetime
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import TypeAdapter, ValidationError
+
+from planner_core.errors import Fault
+from service.files.records import (
+    MOST_COLUMNS,
+    column_names,
+    faults_of_header,
+)
+from service.files.tables import Table, decoded, read_table
+from service.forecasts.axes import fault_of_axes, unwrapped
+from service.forecasts.fields import WHOLE, ByTarget, Field, Grid, time_ms_of
+from service.problems.faults import refuse
+from service.wire.base import Id, Instant
+
+_GRID: Final = ("time", "lat_deg", "lon_deg", "clear_probability")
+_BY_TARGET: Final = ("target_id", "time", "clear_probability")
+_IN_BOTH: Final = ("time", "clear_probability")
+_MOST_FAULTS: Final = 100
+_INSTANT: Final[TypeAdapter[datetime]] = TypeAdapter(Instant)
+_ID: Final[TypeAdapter[str]] = TypeAdapter(Id)
+
+
+def read_csv(data: bytes) -> tuple[Field, list[str]]:
+    """Return what a file says, and notes on how it was read.
+
+    Raises
+    ------
+    ServiceError
+        With the faults of the file, up to a hundred of them.
+    """
+    text = decoded(data)
+    if isinstance(text, Fault):
+        raise refuse([text])
+    form = read_table(text, column_names, _IN_BOTH)
+    rows = form.rows
+    wanted, positions = _header(rows)
+    table = _Table(wanted, positions, form)
+    for row in rows:
+        table.add(row)
+    if not table.faults and not table.lines:
+        table.faults.append(
+            Fault(code="empty_file", detail="The file has a header and no records.")
+        )
+    if table.faults:
+        raise refuse(table.faults)
+    field = _grid(table) if wanted is _GRID else _by_target(table)
+    return field, [f"Probabilities are kept to 1/{WHOLE:,}."]
+
+
+def _header(rows: Iterator[tuple[int, list[str]] | Fault]) -> tuple[tuple[str, ...], list[int]]:
+    """Return which kind of file it is, and where its columns stand."""
+    first = next(rows, None)
+    if first is None:
+        raise refuse([Fault(code="empty_file", detail="The file is empty.")])
+    if isinstance(first, Fault):
+        raise refuse([first])
+    line, header = first
+    if len(header) > MOST_COLUMNS:
+        detail = f"The header has {len(header)} columns; {MOST_COLUMNS} are the most."
+        raise refuse([Fault(code="malformed_csv", detail=detail, row=line)])
+    columns = column_names(header)
+    wanted = _BY_TARGET if "target_id" in columns else _GRID
+    if faults := faults_of_header(line, columns, wanted, wanted):
+        raise refuse(faults)
+    return wanted, [columns.index(name) for name in wanted]
+
+
+class _Table:
+    """The cells that are wanted, column by column, and what is wrong with the others."""
+
+    def __init__(self, wanted: tuple[str, ...], positions: list[int], form: Table):
+        self.columns: dict[str, list[Any]] = {name: [] for name in wanted}
+        self.lines: list[int] = []
+        self.faults: list[Fault] = []
+        self._places = list(zip(wanted, positions, strict=True))
+        self._instants: dict[str, int] = {}
+        self._ids: dict[str, str] = {}
+        self._read: dict[str, Callable[[str], Any]] = {
+            "time": self._time_ms,
+            "target_id": self._target_id,
+            "lat_deg": lambda cell: _number(form.number(cell), -90.0, 90.0),
+            "lon_deg": lambda cell: _number(form.number(cell), -180.0, 360.0),
+            "clear_probability": lambda cell: _number(form.number(cell), 0.0, 1.0),
+        }
+
+    def add(self, row: tuple[int, list[str]] | Fault) -> None:
+        if isinstance(row, Fault):
+            self._blame(row)
+            return
+        line, cells = row
+        values = []
+        for name, position in self._places:
+            try:
+                values.append(self._read[name](cells[position].strip()))
+            except IndexError:
+                detail = f"The line has {len(cells)} cells: {name} is missing."
+                self._blame(Fault(code="malformed_csv", detail=detail, row=line))
+                return
+            except ValueError as error:
+                self._blame(Fault(code="invalid_value", detail=f"{name}: {error}", row=line))
+                return
+        self.lines.append(line)
+        for (name, _), value in zip(self._places, values, strict=True):
+            self.columns[name].append(value)
+
+    def _blame(self, fault: Fault) -> None:
+        self.faults.append(fault)
+        if len(self.faults) == _MOST_FAULTS:
+            raise refuse(self.faults)
+
+    def _time_ms(self, cell: str) -> int:
+        # A grid has few instants and many lines.
+        found = self._instants.get(cell)
+        if found is None:
+            try:
+                instant = _INSTANT.validate_python(cell)
+            except ValidationError as error:
+                raise ValueError(f"{error.errors()[0]['msg']}.") from None
+            found = self._instants[cell] = time_ms_of(instant)
+        return found
+
+    def _target_id(self, cell: str) -> str:
+        if cell not in self._ids:
+            try:
+                self._ids[cell] = _ID.validate_python(cell)
+            except ValidationError as error:
+                raise ValueError(f"{error.errors()[0]['msg']}.") from None
+        return self._ids[cell]
+
+
+def _number(cell: str, least: float, most: float) -> float:
+    try:
+        value = float(cell)
+    except ValueError:
+        raise ValueError(f"{cell[:40]!r} is no number.") from None
+    if not (math.isfinite(value) and least <= value <= most):
+        raise ValueError(f"{value:g} is not between {least:g} and {most:g}.")
+    return value
+
+
+def _shares(probabilities: npt.ArrayLike) -> npt.NDArray[np.uint16]:
+    shares: npt.NDArray[np.uint16] = np.rint(np.asarray(probabilities) * WHOLE).astype(np.uint16)
+    return shares
+
+
+def _grid(table: _Table) -> Grid:
+    names = ("time", "lat_deg", "lon_deg")
+    axes, places = zip(
+        *(np.unique(table.columns[name], return_inverse=True) for name in names), strict=True
+    )
+    shape = tuple(len(axis) for axis in axes)
+    number = math.prod(shape)
+    if (twice := _first_twice(places, shape)) is not None:
+        detail = "This instant and place are given twice."
+        raise refuse([Fault(code="invalid_value", detail=detail, row=table.lines[twice])])
+    if number > len(table.lines):
+        raise refuse(
+            [
+                Fault(
+                    code="invalid_value",
+                    detail=f"The grid is not full: {shape[0]} instants, {shape[1]} latitudes and "
+                    f"{shape[2]} longitudes make {number} values, and there are "
+                    f"{len(table.lines)}.",
+                )
+            ]
+        )
+    if (fault := fault_of_axes(axes[1], axes[2])) is not None:
+        raise refuse([fault])
+    value = np.empty(shape, dtype=np.uint16)
+    value[places] = _shares(table.columns["clear_probability"])
+    lon_deg, value = unwrapped(axes[2], value)
+    return Grid(axes[0].astype(np.int64), axes[1], lon_deg, value)
+
+
+def _first_twice(places: tuple[Any, ...], shape: tuple[int, ...]) -> int | None:
+    """Return which record names a place of the grid that an earlier one has named."""
+    flat = np.ravel_multi_index(places, shape)
+    _, first = np.unique(flat, return_index=True)
+    if len(first) == len(flat):
+        return None
+    return int(np.setdiff1d(np.arange(len(flat)), first)[0])
+
+
+def _by_target(table: _Table) -> ByTarget:
+    ids, own = np.unique(np.array(table.columns["target_id"], dtype=object), return_inverse=True)
+    time_ms = np.array(table.columns["time"], dtype=np.int64)
+    order = np.lexsort((time_ms, own))
+    own, time_ms = own[order], time_ms[order]
+    again = np.flatnonzero((np.diff(own) == 0) & (np.diff(time_ms) == 0))
+    if len(again):
+        row = max(table.lines[order[again[0]]], table.lines[order[again[0] + 1]])
+        detail = f"Target {ids[own[again[0]]]!r} has this instant twice."
+        raise refuse([Fault(code="invalid_value", detail=detail, row=row)])
+    return ByTarget(
+        ids=tuple(ids.tolist()),
+        first=np.searchsorted(own, np.arange(len(ids) + 1)).astype(np.int64),
+        time_ms=time_ms,
+        value=_shares(table.columns["clear_probability"])[order],
+    )

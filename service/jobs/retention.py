@@ -1,0 +1,36 @@
+"""Deleting what is old, a little at a time."""
+
+from __future__ import annotations
+
+import time
+from typing import Final
+
+import sqlalchemy as sa
+
+from service.db.clock import utc_now
+from service.db.session import Database
+from service.stores import deletion
+
+_DAY_S: Final = 86_400.0
+_PAUSE_S: Final = 60.0
+"""Between two looks at a database in which nothing was old."""
+
+
+class Retention:
+    """Deletes jobs, comparisons and scenarios of one database once they are old enough."""
+
+    def __init__(self, database: Database, days: float | None):
+        self._database = database
+        self._days = days
+        self._next_s = 0.0
+
+    def run(self) -> None:
+        """Delete some, if it is time to look."""
+        if self._days is None or time.monotonic() < self._next_s:
+            return
+        with self._database.transaction() as session:
+            before = session.scalar(sa.select(utc_now(-self._days * _DAY_S)))
+            assert before is not None
+            num_deleted = deletion.sweep(session, before)
+        if num_deleted == 0:
+            self._next_s = time.monotonic() + _PAUSE_S

@@ -1,0 +1,195 @@
+"""Deleting for good what is stored of jobs, comparisons, plans and scenarios.
+
+What something else leads to stays: a job of a plan or of a comparison, a scenario of a job. The
+room that a job's answer took is its owner's again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import datetime
+from typing import Any, Final
+
+import sqlalchemy as sa
+from sqlalchemy.orm import Session
+
+from service.db.rows import (
+    BoundRow,
+    ComparisonRow,
+    ComparisonRunRow,
+    ExecutionRow,
+    JobBlockRow,
+    JobResultRow,
+    JobRow,
+    OpportunitySetRow,
+    PlanActionRow,
+    PlanEventRow,
+    PlanRow,
+    PlanSatelliteRow,
+    Row,
+    ScenarioOwnerRow,
+    ScenarioRow,
+)
+from service.problems.kinds import ServiceError
+from service.stores import usage_store
+from service.wire.jobs import FINAL
+
+_AT_ONCE: Final = 50
+"""Most of a kind that one sweep deletes in a transaction, so that nobody waits long for it."""
+_KEPT_PLANS: Final = ("approved", "published")
+
+
+def delete_job(session: Session, job: JobRow) -> None:
+    """Delete a job and its answer.
+
+    Raises
+    ------
+    ServiceError
+        ``invalid_transition`` while it waits or runs, ``in_use`` where a plan or a comparison has
+        it.
+    """
+    if job.state not in FINAL:
+        raise ServiceError(
+            "invalid_transition", f"The job is {job.state}: cancel it, then it can be deleted."
+        )
+    _require_unused(session, PlanRow, PlanRow.job_id == job.id, "The plan", "made of this job")
+    with_run = ComparisonRunRow.job_id == job.id
+    found = session.scalar(sa.select(ComparisonRunRow.comparison_id).where(with_run).limit(1))
+    if found is not None:
+        raise ServiceError("in_use", f"The comparison {found!r} has this job as a run.")
+    _delete_jobs(session, [job.id])
+
+
+def delete_comparison(session: Session, comparison_id: str) -> None:
+    """Delete a comparison. Its runs stay jobs like others."""
+    _delete(session, ComparisonRunRow, ComparisonRunRow.comparison_id == comparison_id)
+    _delete(session, ComparisonRow, ComparisonRow.id == comparison_id)
+
+
+def delete_plan(session: Session, plan: PlanRow) -> None:
+    """Delete a plan with its history and what was reported of it.
+
+    Raises
+    ------
+    ServiceError
+        ``invalid_transition`` while it is approved or published, ``in_use`` where another plan
+        continues it.
+    """
+    if plan.state in _KEPT_PLANS:
+        raise ServiceError(
+            "invalid_transition", f"The plan is {plan.state}: withdraw it, then it can be deleted."
+        )
+    _require_unused(session, PlanRow, PlanRow.parent_id == plan.id, "The plan", "a change of this")
+    for row in (ExecutionRow, PlanEventRow, PlanActionRow, PlanSatelliteRow):
+        _delete(session, row, row.plan_id == plan.id)
+    _delete(session, PlanRow, PlanRow.id == plan.id)
+
+
+def delete_scenario(session: Session, scenario: ScenarioRow) -> None:
+    """Delete a scenario, with its opportunities and what was proven of it.
+
+    Raises
+    ------
+    ServiceError
+        ``in_use`` where a job or a comparison has it.
+    """
+    own = scenario.id
+    _require_unused(session, JobRow, JobRow.scenario_id == own, "The job", "of this scenario")
+    with_it = ComparisonRow.scenario_id == own
+    _require_unused(session, ComparisonRow, with_it, "The comparison", "of this scenario")
+    _delete_scenarios(session, [(own, scenario.sha256)])
+
+
+def sweep(session: Session, before: datetime) -> int:
+    """Delete some of what is older than this; return how much it was, 0 if there is no more.
+
+    Jobs go that have ended before, unless a plan has them or a comparison that is younger;
+    comparisons that were made before, once all their runs have ended; scenarios that were stored
+    before, once no job is left of them. Plans stay.
+    """
+    return (
+        _sweep_comparisons(session, before)
+        + _sweep_jobs(session, before)
+        + _sweep_scenarios(session, before)
+    )
+
+
+def _sweep_comparisons(session: Session, before: datetime) -> int:
+    unfinished = (
+        sa.select(ComparisonRunRow.job_id)
+        .join(JobRow, JobRow.id == ComparisonRunRow.job_id)
+        .where(ComparisonRunRow.comparison_id == ComparisonRow.id, JobRow.state.not_in(FINAL))
+    )
+    old = sa.select(ComparisonRow.id).where(ComparisonRow.created_at < before, ~unfinished.exists())
+    ids = session.scalars(old.limit(_AT_ONCE)).all()
+    for comparison_id in ids:
+        delete_comparison(session, comparison_id)
+    return len(ids)
+
+
+def _sweep_jobs(session: Session, before: datetime) -> int:
+    planned = sa.select(PlanRow.id).where(PlanRow.job_id == JobRow.id)
+    compared = sa.select(ComparisonRunRow.job_id).where(ComparisonRunRow.job_id == JobRow.id)
+    old = sa.select(JobRow.id).where(
+        JobRow.state.in_(FINAL),
+        JobRow.finished_at < before,
+        ~planned.exists(),
+        ~compared.exists(),
+    )
+    ids = session.scalars(old.limit(_AT_ONCE)).all()
+    _delete_jobs(session, ids)
+    return len(ids)
+
+
+def _sweep_scenarios(session: Session, before: datetime) -> int:
+    tried = sa.select(JobRow.id).where(JobRow.scenario_id == ScenarioRow.id)
+    compared = sa.select(ComparisonRow.id).where(ComparisonRow.scenario_id == ScenarioRow.id)
+    old = sa.select(ScenarioRow.id, ScenarioRow.sha256).where(
+        ScenarioRow.created_at < before, ~tried.exists(), ~compared.exists()
+    )
+    rows = [(own_id, sha256) for own_id, sha256 in session.execute(old.limit(_AT_ONCE))]
+    _delete_scenarios(session, rows)
+    return len(rows)
+
+
+def _delete_jobs(session: Session, ids: Sequence[str]) -> None:
+    if not ids:
+        return
+    num_blocks = sa.func.count(JobBlockRow.job_id)
+    num_bytes = sa.func.coalesce(sa.func.sum(sa.func.length(JobBlockRow.text)), 0)
+    taken = (
+        sa.select(
+            JobRow.tenant, num_blocks, num_bytes, sa.func.count(JobResultRow.job_id.distinct())
+        )
+        .join(JobResultRow, JobResultRow.job_id == JobRow.id)
+        .outerjoin(JobBlockRow, JobBlockRow.job_id == JobResultRow.job_id)
+        .where(JobRow.id.in_(ids))
+        .group_by(JobRow.tenant)
+    )
+    for owner, blocks, size, answers in session.execute(taken).all():
+        usage_store.give_back(session, owner, num_rows=answers + blocks, num_bytes=size)
+    _delete(session, JobBlockRow, JobBlockRow.job_id.in_(ids))
+    _delete(session, JobResultRow, JobResultRow.job_id.in_(ids))
+    _delete(session, JobRow, JobRow.id.in_(ids))
+
+
+def _delete_scenarios(session: Session, rows: Sequence[tuple[str, str]]) -> None:
+    if not rows:
+        return
+    ids, hashes = zip(*rows, strict=True)
+    _delete(session, OpportunitySetRow, OpportunitySetRow.scenario_sha256.in_(hashes))
+    _delete(session, BoundRow, BoundRow.scenario_sha256.in_(hashes))
+    _delete(session, ScenarioOwnerRow, ScenarioOwnerRow.scenario_id.in_(ids))
+    _delete(session, ScenarioRow, ScenarioRow.id.in_(ids))
+
+
+def _require_unused(
+    session: Session, row: type[Any], condition: sa.ColumnElement[bool], what: str, how: str
+) -> None:
+    found = session.scalar(sa.select(row.id).where(condition).limit(1))
+    if found is not None:
+        raise ServiceError("in_use", f"{what} {found!r} is {how}.")
+
+
+def _delete(session: Session, row: type[Row], condition: sa.ColumnElement[bool]) -> None:
+    session.execute(sa.delete(row).where(condition))

@@ -1,0 +1,86 @@
+"""Warnings for what is nearly always a mistake: where they are due, and where not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from planner_core.budget import Budget
+from planner_core.build import compute_opportunities
+from planner_core.domain import GroundStation, Quality, Resources, Scenario
+from planner_core.mistakes import mistakes_of_accesses, usual_mistakes
+from planner_core.problem import CONTACT
+from tests.planner_core.test_worth import scenario
+
+STATION = GroundStation(id="n", name="North", lat_deg=78.2, lon_deg=15.4)
+
+
+def optical(**sensor: object) -> Scenario:
+    """Return a mission in watts and megabits that images by day alone, with a station."""
+    asked = scenario(Quality())
+    first = asked.satellites[0]
+    resources = replace(Resources.paper(first.orbit.period_s), recorder_capacity_mbit=1000.0)
+    limits = {"sun_elevation_min_deg": 10.0} | sensor
+    satellite = replace(
+        first,
+        resources=resources,
+        sensor=replace(first.sensor, **limits),  # type: ignore[arg-type]
+    )
+    return replace(asked, satellites=(satellite,), ground_stations=(STATION,), use_resources=True)
+
+
+def test_a_sound_question_has_none() -> None:
+    assert usual_mistakes(optical()) == ()
+    assert usual_mistakes(scenario(Quality())) == ()
+
+
+def test_optical_images_at_night_are_named() -> None:
+    asked = optical(sun_elevation_min_deg=None)
+    (warning,) = usual_mistakes(asked)
+    assert "at night" in warning
+    assert repr(asked.satellites[0].name) in warning
+
+
+@pytest.mark.parametrize("sensor_type", ["SAR", "X-band radar"])
+def test_radar_needs_no_light(sensor_type: str) -> None:
+    assert usual_mistakes(optical(sun_elevation_min_deg=None, sensor_type=sensor_type)) == ()
+
+
+def test_whoever_has_thought_of_the_sun_is_not_told_of_it() -> None:
+    asked = optical(sun_elevation_min_deg=None)
+    by_day = tuple(replace(target, sun_elevation_min_deg=0.0) for target in asked.targets)
+    assert usual_mistakes(replace(asked, targets=by_day)) == ()
+    curves = Quality(sun_elevation_deg=((0.0, 0.0), (10.0, 1.0)))
+    assert usual_mistakes(replace(asked, quality=curves)) == ()
+    (warning,) = usual_mistakes(replace(asked, targets=(asked.targets[0], *by_day[1:])))
+    assert f"1 of {len(by_day)} targets" in warning
+
+
+def test_data_must_have_a_way_down() -> None:
+    asked = optical()
+    (warning,) = usual_mistakes(replace(asked, ground_stations=()))
+    assert "no ground station" in warning
+    assert usual_mistakes(replace(asked, ground_stations=(), use_resources=False)) == ()
+    table = compute_opportunities(asked, Budget()).opportunities
+    assert np.any(table.kind == CONTACT)
+    assert mistakes_of_accesses(asked, table) == ()
+    out_of_sight = replace(asked, ground_stations=(replace(STATION, min_elevation_deg=89.9),))
+    table = compute_opportunities(out_of_sight, Budget()).opportunities
+    (warning,) = mistakes_of_accesses(out_of_sight, table)
+    assert "no image comes down" in warning
+
+
+def test_an_image_must_fit_a_recorder() -> None:
+    asked = optical()
+    resources = asked.satellites[0].resources
+    longest_s = resources.recorder_max_fraction / resources.collect_fill_per_s
+    targets = list(asked.targets)
+    targets[0] = replace(targets[0], collect_s=0.999 * longest_s)
+    assert usual_mistakes(replace(asked, targets=tuple(targets))) == ()
+    targets[0] = replace(targets[0], collect_s=1.001 * longest_s)
+    targets[1] = replace(targets[1], collect_s=2.0 * longest_s)
+    (warning,) = usual_mistakes(replace(asked, targets=tuple(targets)))
+    assert repr(targets[0].id) in warning
+    assert "and 1 more" in warning
