@@ -130,7 +130,7 @@ def get_plan(plan_id: str, call: CallDep) -> PlanOut | Response:
 def delete_plan(plan_id: str, call: CallDep) -> None:
     """Delete a plan for good: not an approved or published one, nor one that has changes."""
     with call.database.transaction() as session:
-        plan = find_plan(session, plan_id, call.caller)
+        plan = find_plan(session, plan_id, call.caller, to_change=True)
         require_match(call.request, lambda: _shown(session, plan))
         deletion.delete_plan(session, plan)
         call.audit.record(session, "delete", "plan", plan_id)

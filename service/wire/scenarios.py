@@ -214,10 +214,10 @@ class ScenarioFile(Question):
     satellites: Annotated[list[FileSatellite], FailFast()] = Field(min_length=1, max_length=10_000)
     targets: Annotated[list[FileTarget], FailFast()] = Field(min_length=1, max_length=1_000_000)
     ground_stations: Annotated[list[FileGroundStation], FailFast()] = Field([], max_length=10_000)
+    forecast: FileForecast | None = Field(None, description="Null to take every sky for clear.")
     replan: ReplanOfFile | None = Field(
         None, description="The plan that this one goes on from, as a replan makes it."
     )
-    forecast: FileForecast | None = Field(None, description="Null to take every sky for clear.")
 
     @model_validator(mode="before")
     @classmethod
