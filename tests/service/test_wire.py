@@ -36,6 +36,7 @@ from service.wire import (
     replans,
     satellites,
     scenarios,
+    spacecraft,
     timelines,
     webhooks,
 )
@@ -47,7 +48,7 @@ from tests.service.jobs.mission import small_mission
 
 MODULES = (
     base, changes, forecasts, imports, jobs, operations, wire_pins, places, plan_before, plans,
-    replans, satellites, scenarios, timelines, webhooks,
+    replans, satellites, scenarios, spacecraft, timelines, webhooks,
 )  # fmt: skip
 NOW = "2026-03-01T00:00:00.000Z"
 ACTION = {
