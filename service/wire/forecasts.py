@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from service.wire.base import Instant, Open, Stored
+
+Ends = Annotated[tuple[float, ...], Field(min_length=2, max_length=2)]
 
 
 class ForecastOut(Stored):
@@ -24,8 +26,8 @@ class ForecastOut(Stored):
     num_times: int
     num_values: int
     num_targets: int | None = Field(None, description="Of values by target.")
-    lat_deg: tuple[float, float] | None = Field(None, description="First and last row of a grid.")
-    lon_deg: tuple[float, float] | None = Field(
+    lat_deg: Ends | None = Field(None, description="First and last row of a grid.")
+    lon_deg: Ends | None = Field(
         None, description="First and last column of a grid; it may go round the globe."
     )
     default_clear_probability: float | None = Field(

@@ -107,7 +107,9 @@ def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
 
 def post_mission(service: Service, targets: list[Document], **flags: Any) -> Document:
     """Send the paper's satellite, its stations and targets, and ask the scenario."""
-    satellite = service.post("/v1/satellites", {"name": "PAPER", "omm": PAPER_ORBIT})
+    satellite = service.post(
+        "/v1/satellites", {"name": "PAPER", "omm": PAPER_ORBIT, "spacecraft": "paper"}
+    )
     stations = [service.post("/v1/ground-stations", station)["id"] for station in STATIONS]
     catalog = service.post("/v1/target-catalogs", {"name": "land", "targets": targets})
     mission = paper_mission([])

@@ -36,6 +36,9 @@ Ids = dict[str, list[str]]
 LUCK = {
     ("POST", "/v1/jobs/{job_id}/cancel"),  # before the job has ended
     ("POST", "/v1/plans/{plan_id}/executions"),  # of a published plan, by its actions' own ids
+    ("POST", "/v1/plans/{plan_id}/replans"),  # from an instant of its own
+    ("DELETE", "/v1/scenarios/{scenario_id}"),  # once no job has it
+    ("DELETE", "/v1/jobs/{job_id}"),  # once no comparison has it
     ("POST", "/v1/webhooks/{webhook_id}/deliveries/{delivery_id}/redeliver"),  # before its deletion
 }
 """Calls that may be refused throughout."""
