@@ -15,9 +15,11 @@ from tests.missions import PAPER_ORBIT, drawn_targets, paper_mission
 from tests.service.conftest import serve
 from tests.service.factories import ground_station, post, satellite, target
 from tests.service.jobs.conftest import Jobs
+from tests.service.jobs.test_api import finish
 from tests.service.jobs.unwritable import sqlite_pragma
 from tests.service.problems import assert_problem
 
+SPAN = {"start": "2026-03-01T00:00:00Z", "end": "2026-03-01T02:00:00Z"}
 Breaks = Callable[[sa.Engine], AbstractContextManager[None]]
 
 
@@ -54,7 +56,28 @@ def writes(client: httpx.Client, jobs: Jobs) -> dict[str, httpx.Request]:
     stations = [post(client, "/v1/ground-stations", ground_station(name=f"S{n}")) for n in (0, 1)]
     made = post(client, "/v1/satellites", satellite())
     job = post(client, "/v1/jobs", question)
+    answered = [post(client, "/v1/jobs", question)["id"] for _ in range(2)]
+    for job_id in answered:
+        finish(jobs, job_id)
+    plan = post(client, "/v1/plans", {"job_id": answered[0]})["links"]["self"]
+    drafted = post(client, "/v1/plans", {"job_id": answered[0]})["links"]["self"]
+    catalog = post(client, "/v1/target-catalogs", {"name": "few", "targets": [target(id="a")]})
+    other = post(client, "/v1/satellites", satellite(name="B"))
+    ids = {"satellite_ids": [other["id"]], "target_catalog_ids": [catalog["id"]]}
+    scenario = {"horizon": SPAN, **ids}
+    stored = {"horizon": SPAN | {"end": "2026-03-01T03:00:00Z"}, **ids}
+    out = {"station_id": stations[1]["id"], **SPAN, "reason": "r" * 200}
+    own = {
+        name: f"/v1/{name}/{post(client, f'/v1/{name}', body)['id']}"
+        for name, body in (
+            ("outages", out), ("spacecraft", {"name": "Bus"}), ("scenarios", stored),
+        )
+    }  # fmt: skip
+    skies = "target_id,time,clear_probability\n" + "".join(
+        f"t{n},2026-03-01T00:00:00Z,0.5\n" for n in range(5000)
+    )
     where = f"/v1/satellites/{made['id']}"
+    named = {"name": "N" * 200}
     csv, kind = "name,lat_deg,lon_deg\nA,1,1\n", {"Content-Type": "text/csv"}
     build = client.build_request
     return {
@@ -72,6 +95,19 @@ def writes(client: httpx.Client, jobs: Jobs) -> dict[str, httpx.Request]:
         "cancel": build("POST", f"/v1/jobs/{job['id']}/cancel"),
         "comparison": build("POST", "/v1/comparisons", json=compared),
         "webhook": build("POST", "/v1/webhooks", json={"url": "https://ops.example/" + "a" * 1900}),
+        "station's change": build("PATCH", f"/v1/ground-stations/{stations[1]['id']}", json=named),
+        "scenario": build("POST", "/v1/scenarios", json=scenario),
+        "scenario's end": build("DELETE", own["scenarios"]),
+        "outage": build("POST", "/v1/outages", json=out),
+        "outage's end": build("DELETE", own["outages"]),
+        "spacecraft": build("POST", "/v1/spacecraft", json={"name": "B" * 200}),
+        "spacecraft's change": build("PATCH", own["spacecraft"], json=named),
+        "spacecraft's end": build("DELETE", own["spacecraft"]),
+        "forecast": build("POST", "/v1/forecasts?name=Skies", content=skies, headers=kind),
+        "plan": build("POST", "/v1/plans", json={"job_id": answered[0]}),
+        "plan's move": build("POST", f"{plan}/transitions", json={"to": "withdrawn"}),
+        "plan's end": build("DELETE", drafted),
+        "job's end": build("DELETE", f"/v1/jobs/{answered[1]}"),
     }  # fmt: skip
 
 
