@@ -6,7 +6,7 @@ import math
 from array import array
 from collections import Counter
 from collections.abc import Iterator
-from datetime import UTC, datetime, timedelta
+from datetime import datetime, timedelta
 from typing import Final
 
 import numpy as np
@@ -22,8 +22,9 @@ from service.wire.instants import instant_text
 TRACK_STEP_S = 30.0
 _DECIMALS = 4  # of a degree: eleven metres
 _CLASS_KM = 10.0
-_OF_IMAGES = ("worth", "quality", "clear_probability")
-_EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
+_OF_IMAGES = ("quality", "clear_probability")  # from 0 to 1
+_SHARE: Final = 10_000
+_UNKNOWN: Final = 65_535
 _MILLISECOND: Final = timedelta(milliseconds=1)
 
 
@@ -36,7 +37,8 @@ def _parts(answered: Answered) -> Iterator[str]:
     names = ("job", "scenario_sha256", "plan_sha256", "horizon")
     head = {name: answered.head[name] for name in names}
     yield f'{{"type":"FeatureCollection",{compact(head)[1:-1]},"features":[\n'
-    yield from listed(compact(feature) for feature in _features(answered))
+    # A loop would hold each feature until the next one is there.
+    yield from listed(map(compact, _features(answered)))
     yield "\n]}\n"
 
 
@@ -99,29 +101,29 @@ def _targets(answered: Answered) -> Iterator[Document]:
 class _Spans:
     """When each action begins and ends, and how good its image is.
 
-    As numbers alone, for there may be very many.
+    As small numbers alone, for there may be very many: milliseconds from the horizon's start, and
+    shares in ten thousandths.
     """
 
     def __init__(self, answered: Answered):
-        spans = array("q")
-        images = array("d")
+        self._start = answered.question.horizon.start
+        self._spans = spans = array("I")
+        self._images = images = array("H")
         # Action ids count through all satellites: a1, a2, ...
         for _, action in answered.each_action():
             for name in ("start", "end"):
                 moment = datetime.fromisoformat(action[name])
-                spans.append((moment - _EPOCH) // _MILLISECOND)
+                spans.append((moment - self._start) // _MILLISECOND)
             # Answers of the first release say nothing of it.
             values = (action.get(name) for name in _OF_IMAGES)
-            images.extend(math.nan if value is None else value for value in values)
-        self._spans = spans
-        self._images = images
+            images.extend(_UNKNOWN if v is None else round(v * _SHARE) for v in values)
 
     def of(self, action_id: str | None) -> tuple[str | None, str | None]:
         """Return the instants of an action, None of none."""
         if action_id is None:
             return None, None
         at = 2 * (int(action_id.removeprefix("a")) - 1)
-        start, end = (_EPOCH + ms * _MILLISECOND for ms in self._spans[at : at + 2])
+        start, end = (self._start + ms * _MILLISECOND for ms in self._spans[at : at + 2])
         return instant_text(start), instant_text(end)
 
     def image_of(self, action_id: str | None) -> Document:
@@ -131,7 +133,7 @@ class _Spans:
         at = len(_OF_IMAGES) * (int(action_id.removeprefix("a")) - 1)
         values = self._images[at : at + len(_OF_IMAGES)]
         return {
-            name: None if math.isnan(value) else value
+            name: None if value == _UNKNOWN else value / _SHARE
             for name, value in zip(_OF_IMAGES, values, strict=True)
         }
 

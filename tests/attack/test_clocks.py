@@ -6,6 +6,7 @@ import os
 import shlex
 import shutil
 import subprocess
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -66,8 +67,8 @@ def _server_under(clock: Clock) -> Iterator[None]:
     if not SERVER_CONTROL:
         yield
         return
-    _restart(clock.environment)
     try:
+        _restart(clock.environment)
         yield
     finally:
         _restart({})
@@ -77,17 +78,18 @@ def _restart(environment: dict[str, str]) -> None:
     # The server alone is to read the clock, not the shell that becomes another user before.
     become, control = SERVER_CONTROL[:-7], SERVER_CONTROL[-7:]
     assert control[1] == "-D"
-    subprocess.run([*SERVER_CONTROL, "-m", "fast", "stop"], cwd="/", check=True)
+    # Where it did not come up before, there is nothing to stop.
+    subprocess.run([*SERVER_CONTROL, "-m", "fast", "stop"], cwd="/", check=False)
     names = [f"{name}={value}" for name, value in environment.items()]
     subprocess.run([*become, "env", *names, *control, "start"], cwd="/", check=True)
 
 
 @pytest.fixture
-def clock(tmp_path: Path) -> Clock:
-    # A server reads it as another user.
-    for folder in (tmp_path, *tmp_path.parents[:2]):
-        folder.chmod(0o755)
-    return Clock(tmp_path)
+def clock() -> Iterator[Clock]:
+    # A server reads it as another user, who may not look into the folders of tests.
+    with tempfile.TemporaryDirectory() as folder:
+        Path(folder).chmod(0o755)
+        yield Clock(Path(folder))
 
 
 def let_clocks_jump(jobs: Jobs, clock: Clock) -> None:

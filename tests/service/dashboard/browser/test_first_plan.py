@@ -80,7 +80,8 @@ def test_a_satellite_is_entered_with_its_own_figures(browser: Browser, api: http
     (stored,) = api.get("/v1/satellites?norad_cat_id=90300").json()["items"]
     assert stored["agility"]["slew_rate_deg_s"] == 2.5
     assert stored["sensor"]["off_nadir_max_deg"] == 40.0
-    assert stored["sensor"]["off_nadir_min_deg"] == 5.0
+    # What was left empty is that of the spacecraft's type.
+    assert stored["sensor"]["sun_elevation_min_deg"] == 10.0
     assert browser.run(
         "return document.querySelector(`input[value='${arguments[0]}']`).checked", stored["id"]
     )
