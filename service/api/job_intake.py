@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from datetime import datetime
+from functools import partial
 from typing import Any, Final
 
 from fastapi import Request, Response
@@ -18,6 +19,7 @@ from service.api.job_shapes import headers_of, shown
 from service.db.rows import JobRow, ScenarioRow
 from service.jobs.queue import JobQueue
 from service.jobs.solver_params import params_of, parse_params
+from service.jobs.submission import JobSpec
 from service.problems.faults import refuse
 from service.problems.kinds import ServiceError
 from service.scenarios import freezing
@@ -27,7 +29,8 @@ from service.scenarios.translate import inside, read_file
 from service.settings import Settings
 from service.stores import job_store as store
 from service.stores import scenario_store
-from service.wire.jobs import ACTIVE, JobOut, LimitsIn, QuestionIn
+from service.wire.jobs import ACTIVE, JobIn, JobOut, LimitsIn, QuestionIn
+from service.wire.replans import ReplanIn
 from service.wire.scenarios import ScenarioFile, ScenarioIn
 
 _QUEUE_FULL_S: Final = 30
@@ -50,6 +53,29 @@ def queue_with_room(call: Call, num_jobs: int = 1) -> JobQueue:
     with call.database.reading() as session:
         require_room(session, call, num_jobs)
     return queue
+
+
+def asked_for(body: JobIn | ReplanIn, call: Call) -> partial[JobSpec]:
+    """Return the spec of a job as far as its body says it: all but the scenario.
+
+    Raises
+    ------
+    ServiceError
+        Where parameters or limits are wrong, before anything is stored.
+    """
+    params = all_params(body.solver, body.params)
+    time_s, memory_mb = limits_of(body.limits, call.settings)
+    return partial(
+        JobSpec,
+        solver=body.solver,
+        params=params,
+        seed=body.seed,
+        time_s=time_s,
+        memory_mb=memory_mb,
+        priority=body.priority,
+        label=body.label,
+        owner=call.caller.owner,
+    )
 
 
 def all_params(solver: str, params: Mapping[str, Any]) -> dict[str, Any]:

@@ -39,23 +39,12 @@ def create_job(body: JobIn, call: CallDep, once: OnceDep) -> JobOut:
 
     Jobs with a higher `priority` start first, those of the same priority in their order.
     """
-    params = intake.all_params(body.solver, body.params)
-    time_s, memory_mb = intake.limits_of(body.limits, call.settings)
+    asked = intake.asked_for(body, call)
     inline = intake.frozen(call, body)
     queue = intake.queue_with_room(call)
     with once.transaction() as session:
         intake.require_room(session, call)
-        spec = submission.JobSpec(
-            scenario_id=intake.stored_scenario(session, call, body, inline),
-            solver=body.solver,
-            params=params,
-            seed=body.seed,
-            time_s=time_s,
-            memory_mb=memory_mb,
-            priority=body.priority,
-            label=body.label,
-            owner=call.caller.owner,
-        )
+        spec = asked(scenario_id=intake.stored_scenario(session, call, body, inline))
         job = submission.submit(session, queue, spec)
         call.audit.record(session, "create", "job", job.id)
         return once.keep(session, intake.accepted(session, call.response, job))

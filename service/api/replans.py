@@ -42,8 +42,7 @@ def create_replan(plan_id: str, body: ReplanIn, call: CallDep, once: OnceDep) ->
     As few actions as possible change; promised targets stay imaged, or the job fails with
     `promise_not_kept`. `links.plan` is the draft, there once the job has succeeded.
     """
-    params = intake.all_params(body.solver, body.params)
-    time_s, memory_mb = intake.limits_of(body.limits, call.settings)
+    job = intake.asked_for(body, call)
     queue = intake.queue_with_room(call)
     with call.database.reading() as session:
         plan = find_plan(session, plan_id, call.caller)
@@ -61,16 +60,8 @@ def create_replan(plan_id: str, body: ReplanIn, call: CallDep, once: OnceDep) ->
         asked = replanning.replan_file(file, body, happened)
         frozen = freezing.freeze_file(asked, call.settings.scenario_limits)
         row, _ = intake.save(session, call, frozen, call.caller.owner)
-        spec = submission.JobSpec(
+        spec = job(
             scenario_id=row.id,
-            solver=body.solver,
-            params=params,
-            seed=body.seed,
-            time_s=time_s,
-            memory_mb=memory_mb,
-            priority=body.priority,
-            label=body.label,
-            owner=call.caller.owner,
             change=replans.note_of(plan, call.caller, body.name, freeze_until),
         )
         made = submission.submit(session, queue, spec)

@@ -59,14 +59,14 @@ def _stand_in(error: Any) -> object:
     return None if bound is None else error["ctx"][bound]
 
 
-def _path(values: object, loc: Sequence[str | int]) -> list[str | int]:
+def _path(values: Any, loc: Sequence[str | int]) -> list[str | int]:
     """Return the steps that lead to a value; the names of a union's members are none."""
     path: list[str | int] = []
     for step in loc:
         if isinstance(values, Mapping) and step not in values:
             continue
         path.append(step)
-        values = values[step]  # type: ignore[index]
+        values = values[step]
     return path
 
 

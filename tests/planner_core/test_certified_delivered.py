@@ -14,7 +14,7 @@ from planner_core.budget import Budget, Termination
 from planner_core.certified.proofs.resource_bound import quick_bound, resource_value
 from planner_core.certified.solver import Certified
 from planner_core.domain import Objective
-from planner_core.problem import COLLECT, Problem
+from planner_core.problem import COLLECT
 from planner_core.problem.delivery import with_objective
 from planner_core.problem.plan import Plan
 from planner_core.reasons.explain import explain
@@ -25,24 +25,12 @@ from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import TIGHT, make_problem, random_problem, varied_problem
 from tests.planner_core.test_delivery import ROOMY, collect, contact
+from tests.planner_core.verdicts import encloses
 
 SEEDS = st.integers(0, 10**6)
 STARVED = replace(TIGHT, battery_min_fraction=0.5, initial_battery_fraction=0.62)
 
 _problem = partial(varied_problem, scarce=STARVED)
-
-
-def _is_optimum(problem: Problem, best: float) -> bool:
-    """Check what `certified` says against the best plan; return whether it found that."""
-    solution = Certified().solve(problem, Budget(), 0)
-    timeline = replay(problem, solution.plan)
-    assert solution.bound is not None
-    assert solution.bound >= best - 1e-6
-    assert timeline.is_valid
-    assert timeline.reward <= best + 1e-6
-    if solution.termination == Termination.OPTIMAL:
-        assert timeline.reward == pytest.approx(best, rel=1e-6)
-    return timeline.reward >= best - 1e-6
 
 
 @pytest.mark.parametrize("dynamics", ["physical", "paper"])
@@ -53,7 +41,7 @@ def test_delivered_is_the_best_of_all_plans(
 ) -> None:
     problem = _problem(seed, dynamics, num_satellites, num_contacts=3, has_quality=has_quality)
     problem = with_objective(problem, Objective.delivered())
-    _is_optimum(problem, best_reward(problem))
+    encloses(problem, best_reward(problem))
 
 
 @examples(500)
@@ -71,7 +59,7 @@ def test_no_plan_beats_the_bound_whatever_delivery_counts(
 ) -> None:
     objective = Objective(collected_share=collected_share, half_life_s=half_life_s)
     problem = with_objective(_problem(seed, dynamics, 1, num_contacts=3), objective)
-    _is_optimum(problem, best_reward(problem))
+    encloses(problem, best_reward(problem))
 
 
 def test_small_problems_end_at_the_optimum() -> None:
@@ -79,7 +67,7 @@ def test_small_problems_end_at_the_optimum() -> None:
     for seed in range(40):
         problem = _problem(seed, "physical" if seed % 2 else "paper", 1, num_contacts=3)
         problem = with_objective(problem, Objective.delivered())
-        reached += _is_optimum(problem, best_reward(problem))
+        reached += encloses(problem, best_reward(problem))
     assert reached >= 38
 
 
@@ -165,7 +153,7 @@ def test_a_share_for_images_on_board_bounds_every_plan(
     best = best_reward(problem)
     for unit in (0.05, 0.25, 1.0):
         assert resource_value(problem, price * problem.best_worth, unit) >= best - 1e-9
-    _is_optimum(problem, best)
+    encloses(problem, best)
 
 
 def test_what_stays_on_board_lowers_the_bound() -> None:
