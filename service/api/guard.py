@@ -6,13 +6,12 @@ import math
 from typing import Final
 
 from sqlalchemy.exc import SQLAlchemyError
-from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from service.access import key_store
 from service.access.callers import LOCAL_CALLER, NOBODY, Caller
 from service.access.callers import Scope as KeyScope
+from service.access.lookup import KeyLookup
 from service.access.rate_limit import RateLimiter
 from service.access.static_keys import StaticKeys
 from service.api.errors import on_database_error, problem
@@ -63,6 +62,7 @@ class Guard:
         self._keys_required = settings.keys_required
         self._static_keys: StaticKeys = settings.static_keys
         self._sites = Sites(settings.own_hosts, settings.allowed_origins)
+        self._keys = KeyLookup()
         self._slots = Slots(MOST_AT_ONCE, MOST_OF_AN_OWNER)
         per_s = settings.requests_per_s
         self._limiter = RateLimiter(per_s, settings.rate_limit_burst) if per_s else None
@@ -119,7 +119,7 @@ class Guard:
                 )
             return LOCAL_CALLER
         database: Database = request.app.state.database
-        caller = self._static_keys.find(token) or await run_in_threadpool(_find, database, token)
+        caller = self._static_keys.find(token) or await self._keys.find(database, token)
         if caller is None:
             raise ServiceError(
                 "invalid_key",
@@ -159,11 +159,6 @@ def _token(request: Request) -> str | None:
     if scheme.lower() == "bearer":
         return credentials.strip()
     return request.headers.get("x-api-key")
-
-
-def _find(database: Database, token: str) -> Caller | None:
-    with database.reading() as session:
-        return key_store.find_caller(session, token)
 
 
 def _is_below(path: str, root: str) -> bool:

@@ -88,9 +88,7 @@ Name = Annotated[
 ]
 Id = Annotated[str, StringConstraints(min_length=1, max_length=200, pattern=TEXT)]
 
-Reason = Annotated[
-    str, StringConstraints(min_length=1, max_length=1000, pattern=r"^[^\x00-\x1f\x7f]*$")
-]
+Reason = Annotated[str, StringConstraints(min_length=1, max_length=1000, pattern=TEXT)]
 """Why, for people; printable characters."""
 
 MOST: Final = 1e9

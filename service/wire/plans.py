@@ -35,9 +35,7 @@ class PlanIn(Body):
 class WaiverIn(Body):
     """A violation that somebody answers for."""
 
-    violation: str = Field(
-        min_length=1,
-        max_length=100,
+    violation: Id = Field(
         description="Its place in the plan's `violations`, such as `/violations/0`, or a code for "
         "all with that code.",
     )
