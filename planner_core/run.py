@@ -20,6 +20,7 @@ from planner_core.problem import Problem
 from planner_core.reasons.explain import explain
 from planner_core.reasons.reason import Search, TargetOutcome
 from planner_core.referee.replay import Timeline, replay
+from planner_core.replanning.relief import flyable, within_limits
 from planner_core.replanning.replan import question_of, solve_replan
 from planner_core.solvers.base import Solution, Solver
 
@@ -89,16 +90,18 @@ def plan_scenario(
     problem = build_problem(scenario, opportunities, budget)
     clock.append(time.perf_counter())
     budget.report(Progress(phase="solve", fraction=0.0))
+    searched = within_limits(problem)
     if scenario.replan is None:
-        solution = solver.solve(problem, budget, seed)
+        solution = solver.solve(searched, budget, seed)
     else:
-        solution = solve_replan(question_of(scenario, problem), solver, budget, seed)
+        solution = solve_replan(question_of(scenario, searched), solver, budget, seed)
+    solution = flyable(problem, searched, solution)
     if problem.continuous_starts:
         solution = with_own_starts(problem, solution, budget)
     clock.append(time.perf_counter())
     budget.report(Progress(phase="verify", fraction=0.0))
     timeline = replay(problem, solution.plan)
-    bound = _best_bound(problem, solution, timeline, budget, known_bound)
+    bound = _best_bound(searched, solution, timeline, budget, known_bound)
     budget.report(
         Progress(
             phase="verify",

@@ -367,7 +367,11 @@ def _stations(problem: Problem, plan: Plan) -> list[Violation]:
 def _limits(
     problem: Problem, index: int, positions: Sequence[int], profile: Profile
 ) -> list[Violation]:
-    """Battery stays strictly above its minimum, recorder strictly below its maximum."""
+    """Battery stays strictly above its minimum, recorder strictly below its maximum.
+
+    From a state beyond a limit, actions that do not worsen it break nothing: a contact that
+    empties a recorder which was too full at the start is the way back.
+    """
     r = problem.satellites[index].resources
 
     def is_low(point: Point) -> bool:
@@ -376,20 +380,31 @@ def _limits(
     def is_full(point: Point) -> bool:
         return point.recorder >= r.recorder_max_fraction
 
+    def drains(before: Point, after: Point) -> bool:
+        return after.battery < before.battery or after.battery <= 0.0
+
+    def fills(before: Point, after: Point) -> bool:
+        return after.recorder > before.recorder or after.recorder >= 1.0
+
+    began_s = profile.points[0].time_s
     found = []
-    for code, is_broken, limit in (
-        ("battery", is_low, r.battery_min_fraction),
-        ("recorder", is_full, r.recorder_max_fraction),
+    for code, is_broken, worsens, limit in (
+        ("battery", is_low, drains, r.battery_min_fraction),
+        ("recorder", is_full, fills, r.recorder_max_fraction),
     ):
         blamed = [
-            (before.time_s, after.time_s, position)
+            (before.time_s, after.time_s, position, worsens(before, after))
             for position, before, after in zip(
                 positions, profile.before, profile.after, strict=True
             )
             if is_broken(after) or (problem.dynamics == "physical" and is_broken(before))
         ]
         for start_s, end_s, worst in _excursions(problem, profile.points, code, limit):
-            partners = tuple(p for b, a, p in blamed if b <= end_s and a >= start_s)
+            partners = tuple(
+                position
+                for before_s, after_s, position, is_worse in blamed
+                if before_s <= end_s and after_s >= start_s and (is_worse or start_s > began_s)
+            )
             found.append(
                 Violation(
                     code="battery" if code == "battery" else "recorder",
@@ -400,7 +415,7 @@ def _limits(
                     detail=f"The {code} reaches {worst:.4f} of its capacity; "
                     f"the limit is {limit:.4f}.",
                     blamed=partners,
-                    inherited=start_s == profile.points[0].time_s and not partners,
+                    inherited=start_s == began_s and not partners,
                 )
             )
     return found

@@ -12,11 +12,11 @@ from tests.missions import Document, drawn_targets, paper_mission
 from tests.service.test_plan_job import run
 
 
-def planned(**resources: Any) -> Document:
+def planned(solver: str = "rule", **resources: Any) -> Document:
     """Return the timeline of a mission that begins like this."""
     file = paper_mission(drawn_targets(20))
     file["satellites"][0]["resources"] = {"preset": "paper"} | resources
-    timeline: Document = json.loads(timeline_text(run(file, "rule").blocks))
+    timeline: Document = json.loads(timeline_text(run(file, solver).blocks))
     return timeline
 
 
@@ -44,6 +44,14 @@ def test_an_empty_battery_is_no_fault_of_a_plan_that_waits() -> None:
     timeline = planned(initial_battery_fraction=0.1, battery_min_fraction=0.3)
     assert timeline["validity"] == "inherited"
     assert [v["inherited"] for v in timeline["violations"]] == [True]
+
+
+def test_contacts_empty_a_recorder_that_is_too_full() -> None:
+    timeline = planned("certified", initial_recorder_fraction=0.9, recorder_max_fraction=0.75)
+    tasks = [a for a in timeline["satellites"][0]["actions"] if a["mode"] in ("collect", "contact")]
+    assert timeline["validity"] == "inherited"
+    assert tasks[0]["mode"] == "contact"
+    assert 0.0 < timeline["totals"]["reward"] <= timeline["totals"]["bound"]
 
 
 def test_a_mission_within_its_limits_inherits_nothing() -> None:
