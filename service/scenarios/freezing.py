@@ -40,6 +40,7 @@ from service.wire.scenarios import (
     Question,
     ScenarioFile,
     ScenarioIn,
+    default_objective,
 )
 from service.wire.spacecraft_types import BUILT_IN
 
@@ -177,9 +178,12 @@ def num_targets(session: Session, catalog_ids: Sequence[str]) -> int:
 
 def _expanded(session: Session, body: ScenarioIn) -> ScenarioFile:
     shared = {name: getattr(body, name) for name in Question.model_fields if name != "outages"}
+    satellites = _satellites(session, body.satellite_ids)
+    if "objective" not in body.model_fields_set:
+        shared["objective"] = default_objective(satellite.spacecraft for satellite in satellites)
     return ScenarioFile(
         **shared,
-        satellites=_satellites(session, body.satellite_ids),
+        satellites=satellites,
         targets=_targets(session, body.target_catalog_ids),
         ground_stations=_ground_stations(session, body.ground_station_ids),
         outages=_outages(session, body),
