@@ -23,9 +23,10 @@ _SPARE_FILES: Final = 256
 
 
 class Protocol(HttpToolsProtocol):
-    """Closes connections that ask for nothing, and the oldest of those where there are too many.
+    """Closes connections that ask for nothing, and some of those where there are too many.
 
-    Those that never asked for anything go first: a client that comes back finds its own open.
+    Those that never asked for anything go first, then those that were answered the longest ago:
+    a client that comes back finds its own open.
 
     A connection *asks* from the end of a request's head until its answer is sent. One that
     does not, or sends a body that nobody has let in yet, gives its place to a new one.
@@ -80,6 +81,8 @@ class Protocol(HttpToolsProtocol):
         """Wait for the next request, or for what is left of this one's body."""
         is_next_here = bool(self.pipeline)
         self._is_answered = True
+        if self in self._places:
+            self._places[self] = self._places.pop(self)
         super().on_response_complete()
         if not is_next_here and not self.transport.is_closing():
             self._await_head()
