@@ -22,7 +22,8 @@ from planner_core.problem import Floats, Problem
 from planner_core.problem.plan import Plan
 
 _MOVES_AN_IMAGE: Final = 8
-_LEAST_MOVES: Final = 64  # on each satellite
+_FIRST_MOVES: Final = 10  # on each satellite: the first gain most
+_LEAST_MOVES: Final = 64
 _MOST_ROUNDS: Final = 24
 _MOST_MISSES: Final = 8
 _LEAST_GAIN: Final = 0.001  # of an aim, for another round
@@ -57,8 +58,6 @@ def polished(
     if view.timeline.is_valid and view.images:
         for number, aim in enumerate(aims):
             accepts = _Acceptance(view, aim, limits)
-            if aim == "early" and problem.use_resources:
-                view = with_contacts(view, accepts, budget)
             if aim in ("few_contacts", "margin"):
                 view = without_contacts(view, accepts, budget)
             if not problem.continuous_starts and not budget.is_spent():
@@ -101,8 +100,8 @@ def _with_windows(
     """Return the plan with windows of images that are planned anew, contacts as they are."""
     problem = view.problem
     num_satellites = len(problem.satellites)
-    num_moves = max(_LEAST_MOVES, _MOVES_AN_IMAGE * len(view.images) // num_satellites)
-    num_misses = 0
+    most_moves = max(_LEAST_MOVES, _MOVES_AN_IMAGE * len(view.images) // num_satellites)
+    num_moves, num_misses = _FIRST_MOVES, 0
     for _ in range(_MOST_ROUNDS):
         liking = liking_of(view, aim)
         if liking is None or num_misses == _MOST_MISSES or budget.is_spent():
@@ -114,8 +113,10 @@ def _with_windows(
         trial = View.of(problem, windows.plan)
         if accepts(trial):
             view = trial
-            if before - value_of(view, aim) < _LEAST_GAIN * abs(before):
+            gained = before - value_of(view, aim)
+            if num_moves == most_moves and gained < _LEAST_GAIN * abs(before):
                 break
+            num_moves = min(3 * num_moves, most_moves)
         else:
             # Fewer moves at once are less likely to lose something between them.
             num_moves, num_misses = max(num_moves // 3, 1), num_misses + 1
