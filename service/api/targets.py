@@ -12,12 +12,10 @@ from fastapi import APIRouter, Query
 from sqlalchemy.orm import Session
 
 from service.api.deps import CallDep
-from service.api.errors import problem_responses
 from service.api.paging import PagingDep, invalid_cursor
 from service.db.rows import TargetCatalogRow, TargetRow
 from service.plans import store as plan_store
 from service.plans.target_lives import lives_of, plans_by_catalog
-from service.problems.kinds import ServiceError
 from service.wire.base import Listed
 from service.wire.places import TargetIn
 from service.wire.stored import from_store
@@ -29,7 +27,7 @@ _AT_ONCE = 500
 _Numbered = tuple[tuple[str, int], TargetLifeOut]
 
 
-@router.get("", responses=problem_responses(404))
+@router.get("")
 def list_target_lives(
     call: CallDep,
     paging: PagingDep,
@@ -61,8 +59,6 @@ def _catalogs(session: Session, catalog_id: str | None, from_id: str) -> list[Ta
     wanted = sa.select(TargetCatalogRow).order_by(TargetCatalogRow.id)
     if catalog_id is not None:
         wanted = wanted.where(TargetCatalogRow.id == catalog_id)
-        if session.scalars(wanted).first() is None:
-            raise ServiceError("not_found", f"There is no target catalogue {catalog_id!r}.")
     return list(session.scalars(wanted.where(TargetCatalogRow.id >= from_id)))
 
 
