@@ -16,7 +16,13 @@ from planner_core.domain import Objective, Quality, Resources
 from planner_core.errors import InvalidScenario, PlannerError
 from service.scenarios.translate import canonical, read_file, scenario_from_content, sha256_of
 from service.wire.base import MOST
-from tests.service.factories import ground_station, satellite, target, tle
+from tests.service import factories
+from tests.service.factories import ground_station, target, tle
+
+
+def satellite(**fields: Any) -> dict[str, Any]:
+    """Return the same satellite each time, but for these fields."""
+    return factories.satellite(tle=tle()) | fields
 
 
 def file(**fields: Any) -> dict[str, Any]:

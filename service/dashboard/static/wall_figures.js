@@ -54,11 +54,12 @@ export function telling(plan, changes) {
 /**
  * @param {PlanChangesOut["items"][number]} item
  * @param {Plan | undefined} plan
+ * @param {(stationId: string) => string} stationOf
  */
-export function changeLine(item, plan) {
+export function changeLine(item, plan, stationOf) {
   const about = item.action ?? item.parent_action;
   if (about === null) return item.change;
-  const where = about.target_id ?? (plan?.actions.get(item.action?.id ?? "")?.station_name ?? about.station_id);
+  const where = about.target_id ?? stationOf(about.station_id ?? "");
   const name = plan?.satelliteName(about.satellite_id) ?? about.satellite_id;
   return `${item.change}: ${name}, ${about.mode} ${where}, ${utc(about.start).slice(11)}`;
 }

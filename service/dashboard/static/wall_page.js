@@ -19,6 +19,7 @@ const EVERY_MS = 10_000;
 const PASSES_EVERY_MS = 600_000;
 const AHEAD_MS = 14 * 3_600_000;
 const MOST_CHANGES = 6;
+const FEW_ROWS = 7;
 
 /** `#at=2026-03-01T06:00:00Z` shows another time than now, for plans of other days. */
 const fragment = new URLSearchParams(location.hash.slice(1));
@@ -143,8 +144,9 @@ async function showChanges(inForce) {
   } else {
     /** @type {import("./types.js").PlanChangesOut} */
     const changes = await get(`/v1/plans/${encodeURIComponent(replan.id)}/changes`);
-    const drawn = shown.get(replan.id)?.drawn;
-    const lines = changes.items.slice(0, MOST_CHANGES).map((item) => h("li", {}, changeLine(item, drawn)));
+    const known = shown.get(replan.id);
+    const stationOf = (/** @type {string} */ id) => known?.geography.stations.find((one) => one.id === id)?.name ?? id;
+    const lines = changes.items.slice(0, MOST_CHANGES).map((item) => h("li", {}, changeLine(item, known?.drawn, stationOf)));
     const more = changes.items.length - lines.length;
     fill(place, h("p", {}, telling(replan, changes)), h("ul", {}, ...lines, more > 0 && h("li", {}, `and ${more} more`)));
   }
@@ -153,14 +155,17 @@ async function showChanges(inForce) {
 
 function tick() {
   const at = now();
+  const next = nextOfStations(at);
   const body = byId("wall-passes").querySelector("tbody");
-  if (body) fill(body, ...nextOfStations(at).map((one) => passRow(one, at)));
+  if (body) fill(body, ...next.map((one) => passRow(one, at)));
   const rows = [...shown.values()].flatMap(({ plan, drawn }) => {
     const own = new Set(satellitesInForce(plan));
     return drawn.rows.filter((row) => own.has(row.id)).map((row) => satelliteRow(drawn, row, at));
   });
   const satellites = byId("wall-satellites").querySelector("tbody");
   if (satellites) fill(satellites, ...rows);
+  // Nobody scrolls a wall.
+  document.body.classList.toggle("crowded", Math.max(next.length, rows.length) > FEW_ROWS);
 }
 
 /**

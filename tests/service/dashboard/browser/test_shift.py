@@ -95,7 +95,7 @@ def print_the_passes(browser: Browser, api: httpx.Client) -> None:
     shift = {
         "from": instant_text(start),
         "to": instant_text(start.replace(hour=start.hour + 8)),
-        "limit": 500,
+        "limit": "500",
     }
     script = """
       document.querySelector("#passes-from").value = arguments[0];
