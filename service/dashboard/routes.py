@@ -59,6 +59,12 @@ def plan_page(request: Request) -> Response:
     return _page(request, "plan")
 
 
+@router.get("/fleet")
+def fleet_page(request: Request) -> Response:
+    """Return the page on which satellites, stations and types are changed, and outages reported."""
+    return _page(request, "fleet")
+
+
 @router.get("/wall")
 def wall_page(request: Request) -> Response:
     """Return the page for a display on the wall."""

@@ -358,4 +358,16 @@
  * @property {PassConflictOut[]} conflicts
  */
 
+/**
+ * @typedef {object} OutageOut
+ * @property {string} id
+ * @property {string | null} satellite_id
+ * @property {string | null} satellite_name
+ * @property {string | null} station_id
+ * @property {string | null} station_name
+ * @property {string} start
+ * @property {string} end
+ * @property {string | null} reason
+ */
+
 export {};

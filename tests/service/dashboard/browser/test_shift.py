@@ -140,3 +140,42 @@ def test_the_wall_outlasts_a_service_that_does_not_answer(browser: Browser, job:
     browser.wait(lambda: "No answer since" in browser.text("#wall-status"), "it does not tell")
     browser.run("window.fetch = window.realFetch")
     browser.wait(lambda: "No answer" not in browser.text("#wall-status"), "it does not come back")
+
+
+def test_a_station_is_changed_and_reported_as_out(
+    browser: Browser, api: httpx.Client, job: Json
+) -> None:
+    station = listed(api, "/v1/ground-stations")[0]
+    address = f"/v1/ground-stations/{station['id']}"
+    browser.open("/fleet")
+    choice = f"#thing option[value='{address}']"
+    browser.wait(lambda: browser.driver.find_elements("css selector", choice), "no station")
+    browser.run(
+        """
+        const thing = document.querySelector("#thing");
+        thing.value = arguments[0];
+        thing.dispatchEvent(new Event("change"));
+        """,
+        address,
+    )
+    mask = "[data-path=min_elevation_deg]"
+    browser.wait(lambda: browser.driver.find_elements("css selector", mask), "no field")
+    browser.find(mask).clear()
+    browser.find(mask).send_keys("12.5")
+    browser.click("#edit-form button")
+    browser.wait(lambda: browser.text("#edit-status") == "Saved.", "it is not saved")
+    assert api.get(address).json() == station | {"min_elevation_deg": 12.5}
+    browser.click("#edit-form button")
+    browser.wait(lambda: browser.text("#edit-status") == "Nothing is different.", "it changed")
+    browser.run(
+        "document.querySelector('#outage-of').value = arguments[0]", f"station_id {station['id']}"
+    )
+    browser.find("#outage-reason").send_keys("Antenna in service")
+    browser.click("#outage-form button")
+    browser.wait(lambda: "Antenna in service" in browser.text("#outages"), "no outage")
+    (outage,) = listed(api, "/v1/outages", station_id=station["id"])
+    assert outage["reason"] == "Antenna in service"
+    browser.click("#outages tbody button")
+    browser.wait(lambda: "Antenna in service" not in browser.text("#outages"), "it is still there")
+    assert listed(api, "/v1/outages", station_id=station["id"]) == []
+    api.patch(address, json={"min_elevation_deg": station["min_elevation_deg"]}).raise_for_status()
