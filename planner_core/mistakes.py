@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from planner_core.domain import Satellite, Scenario, Target
-from planner_core.problem import CONTACT, Opportunities
+from planner_core.problem import COLLECT, CONTACT, Opportunities
 
 _RADAR = ("sar", "radar")
 
@@ -16,9 +18,47 @@ def usual_mistakes(scenario: Scenario) -> tuple[str, ...]:
 
 def mistakes_of_accesses(scenario: Scenario, table: Opportunities) -> tuple[str, ...]:
     """Return sentences about what satellites see of a question's targets and stations."""
-    if not (scenario.use_resources and scenario.ground_stations) or (table.kind == CONTACT).any():
+    if not (scenario.use_resources and scenario.ground_stations):
         return ()
-    return ("No satellite has a contact with any ground station: no image comes down.",)
+    if not (table.kind == CONTACT).any():
+        return ("No satellite has a contact with any ground station: no image comes down.",)
+    too_much = _more_than_contacts_take(scenario, table)
+    return () if too_much is None else (too_much,)
+
+
+def _more_than_contacts_take(scenario: Scenario, table: Opportunities) -> str | None:
+    """Warn where one image of each target in sight is more than all contacts together take down.
+
+    Each is as small as it can be, each contact at its satellite's highest rate, and none in the way
+    of another: it is more than they take whatever is planned.
+    """
+    capacities = [s.resources.recorder_capacity_mbit for s in scenario.satellites]
+    known = np.array([1.0 if one is None else one for one in capacities])
+    if len(known) > 1 and None in capacities:
+        return None  # there is no common measure
+    length_s = table.end_s - table.start_s
+    resources = [satellite.resources for satellite in scenario.satellites]
+    fill_per_s = known * [r.collect_fill_per_s for r in resources]
+    taken_per_s = known * [
+        max((rate for _, rate in r.downlink_by_elevation), default=r.downlink_per_s)
+        for r in resources
+    ]
+    least = np.full(len(scenario.targets), np.inf)
+    collects = np.flatnonzero(table.kind == COLLECT)
+    sizes = (length_s * fill_per_s[table.satellite])[collects]
+    np.minimum.at(least, table.place[collects], sizes)
+    contacts = np.flatnonzero(table.kind == CONTACT)
+    stations = [scenario.ground_stations[place] for place in table.place[contacts].tolist()]
+    useful_s = np.maximum(length_s[contacts] - [s.setup_s for s in stations], 0.0)
+    gains = np.array([s.downlink_gain for s in stations])
+    most = float((useful_s * taken_per_s[table.satellite[contacts]] * gains).sum())
+    needed = float(least[np.isfinite(least)].sum())
+    if needed <= most:
+        return None
+    return (
+        f"All contacts together take down {100.0 * most / needed:.0f} % of one image of each "
+        "target in sight at most: add ground stations or plan a longer horizon."
+    )
 
 
 def _at_night(scenario: Scenario) -> str | None:

@@ -16,6 +16,8 @@ from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.proofs.lagrangian import lagrangian_bound
 from planner_core.certified.proofs.resource_bound import quick_bound
 from planner_core.domain import Scenario
+from planner_core.preferences.downlinks import with_more_downlinks
+from planner_core.preferences.polish import Effect, polished
 from planner_core.problem import Problem
 from planner_core.reasons.explain import explain
 from planner_core.reasons.reason import Search, TargetOutcome
@@ -26,6 +28,7 @@ from planner_core.solvers.base import Solution, Solver
 
 log = logging.getLogger(__name__)
 
+_SEARCH: Final = 0.8  # of the time: the rest is for what is preferred beside worth
 _ROUNDING: Final = 1e-6  # relative; rewards to which bounds are stated
 
 
@@ -49,6 +52,8 @@ class Judged:
         None where this plan has refuted all there were.
     outcomes
         Every target once, in the scenario's order.
+    effects
+        What preferences came to, in their order.
     """
 
     scenario: Scenario
@@ -59,6 +64,7 @@ class Judged:
     bound: Bound | None
     outcomes: tuple[TargetOutcome, ...]
     runtime_s: Runtime
+    effects: tuple[Effect, ...] = ()
 
 
 def plan_scenario(
@@ -90,18 +96,28 @@ def plan_scenario(
     problem = build_problem(scenario, opportunities, budget)
     clock.append(time.perf_counter())
     budget.report(Progress(phase="solve", fraction=0.0))
-    searched = within_limits(problem)
+    relieved = within_limits(problem)
+    # A replan changes as little as it must; nothing else may ask for more changes.
+    aims = scenario.objective.prefer if scenario.replan is None else ()
     if scenario.replan is None:
-        solution = solver.solve(searched, budget, seed)
+        search = budget.part(_SEARCH) if aims else budget
+        solution = solver.solve(relieved, search, seed)
     else:
-        solution = solve_replan(question_of(scenario, searched), solver, budget, seed)
-    solution = flyable(problem, searched, solution)
+        solution = solve_replan(question_of(scenario, relieved), solver, budget, seed)
+    solution = flyable(problem, relieved, solution)
     if problem.continuous_starts:
         solution = with_own_starts(problem, solution, budget)
+    if scenario.replan is None and solution.termination is not Termination.OPTIMAL:
+        more = with_more_downlinks(problem, solution.plan, budget)
+        solution = replace(solution, plan=more)
+    effects: tuple[Effect, ...] = ()
+    if aims:
+        polish = polished(problem, solution.plan, aims, budget, seed)
+        solution, effects = replace(solution, plan=polish.plan), polish.effects
     clock.append(time.perf_counter())
     budget.report(Progress(phase="verify", fraction=0.0))
     timeline = replay(problem, solution.plan)
-    bound = _best_bound(searched, solution, timeline, budget, known_bound)
+    bound = _best_bound(relieved, solution, timeline, budget, known_bound)
     budget.report(
         Progress(
             phase="verify",
@@ -110,12 +126,12 @@ def plan_scenario(
             bound=bound.value if bound else None,
         )
     )
-    search = Search(
+    searched = Search(
         is_optimal=timeline.is_valid and solution.termination is Termination.OPTIMAL,
         breadth=solver.outlook.breadth,
         contact_above=solver.outlook.contact_above,
     )
-    outcomes = explain(problem, solution.plan, timeline, search)
+    outcomes = explain(problem, solution.plan, timeline, searched)
     clock.append(time.perf_counter())
     access, compile_, solve, verify = (b - a for a, b in itertools.pairwise(clock))
     return Judged(
@@ -127,6 +143,7 @@ def plan_scenario(
         bound=bound,
         outcomes=outcomes,
         runtime_s=Runtime(access=access, compile=compile_, solve=solve, verify=verify),
+        effects=effects,
     )
 
 

@@ -28,6 +28,7 @@ from service.api import (
     metrics,
     openapi,
     outages,
+    passes,
     plans,
     replans,
     satellites,
@@ -35,6 +36,7 @@ from service.api import (
     solvers,
     spacecraft,
     target_catalogs,
+    targets,
     timelines,
     webhooks,
     what_if,
@@ -45,9 +47,9 @@ from service.api.deps import check_request
 from service.api.errors import install_error_handlers
 from service.api.guard import Guard
 from service.api.idempotency import install_replay
-from service.api.job_wait import Versions
 from service.api.middleware import RequestContext
 from service.api.polls import Polls
+from service.api.questions import Questions
 from service.api.security_headers import SecurityHeaders
 from service.dashboard import routes as dashboard
 from service.db.session import Database
@@ -71,6 +73,7 @@ ROUTERS = (
     ground_stations.router,
     outages.router,
     target_catalogs.router,
+    targets.router,
     forecasts.router,
     scenarios.router,
     jobs.router,
@@ -82,6 +85,7 @@ ROUTERS = (
     comparisons.router,
     solvers.router,
     plans.router,
+    passes.router,
     replans.router,
     webhooks.router,
     audit_events.router,
@@ -139,7 +143,7 @@ def create_app(
     app.state.explainer = Explainer()
     app.state.variations = Variations()
     app.state.queue = queue
-    app.state.versions = Versions(app.state)
+    app.state.questions = Questions(app.state)
     app.state.call_counters = metrics.CallCounters()
     for router in ROUTERS:
         app.include_router(router)

@@ -34,7 +34,7 @@ from __future__ import annotations
 
 from planner_core.domain.forecast import Forecast, SkySeries
 from planner_core.domain.horizon import Horizon
-from planner_core.domain.objective import Objective
+from planner_core.domain.objective import Objective, Preference
 from planner_core.domain.outages import Outage
 from planner_core.domain.places import GroundStation, Target
 from planner_core.domain.quality import Curve, Quality
@@ -67,6 +67,7 @@ __all__ = [
     "OrbitDirection",
     "OrbitElements",
     "Outage",
+    "Preference",
     "Promise",
     "Quality",
     "Replan",

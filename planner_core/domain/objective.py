@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Self
+from typing import Literal, Self, get_args
 
 from planner_core.domain.checks import require
+
+Preference = Literal["early", "off_nadir", "sun", "balance", "margin", "few_contacts"]
+"""A secondary aim: least mean age, least mean angle off nadir, highest mean sun elevation, least
+share of the busiest satellite, highest lowest battery, fewest contacts."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,10 +25,13 @@ class Objective:
     half_life_s
         The rest halves with every such time between the end of the collect and that instant; None
         for no decay.
+    prefer
+        Secondary aims, in order: of plans of the same worth, which are liked better.
     """
 
     collected_share: float = 1.0
     half_life_s: float | None = None
+    prefer: tuple[Preference, ...] = ()
 
     def __post_init__(self) -> None:
         require(
@@ -35,6 +42,10 @@ class Objective:
             "objective/half_life_s",
             "must be greater than 0, or null for no decay",
         )
+        is_known = all(aim in get_args(Preference) for aim in self.prefer)
+        require(is_known, "objective/prefer", f"must be of {', '.join(get_args(Preference))}")
+        is_once = len(set(self.prefer)) == len(self.prefer)
+        require(is_once, "objective/prefer", "must name each aim once")
 
     @classmethod
     def collected(cls) -> Self:

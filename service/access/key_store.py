@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hmac
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any, Final, cast
 
 import sqlalchemy as sa
@@ -15,6 +15,10 @@ from service.db.clock import utc_now
 from service.db.rows import ApiKeyRow
 
 _SECONDS_A_DAY: Final = 86_400.0
+
+_OF_A_CALLER: Final = (
+    ApiKeyRow.id, ApiKeyRow.owner, ApiKeyRow.scope, ApiKeyRow.name, ApiKeyRow.token_sha256
+)  # fmt: skip
 
 
 def create(
@@ -60,10 +64,10 @@ def has_key(session: Session, key_id: str) -> bool:
     return session.scalar(sa.select(ApiKeyRow.id).where(ApiKeyRow.id == key_id)) is not None
 
 
-def has_ended(session: Session, key_id: str) -> bool:
-    """Return whether a stored key is revoked or expired by now."""
-    ended = sa.select(ApiKeyRow.id).where(ApiKeyRow.id == key_id, ~_is_good())
-    return session.scalar(ended) is not None
+def ended_of(connection: sa.Connection, key_ids: Collection[str]) -> set[str]:
+    """Return which of these stored keys are revoked or expired by now."""
+    ended = sa.select(ApiKeyRow.id).where(ApiKeyRow.id.in_(key_ids), ~_is_good())
+    return set(connection.scalars(ended))
 
 
 def has_good_key(session: Session) -> bool:
@@ -71,15 +75,19 @@ def has_good_key(session: Session) -> bool:
     return session.scalar(sa.select(ApiKeyRow.id).where(_is_good()).limit(1)) is not None
 
 
-def find_caller(session: Session, token: str) -> Caller | None:
-    """Return whose token this is; None where it is wrong, expired or revoked."""
-    key_id = key_id_of(token)
-    if key_id is None:
-        return None
-    row = session.scalar(sa.select(ApiKeyRow).where(ApiKeyRow.id == key_id, _is_good()))
-    if row is None or not hmac.compare_digest(row.token_sha256, digest_of(token)):
-        return None
-    return Caller(owner=row.owner, scope=Scope(row.scope), key_id=row.id, key_name=row.name)
+def callers_of(connection: sa.Connection, tokens: Collection[str]) -> dict[str, Caller]:
+    """Return whose tokens these are, without those that are wrong, expired or revoked."""
+    key_ids = {token: key_id for token in tokens if (key_id := key_id_of(token)) is not None}
+    if not key_ids:
+        return {}
+    good = sa.select(*_OF_A_CALLER).where(ApiKeyRow.id.in_(set(key_ids.values())), _is_good())
+    rows = {row.id: row for row in connection.execute(good)}
+    return {
+        token: Caller(owner=row.owner, scope=Scope(row.scope), key_id=row.id, key_name=row.name)
+        for token, key_id in key_ids.items()
+        if (row := rows.get(key_id)) is not None
+        and hmac.compare_digest(row.token_sha256, digest_of(token))
+    }
 
 
 def _is_good() -> sa.ColumnElement[bool]:

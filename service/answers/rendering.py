@@ -35,6 +35,7 @@ from service.wire.timelines import (
     ActionOut,
     ModelsOut,
     Outcome,
+    PreferredOut,
     ReasonOut,
     ResourceCurvesOut,
     RuntimeOut,
@@ -253,6 +254,12 @@ class Documents(Wording):
             delivered=num_delivered(self.problem, timeline.collected.values()),
             age_s=ages_of(timeline.collected.values()),
             on_board_mbit_end=on_board_mbit(self.scenario, self.problem, timeline.on_board),
+            preferred=[
+                PreferredOut(
+                    aim=effect.aim, before=round(effect.before, 6), after=round(effect.after, 6)
+                )
+                for effect in judged.effects
+            ],
         )
 
     def _action(self, action_id: str, action: JudgedAction) -> ActionOut:

@@ -35,7 +35,7 @@ LIGHT_TARGETS: Final = 5_000
 
 _HEAVY: Final = re.compile(
     r"/v1/scenarios/[^/]+(/opportunities)?|/v1/jobs/[^/]+/(what-if|diff/.*|targets/.+/explanation)"
-    r"|/v1/plans/[^/]+/replans"
+    r"|/v1/plans/[^/]+/(replans|passes(\.[^/]*)?)"
 )
 _IS_LIGHT: Final = "slewline.is_light"
 _CALLER: Final = "x-slewline-caller"

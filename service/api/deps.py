@@ -11,17 +11,17 @@ from fastapi import Depends, Request, Response
 from fastapi.dependencies.models import Dependant
 from fastapi.routing import APIRoute
 from sqlalchemy.orm import Session
-from starlette.concurrency import run_in_threadpool
 
 from planner_core.errors import Fault
 from service.access.audit import Audit
 from service.access.callers import Caller, Scope
 from service.api.guard import require_scope
+from service.api.questions import QuestionsDep
 from service.db.session import Database
 from service.problems.faults import refuse
 from service.problems.kinds import ServiceError
 from service.settings import Settings
-from service.stores import job_store, usage_store
+from service.stores import usage_store
 from service.wire.base import is_plain
 
 # What needs no thread is async: FastAPI runs everything else in one, which costs more than the
@@ -91,18 +91,14 @@ async def admin_only(caller: CallerDep) -> None:
     require_scope(caller, Scope.ADMIN)
 
 
-async def own_job_only(request: Request, caller: CallerDep, database: DatabaseDep) -> None:
+async def own_job_only(request: Request, caller: CallerDep, questions: QuestionsDep) -> None:
     """Let a caller reach only jobs of its own: for it there are no others (404)."""
     job_id = request.path_params.get("job_id")
     owner = caller.visible_owner
-    if job_id is not None and owner is not None:
-        await run_in_threadpool(_require_owner, database, job_id, owner)
-
-
-def _require_owner(database: Database, job_id: str, owner: str) -> None:
-    with database.reading() as session:
-        if job_store.owner_of(session, job_id) != owner:
-            raise ServiceError("not_found", f"There is no job {job_id!r}.")
+    if job_id is None or owner is None:
+        return
+    if await questions.owners.get(job_id) != owner:
+        raise ServiceError("not_found", f"There is no job {job_id!r}.")
 
 
 def media_type_of(request: Request) -> str:

@@ -11,13 +11,12 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from service.access.callers import LOCAL_CALLER, NOBODY, Caller
 from service.access.callers import Scope as KeyScope
-from service.access.lookup import KeyLookup
 from service.access.rate_limit import RateLimiter
 from service.access.static_keys import StaticKeys
 from service.api.errors import on_database_error, problem
+from service.api.questions import Questions
 from service.api.sites import READING, Sites
 from service.api.slots import Slots
-from service.db.session import Database
 from service.problems.kinds import ServiceError
 from service.settings import Settings
 
@@ -62,7 +61,6 @@ class Guard:
         self._keys_required = settings.keys_required
         self._static_keys: StaticKeys = settings.static_keys
         self._sites = Sites(settings.own_hosts, settings.allowed_origins)
-        self._keys = KeyLookup()
         self._slots = Slots(MOST_AT_ONCE, MOST_OF_AN_OWNER)
         per_s = settings.requests_per_s
         self._limiter = RateLimiter(per_s, settings.rate_limit_burst) if per_s else None
@@ -118,8 +116,8 @@ class Guard:
                     headers={"WWW-Authenticate": 'Bearer realm="slewline"'},
                 )
             return LOCAL_CALLER
-        database: Database = request.app.state.database
-        caller = self._static_keys.find(token) or await self._keys.find(database, token)
+        questions: Questions = request.app.state.questions
+        caller = self._static_keys.find(token) or await questions.callers.get(token)
         if caller is None:
             raise ServiceError(
                 "invalid_key",

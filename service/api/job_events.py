@@ -10,16 +10,14 @@ from typing import Annotated, Final
 from fastapi import APIRouter, Depends, Header, Response
 from fastapi.responses import StreamingResponse
 from sqlalchemy.exc import SQLAlchemyError
-from starlette.concurrency import run_in_threadpool
 
-from service.access import key_store
 from service.access.callers import Caller
-from service.api.deps import CallerDep, DatabaseDep, own_job_only
+from service.api.deps import CallerDep, own_job_only
 from service.api.errors import problem_responses
 from service.api.job_shapes import etag_of_job, shown
-from service.api.job_wait import Versions, VersionsDep, wait_for_change
+from service.api.job_wait import wait_for_change
+from service.api.questions import Questions, QuestionsDep
 from service.db.failures import why_unavailable
-from service.db.session import Database
 from service.wire.jobs import ACTIVE, FINAL
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[Depends(own_job_only)])
@@ -41,9 +39,8 @@ _NOTHING_SEEN: Final = "0"
 )
 async def job_events(
     job_id: str,
-    database: DatabaseDep,
     caller: CallerDep,
-    versions: VersionsDep,
+    questions: QuestionsDep,
     last_event_id: Annotated[
         str, Header(alias="Last-Event-ID", description="The last event that was seen.")
     ] = "",
@@ -55,25 +52,25 @@ async def job_events(
     database fails: ask again with `Last-Event-ID`. It ends for good with the key it was asked
     for with.
     """
-    job, _ = await wait_for_change(database, versions, job_id, None, 0.0, _never)
+    job, _ = await wait_for_change(questions, job_id, None, 0.0, _never)
     seen = last_event_id or _NOTHING_SEEN
     if job.state in FINAL and seen == str(job.version):
         # What browsers do after a stream has ended is to ask for it again, for ever.
         return Response(status_code=204)
     return StreamingResponse(
-        _events(database, versions, _Listener(database, caller), job_id, f'"{seen}"'),
+        _events(questions, _Listener(questions, caller), job_id, f'"{seen}"'),
         media_type="text/event-stream",
         headers={"Cache-Control": "no-store"},
     )
 
 
 async def _events(
-    database: Database, versions: Versions, listener: _Listener, job_id: str, seen: str
+    questions: Questions, listener: _Listener, job_id: str, seen: str
 ) -> AsyncIterator[str]:
     while True:
         try:
             job, sha256 = await wait_for_change(
-                database, versions, job_id, seen, SIGN_OF_LIFE_S, listener.has_lost_its_key
+                questions, job_id, seen, SIGN_OF_LIFE_S, listener.has_lost_its_key
             )
             if await listener.has_lost_its_key():
                 return
@@ -102,8 +99,8 @@ async def _never() -> bool:
 class _Listener:
     """Who reads a stream, and whether the key that it was asked for with is still good."""
 
-    def __init__(self, database: Database, caller: Caller):
-        self._database = database
+    def __init__(self, questions: Questions, caller: Caller):
+        self._questions = questions
         self._key_id = caller.key_id
         self._next_s = time.monotonic() + _LOOK_AT_KEY_EVERY_S
         self._has_lost_its_key = False
@@ -112,9 +109,5 @@ class _Listener:
         """Return whether it is revoked or expired, looking every other second."""
         if self._key_id is not None and time.monotonic() >= self._next_s:
             self._next_s = time.monotonic() + _LOOK_AT_KEY_EVERY_S
-            self._has_lost_its_key = await run_in_threadpool(self._look, self._key_id)
+            self._has_lost_its_key = bool(await self._questions.ended_keys.get(self._key_id))
         return self._has_lost_its_key
-
-    def _look(self, key_id: str) -> bool:
-        with self._database.reading() as session:
-            return key_store.has_ended(session, key_id)

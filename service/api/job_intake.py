@@ -24,7 +24,7 @@ from service.problems.faults import refuse
 from service.problems.kinds import ServiceError
 from service.scenarios import freezing
 from service.scenarios.freezing import FrozenScenario
-from service.scenarios.pin_inputs import refuse_duplicate_pins
+from service.scenarios.pin_inputs import with_settled_pins
 from service.scenarios.translate import inside, read_file
 from service.settings import Settings
 from service.stores import job_store as store
@@ -95,8 +95,7 @@ def frozen(call: Call, body: QuestionIn) -> FrozenScenario | None:
         if isinstance(scenario, ScenarioIn):
             return freeze(call, scenario)
         if isinstance(scenario, ScenarioFile):
-            refuse_duplicate_pins(scenario.pins)
-            file = read_file(scenario.model_dump(mode="json"))
+            file = with_settled_pins(read_file(scenario.model_dump(mode="json")))
             return freezing.freeze_file(file, limits)
     return None
 

@@ -16,8 +16,9 @@ from service.api.etags import matches
 from service.api.filters import StoredDep
 from service.api.idempotency import OnceDep
 from service.api.job_shapes import etag_of_job, shown
-from service.api.job_wait import VersionsDep, wait_for_change
+from service.api.job_wait import wait_for_change
 from service.api.paging import PagingDep, newest_first, size_of
+from service.api.questions import QuestionsDep
 from service.db.rows import JobRow
 from service.jobs import lease, submission
 from service.jobs.queue import JobQueue
@@ -83,7 +84,7 @@ def list_jobs(
 async def get_job(
     job_id: str,
     call: CallDep,
-    versions: VersionsDep,
+    questions: QuestionsDep,
     wait: Annotated[
         float,
         Query(ge=0, le=LONGEST_WAIT_S, description="Hold so many seconds for a change."),
@@ -96,7 +97,7 @@ async def get_job(
     """
     known = call.request.headers.get("if-none-match")
     job, sha256 = await wait_for_change(
-        call.database, versions, job_id, known, wait, call.request.is_disconnected
+        questions, job_id, known, wait, call.request.is_disconnected
     )
     if matches(known, etag_of_job(job)):
         return Response(status_code=304, headers={"ETag": etag_of_job(job)})

@@ -45,7 +45,7 @@ class Paging:
         if self.after is None:
             return -1
         if not self.after.isdigit():
-            raise _invalid_cursor()
+            raise invalid_cursor()
         return int(self.after[:18])
 
     def answer(self, rows: Sequence[R], key: Callable[[R], object]) -> Page[R]:
@@ -69,13 +69,14 @@ def decode_cursor(cursor: str) -> str:
         padded = cursor + "=" * (-len(cursor) % 4)
         key = base64.b64decode(padded, altchars=b"-_", validate=True).decode("ascii")
     except (binascii.Error, ValueError):
-        raise _invalid_cursor() from None
+        raise invalid_cursor() from None
     if not key.isprintable():
-        raise _invalid_cursor()
+        raise invalid_cursor()
     return key
 
 
-def _invalid_cursor() -> ServiceError:
+def invalid_cursor() -> ServiceError:
+    """Return what a cursor of another list is refused with."""
     return ServiceError("invalid_cursor", "The cursor is not one that this list has given.")
 
 

@@ -270,6 +270,7 @@ def _plan_out(plan: PlanRow, satellites: list[PlanSatelliteRow]) -> PlanOut:
         "history": f"{address}/history",
         "executions": f"{address}/executions",
         "timeline": f"{address}/timeline.json",
+        "passes": f"{address}/passes",
         "job": f"/v1/jobs/{plan.job_id}",
     }
     if plan.parent_id is not None:

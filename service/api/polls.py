@@ -18,8 +18,9 @@ from service.access.callers import Caller
 from service.api.etags import matches
 from service.api.job_shapes import etag_of_job, etag_of_timeline, headers_of, shown
 from service.api.together import Together
-from service.db.rows import JobResultRow, JobRow, ScenarioRow
+from service.db.rows import JobResultRow, JobRow
 from service.db.session import Database
+from service.stores import job_store
 
 _JSON: Final = "application/json"
 _ACCEPTABLE: Final = (None, "*/*", _JSON)
@@ -28,11 +29,6 @@ _THESE: Final = JobRow.id.in_(sa.bindparam("ids", expanding=True))
 _JOBS: Final = sa.select(
     JobRow.id, JobRow.tenant, JobRow.version, JobRow.state, JobRow.created_at
 ).where(_THESE)
-_WHOLE_JOBS: Final = (
-    sa.select(JobRow, ScenarioRow.sha256)
-    .join(ScenarioRow, ScenarioRow.id == JobRow.scenario_id)
-    .where(_THESE)
-)
 _TIMELINES: Final = (
     sa.select(JobRow.id, JobRow.tenant)
     .join(JobResultRow, JobRow.id == JobResultRow.job_id)
@@ -169,8 +165,8 @@ class _PolledJobs:
         missing = rows.keys() - whole.keys()
         if missing:
             with database.reading() as session:
-                jobs = session.execute(_WHOLE_JOBS, {"ids": list(missing)}).all()
-            for job, sha256 in jobs:
+                jobs = job_store.with_hashes(session, missing)
+            for job, sha256 in jobs.values():
                 body = shown(job, sha256).model_dump_json().encode()
                 whole[job.id] = _Found(job.tenant, headers_of(job), body)
                 self._keep(job, body)

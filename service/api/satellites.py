@@ -53,9 +53,13 @@ _ACTIONS: Final[dict[store.Status, str]] = {"created": "create", "elements_added
 _IMPORT_TYPES = ("text/plain", "application/json", "text/csv", "application/xml", "text/xml")
 
 
-@router.post("", status_code=201)
+@router.post("", status_code=201, responses=problem_responses(409))
 def create_satellite(body: SatelliteIn, once: OnceDep, call: CallDep) -> SatelliteOut:
-    """Store one satellite. A second one with the same catalogue number is another satellite."""
+    """Store one satellite.
+
+    There is one satellite of a catalogue number: 409 `duplicate_norad_cat_id` names it. Number 0
+    says nothing, so that many may have it.
+    """
     orbit = orbit_from(body)
     with once.transaction() as session:
         whole = spacecraft_store.completed(session, sent_by(body), WholeSatellite)

@@ -28,10 +28,18 @@ class Together(Generic[K, T]):
     ----------
     ask
         Returns what there is of these keys, which are all different.
+    longest_pause_s
+        0 for what nobody should wait for longer than the query before takes.
     """
 
-    def __init__(self, ask: Callable[[Sequence[K]], Mapping[K, T]]):
+    def __init__(
+        self,
+        ask: Callable[[Sequence[K]], Mapping[K, T]],
+        *,
+        longest_pause_s: float = _LONGEST_PAUSE_S,
+    ):
         self._ask = ask
+        self._longest_pause_s = longest_pause_s
         # The loop's own executor costs less than Starlette's, which can be cancelled.
         self._thread = ThreadPoolExecutor(1, "together")
         self._is_asking = asyncio.Lock()
@@ -64,7 +72,7 @@ class Together(Generic[K, T]):
             loop = asyncio.get_running_loop()
             await asyncio.sleep(self._not_before_s - loop.time())
             self._gathering = None
-            pause_s = min(_LONGEST_PAUSE_S, _PAUSE_EACH_S * (len(keys) - 1))
+            pause_s = min(self._longest_pause_s, _PAUSE_EACH_S * (len(keys) - 1))
             self._not_before_s = loop.time() + pause_s
             different = list(dict.fromkeys(keys))
             return await loop.run_in_executor(self._thread, self._ask_in_parts, different)

@@ -23,6 +23,7 @@ from service.wire.jobs import ComparisonOut as Comparison
 from service.wire.jobs import ProgressOut as Progress
 from service.wire.operations import FaultOut as Fault
 from service.wire.operations import SolverOut as Solver
+from service.wire.passes import PassOut as Pass
 from service.wire.pins import OutageOut as Outage
 from service.wire.places import GroundStationOut as GroundStation
 from service.wire.places import TargetCatalogOut as TargetCatalog
@@ -36,6 +37,7 @@ from service.wire.satellites import SatelliteOut as Satellite
 from service.wire.scenarios import OpportunityOut as Opportunity
 from service.wire.scenarios import ScenarioOut as Scenario
 from service.wire.scenarios import ScenarioSummary
+from service.wire.target_lives import TargetLifeOut as TargetLife
 from service.wire.timelines import ActionOut as Action
 from service.wire.timelines import AttemptOut as Attempt
 from service.wire.timelines import DiffOut as PlanDiff
@@ -65,6 +67,7 @@ __all__ = [
     "JobFailed",
     "Opportunity",
     "Outage",
+    "Pass",
     "Plan",
     "PlanAction",
     "PlanChanges",
@@ -79,6 +82,7 @@ __all__ = [
     "Solver",
     "Target",
     "TargetCatalog",
+    "TargetLife",
     "TargetOutcome",
     "Timeline",
     "Totals",

@@ -22,6 +22,7 @@ from service.client.satellites import Satellites
 from service.client.scenarios import Scenarios
 from service.client.spacecraft import SpacecraftTypes
 from service.client.target_catalogs import TargetCatalogs
+from service.client.targets import Targets
 from service.client.transport import Transport, held, path_of
 from service.client.webhooks import Webhooks
 from service.wire.operations import Ready, Version
@@ -82,6 +83,7 @@ class Client:
         self.spacecraft = SpacecraftTypes(self._transport)
         self.outages = Outages(self._transport)
         self.target_catalogs = TargetCatalogs(self._transport)
+        self.targets = Targets(self._transport)
         self.forecasts = Forecasts(self._transport)
         self.scenarios = Scenarios(self._transport)
         self.jobs = Jobs(self._transport)

@@ -9,6 +9,7 @@ from typing import Any, Literal
 from service.client.jobs import Job, Jobs
 from service.client.transport import Transport, path_of
 from service.wire.instants import instant_text
+from service.wire.passes import PassOut as Pass
 from service.wire.plans import ExecutionOut as Execution
 from service.wire.plans import PlanActionOut as PlanAction
 from service.wire.plans import PlanEventOut as PlanEvent
@@ -99,6 +100,27 @@ class Plans:
         return self._transport.pages(
             path_of("plans", plan_id, "actions"), PlanAction, params=params
         )
+
+    def passes(
+        self,
+        plan_id: str,
+        *,
+        station_id: str | None = None,
+        satellite_id: str | None = None,
+        from_: datetime | None = None,
+        to: datetime | None = None,
+        planned: bool | None = None,
+    ) -> Iterator[Pass]:
+        """Yield the passes over the plan's stations by AOS, planned or not."""
+        wanted = {
+            "station_id": station_id,
+            "satellite_id": satellite_id,
+            "from": None if from_ is None else instant_text(from_),
+            "to": None if to is None else instant_text(to),
+            "planned": None if planned is None else str(planned).lower(),
+        }
+        params = {name: value for name, value in wanted.items() if value is not None}
+        return self._transport.pages(path_of("plans", plan_id, "passes"), Pass, params=params)
 
     def report(
         self,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -26,6 +27,48 @@ _HEADER: Final = (
 _WIDTHS: Final = (12, 13, 9, 7, 9, 7, 8, 16, 10)
 
 
+@dataclass(frozen=True, slots=True)
+class _Row:
+    """What a search has found for one choice of starts."""
+
+    starts: str
+    num_opportunities: int
+    timeline: Mapping[str, Any]
+    is_cancelled: bool
+
+    @property
+    def reward(self) -> float:
+        return float(self.timeline["totals"]["reward"])
+
+    def with_plan_of(self, other: _Row) -> _Row:
+        """Return the row with another one's plan, and its own bound unless that plan earns more."""
+        bound = self.timeline["totals"]["bound"]
+        if bound is not None and bound < other.reward:
+            bound = None
+        gap = None if not bound else (bound - other.reward) / bound
+        totals = {**self.timeline["totals"], "reward": other.reward, "bound": bound, "gap": gap}
+        validity = other.timeline["validity"]
+        told = {"totals": totals, "validity": validity, "termination": "plan above"}
+        plan = {"satellites": other.timeline["satellites"]}
+        return replace(self, timeline={**self.timeline, **plan, **told})
+
+    def cells(self, first: float) -> tuple[str, ...]:
+        """Return what is printed, with the gain on the first row."""
+        totals = self.timeline["totals"]
+        gain = self.reward / first - 1.0 if first else 0.0
+        return (
+            self.starts,
+            str(self.num_opportunities),
+            f"{self.reward:g}",
+            f"{gain:+.1%}",
+            "-" if totals["bound"] is None else f"{totals['bound']:g}",
+            "-" if totals["gap"] is None else f"{totals['gap']:.1%}",
+            f"{self.timeline['runtime_s']['solve']:.1f}",
+            self.timeline["termination"],
+            self.timeline["validity"],
+        )
+
+
 def compare_spacing(
     path: Path,
     *,
@@ -37,6 +80,9 @@ def compare_spacing(
     out: Path | None = None,
 ) -> int:
     """Plan a scenario file with ever more starts, print a line for each; return 0 if all are valid.
+
+    No row is worse than the one above it. Where a search ends before it gets so far, another one
+    starts from the plan above; that plan itself may be flown in any case.
 
     Parameters
     ----------
@@ -66,12 +112,9 @@ def compare_spacing(
     content = read_scenario(path)
     has_quality = bool(quality_from(read_file(content).quality))
     chosen = params_of(parse_params(solver_class(solver), params))
-    print(_line(_HEADER))
-    rows: list[tuple[str, ...]] = []
-    first: float | None = None
-    all_valid = True
-    for starts, change in _variants(spacings_s, anywhere=not has_quality):
-        varied = canonical(content | change)
+
+    def search(starts: str, question: Mapping[str, Any]) -> _Row:
+        varied = canonical(question)
         request = PlanRequest(
             job_id="local",
             scenario_sha256=sha256_of(varied),
@@ -83,13 +126,35 @@ def compare_spacing(
         )
         budget = Budget(time_s)
         answer = answer_of(request, budget)
-        timeline, block = json.loads(answer.timeline), answer.opportunity_block
-        assert block is not None
-        first = answer.reward if first is None else first
-        rows.append(_row(starts, timeline, first, ScenarioOpportunities.from_bytes(block)))
-        all_valid = all_valid and timeline["validity"] == "valid"
+        assert answer.opportunity_block is not None
+        return _Row(
+            starts=starts,
+            num_opportunities=len(
+                ScenarioOpportunities.from_bytes(answer.opportunity_block).opportunities
+            ),
+            timeline=json.loads(answer.timeline),
+            is_cancelled=budget.is_cancelled,
+        )
+
+    print(_line(_HEADER))
+    rows: list[tuple[str, ...]] = []
+    first: float | None = None
+    above: _Row | None = None
+    all_valid = True
+    for starts, change in _variants(spacings_s, anywhere=not has_quality):
+        row = search(starts, content | change)
+        if above is not None and not row.is_cancelled and row.reward < above.reward:
+            # The time was too short: with more freedom the plan above can be flown as well.
+            if not change["continuous_starts"]:  # no search starts from a plan there
+                again = search(starts, content | change | {"replan": _from_plan(above, content)})
+                row = max(row, again, key=lambda one: one.reward)
+            row = row if row.reward >= above.reward else row.with_plan_of(above)
+        above = row
+        first = row.reward if first is None else first
+        rows.append(row.cells(first))
+        all_valid = all_valid and row.timeline["validity"] == "valid"
         print(_line(rows[-1]), flush=True)
-        if budget.is_cancelled:
+        if row.is_cancelled:
             break
     if out is not None:
         with out.open("w", newline="", encoding="utf-8") as file:
@@ -110,22 +175,20 @@ def _variants(
         yield "anywhere", {"collect_spacing_s": None, "continuous_starts": True}
 
 
-def _row(
-    starts: str, timeline: Mapping[str, Any], first: float, found: ScenarioOpportunities
-) -> tuple[str, ...]:
-    totals = timeline["totals"]
-    gain = totals["reward"] / first - 1.0 if first else 0.0
-    return (
-        starts,
-        str(len(found.opportunities)),
-        f"{totals['reward']:g}",
-        f"{gain:+.1%}",
-        "-" if totals["bound"] is None else f"{totals['bound']:g}",
-        "-" if totals["gap"] is None else f"{totals['gap']:.1%}",
-        f"{timeline['runtime_s']['solve']:.1f}",
-        timeline["termination"],
-        timeline["validity"],
-    )
+def _from_plan(row: _Row, content: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the part of a scenario that lets its search start from the plan of another row."""
+    actions = [
+        {"satellite_id": satellite["id"]}
+        | {name: action[name] for name in ("target_id", "station_id", "start") if action[name]}
+        for satellite in row.timeline["satellites"]
+        for action in satellite["actions"]
+        if action["mode"] in ("collect", "contact")
+    ]
+    return {
+        "base": actions,
+        "freeze_until": content["horizon"]["start"],
+        "stability": {"weight": 0.0, "contact_weight": 0.0},
+    }
 
 
 def _line(cells: Sequence[str]) -> str:

@@ -54,6 +54,10 @@ _PAGES: Final = {
     "jobs": _Page(title="Jobs", script="jobs_page.js"),
     "new": _Page(title="New plan", script="new_page.js"),
     "job": _Page(title="Job", script="job_page.js"),
+    "plans": _Page(title="Plans", script="plans_page.js"),
+    "plan": _Page(title="Plan", script="plan_page.js"),
+    "fleet": _Page(title="Fleet", script="fleet_page.js"),
+    "wall": _Page(title="Wall", script="wall_page.js"),
     "comparison": _Page(title="Comparison", script="comparison_page.js"),
 }
 

@@ -47,6 +47,30 @@ def comparison_page(request: Request) -> Response:
     return _page(request, "comparison")
 
 
+@router.get("/plans")
+def plans_page(request: Request) -> Response:
+    """Return the list of plans."""
+    return _page(request, "plans")
+
+
+@router.get("/plans/{plan_id}")
+def plan_page(request: Request) -> Response:
+    """Return the page of one plan."""
+    return _page(request, "plan")
+
+
+@router.get("/fleet")
+def fleet_page(request: Request) -> Response:
+    """Return the page on which satellites, stations and types are changed, and outages reported."""
+    return _page(request, "fleet")
+
+
+@router.get("/wall")
+def wall_page(request: Request) -> Response:
+    """Return the page for a display on the wall."""
+    return _page(request, "wall")
+
+
 @router.get("/static/{version}/{name}")
 def static_file(version: str, name: str) -> Response:
     """Return a script, style or picture of this version."""

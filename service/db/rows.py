@@ -451,7 +451,11 @@ class PlanSatelliteRow(Row):
 
 
 class PlanActionRow(Row):
-    """A collect or a contact of a plan. ``action_id`` is its id in the job's timeline."""
+    """A collect or a contact of a plan. ``action_id`` is its id in the job's timeline.
+
+    ``delivered_at`` of a collect is when the plan has its image down; null for never, and in plans
+    of earlier releases.
+    """
 
     __tablename__ = "plan_action"
 
@@ -464,6 +468,7 @@ class PlanActionRow(Row):
     end: Mapped[datetime]
     target_id: Mapped[str | None]
     station_id: Mapped[str | None]
+    delivered_at: Mapped[datetime | None]
 
 
 class PlanEventRow(Row):

@@ -74,6 +74,15 @@ class Database:
         self._untested.dispose()
 
 
+def take_turns(session: Session, name: str) -> None:
+    """Let other transactions that call this with the same name wait until this one has ended.
+
+    For what a constraint cannot say. On SQLite one transaction at a time writes anyway.
+    """
+    if session.get_bind().dialect.name == "postgresql":
+        session.execute(sa.select(sa.func.pg_advisory_xact_lock(sa.func.hashtext(name))))
+
+
 def make_engine(url: str, timeout_s: float | None = DEFAULT_TIMEOUT_S) -> sa.Engine:
     """Return an engine set up as the service needs it (SQLite: WAL, every commit synced)."""
     address = sa.make_url(url)

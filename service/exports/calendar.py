@@ -34,13 +34,7 @@ def write(answered: Answered) -> Iterator[str]:
 
 
 def _parts(answered: Answered) -> Iterator[str]:
-    calendar = Calendar()
-    calendar.add("prodid", f"-//Slewline//{planner_core.__version__}//EN")
-    calendar.add("version", "2.0")
-    calendar.add("method", "PUBLISH")
-    calendar.add("name", "Contacts")
-    calendar.add("x-wr-calname", "Contacts")  # what calendars show that do not know NAME
-    head, end, _ = calendar.to_ical().decode().partition("END:VCALENDAR")
+    head, tail = around("Contacts")
     yield head
     stations = {station.id: station for station in answered.question.ground_stations}
     seen: Counter[str] = Counter()
@@ -48,7 +42,19 @@ def _parts(answered: Answered) -> Iterator[str]:
         if action["mode"] == "contact":
             event = _event(answered, satellite, action, stations[action["station_id"]], seen)
             yield event.to_ical().decode()
-    yield end + "\r\n"
+    yield tail
+
+
+def around(name: str) -> tuple[str, str]:
+    """Return what stands before the events of a calendar of this name, and behind them."""
+    calendar = Calendar()
+    calendar.add("prodid", f"-//Slewline//{planner_core.__version__}//EN")
+    calendar.add("version", "2.0")
+    calendar.add("method", "PUBLISH")
+    calendar.add("name", name)
+    calendar.add("x-wr-calname", name)  # what calendars show that do not know NAME
+    head, end, rest = calendar.to_ical().decode().partition("END:VCALENDAR")
+    return head, end + rest
 
 
 def _event(
@@ -60,16 +66,9 @@ def _event(
 ) -> Event:
     start, end = (datetime.fromisoformat(action[name]) for name in ("start", "end"))
     what = f"{satellite['name']} over {station.name}"
-    event = Event()
-    event.add("uid", _uid(satellite["id"], station.id, start + (end - start) / 2, seen))
-    event.add("sequence", (answered.finished_at - _EPOCH) // _SECOND)
-    event.add("dtstamp", answered.finished_at.replace(microsecond=0))
-    # Calendars know whole seconds: the entry covers the contact.
-    event.add("dtstart", start.replace(microsecond=0))
-    event.add("dtend", end.replace(microsecond=0) + _SECOND * (end.microsecond > 0))
+    event = entry(start, end, station, answered.finished_at)
+    event.add("uid", uid("contact", satellite["id"], station.id, start + (end - start) / 2, seen))
     event.add("summary", what)
-    event.add("location", station.name)
-    event.add("geo", (round(station.lat_deg, 6), round(_signed(station.lon_deg), 6)))
     event.add("description", _description(answered.head, action))
     event.add("categories", ["Contact"])
     alarm = Alarm()
@@ -80,12 +79,26 @@ def _event(
     return event
 
 
-def _uid(satellite_id: str, station_id: str, middle: datetime, seen: Counter[str]) -> str:
+def entry(start: datetime, end: datetime, station: GroundStation, made_at: datetime) -> Event:
+    """Return an event at a station, of a plan that was made at an instant."""
+    event = Event()
+    event.add("sequence", (made_at - _EPOCH) // _SECOND)
+    event.add("dtstamp", made_at.replace(microsecond=0))
+    # Calendars know whole seconds: the entry covers the span.
+    event.add("dtstart", start.replace(microsecond=0))
+    event.add("dtend", end.replace(microsecond=0) + _SECOND * (end.microsecond > 0))
+    event.add("location", station.name)
+    event.add("geo", (round(station.lat_deg, 6), round(_signed(station.lon_deg), 6)))
+    return event
+
+
+def uid(kind: str, satellite_id: str, station_id: str, middle: datetime, seen: Counter[str]) -> str:
+    """Return what a calendar knows an entry by, from plan to plan."""
     # A mask may cut one pass in parts, which are contacts of their own.
     key = json.dumps([satellite_id, station_id, (middle - _EPOCH) // _HALF_HOUR])
     part = seen[key]
     seen[key] += 1
-    return str(uuid5(NAMESPACE_URL, f"slewline:contact:{key}:{part}"))
+    return str(uuid5(NAMESPACE_URL, f"slewline:{kind}:{key}:{part}"))
 
 
 def _signed(lon_deg: float) -> float:

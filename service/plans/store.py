@@ -60,6 +60,7 @@ def add(
             "plan_id": plan.id, "position": position, "action_id": action.id,
             "satellite_id": satellite_id, "mode": action.mode, "start": action.start,
             "end": action.end, "target_id": action.target_id, "station_id": action.station_id,
+            "delivered_at": action.delivered_at,
         }
         for position, (satellite_id, action) in enumerate(actions)
     ]  # fmt: skip

@@ -23,7 +23,10 @@ _SPARE_FILES: Final = 256
 
 
 class Protocol(HttpToolsProtocol):
-    """Closes connections that ask for nothing, and the oldest of those where there are too many.
+    """Closes connections that ask for nothing, and some of those where there are too many.
+
+    Those that never asked for anything go first, then those that were answered the longest ago:
+    a client that comes back finds its own open.
 
     A connection *asks* from the end of a request's head until its answer is sent. One that
     does not, or sends a body that nobody has let in yet, gives its place to a new one.
@@ -37,6 +40,7 @@ class Protocol(HttpToolsProtocol):
         self._head_timer: asyncio.TimerHandle | None = None
         self._is_head = False
         self._head_bytes = 0
+        self._is_answered = False
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Take a place, that of the oldest idle connection where there is none."""
@@ -76,6 +80,9 @@ class Protocol(HttpToolsProtocol):
     def on_response_complete(self) -> None:
         """Wait for the next request, or for what is left of this one's body."""
         is_next_here = bool(self.pipeline)
+        self._is_answered = True
+        if self in self._places:
+            self._places[self] = self._places.pop(self)
         super().on_response_complete()
         if not is_next_here and not self.transport.is_closing():
             self._await_head()
@@ -91,9 +98,10 @@ class Protocol(HttpToolsProtocol):
 
     def _make_room(self) -> None:
         others = [one for one in self._places if one is not self]
-        idle = (one for one in others if one._head_timer is not None)
+        idle = [one for one in others if one._head_timer is not None]
+        silent = (one for one in idle if not one._is_answered)
         sending = (one for one in others if one._head_timer is None and one.cycle.more_body)
-        for one in itertools.islice(itertools.chain(idle, sending), 1):
+        for one in itertools.islice(itertools.chain(silent, idle, sending), 1):
             del self._places[one]
             one.transport.abort()
 

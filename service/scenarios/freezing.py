@@ -22,7 +22,7 @@ from service.db.rows import GroundStationRow, SatelliteRow, ScenarioRow, TargetC
 from service.db.session import Database
 from service.problems.faults import faults_of_validation
 from service.scenarios.forecast_inputs import find_forecast, frozen_forecast
-from service.scenarios.pin_inputs import refuse_duplicate_pins
+from service.scenarios.pin_inputs import with_settled_pins
 from service.scenarios.scenario_limits import ScenarioLimits
 from service.scenarios.translate import (
     canonical_of_file,
@@ -40,6 +40,7 @@ from service.wire.scenarios import (
     Question,
     ScenarioFile,
     ScenarioIn,
+    default_objective,
 )
 from service.wire.spacecraft_types import BUILT_IN
 
@@ -81,7 +82,7 @@ def freeze(
         ``unknown_satellite``, ``unknown_target_catalog``, ``unknown_ground_station``,
         ``duplicate_satellite_id``, ``duplicate_target_catalog_id``, ``duplicate_target_id``,
         ``duplicate_ground_station_id``, ``horizon_inverted``, ``horizon_too_long``,
-        ``scenario_too_large``, ``duplicate_pin``, ``unknown_forecast``,
+        ``scenario_too_large``, ``duplicate_pin``, ``ambiguous_name``, ``unknown_forecast``,
         ``forecast_does_not_cover``; with a pointer into the body.
     PropagationFailed
         SGP4 cannot carry a satellite through the horizon.
@@ -93,9 +94,8 @@ def freeze(
         if body.forecast_id is not None:
             stored = find_forecast(session, body.forecast_id, owner)
             file = file.model_copy(update={"forecast": frozen_forecast(stored, file)})
-    refuse_duplicate_pins(file.pins)
     with _named_by_ids():
-        frozen = freeze_file(file, limits)
+        frozen = freeze_file(with_settled_pins(file), limits)
     return replace(frozen, summary=frozen.summary | {"forecast_id": body.forecast_id})
 
 
@@ -177,9 +177,12 @@ def num_targets(session: Session, catalog_ids: Sequence[str]) -> int:
 
 def _expanded(session: Session, body: ScenarioIn) -> ScenarioFile:
     shared = {name: getattr(body, name) for name in Question.model_fields if name != "outages"}
+    satellites = _satellites(session, body.satellite_ids)
+    if "objective" not in body.model_fields_set:
+        shared["objective"] = default_objective(satellite.spacecraft for satellite in satellites)
     return ScenarioFile(
         **shared,
-        satellites=_satellites(session, body.satellite_ids),
+        satellites=satellites,
         targets=_targets(session, body.target_catalog_ids),
         ground_stations=_ground_stations(session, body.ground_station_ids),
         outages=_outages(session, body),

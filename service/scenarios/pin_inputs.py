@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
+from typing import TypeVar
+
 from planner_core.domain import Outage, Promise, Replan, Stability
 from planner_core.errors import InvalidScenario
 from planner_core.pins import BlockedInterval, PinnedAction, Pins
 from service.wire.pins import BlockedIn, OutageIn, PinnedActionIn, PinsIn
 from service.wire.plan_before import ReplanOfFile
+from service.wire.scenarios import FileGroundStation, FileSatellite, ScenarioFile
+
+P = TypeVar("P", PinnedActionIn, BlockedIn)
 
 
 def pins_from(body: PinsIn) -> Pins:
@@ -52,11 +58,61 @@ def replan_from(body: ReplanOfFile) -> Replan:
     )
 
 
-def refuse_duplicate_pins(body: PinsIn) -> None:
-    """Raise ``duplicate_pin`` where one is written twice.
+def with_settled_pins(file: ScenarioFile) -> ScenarioFile:
+    """Return the file with ids where its pins have names of satellites and stations.
 
     Not part of what a scenario is checked for: those of earlier releases keep theirs.
+
+    Raises
+    ------
+    InvalidScenario
+        ``ambiguous_name`` where several have the name, ``duplicate_pin`` where one pin is
+        written twice.
     """
+    ids = {
+        "satellite_id": _ids_by_name(file.satellites),
+        "station_id": _ids_by_name(file.ground_stations),
+    }
+    pins = file.pins.model_copy(
+        update={
+            kind: [
+                _with_ids(pin, ids, f"/pins/{kind}/{position}")
+                for position, pin in enumerate(getattr(file.pins, kind))
+            ]
+            for kind in ("keep", "skip", "block")
+        }
+    )
+    _refuse_duplicates(pins)
+    return file.model_copy(update={"pins": pins})
+
+
+def _ids_by_name(things: Iterable[FileSatellite | FileGroundStation]) -> Mapping[str, list[str]]:
+    """Return the ids that each name may stand for; an id stands for itself."""
+    found: dict[str, list[str]] = {}
+    for thing in things:
+        found.setdefault(thing.name, []).append(thing.id or thing.name)
+    return found | {thing.id: [thing.id] for thing in things if thing.id is not None}
+
+
+def _with_ids(pin: P, ids: Mapping[str, Mapping[str, list[str]]], pointer: str) -> P:
+    named = {}
+    for field, ids_by_name in ids.items():
+        name: str | None = getattr(pin, field, None)
+        if name is None:
+            continue
+        meant = ids_by_name.get(name, [name])
+        if len(meant) > 1:
+            raise InvalidScenario(
+                "ambiguous_name",
+                f"{len(meant)} have the name {name!r}: give an id, such as {meant[0]!r}.",
+                pointer=f"{pointer}/{field}",
+            )
+        if meant != [name]:
+            named[field] = meant[0]
+    return pin.model_copy(update=named)
+
+
+def _refuse_duplicates(body: PinsIn) -> None:
     for kind in PinsIn.model_fields:
         seen = set()
         for position, pin in enumerate(getattr(body, kind)):

@@ -101,7 +101,8 @@ class StoredQuestion:
             unset = {"omm", "spacecraft", "tle"} - body.model_fields_set
             satellites.append(body.model_dump(mode="json", exclude=unset))
         head: dict[str, Any] = {} if name is None else {"name": name}
-        head |= {**members, "release": 2, "satellites": satellites}
+        # What is not said of the objective is the paper's, which files of release 2 must say.
+        head |= {"objective": "paper", **members, "release": 2, "satellites": satellites}
         text = json.dumps(head, separators=(",", ":"), allow_nan=False)
         return f'{text[:-1]},"{_TARGETS}":[{self._content[at:]}'
 

@@ -50,6 +50,7 @@ from service.wire.scenarios import (
     FileSatellite,
     FileTarget,
     HorizonIn,
+    ObjectiveIn,
     QualityIn,
     ScenarioFile,
 )
@@ -151,8 +152,7 @@ def canonical_of_file(file: ScenarioFile) -> str:
     _without_unset(document, "replan")
     for action in document.get("replan", {}).get("base", ()):
         _without_unset(action, *tuple(action))
-    if not _counts_delivery(document["objective"]):
-        del document["objective"]
+    _plain_objective(document)
     for outage in document["outages"]:
         _without_unset(outage, "id", "satellite_id", "station_id", "reason")
     if not document["outages"]:
@@ -161,6 +161,17 @@ def canonical_of_file(file: ScenarioFile) -> str:
         if not any(document[part].values()):
             del document[part]
     return json.dumps(document, sort_keys=True, separators=(",", ":"), allow_nan=False)
+
+
+def _plain_objective(document: dict[str, Any]) -> None:
+    """Leave out of the objective what it means without being said."""
+    objective = document["objective"]
+    if not objective["prefer"]:
+        del objective["prefer"]
+        if not _counts_delivery(objective):
+            del document["objective"]
+    elif not _counts_delivery(objective):
+        objective["half_life_s"] = None
 
 
 def _counts_delivery(objective: Mapping[str, Any]) -> bool:
@@ -203,11 +214,20 @@ def scenario_from_file(file: ScenarioFile) -> Scenario:
         continuous_starts=file.continuous_starts,
         quality=quality_from(file.quality),
         forecast=forecast_from(file),
-        objective=Objective(**file.objective.model_dump()),
+        objective=objective_from(file.objective),
         allow_old_elements=file.allow_old_elements,
         pins=pins_from(file.pins),
         outages=tuple(outage_from(outage) for outage in file.outages),
         replan=None if file.replan is None else replan_from(file.replan),
+    )
+
+
+def objective_from(item: ObjectiveIn) -> Objective:
+    """Return the domain's objective."""
+    return Objective(
+        collected_share=item.collected_share,
+        half_life_s=item.half_life_s,
+        prefer=tuple(item.prefer),
     )
 
 

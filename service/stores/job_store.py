@@ -11,8 +11,13 @@ from sqlalchemy.orm import Session
 from service.db.rows import JobRow, ScenarioRow
 
 # Made once: to make and compile it takes longer than to run it.
-_VERSIONS: Final = sa.select(JobRow.id, JobRow.version).where(
-    JobRow.id.in_(sa.bindparam("job_ids", expanding=True))
+_THESE: Final = JobRow.id.in_(sa.bindparam("job_ids", expanding=True))
+_VERSIONS: Final = sa.select(JobRow.id, JobRow.version).where(_THESE)
+_OWNERS: Final = sa.select(JobRow.id, JobRow.tenant).where(_THESE)
+_WITH_HASHES: Final = (
+    sa.select(JobRow, ScenarioRow.sha256)
+    .join(ScenarioRow, ScenarioRow.id == JobRow.scenario_id)
+    .where(_THESE)
 )
 
 
@@ -31,7 +36,19 @@ def find(session: Session, job_id: str) -> JobRow | None:
 
 def owner_of(session: Session, job_id: str) -> str | None:
     """Return whose job this is, or None for no job."""
-    return session.scalar(sa.select(JobRow.tenant).where(JobRow.id == job_id))
+    return owners_of(session.connection(), [job_id]).get(job_id)
+
+
+def owners_of(connection: sa.Connection, job_ids: Collection[str]) -> dict[str, str]:
+    """Return whose jobs these are, without those that there are not."""
+    rows = connection.execute(_OWNERS, {"job_ids": list(job_ids)})
+    return {row.id: row.tenant for row in rows}
+
+
+def with_hashes(session: Session, job_ids: Collection[str]) -> dict[str, tuple[JobRow, str]]:
+    """Return those of these jobs that there are, each with its scenario's SHA-256."""
+    rows = session.execute(_WITH_HASHES, {"job_ids": list(job_ids)})
+    return {job.id: (job, sha256) for job, sha256 in rows}
 
 
 def versions_of(connection: sa.Connection, job_ids: Collection[str]) -> dict[str, int]:

@@ -14,10 +14,13 @@ from planner_core.domain import OrbitElements
 from planner_core.orbits.ingest import Entry
 from service.db.ids import new_id
 from service.db.rows import ElementSetRow, SatelliteRow
+from service.db.session import take_turns
+from service.problems.kinds import ServiceError
 from service.wire.satellites import WholeSatellite
 
 FIGURES: Final = ("agility", "sensor", "resources", "spacecraft")
 """What a satellite can do, and the type that it is of."""
+_TURNS: Final = "satellites"
 _LONGEST_NAME: Final = 200
 
 Status = Literal["created", "elements_added", "unchanged"]
@@ -40,7 +43,14 @@ def alive() -> sa.Select[SatelliteRow]:
 def add_satellite(
     session: Session, body: WholeSatellite, elements: OrbitElements, orbit: dict[str, Any]
 ) -> SatelliteRow:
-    """Store a new satellite with its first element set, parsed and in its tidy form."""
+    """Store a new satellite with its first element set, parsed and in its tidy form.
+
+    Raises
+    ------
+    ServiceError
+        ``duplicate_norad_cat_id`` where there is one of this catalogue number.
+    """
+    _require_new(session, elements.norad_cat_id)
     dumped = body.model_dump(mode="json", include=set(FIGURES))
     row = SatelliteRow(
         id=new_id(),
@@ -53,6 +63,24 @@ def add_satellite(
     session.flush()
     add_elements(session, row.id, elements.epoch, orbit)
     return row
+
+
+def _require_new(session: Session, norad_cat_id: int) -> None:
+    # Number 0 says nothing.
+    if norad_cat_id == 0:
+        return
+    take_turns(session, _TURNS)
+    rival = session.scalar(
+        sa.select(SatelliteRow.id).where(
+            SatelliteRow.norad_cat_id == norad_cat_id, SatelliteRow.deleted_at.is_(None)
+        )
+    )
+    if rival is not None:
+        raise ServiceError(
+            "duplicate_norad_cat_id",
+            f"The satellite {rival!r} has the catalogue number {norad_cat_id}. "
+            "Send its new elements there, or import them.",
+        )
 
 
 def add_elements(
@@ -100,6 +128,7 @@ def import_entries(
     that epoch. Number 0 says nothing, so that there the name counts too. New satellites get
     these ``FIGURES``.
     """
+    take_turns(session, _TURNS)
     batch = _Import(_known_satellites(session), _known_epochs(session), figures)
     results = [batch.take(entry) for entry in entries]
     session.add_all(batch.new_satellites)

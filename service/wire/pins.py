@@ -2,21 +2,39 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Final, Literal, get_args
 
-from pydantic import Field
+from pydantic import Field, model_validator
+from pydantic_core import PydanticCustomError
 
 from service.wire.base import Body, Id, Instant, Open, Reason, Wire
 
 PinnedMode = Literal["collect", "contact"]
 
+OF_ACTIONS: Final = frozenset(
+    (
+        "id", "mode", "start", "end", "satellite_id", "satellite_name", "target_id", "station_id",
+        "station_name", "opportunity_id", "off_nadir_deg", "azimuth_deg", "slew", "turn_to_s",
+        "turn_back_s", "reward", "worth", "quality", "clear_probability", "delivered_at", "age_s",
+        "battery_fraction_end", "recorder_fraction_end", "outcome",
+    )
+)  # fmt: skip
+"""What actions of timelines and plans tell."""
+
 
 class PinnedActionIn(Body):
-    """An action in words: a booked contact, a promised image."""
+    """An action in words: a booked contact, a promised image.
 
-    satellite_id: Id | None = Field(None, description="Any satellite by default.")
+    An action of a timeline or of a plan is taken as it is: its `mode` tells that it is one.
+    """
+
+    satellite_id: Id | None = Field(
+        None, description="Or the name of one satellite alone. Any satellite by default."
+    )
     target_id: Id | None = Field(None, description="Of the image.")
-    station_id: Id | None = Field(None, description="Of the contact.")
+    station_id: Id | None = Field(
+        None, description="Of the contact; or the name of one station alone."
+    )
     start: Instant | None = Field(
         None,
         description="Of the opportunities that start and end touch, the one that starts nearest "
@@ -26,6 +44,19 @@ class PinnedActionIn(Body):
     opportunity_id: Id | None = Field(
         None, description="The opportunity itself, as the scenario lists it, in place of the rest."
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_a_plan(cls, value: object) -> object:
+        """Leave out what an action tells beyond a pin."""
+        if not isinstance(value, dict) or "mode" not in value:
+            return value
+        if value["mode"] not in get_args(PinnedMode):
+            raise PydanticCustomError("no_pinned_mode", "Only collects and contacts are pinned")
+        # The same opportunity has another id in another scenario; times and places say it all.
+        own = cls.model_fields.keys() - {"opportunity_id"}
+        dropped = OF_ACTIONS - own
+        return {name: part for name, part in value.items() if name not in dropped}
 
 
 class BlockedIn(Body):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Annotated, Final, Literal, get_args
 
 from pydantic import BeforeValidator, FailFast, Field, GetJsonSchemaHandler, model_validator
@@ -52,6 +53,9 @@ class QualityIn(Body):
     )
 
 
+Preference = Literal["early", "off_nadir", "sun", "balance", "margin", "few_contacts"]
+
+
 class ObjectiveIn(Body):
     """What a plan earns for an image when it is taken, and what when it is on the ground."""
 
@@ -69,9 +73,19 @@ class ObjectiveIn(Body):
         description="The rest halves with every such time between the end of the collect and its "
         "last bit on the ground; null for no decay.",
     )
+    prefer: list[Preference] = Field(
+        [],
+        description="Secondary aims, in order, that never cost worth: `early` (least mean age), "
+        "`off_nadir` (least mean angle), `sun` (highest mean sun elevation), `balance` (least "
+        "share of the busiest satellite), `margin` (highest lowest battery), `few_contacts`. An "
+        "aim may cost those before it a hundredth at most. A replan leaves them aside: it changes "
+        "as little as it must.",
+    )
 
 
+DEFAULT_OBJECTIVE: Final = ObjectiveIn(collected_share=0.9, prefer=["early", "off_nadir"])
 ObjectiveName = Literal["collected", "delivered", "paper"]
+_SECOND: Final = 2
 _NAMED: Final = {
     "collected": ObjectiveIn(),
     "delivered": ObjectiveIn(collected_share=0.0),
@@ -98,6 +112,16 @@ class _OrShortName:
 
 
 AnyObjective = Annotated[ObjectiveIn, BeforeValidator(_objective_named), _OrShortName()]
+
+
+def default_objective(types: Iterable[object]) -> ObjectiveIn:
+    """Return what a new question earns that does not say it, by the types of its satellites."""
+    is_of_paper = all(name in ("paper", "paper_code") for name in types)
+    return ObjectiveIn() if is_of_paper else DEFAULT_OBJECTIVE
+
+
+def _without_default(schema: JsonSchemaValue) -> None:
+    schema.pop("default", None)
 
 
 class Question(Body):
@@ -127,8 +151,11 @@ class Question(Body):
     objective: AnyObjective = Field(
         ObjectiveIn(),
         description="What a plan is to earn. `collected` is short for a collected_share of 1, "
-        "`delivered` for 0; `paper` is the same as `collected`.",
-        json_schema_extra={"default": "collected"},
+        "`delivered` for 0; `paper` is the same as `collected`. Left out, it is a collected_share "
+        "of 0.9 with `early` and `off_nadir` preferred; `paper` where all satellites are of the "
+        "types `paper` and `paper_code`, and in files of the first release.",
+        # What it is by default hangs on the satellites.
+        json_schema_extra=_without_default,
     )
     allow_old_elements: bool = Field(
         False,
@@ -229,7 +256,12 @@ class ScenarioFile(Question):
             filled_file_satellite(one, value.get("release")) if isinstance(one, dict) else one
             for one in value["satellites"]
         ]
-        return {**value, "satellites": satellites}
+        filled = {**value, "satellites": satellites}
+        if value.get("release") == _SECOND and "objective" not in value:
+            filled["objective"] = default_objective(
+                one.get("spacecraft") for one in satellites if isinstance(one, dict)
+            )
+        return filled
 
 
 class HorizonOut(Wire):

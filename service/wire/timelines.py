@@ -8,7 +8,7 @@ from pydantic import Field
 
 from service.wire.base import Instant, Json, Open, Wire
 from service.wire.satellites import Nadir
-from service.wire.scenarios import HorizonOut
+from service.wire.scenarios import HorizonOut, Preference
 
 Mode = Literal["collect", "contact", "sunpoint", "hold"]
 IDLE_MODES: Final = ("sunpoint", "hold")
@@ -83,6 +83,18 @@ class ImageFiguresOut(Wire):
     quality_mean: float | None = Field(None, description="Null where there is none.")
 
 
+class PreferredOut(Wire):
+    """What a plan of the same worth was made to be like: before and after."""
+
+    aim: Open[Preference]
+    before: float = Field(
+        description="`early`: mean age in seconds, an image that stays on board as old as the "
+        "horizon; `off_nadir`, `sun`: mean angle in degrees; `balance`: the busiest satellite's "
+        "share of all images; `margin`: lowest battery, as a fraction; `few_contacts`: how many."
+    )
+    after: float
+
+
 class TotalsOut(ImageFiguresOut):
     """The plan in numbers, as the referee found them."""
 
@@ -115,6 +127,9 @@ class TotalsOut(ImageFiguresOut):
         None,
         description="What recorders hold at the end, telemetry included; null where a recorder "
         "has no capacity in megabits.",
+    )
+    preferred: list[PreferredOut] = Field(
+        [], description="What the objective's `prefer` came to, in its order."
     )
 
 

@@ -87,6 +87,30 @@ def test_half_sent_requests_leave_room_for_others(program: StartProgram, text: s
             assert all(map(is_closed, silent))
 
 
+def test_who_was_served_keeps_a_connection_that_others_want(program: StartProgram) -> None:
+    ask = head("GET", "/health/live")
+    with (
+        program(num_files=NUM_FILES) as run,
+        connected(run.door.client, 1, ask) as (regular,),
+    ):
+        assert status_of(regular) == 200
+        while b"}" not in regular.recv(65_536):
+            pass
+        with connected(run.door.client, NUM // 2, ask) as others:
+            assert [status_of(one) for one in others] == [200] * len(others)
+            regular.sendall(ask.encode())
+            assert status_of(regular) == 200
+            while b"}" not in regular.recv(65_536):
+                pass
+            with connected(run.door.client, NUM - len(others), "") as silent:
+                assert is_closed(silent[0])
+            with connected(run.door.client, NUM - len(others), ask) as more:
+                assert [status_of(one) for one in more] == [200] * len(more)
+                assert is_closed(others[0])
+                regular.sendall(ask.encode())
+                assert status_of(regular) == 200
+
+
 def test_half_sent_bodies_leave_room_for_others(program: StartProgram) -> None:
     with program(num_files=NUM_FILES) as run:
         greedy, other = run.door.key("submit", "greedy"), run.door.key("read", "other")

@@ -84,3 +84,22 @@ def test_an_image_must_fit_a_recorder() -> None:
     (warning,) = usual_mistakes(replace(asked, targets=tuple(targets)))
     assert repr(targets[0].id) in warning
     assert "and 1 more" in warning
+
+
+def test_more_data_than_all_contacts_take_is_told() -> None:
+    asked = optical()
+    own = asked.satellites[0].resources
+    for rate_per_s, is_told in ((1e-9, True), (1.0, False)):
+        slow = replace(own, downlink_per_s=rate_per_s)
+        question = replace(asked, satellites=(replace(asked.satellites[0], resources=slow),))
+        table = compute_opportunities(question, Budget()).opportunities
+        assert (table.kind == CONTACT).any()
+        assert bool(mistakes_of_accesses(question, table)) is is_told
+        # At its border: what contacts take, to the percent, is what is told.
+    most = float((table.end_s - table.start_s)[table.kind == CONTACT].sum())
+    images = np.unique(table.place[table.kind != CONTACT])
+    needed = sum(asked.targets[i].collect_s for i in images) * own.collect_fill_per_s
+    half = replace(own, downlink_per_s=0.5 * needed / most)
+    question = replace(asked, satellites=(replace(asked.satellites[0], resources=half),))
+    (warning,) = mistakes_of_accesses(question, table)
+    assert " 50 % " in warning

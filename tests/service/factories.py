@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from datetime import UTC, datetime
 from typing import Any
 
@@ -11,6 +12,8 @@ from planner_core.domain import OrbitElements
 from planner_core.orbits.tle import format_tle
 
 EPOCH = datetime(2026, 3, 1, tzinfo=UTC)
+# There is one satellite of a catalogue number.
+_NUMBERS = itertools.count(91_001)
 
 
 def tle(norad_cat_id: int = 90001, **elements: Any) -> list[str]:
@@ -32,7 +35,7 @@ def tle(norad_cat_id: int = 90001, **elements: Any) -> list[str]:
 
 def satellite(**fields: Any) -> dict[str, Any]:
     """Return the body of a satellite, by default with the figures of the paper's."""
-    return {"name": "EYE-1", "tle": tle(), "spacecraft": "paper"} | fields
+    return {"name": "EYE-1", "tle": tle(next(_NUMBERS)), "spacecraft": "paper"} | fields
 
 
 def target(**fields: Any) -> dict[str, Any]:

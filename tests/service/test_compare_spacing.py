@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from planner_core.budget import Budget
+from service.commands import compare_spacing
 from service.commands.bodies import OK, WRONG_INPUT
 from service.commands.cli import main
+from service.commands.solve import answer_of
+from service.jobs.plan_job import PlanAnswer, PlanRequest
+from service.scenarios.translate import canonical
 from tests.missions import drawn_targets, paper_mission
 
 A_QUARTER = {"start": "2019-01-01T00:00:00Z", "end": "2019-01-01T06:00:00Z"}
@@ -70,3 +76,38 @@ def test_what_is_wrong_is_told_by_its_place(
     scenario.write_text(json.dumps(content))
     assert main(["compare-spacing", str(scenario)]) == WRONG_INPUT
     assert "scenario.json /targets/3/lat_deg" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("again", ["certified", "nothing"])
+def test_no_row_is_worse_than_the_one_above(
+    scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, again: str
+) -> None:
+    """Later searches find little, as where time is short; those from a plan all or nothing."""
+    num_searches = 0
+
+    def poor(request: PlanRequest, budget: Budget) -> PlanAnswer:
+        nonlocal num_searches
+        num_searches += 1
+        from_plan = '"replan"' in request.content
+        if num_searches == 1 or (from_plan and again == "certified"):
+            return answer_of(request, budget)
+        few = json.loads(request.content) | {"targets": drawn_targets(3)}
+        few.pop("replan", None)
+        return answer_of(replace(request, content=canonical(few)), budget)
+
+    monkeypatch.setattr(compare_spacing, "answer_of", poor)
+    table = tmp_path / "table.csv"
+    asked = ["compare-spacing", str(scenario), "--spacing-s", "45", "--spacing-s", "20"]
+    assert main([*asked, "--out", str(table)]) == OK
+    with table.open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    rewards = [float(row["reward"]) for row in rows]
+    assert num_searches == 6  # nothing starts from a plan where collects start anywhere
+    assert rewards[0] > 3
+    if again == "certified":
+        assert rewards[1] > rewards[0]
+        assert rewards == sorted(rewards)
+    else:
+        assert rewards == [rewards[0]] * 4
+        assert {row["ended"] for row in rows[1:]} == {"plan above"}
+    assert {row["validity"] for row in rows} == {"valid"}

@@ -108,7 +108,7 @@ def test_a_change_that_was_meant_for_another_state_is_412(client: httpx.Client) 
 
 
 def test_of_two_changes_of_one_state_only_the_first_is_made(client: httpx.Client) -> None:
-    made = client.post("/v1/satellites", json=satellite())
+    made = client.post("/v1/satellites", json=satellite(tle=tle()))
     address, etag = made.headers["location"], made.headers["etag"]
     known = {"If-Match": etag}
     newer = {"tle": tle(epoch=EPOCH + timedelta(days=1))}

@@ -5,12 +5,16 @@ from __future__ import annotations
 import json
 from typing import Any
 
+import httpx
 import pytest
 
 from service.scenarios.translate import canonical, scenario_from_content, sha256_of
+from service.wire.pins import OF_ACTIONS
+from service.wire.plans import PlanActionOut
+from service.wire.timelines import ActionOut
 from tests.missions import Document, drawn_targets, paper_mission
 from tests.service.conftest import Service
-from tests.service.factories import post
+from tests.service.factories import post, satellite
 from tests.service.problems import assert_problem
 from tests.service.test_plan_job import run
 from tests.service.test_scenarios import PATH, question
@@ -126,3 +130,72 @@ def test_a_scenario_shows_its_pins(service: Service) -> None:
     assert plain["pins"] == {"keep": [], "skip": [], "block": [], "forbid": []}
     file = service.client.get(f"{PATH}/{pinned['id']}", params={"expand": True}).json()
     assert sha256_of(canonical(file)) == pinned["sha256"]
+
+
+@pytest.mark.parametrize("kind", ["keep", "skip"])
+def test_actions_of_a_timeline_are_pins_as_they_are(kind: str) -> None:
+    first = json.loads(run(mission(), "rule").timeline)
+    (satellite,) = first["satellites"]
+    wanted = [a for a in satellite["actions"] if a["mode"] in ("collect", "contact")]
+    assert {a["mode"] for a in wanted} == {"collect", "contact"}
+    timeline = json.loads(run(mission(**{kind: wanted}), "rule").timeline)
+    assert timeline["validity"] == "valid"
+    (satellite,) = timeline["satellites"]
+    planned = {a["opportunity_id"] for a in satellite["actions"]}
+    named = {a["opportunity_id"] for a in wanted}
+    assert named <= planned if kind == "keep" else not named & planned
+
+
+def test_pins_know_all_that_actions_tell() -> None:
+    told = ActionOut.model_fields.keys() | PlanActionOut.model_fields.keys() | {"satellite_name"}
+    assert told == OF_ACTIONS
+
+
+def test_idle_time_is_no_pin(service: Service) -> None:
+    asked = question(service.client)
+    idle = {"mode": "sunpoint", "start": "2026-03-01T01:00:00Z", "end": "2026-03-01T01:10:00Z"}
+    answer = service.client.post(PATH, json=asked | {"pins": {"keep": [idle]}})
+    problem = assert_problem(answer, 422, problem_code(answer))
+    assert problem["errors"][0]["pointer"] == "/pins/keep/0"
+    assert "collects and contacts" in problem["errors"][0]["detail"]
+
+
+def test_what_is_no_part_of_an_action_is_refused_beside_its_mode(service: Service) -> None:
+    asked = question(service.client)
+    pin = {"mode": "collect", "target_id": "20/0", "colour": "red"}
+    answer = service.client.post(PATH, json=asked | {"pins": {"keep": [pin]}})
+    problem = assert_problem(answer, 422, problem_code(answer))
+    assert problem["errors"][0]["pointer"] == "/pins/keep/0/colour"
+
+
+def test_names_stand_for_ids_where_one_has_the_name(service: Service) -> None:
+    client = service.client
+    asked = question(client)
+    (satellite_id,), (station_id,) = asked["satellite_ids"], asked["ground_station_ids"]
+    span = {"start": "2026-03-01T01:00:00Z", "end": "2026-03-01T01:10:00Z"}
+    satellite_name = client.get(f"/v1/satellites/{satellite_id}").json()["name"]
+    station_name = client.get(f"/v1/ground-stations/{station_id}").json()["name"]
+    named = {
+        "keep": [{"station_id": station_name, "satellite_id": satellite_name} | span],
+        "block": [{"satellite_id": satellite_name} | span],
+    }
+    by_id = {
+        "keep": [{"station_id": station_id, "satellite_id": satellite_id} | span],
+        "block": [{"satellite_id": satellite_id} | span],
+    }
+    one = post(client, PATH, asked | {"pins": named})
+    assert one["pins"]["keep"][0]["station_id"] == station_id
+    again = client.post(PATH, json=asked | {"pins": by_id})
+    assert again.json()["id"] == one["id"]
+    # A name and its id are one pin.
+    twice = asked | {"pins": {"block": named["block"] + by_id["block"]}}
+    problem = assert_problem(client.post(PATH, json=twice), 422, "duplicate_pin")
+    assert problem["errors"][0]["pointer"] == "/pins/block/1"
+    rival = post(client, "/v1/satellites", satellite(name=satellite_name))["id"]
+    both = asked | {"satellite_ids": [satellite_id, rival], "pins": named}
+    problem = assert_problem(client.post(PATH, json=both), 422, "ambiguous_name")
+    assert problem["errors"][0]["pointer"] == "/pins/keep/0/satellite_id"
+
+
+def problem_code(answer: httpx.Response) -> str:
+    return str(answer.json()["code"])

@@ -122,7 +122,7 @@ def test_every_collect_tells_its_worth_and_its_quality() -> None:
 
 @pytest.mark.parametrize("objective", ["collected", {"collected_share": 0.5, "half_life_s": 7200}])
 def test_every_collect_tells_when_it_is_on_the_ground(objective: object) -> None:
-    answer = run(paper_mission(drawn_targets(150), objective=objective), "rule")
+    answer = run(paper_mission(drawn_targets(600), objective=objective), "rule")
     timeline = json.loads(answer.timeline)
     totals, line = timeline["totals"], timeline["satellites"][0]
     collects = [a for a in line["actions"] if a["mode"] == "collect"]

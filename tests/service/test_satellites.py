@@ -35,7 +35,7 @@ def test_a_bare_tle_makes_the_papers_satellite(client: httpx.Client) -> None:
     body = response.json()
     assert response.status_code == 201
     assert response.headers["location"] == f"/v1/satellites/{body['id']}"
-    assert body["norad_cat_id"] == 90001
+    assert body["norad_cat_id"] > 91_000
     assert body["epoch"] == "2026-03-01T00:00:00.000Z"
     assert body["agility"] == {
         "slew_rate_deg_s": 1.0,
@@ -185,7 +185,7 @@ def test_a_deleted_satellite_is_gone_from_every_call(client: httpx.Client) -> No
 
 
 def test_newer_elements_are_in_force_and_older_ones_stay(client: httpx.Client) -> None:
-    where = "/v1/satellites/" + post(client, "/v1/satellites", satellite())["id"]
+    where = "/v1/satellites/" + post(client, "/v1/satellites", satellite(tle=tle()))["id"]
     newer = {"tle": tle(epoch=EPOCH + timedelta(days=2))}
     older = {"tle": tle(epoch=EPOCH - timedelta(days=2))}
     first = client.put(f"{where}/elements", json=newer)
@@ -285,3 +285,21 @@ def test_each_bad_file_gets_what_its_table_says(service: Service, shared_data: P
         else:
             body = response.json()
             assert (body["accepted"], body["rejected"]) == (1, 1), name
+
+
+def test_a_catalogue_number_is_taken_once(client: httpx.Client) -> None:
+    first = post(client, "/v1/satellites", satellite(tle=tle()))
+    second = client.post("/v1/satellites", json=satellite(name="rival", tle=tle()))
+    assert_problem(second, 409, "duplicate_norad_cat_id")
+    assert first["id"] in second.json()["detail"]
+    lines = "\n".join(tle(epoch=EPOCH + timedelta(days=1)))
+    imported = send(client, "/v1/satellites/import", lines, "text/plain").json()
+    assert [item["id"] for item in imported["items"]] == [first["id"]]
+    # Who deletes the first may have another one.
+    assert client.delete(f"/v1/satellites/{first['id']}").status_code == 204
+    assert client.post("/v1/satellites", json=satellite(tle=tle())).status_code == 201
+
+
+def test_any_number_of_satellites_may_have_no_catalogue_number(client: httpx.Client) -> None:
+    made = [post(client, "/v1/satellites", satellite(tle=tle(0)))["id"] for _ in range(2)]
+    assert len(set(made)) == 2

@@ -141,7 +141,7 @@ def test_later_edits_change_nothing_in_a_scenario(client: httpx.Client) -> None:
     body = post(client, PATH, asked)
     before = client.get(body["links"]["file"]).json()
     where = f"/v1/satellites/{asked['satellite_ids'][0]}"
-    newer = {"tle": tle(epoch=EPOCH + timedelta(days=1))}
+    newer = {"tle": tle(client.get(where).json()["norad_cat_id"], epoch=EPOCH + timedelta(days=1))}
     assert client.put(f"{where}/elements", json=newer).status_code == 200
     changed = client.post(PATH, json=asked)
     assert changed.status_code == 201

@@ -107,10 +107,11 @@ def test_a_satellite_without_figures_is_a_generic_optical_one(client: httpx.Clie
     stored = post(client, "/v1/satellites", bare())
     assert stored["spacecraft"] == "generic_optical"
     assert stored["resources"]["sun_pointing"] == "slew"
-    plain = post(client, "/v1/satellites", bare(resources="paper"))
+    plain = post(client, "/v1/satellites", bare(resources="paper", tle=tle(90002)))
     assert (plain["spacecraft"], plain["resources"]) == ("paper", "paper")
     assert plain["agility"]["slew_model"] == "rest"
-    partly = post(client, "/v1/satellites", bare(resources={"battery_capacity_wh": 90.0}))
+    own = {"battery_capacity_wh": 90.0}
+    partly = post(client, "/v1/satellites", bare(resources=own, tle=tle(90003)))
     assert partly["resources"]["battery_capacity_wh"] == 90.0
     refused = client.post("/v1/satellites", json=bare(spacecraft="nimbus"))
     assert refused.status_code == 422

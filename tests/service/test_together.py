@@ -106,3 +106,14 @@ def test_any_number_of_keys_is_asked_for_in_queries_that_have_room(source: Sourc
     assert asyncio.run(ask()) == [f"{key}0" for key in keys]
     assert max(map(len, source.queries)) <= 500
     assert sorted(key for query in source.queries for key in query) == sorted(keys)
+
+
+def test_what_nobody_should_wait_for_is_asked_without_a_pause(source: Source) -> None:
+    source.may_go_on.set()
+
+    async def not_before_s(together: Together[str, str]) -> float:
+        await asyncio.gather(*(together.get(f"k{number}-") for number in range(50)))
+        return together._not_before_s - asyncio.get_running_loop().time()
+
+    assert asyncio.run(not_before_s(Together(source.ask, longest_pause_s=0.0))) <= 0.0
+    assert asyncio.run(not_before_s(Together(source.ask, longest_pause_s=9e9))) > 0.0

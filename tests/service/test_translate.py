@@ -16,7 +16,13 @@ from planner_core.domain import Objective, Quality, Resources
 from planner_core.errors import InvalidScenario, PlannerError
 from service.scenarios.translate import canonical, read_file, scenario_from_content, sha256_of
 from service.wire.base import MOST
-from tests.service.factories import ground_station, satellite, target, tle
+from tests.service import factories
+from tests.service.factories import ground_station, target, tle
+
+
+def satellite(**fields: Any) -> dict[str, Any]:
+    """Return the same satellite each time, but for these fields."""
+    return factories.satellite(tle=tle()) | fields
 
 
 def file(**fields: Any) -> dict[str, Any]:
@@ -118,6 +124,10 @@ def test_the_same_question_has_the_same_hash(same: dict[str, Any]) -> None:
         {"objective": "delivered"},
         {"objective": {"collected_share": 0.5}},
         {"objective": {"collected_share": 0.5, "half_life_s": 3600}},
+        {"objective": {"prefer": ["early"]}},
+        {"objective": {"collected_share": 0.5, "prefer": ["early"]}},
+        {"objective": {"prefer": ["early", "off_nadir"]}},
+        {"objective": {"prefer": ["off_nadir", "early"]}},
     ],
 )
 def test_another_question_has_another_hash(other: dict[str, Any]) -> None:
@@ -150,8 +160,47 @@ def test_an_objective_survives_its_file() -> None:
     assert canonical(file(**named)) == canonical(file(**spelled))
 
 
+def test_preferences_survive_their_file() -> None:
+    for share in (0.9, 1.0):
+        text = canonical(file(objective={"collected_share": share, "prefer": ["sun", "balance"]}))
+        assert canonical(json.loads(text)) == text
+        made = scenario_from_content(json.loads(text))
+        assert made.objective == Objective(collected_share=share, prefer=("sun", "balance"))
+    with_half_life = {"half_life_s": 60, "prefer": ["sun"]}
+    assert canonical(file(objective=with_half_life)) == canonical(
+        file(objective={"prefer": ["sun"]})
+    )
+
+
+def test_an_objective_before_preferences_keeps_its_form() -> None:
+    text = canonical(file(objective={"collected_share": 0.5, "half_life_s": 7200}))
+    assert json.loads(text)["objective"] == {"collected_share": 0.5, "half_life_s": 7200.0}
+
+
+def test_what_a_file_leaves_out_is_of_its_release() -> None:
+    default = Objective(collected_share=0.9, prefer=("early", "off_nadir"))
+    of_paper = satellite(spacecraft="paper")
+    assert scenario_from_content(file()).objective == Objective()
+    generic = satellite(spacecraft="generic_optical")
+    generic.pop("resources", None)
+    new = {"release": 2, "satellites": [generic]}
+    assert scenario_from_content(file(**new)).objective == default
+    assert scenario_from_content(file(release=2, satellites=[of_paper])).objective == Objective()
+    spelled = {"collected_share": 0.9, "prefer": ["early", "off_nadir"]}
+    assert canonical(file(**new, objective=spelled)) == canonical(file(**new))
+    plain = file(**new, objective="paper")
+    assert scenario_from_content(plain).objective == Objective()
+
+
 @pytest.mark.parametrize(
-    "objective", ["downlinked", {"collected_share": 1.1}, {"half_life_s": 0}, {"share": 1}]
+    "objective",
+    [
+        "downlinked",
+        {"collected_share": 1.1},
+        {"half_life_s": 0},
+        {"share": 1},
+        {"prefer": ["late"]},
+    ],
 )
 def test_an_objective_that_cannot_be_is_refused(objective: object) -> None:
     with pytest.raises(InvalidScenario) as refused:

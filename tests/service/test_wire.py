@@ -30,6 +30,7 @@ from service.wire import (
     imports,
     jobs,
     operations,
+    passes,
     places,
     plan_before,
     plans,
@@ -37,6 +38,7 @@ from service.wire import (
     satellites,
     scenarios,
     spacecraft,
+    target_lives,
     timelines,
     webhooks,
 )
@@ -47,8 +49,8 @@ from service.wire.base import Wire, dumped, read
 from tests.service.jobs.mission import small_mission
 
 MODULES = (
-    base, changes, forecasts, imports, jobs, operations, wire_pins, places, plan_before, plans,
-    replans, satellites, scenarios, spacecraft, timelines, webhooks,
+    base, changes, forecasts, imports, jobs, operations, wire_pins, passes, places, plan_before,
+    plans, replans, satellites, scenarios, spacecraft, target_lives, timelines, webhooks,
 )  # fmt: skip
 NOW = "2026-03-01T00:00:00.000Z"
 ACTION = {

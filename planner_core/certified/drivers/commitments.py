@@ -91,7 +91,7 @@ def with_contacts(problem: Problem, spacing_s: float) -> Problem:
     new = tuple(Kept(row=row, pointer="") for row in chosen if row not in already)
     return replace(
         problem,
-        worth=_worth_with(problem, chosen),
+        worth=worth_with(problem, chosen),
         pinned=replace(problem.pinned, kept=(*problem.pinned.kept, *new)),
         left_on_board=0.0,
     )
@@ -133,7 +133,7 @@ def _is_served(problem: Problem, chosen: list[int], row: int) -> bool:
     return len(beside) < int(problem.station_antennas[table.place[row]])
 
 
-def _worth_with(problem: Problem, contacts: list[int]) -> Floats:
+def worth_with(problem: Problem, contacts: list[int]) -> Floats:
     """Return what each image earns that comes down at the start of the next of these contacts."""
     table = problem.opportunities
     age_s = np.full(len(table), np.inf)

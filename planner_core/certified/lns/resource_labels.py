@@ -63,6 +63,11 @@ class Ground(NamedTuple):
         Which targets must stay where they are imaged. Shape ``(num_targets + 1,)``.
     is_shut
         Contacts whose antenna another satellite holds.
+    liking
+        What each opportunity is liked for beside its worth, in a polish that leaves the worth of
+        the plan and its contacts as they are; nothing else asks for it. Shape ``(n,)``.
+    is_polish
+        Whether it is one.
     """
 
     network: Network
@@ -75,6 +80,8 @@ class Ground(NamedTuple):
     typical: float
     is_locked: Bools
     is_shut: Bools
+    liking: Floats
+    is_polish: bool
 
 
 @bundle

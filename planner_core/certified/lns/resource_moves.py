@@ -33,6 +33,9 @@ _TRIALS: Final = 200  # for such a target
 _WITH_OTHERS: Final = 0.5  # of all moves may take targets that are imaged elsewhere
 _TIE: Final = 0.01  # of a target's worth
 _CONTACT: Final = 0.05  # of a typical target: what one contact fewer is worth
+_STAYS: Final = 1e6  # typical targets: what a polish would lose with a contact
+_SLIGHT: Final = 1e-5  # of a typical target: what a polish counts liking, which is 1 at most
+_EQUAL: Final = 1e-9
 
 
 @borrowing
@@ -54,7 +57,10 @@ def make_moves(
         need, bears = _wanted_before(ground, taken, right, _data_end(ground, taken, high))
         if low >= high or not is_kept_to:
             continue
-        _weigh(ground, taken, room, low, high, draws)
+        if ground.is_polish:
+            _weigh_liking(ground, taken, room, low, high, draws)
+        else:
+            _weigh(ground, taken, room, low, high, draws)
         last = best_label(ground, room, left, low, high, right, energy, data, need, bears)
         if last != NOWHERE:
             _replace(ground, taken, room, low, high, last)
@@ -64,7 +70,7 @@ def make_moves(
 def _pivot(ground: Ground, taken: Taken, draws: Uint64s) -> int:
     """Return a task at random, mostly one of a target that is not imaged."""
     m = len(ground.rows)
-    num_trials = _TRIALS if next_draw(draws) < _FOR_FREE_TARGET else 1
+    num_trials = _TRIALS if next_draw(draws) < _FOR_FREE_TARGET and not ground.is_polish else 1
     pivot = 0
     for _ in range(num_trials):
         pivot = int(next_draw(draws) * m)
@@ -199,10 +205,49 @@ def _weigh(ground: Ground, taken: Taken, room: Room, low: int, high: int, draws:
 
 
 @borrowing
+def _weigh_liking(
+    ground: Ground, taken: Taken, room: Room, low: int, high: int, draws: Uint64s
+) -> None:
+    """Say the same for a polish: worth above all, then what is liked; contacts stay as they are.
+
+    Half of the moves leave out targets that the plan does not image: where a window could earn
+    more with them, the others would find nothing that is worth the same.
+    """
+    move = room.move[0] + 1
+    room.move[0] = move
+    with_free = next_draw(draws) < _WITH_OTHERS
+    slight = _SLIGHT * ground.typical
+    for k in range(low, high):
+        at, row = k - low, ground.rows[k]
+        target = ground.target[k]
+        if ground.network.is_contact[k]:
+            room.gain[at] = _STAYS * ground.typical if taken.is_taken[row] else NEVER
+            continue
+        if room.marked_at[target] != move:
+            room.marked_at[target] = move
+            room.seen[target] = 0
+        room.seen[target] += 1
+        held = taken.holder[target]
+        worth, liking = ground.worth[row], ground.liking[row]
+        is_here = held != FREE and ground.satellite[held] == ground.number
+        if is_here:
+            is_here = low <= ground.local[held] < high
+        if (held == FREE and with_free) or is_here:
+            room.gain[at] = worth + slight * (1.0 + liking) if worth > 0.0 else NEVER
+        elif held != FREE and not ground.is_locked[target]:
+            room.gain[at] = worth - ground.worth[held] + slight * (liking - ground.liking[held])
+        else:
+            room.gain[at] = NEVER
+        if ground.network.is_kept[k]:
+            room.gain[at] = max(room.gain[at], 0.0)
+
+
+@borrowing
 def _replace(ground: Ground, taken: Taken, room: Room, low: int, high: int, last: int) -> None:
     """Let a path take the place of what is in the window, unless the plan is worth less then."""
     place = ground.target
     num_new, worth = 0, 0.0
+    liking, num_contacts = 0.0, 0
     label = last
     while label >= 0:
         k = low + label // LABELS
@@ -211,10 +256,14 @@ def _replace(ground: Ground, taken: Taken, room: Room, low: int, high: int, last
         if not ground.network.is_contact[k]:
             held = taken.holder[place[k]]
             worth += ground.worth[ground.rows[k]]
+            liking += ground.liking[ground.rows[k]]
             if held != FREE and not (
                 ground.satellite[held] == ground.number and low <= ground.local[held] < high
             ):
                 worth -= ground.worth[held]
+                liking -= ground.liking[held]
+        else:
+            num_contacts += 1
         label = room.source[label]
     num_old = 0
     for k in range(low, high):
@@ -223,7 +272,12 @@ def _replace(ground: Ground, taken: Taken, room: Room, low: int, high: int, last
             num_old += 1
             if not ground.network.is_contact[k]:
                 worth -= ground.worth[ground.rows[k]]
-    if worth < -1e-9:
+                liking -= ground.liking[ground.rows[k]]
+            else:
+                num_contacts -= 1
+    if worth < -_EQUAL:
+        return
+    if ground.is_polish and (worth > _EQUAL or liking <= _EQUAL or num_contacts != 0):
         return
     for i in range(num_old):
         k = room.old[i]

@@ -17,6 +17,7 @@ from planner_core.problem import (
     COLLECT,
     CONTACT,
     Bools,
+    Floats,
     Problem,
 )
 from planner_core.problem.plan import Plan
@@ -50,11 +51,30 @@ class ResourceWindows:
                 typical=problem.typical_worth,
                 is_locked=is_locked,
                 is_shut=np.zeros(len(satellite), dtype=np.bool_),
+                liking=np.zeros(len(table)),
+                is_polish=False,
             )
             for index, satellite in enumerate(problem.satellites)
             if len(satellite)
         ]
         self.adopt(Plan())
+
+    def go_by(self, worth: Floats, liking: Floats) -> None:
+        """Become a polish: leave the worth of the plan and its contacts alone from now on.
+
+        Parameters
+        ----------
+        worth
+            Of each opportunity with those contacts. Shape ``(n,)``.
+        liking
+            What each opportunity is liked for, from -1 to 1. Shape ``(n,)``.
+        """
+        # The referee sees each step: what a slow satellite needs on its way it will tell.
+        kept = _kept_targets(self._problem)
+        self._grounds = [
+            ground._replace(worth=worth, liking=liking, is_locked=kept, is_polish=True)
+            for ground in self._grounds
+        ]
 
     def adopt(self, plan: Plan) -> None:
         """Go on from another plan."""
@@ -79,6 +99,16 @@ class ResourceWindows:
             )  # fmt: skip
             num_moves -= _MOVES_AT_A_TIME
 
+    def make_moves_on_each(self, num_moves: int, budget: Budget) -> None:
+        """Make so many moves on each satellite, unless the budget is spent before."""
+        for ground in self._grounds:
+            if budget.is_spent():
+                break
+            make_moves(
+                ground._replace(is_shut=self._shut(ground.number)), self._taken, self._room,
+                self._draws, num_moves, budget.stop,
+            )  # fmt: skip
+
     def _shut(self, index: int) -> Bools:
         """Return the tasks of a satellite whose antenna another one holds."""
         table = self._problem.opportunities
@@ -101,10 +131,16 @@ class ResourceWindows:
 
 def _locked_targets(problem: Problem) -> Bools:
     """Return which targets stay where they are imaged; the last entry stands for contacts."""
-    locked = np.zeros(len(problem.target_ids) + 1, dtype=np.bool_)
-    table, kept = problem.opportunities, problem.kept_rows
-    locked[table.place[kept[table.kind[kept] == COLLECT]]] = True
+    locked = _kept_targets(problem)
     if not is_transitive(problem):
         # The tasks around one that is dropped could not do without it.
         locked[:] = True
     return locked
+
+
+def _kept_targets(problem: Problem) -> Bools:
+    """Return which targets have an image that must be taken; the last entry stands for contacts."""
+    is_kept = np.zeros(len(problem.target_ids) + 1, dtype=np.bool_)
+    table, kept = problem.opportunities, problem.kept_rows
+    is_kept[table.place[kept[table.kind[kept] == COLLECT]]] = True
+    return is_kept

@@ -26,7 +26,7 @@ from planner_core.certified.dp.forward_labels import (
 from planner_core.certified.dp.resource_network import Network, network_of
 from planner_core.certified.proofs.bound import Bound, rounded_bound
 from planner_core.certified.proofs.lagrangian import lagrangian_bound
-from planner_core.precedence.relation import is_transitive_on
+from planner_core.certified.proofs.shares import ROUNDING, Shares
 from planner_core.problem import (
     COLLECT,
     Bools,
@@ -47,8 +47,7 @@ _TRIED: Final = 2
 _PARTS: Final = 4  # of whole rewards, where images may earn parts of them
 _FEW: Final = 1000  # opportunities whose programme takes no time
 _TRIAL_UNITS: Final = 24  # of an image, in the search for a price of data
-_ROUNDING: Final = 1e-9  # of a unit
-_LEFT_SLACK: Final = 3e-9  # of a recorder's capacity, that the referee forgives
+_FIRST_GOAL: Final = 0.95  # of what the battery alone allows
 _SPAN: Final = 0.6  # of an image: telemetry in a span of the last image
 FINE: Final = 8
 """Levels of the recorder that the smallest collect fills, where a proof counts."""
@@ -75,7 +74,7 @@ class SatelliteRelaxation:
     network: Network
     levels: DataLevels
     classes: tuple[DataLevels, ...]
-    shares: _Shares | None = None
+    shares: Shares | None = None
     data_price: float = 0.0
 
     @classmethod
@@ -86,7 +85,7 @@ class SatelliteRelaxation:
         network = network_of(problem, satellite)
         levels = data_levels(network, levels_per_collect, is_optimistic=True)
         classes = _classes(problem, satellite, network, levels)
-        shares = _Shares.of(problem, satellite, network)
+        shares = Shares.of(problem, satellite, network)
         return cls(
             satellite=satellite, network=network, levels=levels, classes=classes, shares=shares
         )
@@ -148,10 +147,63 @@ class SatelliteRelaxation:
             Whether to answer the path.
         """
         weight = worth[self.satellite.rows]
-        end_cost = np.zeros(self.levels.num_levels, dtype=np.int32)
         if self.shares is not None:
-            weight = self.shares.weights(weight, unit)
-            end_cost = self.shares.end_cost(self.levels, unit)
+            return self._most_of_shares(weight, unit, enough, stop, near, keeps_path)
+        return self._most_of_all(
+            weight, np.zeros(self.levels.num_levels, dtype=np.int32), enough, stop, near, keeps_path
+        )
+
+    def _most_of_shares(
+        self,
+        weight: Ints,
+        unit: float,
+        enough: int,
+        stop: Bytes,
+        near: int | None,
+        keeps_path: bool,
+    ) -> tuple[int, Ints | None]:
+        """Return the same where images earn a share on board; see ``Shares``.
+
+        The instant that tells the two cases apart is tried where the first of them is known not to
+        matter, and once more where what the second came to says so.
+        """
+        shares = self.shares
+        assert shares is not None
+        goal = max(enough, near or 0)
+        if goal == 0:
+            goal = int(_FIRST_GOAL * _Needs.of(self.network, self.levels, weight, 0.0, near).top)
+        # By the battery alone smaller units take next to no time.
+        finer = max(1, min(shares.finer(unit), _MAX_CELLS // max(1, goal * len(weight))))
+
+        def before(since: int) -> int:
+            own = shares.weights_before(weight, unit, since, finer)
+            most = int(_Needs.of(self.network, self.levels, own, 0.0, finer * goal).top)
+            return -(-most // finer)
+
+        def after(since: int) -> tuple[int, Ints | None]:
+            own = shares.weights(weight, unit, since)
+            cost = shares.end_cost(self.levels, unit, since)
+            return self._most_of_all(own, cost, enough, stop, near, keeps_path)
+
+        since, early = shares.latest(before, goal)
+        most, path = after(since)
+        later, lower = shares.latest(before, max(most, enough))
+        if max(most, early) > enough and later != since and not stop[0]:
+            again, other = after(later)
+            if max(again, lower) < max(most, early):
+                most, early, path = again, lower, other
+        return max(most, early), path
+
+    def _most_of_all(
+        self,
+        weight: Ints,
+        end_cost: Ints,
+        enough: int,
+        stop: Bytes,
+        near: int | None,
+        keeps_path: bool,
+    ) -> tuple[int, Ints | None]:
+        """Return the same at these weights and costs of what a recorder holds at the end."""
         best, path = UNREACHED, None
         for number, levels in enumerate(self.classes):
             least = max(enough, best + 1)
@@ -217,73 +269,6 @@ class SatelliteRelaxation:
         return float(np.round(self.data_price * typical)) / least
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Shares:
-    r"""What images earn less that stay on board, as a price of what a recorder holds at the end.
-
-    An image that stays is worth :math:`w_k - l_k` at the prices of the targets, one that comes down
-    :math:`w_k`. What stays is at least what the recorder holds at the end, less all telemetry and
-    what it held at the start: :math:`\sum_{stay} s_k \ge g`. For any :math:`\mu \ge 0` a plan gains
-    :math:`\sum_k \max(w_k, w_k - l_k + \mu s_k) - \mu g` at most.
-
-    Attributes
-    ----------
-    lost, size
-        :math:`l_k`, and the image's data in recorder capacities, both 0 for contacts. Shape
-        ``(m,)``.
-    per_data
-        :math:`\mu`.
-    held
-        What the recorder holds at the start.
-    """
-
-    lost: Floats
-    size: Floats
-    is_kept: Bools
-    per_data: float
-    held: float
-
-    @classmethod
-    def of(cls, problem: Problem, satellite: SatelliteProblem, network: Network) -> _Shares | None:
-        """Return them where they matter; None where a task may be a detour for others."""
-        objective, rows = problem.objective, satellite.rows
-        if (
-            not problem.counts_delivery
-            or objective.half_life_s is not None
-            or network.must_deliver
-            or not is_transitive_on(satellite)
-        ):
-            return None
-        is_image = satellite.kind == COLLECT
-        size = np.where(is_image, satellite.end_s - satellite.start_s, 0.0)
-        size *= satellite.resources.collect_fill_per_s
-        on_board = objective.collected_share * problem.worth_on_ground[rows]
-        lost = np.where(is_image, problem.worth[rows] - on_board, 0.0)
-        counts = (lost > 0.0) & (size > 0.0)
-        if not counts.any():
-            return None
-        return cls(
-            lost=lost,
-            size=size,
-            is_kept=network.is_kept,
-            per_data=float(np.median(lost[counts] / size[counts])),
-            held=network.data_start,
-        )
-
-    def weights(self, weight: Ints, unit: float) -> Ints:
-        """Return what images count at most, in units, of what they are worth on the ground."""
-        worth = weight * unit
-        stays = np.maximum(worth - self.lost, 0.0) + self.per_data * self.size
-        # Whoever takes an image for nothing can do without.
-        most = np.where((weight > 0) | self.is_kept, np.maximum(worth, stays), 0.0)
-        return np.ceil(most / unit - _ROUNDING).astype(np.int32)
-
-    def end_cost(self, levels: DataLevels, unit: float) -> Ints:
-        """Return what a recorder costs that ends at each level, in units."""
-        left = np.maximum(levels.least - self.held - _LEFT_SLACK, 0.0)
-        return np.floor(self.per_data * left / unit).astype(np.int32)
-
-
 def _classes(
     problem: Problem, satellite: SatelliteProblem, network: Network, levels: DataLevels
 ) -> tuple[DataLevels, ...]:
@@ -340,10 +325,10 @@ class _Needs(NamedTuple):
         cls, network: Network, levels: DataLevels, weight: Ints, price: float, near: int | None
     ) -> _Needs:
         change = np.maximum(levels.gain, levels.floor - levels.before)
-        priced = np.ceil(weight - price * change - _ROUNDING)
+        priced = np.ceil(weight - price * change - ROUNDING)
         priced = np.maximum(priced, 0.0).astype(np.int32)
         free = np.maximum(levels.end - np.arange(levels.num_levels), 0)
-        credit = np.ceil(price * free - _ROUNDING).astype(np.int32)
+        credit = np.ceil(price * free - ROUNDING).astype(np.int32)
         at_start = int(credit[min(levels.start, levels.num_levels - 1)])
         limit = int(1.07 * near) if near is not None else 0
         limit += 128 + int(priced.max(initial=0))
@@ -374,7 +359,7 @@ def whole_worth(problem: Problem, prices: Floats, unit: float) -> Ints:
     units = np.zeros(len(table), dtype=np.int32)
     price = np.maximum(prices[table.place[is_collect]], 0.0)
     worth = weights(problem.worth[is_collect], price)
-    units[is_collect] = np.maximum(np.ceil(worth / unit - _ROUNDING), 0.0)
+    units[is_collect] = np.maximum(np.ceil(worth / unit - ROUNDING), 0.0)
     return units
 
 
@@ -406,7 +391,7 @@ def _value(
     # What the other satellites gain is known only afterwards: one alone may stop early.
     units_enough = int(np.floor((enough - paid) / unit)) if len(satellites) == 1 else 0
     units = sum(s.most(worth, unit, max(units_enough, 0), stop)[0] for s in satellites)
-    rounded_away = _ROUNDING * len(problem.opportunities) * unit
+    rounded_away = ROUNDING * len(problem.opportunities) * unit
     return max(paid + units * unit + rounded_away, enough)
 
 

@@ -52,6 +52,11 @@ startPage(async () => {
 
 function installButtons() {
   byId("cancel").addEventListener("click", () => post(`${jobPath}/cancel`).catch(showError));
+  byId("take").addEventListener("click", async () => {
+    /** @type {import("./types.js").PlanOut} */
+    const plan = await post("/v1/plans", { job_id: jobId });
+    location.assign(`/plans/${plan.id}`);
+  });
   byId("rerun").addEventListener("click", async () => {
     /** @type {JobOut} */
     const again = await post(`${jobPath}/rerun`);
@@ -86,6 +91,7 @@ function showState(job) {
   );
   byId("cancel").hidden = isFinal || job.state === "cancelling";
   byId("rerun").hidden = !isFinal;
+  byId("take").hidden = job.state !== "succeeded";
   byId("compare").hidden = !isFinal;
 }
 

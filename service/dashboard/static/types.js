@@ -276,4 +276,98 @@
  * @property {string[]} [required]
  */
 
+/**
+ * @typedef {object} PlanSatelliteOut
+ * @property {string} satellite_id
+ * @property {string} satellite_name
+ * @property {string | null} in_force_from
+ * @property {string | null} in_force_until
+ */
+
+/**
+ * @typedef {object} PlanOut
+ * @property {string} id
+ * @property {string | null} name
+ * @property {string} state
+ * @property {string} job_id
+ * @property {string | null} parent_id
+ * @property {{start: string, end: string}} horizon
+ * @property {Violation[]} violations
+ * @property {PlanSatelliteOut[]} satellites
+ * @property {string[]} allowed
+ * @property {string} created_at
+ */
+
+/**
+ * @typedef {object} PlanActionOut
+ * @property {string} id
+ * @property {string} satellite_id
+ * @property {string} mode
+ * @property {string} start
+ * @property {string} end
+ * @property {string | null} target_id
+ * @property {string | null} station_id
+ * @property {string | null} outcome
+ */
+
+/**
+ * @typedef {object} PlanEventOut
+ * @property {string} at
+ * @property {string} to_state
+ * @property {string} owner
+ * @property {string | null} key_name
+ * @property {string | null} reason
+ */
+
+/**
+ * @typedef {object} PlanChangeItem
+ * @property {string} change
+ * @property {PlanActionOut | null} action
+ * @property {PlanActionOut | null} parent_action
+ * @property {string} cause
+ */
+
+/**
+ * @typedef {object} PlanChangesOut
+ * @property {string | null} freeze_until
+ * @property {number} changed_share
+ * @property {number} forced_share
+ * @property {PlanChangeItem[]} items
+ */
+
+/**
+ * @typedef {object} PassConflictOut
+ * @property {string} satellite_name
+ * @property {boolean} planned
+ */
+
+/**
+ * @typedef {object} PassOut
+ * @property {string} station_id
+ * @property {string} station_name
+ * @property {string} satellite_id
+ * @property {string} satellite_name
+ * @property {string} aos
+ * @property {string} tca
+ * @property {string} los
+ * @property {number} max_elevation_deg
+ * @property {boolean} aos_cut
+ * @property {boolean} los_cut
+ * @property {boolean} planned
+ * @property {number | null} volume_mbit
+ * @property {PassConflictOut[]} conflicts
+ */
+
+/**
+ * @typedef {object} OutageOut
+ * @property {string} id
+ * @property {string | null} satellite_id
+ * @property {string | null} satellite_name
+ * @property {string | null} station_id
+ * @property {string | null} station_name
+ * @property {string} start
+ * @property {string} end
+ * @property {string | null} reason
+ */
+
 export {};

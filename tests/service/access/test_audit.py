@@ -30,7 +30,7 @@ def post(client: httpx.Client, path: str, body: object) -> str:
 
 
 def new_satellite(client: httpx.Client) -> str:
-    return post(client, "/v1/satellites", satellite())
+    return post(client, "/v1/satellites", satellite(tle=tle()))
 
 
 def new_station(client: httpx.Client) -> str:

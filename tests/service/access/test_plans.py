@@ -4,81 +4,21 @@ from __future__ import annotations
 
 import json
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
-import httpx
-import pytest
 import sqlalchemy as sa
 
-from service.answers import store as answer_store
-from service.answers.blocks import Block
-from service.db.rows import JobRow, WebhookDeliveryRow
-from tests.service.access.conftest import Door
-from tests.service.exports.conftest import Mission, mission  # noqa: F401 - a fixture
+from service.db.rows import WebhookDeliveryRow
+from tests.service.access.conftest import Desk
+from tests.service.exports.conftest import Mission
 from tests.service.problems import assert_problem
 
 Document = dict[str, Any]
 NOON = "2019-01-01T12:00:00.000Z"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Desk:
-    """A server whose jobs have answers, and the calls that move plans."""
-
-    door: Door
-    mission: Mission
-
-    def answered_job(self, key: dict[str, str], blocks: tuple[Block, ...] | None = None) -> str:
-        """Return a job that has the mission's answer."""
-        job_id = self.door.submit(key)
-        with self.door.jobs.database.transaction() as session:
-            answer_store.save(session, job_id, blocks or self.mission.blocks, None)
-            session.execute(sa.update(JobRow).where(JobRow.id == job_id).values(state="succeeded"))
-        return job_id
-
-    def draft(self, key: dict[str, str], job_id: str | None = None) -> Document:
-        """Return a new plan."""
-        body = {"job_id": job_id or self.answered_job(key), "name": "Monday"}
-        answer = self.door.client.post("/v1/plans", json=body, headers=key)
-        assert answer.status_code == 201, answer.text
-        assert answer.headers["location"] == f"/v1/plans/{answer.json()['id']}"
-        found: Document = answer.json()
-        return found
-
-    def move(self, plan: Document, to: str, key: dict[str, str], **fields: Any) -> httpx.Response:
-        """Ask for a transition."""
-        address = f"/v1/plans/{plan['id']}/transitions"
-        return self.door.client.post(address, json={"to": to} | fields, headers=key)
-
-    def published(self, key: dict[str, str], from_: str) -> Document:
-        """Return a plan that is in force from an instant on."""
-        plan = self.draft(key)
-        assert self.move(plan, "approved", key).status_code == 200
-        answer = self.move(plan, "published", key, effective_from=from_)
-        assert answer.status_code == 200, answer.text
-        return plan
-
-    def get(self, plan: Document, key: dict[str, str], part: str = "") -> Document:
-        """Return a plan, or a part of it."""
-        answer = self.door.client.get(f"/v1/plans/{plan['id']}{part}", headers=key)
-        assert answer.status_code == 200, answer.text
-        found: Document = answer.json()
-        return found
-
-    def in_force(self, key: dict[str, str], at: str, **query: str) -> list[str]:
-        """Return the plans that are published for an instant."""
-        wanted = {"state": "published", "at": at} | query
-        answer = self.door.client.get("/v1/plans", params=wanted, headers=key)
-        return [plan["id"] for plan in answer.json()["items"]]
-
-
-@pytest.fixture
-def desk(door: Door, mission: Mission) -> Desk:  # noqa: F811 - a fixture is used by its name
-    return Desk(door=door, mission=mission)
-
-
-def tasks(mission: Mission) -> list[Document]:  # noqa: F811
+def tasks(mission: Mission) -> list[Document]:
     return [
         {"satellite_id": satellite["id"], **action}
         for satellite in mission.document["satellites"]

@@ -51,6 +51,22 @@ def test_a_replan_to_which_nothing_happened_is_the_plan(whole: Client, base: Pla
     assert (changes.changed_share, changes.forced_share, changes.items) == (0.0, 0.0, ())
 
 
+def test_passes_hold_the_contacts(whole: Client, base: Plan) -> None:
+    contacts = {a.id: a for a in whole.plans.actions(base.id) if a.mode == "contact"}
+    passes = list(whole.plans.passes(base.id))
+    assert {own_id for one in passes for own_id in one.action_ids} == contacts.keys()
+    station_id = passes[0].station_id
+    narrowed = whole.plans.passes(
+        base.id, station_id=station_id, planned=True, from_=noon(base), to=base.horizon.end
+    )
+    wanted = [
+        one
+        for one in passes
+        if one.station_id == station_id and one.planned and one.los > noon(base)
+    ]
+    assert list(narrowed) == wanted
+
+
 def test_a_lost_station_and_an_urgent_request(whole: Client, base: Plan) -> None:
     before = tasks(whole, base)
     later = [a for a in before.values() if a.start >= noon(base)]

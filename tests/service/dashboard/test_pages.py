@@ -13,7 +13,10 @@ import pytest
 from service.dashboard.assets import load_assets
 from service.dashboard.routes import PAGE_POLICY
 
-PAGES = {"/": "jobs", "/new": "new", "/jobs/x": "job", "/comparisons/x": "comparison"}
+PAGES = {
+    "/": "jobs", "/new": "new", "/jobs/x": "job", "/comparisons/x": "comparison",
+    "/plans": "plans", "/plans/x": "plan", "/fleet": "fleet", "/wall": "wall",
+}  # fmt: skip
 STATIC = Path(__file__).resolve().parents[3] / "service" / "dashboard" / "static"
 VOID = {"input", "link", "meta"}
 FIELDS = {"input", "select", "textarea"}

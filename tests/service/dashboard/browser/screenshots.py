@@ -78,6 +78,47 @@ def select_blocked(browser: Browser) -> None:
     browser.wait(lambda: browser.text("#selected table"))
 
 
+def shift(api: httpx.Client, browser: Browser, scenario_id: str) -> None:
+    """Publish a plan and its change, and picture the plan and the wall."""
+    job = planned(api, scenario_id, "certified")
+    plan = post(api, "/v1/plans", {"job_id": job["id"], "name": "Monday"})
+    start = plan["horizon"]["start"]
+    publish(api, plan, start)
+    contacts = [
+        each
+        for each in api.get(f"/v1/plans/{plan['id']}/actions?limit=500").json()["items"]
+        if each["mode"] == "contact"
+    ]
+    lost = sorted(contacts, key=lambda each: str(each["start"]))[len(contacts) // 2]
+    body = {
+        "now": start,
+        "name": "Monday, one pass lost",
+        "outages": [{name: lost[name] for name in ("satellite_id", "start", "end")}],
+        "limits": {"time_s": 15},
+    }
+    job = post(api, f"/v1/plans/{plan['id']}/replans", body)
+    while job["state"] in ("queued", "running"):
+        job = api.get(f"/v1/jobs/{job['id']}?wait=10").json()
+    replan = api.get(job["links"]["plan"]).json()
+    browser.open(f"/plans/{replan['id']}")
+    browser.wait(lambda: browser.drawn("gantt") and browser.text("#passes tbody"))
+    take(browser, "plan", 1500)
+    publish(api, replan, start)
+    browser.open(f"/wall#at={lost['start']}")
+    browser.wait(lambda: browser.drawn("wall-map") and "OS" in browser.text("#wall-passes"))
+    colors(browser, "dark")
+    take(browser, "wall", 900)
+    colors(browser, "light")
+
+
+def publish(api: httpx.Client, plan: Json, effective_from: str) -> None:
+    """Approve and publish a plan."""
+    address = f"/v1/plans/{plan['id']}/transitions"
+    api.post(address, json={"to": "approved"}).raise_for_status()
+    body = {"to": "published", "effective_from": effective_from}
+    api.post(address, json=body).raise_for_status()
+
+
 def main() -> None:
     """Plan the demonstration's mission and write the pictures."""
     FOLDER.mkdir(exist_ok=True)
@@ -109,6 +150,7 @@ def main() -> None:
         browser.open("/new")
         browser.wait(lambda: browser.text("#satellites .choices label"))
         take(browser, "new", 1360)
+        shift(api, browser, scenario_id)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,166 @@
+"""What images earn that stay on board, in the programme of one satellite."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from planner_core.certified.dp.data_levels import DataLevels
+from planner_core.certified.dp.resource_network import Network
+from planner_core.precedence.relation import is_transitive_on
+from planner_core.problem import (
+    COLLECT,
+    Bools,
+    Floats,
+    Ints,
+    Problem,
+    SatelliteProblem,
+)
+from planner_core.problem.slew import TIME_TOLERANCE_S
+
+ROUNDING: Final = 1e-9
+"""Of a unit."""
+
+FROM_START: Final = -1
+"""In place of an instant: of all that is ever recorded."""
+
+_INSTANTS: Final = 33
+_FINE_PARTS: Final = 10  # of a typical image
+_LEFT_SLACK: Final = 3e-9  # of a recorder's capacity, that the referee forgives
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Shares:
+    r"""What images earn less that stay on board, as a price of what a recorder holds at the end.
+
+    An image that stays is worth :math:`w_k - l_k` at the prices of the targets, one that comes down
+    :math:`w_k`. A recorder holds what was recorded last. For any instant :math:`T` either something
+    recorded before it stays, and then all images from there on do: a plan gains no more than with
+    :math:`w_k - l_k` for those. Or nothing does, and then the images that ended later fill what the
+    recorder holds at the end but for the telemetry since :math:`T`: :math:`\sum_{stay} s_k \ge g`.
+    For any :math:`\mu \ge 0` such a plan gains at most :math:`\sum_k w_k` of the images before and
+    :math:`\sum_k \max(w_k, w_k - l_k + \mu s_k) - \mu g` of those after it.
+
+    Attributes
+    ----------
+    lost, size
+        :math:`l_k`, and the image's data in recorder capacities, both 0 for contacts. Shape
+        ``(m,)``.
+    per_data
+        :math:`\mu`.
+    held
+        What the recorder holds at the start.
+    typical
+        What an image on the ground is worth.
+    telemetry_per_s
+        In recorder capacities.
+    since_s, telemetry_since_s
+        Instants to tell the two cases apart, ascending, and since when telemetry may have been
+        recorded after them. Shape ``(k,)``.
+    start_s, end_s
+        Of each task, when it is recorded. Shape ``(m,)``.
+    """
+
+    lost: Floats
+    size: Floats
+    is_kept: Bools
+    per_data: float
+    held: float
+    typical: float
+    telemetry_per_s: float
+    since_s: Floats
+    telemetry_since_s: Floats
+    start_s: Floats
+    end_s: Floats
+
+    @classmethod
+    def of(cls, problem: Problem, satellite: SatelliteProblem, network: Network) -> Shares | None:
+        """Return them where they matter; None where a task may be a detour for others."""
+        objective, rows = problem.objective, satellite.rows
+        if (
+            not problem.counts_delivery
+            or objective.half_life_s is not None
+            or network.must_deliver
+            or not is_transitive_on(satellite)
+        ):
+            return None
+        is_image = satellite.kind == COLLECT
+        size = np.where(is_image, satellite.end_s - satellite.start_s, 0.0)
+        size *= satellite.resources.collect_fill_per_s
+        on_board = objective.collected_share * problem.worth_on_ground[rows]
+        lost = np.where(is_image, problem.worth[rows] - on_board, 0.0)
+        counts = (lost > 0.0) & (size > 0.0)
+        if not counts.any():
+            return None
+        starts = np.unique(satellite.start_s)
+        since_s = starts[np.unique(np.linspace(0, len(starts) - 1, _INSTANTS).astype(np.int64))]
+        is_booked = problem.dynamics == "paper"
+        # Events book the telemetry since the one before them.
+        events_s = np.concatenate([[0.0], satellite.event_s])
+        before_s = events_s[np.searchsorted(satellite.event_s, since_s)]
+        return cls(
+            lost=lost,
+            size=size,
+            is_kept=network.is_kept,
+            per_data=float(np.median(lost[counts] / size[counts])),
+            held=network.data_start,
+            typical=float(np.median(problem.worth_on_ground[rows][counts])),
+            telemetry_per_s=satellite.resources.telemetry_per_s,
+            since_s=since_s,
+            telemetry_since_s=before_s if is_booked else since_s,
+            start_s=satellite.start_s,
+            end_s=satellite.start_s if is_booked else satellite.end_s,
+        )
+
+    def latest(self, gained_before: Callable[[int], int], goal: int) -> tuple[int, int]:
+        """Return the last instant at which the first case gains no more than a goal, and its gain.
+
+        Parameters
+        ----------
+        gained_before
+            What the first case gains with each instant; the later, the more.
+        """
+        low, high, gained = FROM_START, len(self.since_s), 0
+        while high - low > 1:
+            middle = (low + high) // 2
+            trial = gained_before(middle)
+            if trial <= goal:
+                low, gained = middle, trial
+            else:
+                high = middle
+        return low, gained
+
+    def finer(self, unit: float) -> int:
+        """Return into how many parts a unit is to be cut where that takes little time."""
+        return int(np.ceil(_FINE_PARTS * unit / self.typical))
+
+    def weights_before(self, weight: Ints, unit: float, since: int, finer: int) -> Ints:
+        """Return what images count in the first case, in so much finer units."""
+        stays = self.start_s >= self.since_s[since] + TIME_TOLERANCE_S
+        worth = np.where(stays, np.maximum(weight * unit - self.lost, 0.0), weight * unit)
+        return np.ceil(worth * (finer / unit) - ROUNDING).astype(np.int32)
+
+    def weights(self, weight: Ints, unit: float, since: int) -> Ints:
+        """Return what images count at most, in units, of what they are worth on the ground.
+
+        With ``FROM_START`` as the instant that is so for all plans.
+        """
+        worth = weight * unit
+        stays = np.maximum(worth - self.lost, 0.0) + self.per_data * self.size
+        if since != FROM_START:
+            may_stay = self.end_s > self.since_s[since] - TIME_TOLERANCE_S
+            stays = np.where(may_stay, stays, 0.0)
+        # Whoever takes an image for nothing can do without.
+        most = np.where((weight > 0) | self.is_kept, np.maximum(worth, stays), 0.0)
+        return np.ceil(most / unit - ROUNDING).astype(np.int32)
+
+    def end_cost(self, levels: DataLevels, unit: float, since: int) -> Ints:
+        """Return what a recorder costs that ends at each level, in units."""
+        without = -self.held
+        if since != FROM_START:
+            without = self.telemetry_per_s * (self.telemetry_since_s[since] - TIME_TOLERANCE_S)
+        left = np.maximum(levels.least + without - _LEFT_SLACK, 0.0)
+        return np.floor(self.per_data * left / unit).astype(np.int32)

@@ -1,0 +1,1 @@
+"""What operators like beside worth: secondary aims that never cost any."""

@@ -1,0 +1,131 @@
+"""A plan of the same worth that comes nearer to what is preferred.
+
+The search for worth is over: what it found and has proven stays as it is, to the last bit. Aims are
+followed in their order, each by contacts that are added or dropped and by windows of images that
+are planned anew; the referee says of every step what it did to worth and aims. Aims further down
+may cost those before them a hundredth at most.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from planner_core.budget import Budget
+from planner_core.certified.drivers.commitments import worth_with
+from planner_core.certified.lns.resource_search import ResourceWindows
+from planner_core.domain import Preference
+from planner_core.preferences.aims import View, figure_of, liking_of, value_of
+from planner_core.preferences.contacts import Accepts, with_contacts, without_contacts
+from planner_core.problem import Floats, Problem
+from planner_core.problem.plan import Plan
+
+_MOVES_AN_IMAGE: Final = 8
+_FIRST_MOVES: Final = 10  # on each satellite: the first gain most
+_LEAST_MOVES: Final = 64
+_MOST_ROUNDS: Final = 24
+_MOST_MISSES: Final = 8
+_LEAST_GAIN: Final = 0.001  # of an aim, for another round
+_SLACK: Final = 0.01  # of an aim, for those after it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Effect:
+    """The figure of an aim before and after: seconds, degrees, shares or a number."""
+
+    aim: Preference
+    before: float
+    after: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Polished:
+    """The plan, and what it came to for each aim, in their order."""
+
+    plan: Plan
+    effects: tuple[Effect, ...]
+
+
+def polished(
+    problem: Problem, plan: Plan, aims: tuple[Preference, ...], budget: Budget, seed: int
+) -> Polished:
+    """Return the plan, nearer to the aims where that costs nothing."""
+    view = View.of(problem, plan)
+    before = {aim: figure_of(aim, value_of(view, aim)) for aim in aims}
+    limits = dict[Preference, float]()
+    windows: ResourceWindows | None = None
+    if view.timeline.is_valid and view.images:
+        for number, aim in enumerate(aims):
+            accepts = _Acceptance(view, aim, limits)
+            if aim in ("few_contacts", "margin"):
+                view = without_contacts(view, accepts, budget)
+            if not problem.continuous_starts and not budget.is_spent():
+                # One search for all aims: to build it takes a while.
+                windows = windows or ResourceWindows(problem, seed + number)
+                view = _with_windows(view, windows, aim, accepts, budget)
+            if aim == "early" and problem.use_resources:
+                view = with_contacts(view, accepts, budget)
+            reached = value_of(view, aim)
+            limits[aim] = reached + _SLACK * abs(reached)
+    effects = (
+        Effect(aim=aim, before=before[aim], after=figure_of(aim, value_of(view, aim)))
+        for aim in aims
+    )
+    return Polished(plan=view.plan, effects=tuple(effects))
+
+
+class _Acceptance:
+    """Says of plans whether they cost nothing and come nearer to the aim at hand."""
+
+    def __init__(self, view: View, aim: Preference, limits: Mapping[Preference, float]) -> None:
+        self._reward, self._aim, self._limits = view.timeline.reward, aim, limits
+        self._best = value_of(view, aim)
+
+    def __call__(self, trial: View) -> bool:
+        if not trial.timeline.is_valid or trial.timeline.reward != self._reward:
+            return False
+        value = value_of(trial, self._aim)
+        if value >= self._best:
+            return False
+        if any(value_of(trial, aim) > limit for aim, limit in self._limits.items()):
+            return False
+        self._best = value
+        return True
+
+
+def _with_windows(
+    view: View, windows: ResourceWindows, aim: Preference, accepts: Accepts, budget: Budget
+) -> View:
+    """Return the plan with windows of images that are planned anew, contacts as they are."""
+    problem = view.problem
+    num_satellites = len(problem.satellites)
+    most_moves = max(_LEAST_MOVES, _MOVES_AN_IMAGE * len(view.images) // num_satellites)
+    num_moves, num_misses = _FIRST_MOVES, 0
+    for _ in range(_MOST_ROUNDS):
+        liking = liking_of(view, aim)
+        if liking is None or num_misses == _MOST_MISSES or budget.is_spent():
+            break
+        windows.go_by(_worth_in(view), liking)
+        windows.adopt(view.plan)
+        windows.make_moves_on_each(num_moves, budget)
+        before = value_of(view, aim)
+        trial = View.of(problem, windows.plan)
+        if accepts(trial):
+            view = trial
+            gained = before - value_of(view, aim)
+            if num_moves == most_moves and gained < _LEAST_GAIN * abs(before):
+                break
+            num_moves = min(3 * num_moves, most_moves)
+        else:
+            # Fewer moves at once are less likely to lose something between them.
+            num_moves, num_misses = max(num_moves // 3, 1), num_misses + 1
+    return view
+
+
+def _worth_in(view: View) -> Floats:
+    """Return what each image earns with the contacts of the plan, about."""
+    problem = view.problem
+    if not problem.counts_delivery:
+        return problem.worth
+    return worth_with(problem, [contact.opportunity for contact in view.contacts])

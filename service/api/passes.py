@@ -1,0 +1,117 @@
+"""Passes of a plan: who is over which station when, and what comes down."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Annotated, Final
+
+from fastapi import APIRouter, Depends, Path, Query, Response
+from fastapi.responses import StreamingResponse
+
+from planner_core.domain import GroundStation
+from service.answers.passes import PassFilter, passes_of_plan
+from service.api import job_intake as intake
+from service.api.deps import Call, CallDep
+from service.api.errors import problem_responses
+from service.api.paging import PagingDep
+from service.api.plans import find_plan
+from service.db.rows import JobRow
+from service.exports.passes import write_csv, write_ics
+from service.problems.kinds import ServiceError
+from service.scenarios.stored_question import StoredQuestion
+from service.stores import job_store
+from service.wire.base import Instant, Listed, read
+from service.wire.passes import PassOut
+from service.wire.timelines import TimelineOut
+
+router = APIRouter(prefix="/v1/plans", tags=["plans"])
+
+_TYPES: Final = {"csv": "text/csv", "ics": "text/calendar"}
+
+Suffix = Annotated[
+    str, Path(description="`csv`: a table; `ics`: a calendar.", examples=list(_TYPES))
+]
+
+
+def _filter(
+    station_id: Annotated[str | None, Query(description="Only of this station.")] = None,
+    satellite_id: Annotated[str | None, Query(description="Only of this satellite.")] = None,
+    from_: Annotated[
+        Instant | None, Query(alias="from", description="Only passes that end after it.")
+    ] = None,
+    to: Annotated[Instant | None, Query(description="Only passes that begin before it.")] = None,
+    planned: Annotated[
+        bool | None, Query(description="Only passes with a contact, or only those without.")
+    ] = None,
+) -> PassFilter:
+    return PassFilter(
+        station_id=station_id, satellite_id=satellite_id, start=from_, end=to, planned=planned
+    )
+
+
+FilterDep = Annotated[PassFilter, Depends(_filter)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Found:
+    passes: Sequence[PassOut]
+    stations: dict[str, GroundStation]
+    made_at: datetime
+
+
+@router.get("/{plan_id}/passes", responses=problem_responses(404, 409, 503))
+def list_passes(
+    plan_id: str, call: CallDep, paging: PagingDep, wanted: FilterDep
+) -> Listed[PassOut]:
+    """List the passes of a plan's satellites over its stations by AOS, planned or not."""
+    after = paging.after_number()
+    numbered = list(enumerate(_find(call, plan_id, wanted).passes))[after + 1 :]
+    page = paging.answer(numbered[: paging.limit + 1], lambda pair: pair[0])
+    return Listed(items=[one for _, one in page.rows], next=page.next)
+
+
+@router.get(
+    "/{plan_id}/passes.{suffix}",
+    response_class=Response,
+    responses={
+        200: {
+            "description": "The passes.",
+            "content": {media_type: {} for media_type in _TYPES.values()},
+        },
+        **problem_responses(404, 406, 409, 503),
+    },
+)
+def get_passes_as(plan_id: str, suffix: Suffix, call: CallDep, wanted: FilterDep) -> Response:
+    """Return the passes of a plan as a table or as a calendar."""
+    with call.database.reading() as session:
+        find_plan(session, plan_id, call.caller)
+    if suffix not in _TYPES:
+        offered = ", ".join(f".{known}" for known in _TYPES)
+        raise ServiceError("not_acceptable", f"Passes are offered as {offered}.")
+    found = _find(call, plan_id, wanted)
+    return StreamingResponse(
+        _written(found, suffix),
+        media_type=_TYPES[suffix],
+        headers={"Content-Disposition": f'inline; filename="passes-{plan_id}.{suffix}"'},
+    )
+
+
+def _written(found: _Found, suffix: str) -> Iterator[str]:
+    if suffix == "csv":
+        return write_csv(found.passes)
+    return write_ics(found.passes, found.stations, found.made_at)
+
+
+def _find(call: Call, plan_id: str, wanted: PassFilter) -> _Found:
+    with call.database.reading() as session:
+        job = session.get_one(JobRow, find_plan(session, plan_id, call.caller).job_id)
+        made_at = intake.require_answer(session, job)
+        timeline = read(TimelineOut, intake.find_timeline(session, job))
+        question = StoredQuestion(job_store.content_of(session, job.id))
+    return _Found(
+        passes=passes_of_plan(question, timeline, wanted),
+        stations={station.id: station for station in question.ground_stations},
+        made_at=made_at,
+    )

@@ -1,0 +1,50 @@
+// @ts-check
+/** What a replan changes, and why. */
+
+import { h } from "./dom.js";
+import { percent, utc } from "./format.js";
+
+/** @typedef {import("./types.js").PlanChangesOut} PlanChangesOut */
+/** @typedef {import("./types.js").PlanActionOut} PlanActionOut */
+
+/** @type {Record<string, string>} */
+const CAUSES = {
+  lost: "lost by an outage, a failure or a dropped target",
+  displaced_by: "its time was taken",
+  resource: "for battery, recorder or a contact",
+  gain: "for what it earns",
+};
+
+/**
+ * Return the changes as elements: the shares, then a row for each.
+ * @param {PlanChangesOut} changes
+ * @param {(satelliteId: string) => string} nameOf
+ * @param {(stationId: string) => string} stationOf
+ */
+export function changesTable(changes, nameOf, stationOf) {
+  const { items } = changes;
+  const shares =
+    `${percent(changes.changed_share)} of the plan after ${utc(changes.freeze_until)} UTC moved or removed, ` +
+    `${percent(changes.forced_share)} lost in any case.`;
+  if (items.length === 0) return [h("p", {}, "Nothing changes.")];
+  const rows = items.map((item) => {
+    const about = /** @type {PlanActionOut} */ (item.action ?? item.parent_action);
+    return h(
+      "tr",
+      {},
+      h("th", { scope: "row" }, item.change),
+      h("td", {}, about.mode),
+      h("td", {}, about.target_id ?? stationOf(about.station_id ?? "")),
+      h("td", {}, nameOf(about.satellite_id)),
+      h("td", {}, utc(item.parent_action?.start)),
+      h("td", {}, utc(item.action?.start)),
+      h("td", {}, CAUSES[item.cause] ?? item.cause),
+    );
+  });
+  const heads = ["Change", "Mode", "Target or station", "Satellite", "Was (UTC)", "Is (UTC)", "Why"];
+  const head = h("tr", {}, ...heads.map((text) => h("th", { scope: "col" }, text)));
+  return [
+    h("p", {}, shares),
+    h("div", { class: "scroll changes" }, h("table", {}, h("thead", {}, head), h("tbody", {}, ...rows))),
+  ];
+}

@@ -1,0 +1,122 @@
+// @ts-check
+/** Satellites, stations and spacecraft types as they are now, and what is out. */
+
+import { call, list, post } from "./api.js";
+import { byId, fill, h } from "./dom.js";
+import { changesIn, fieldsOf, labelled } from "./fields.js";
+import { utc } from "./format.js";
+import { instantOf } from "./instants.js";
+import { startPage, whileBusy } from "./page.js";
+
+/** @typedef {{id: string, name: string, is_built_in?: boolean}} Named */
+/** @typedef {import("./types.js").OutageOut} OutageOut */
+
+const KINDS = { satellites: "satellite", "ground-stations": "station", spacecraft: "type" };
+const MOST = 1000;
+const HOUR_MS = 3_600_000;
+
+/** @type {{thing: Record<string, any>, etag: string, fields: import("./fields.js").Field[]} | null} */
+let open = null;
+
+startPage(async () => {
+  const [satellites, stations, types] = await Promise.all(Object.keys(KINDS).map(read));
+  for (const [i, [kind, word]] of Object.entries(KINDS).entries()) {
+    const own = [satellites, stations, types][i] ?? [];
+    const options = own.filter((one) => !one.is_built_in).map(({ id, name }) => h("option", { value: `/v1/${kind}/${encodeURIComponent(id)}` }, `${word} ${name}`));
+    byId("thing").append(...options);
+  }
+  byId("outage-of").append(
+    ...(stations ?? []).map(({ id, name }) => h("option", { value: `station_id ${id}` }, `station ${name}`)),
+    ...(satellites ?? []).map(({ id, name }) => h("option", { value: `satellite_id ${id}` }, `satellite ${name}`)),
+  );
+  field("outage-start").value = utc(Date.now());
+  byId("thing").addEventListener("change", () => edit());
+  installForms();
+  await showOutages();
+});
+
+/** @param {string} kind @returns {Promise<Named[]>} */
+async function read(kind) {
+  return (await list(`/v1/${kind}`, MOST)).items;
+}
+
+/** @param {string} id */
+function field(id) {
+  return /** @type {HTMLInputElement} */ (byId(id));
+}
+
+async function edit() {
+  const path = field("thing").value;
+  byId("edit-form").hidden = path === "";
+  byId("edit-status").textContent = "";
+  fill(byId("edit-error"));
+  if (path === "") return;
+  const response = await call(path, { cache: "no-store" });
+  const thing = await response.json();
+  open = { thing, etag: response.headers.get("ETag") ?? "", fields: fieldsOf(thing) };
+  fill(byId("edit-fields"), ...open.fields.map(labelled));
+}
+
+function installForms() {
+  onSubmit("edit-form", "edit-error", async () => {
+    if (open === null) return;
+    const changes = changesIn(open.thing, open.fields);
+    if (Object.keys(changes).length === 0) {
+      byId("edit-status").textContent = "Nothing is different.";
+      return;
+    }
+    // Whoever was quicker is not overwritten.
+    const headers = { "Content-Type": "application/json", "If-Match": open.etag };
+    await call(field("thing").value, { method: "PATCH", headers, body: JSON.stringify(changes) });
+    await edit();
+    byId("edit-status").textContent = "Saved.";
+  });
+  onSubmit("outage-form", "outage-error", async () => {
+    const of = field("outage-of").value;
+    const at = of.indexOf(" ");
+    const start = instantOf(field("outage-start").value);
+    const end = new Date(Date.parse(start) + Number(field("outage-hours").value) * HOUR_MS).toISOString();
+    const reason = field("outage-reason").value.trim();
+    await post("/v1/outages", { [of.slice(0, at)]: of.slice(at + 1), start, end, ...(reason ? { reason } : {}) });
+    await showOutages();
+  });
+}
+
+/**
+ * @param {string} form
+ * @param {string} place
+ * @param {() => Promise<void>} work
+ */
+function onSubmit(form, place, work) {
+  byId(form).addEventListener("submit", (event) => {
+    event.preventDefault();
+    const button = /** @type {HTMLButtonElement} */ (byId(form).querySelector("button[type=submit]"));
+    whileBusy(button, byId(place), work);
+  });
+}
+
+async function showOutages() {
+  /** @type {{items: OutageOut[]}} */
+  const { items } = await list("/v1/outages", MOST);
+  const body = byId("outages").querySelector("tbody");
+  if (body) fill(body, ...items.map(rowOf));
+}
+
+/** @param {OutageOut} one */
+function rowOf(one) {
+  const what = one.station_name ?? one.satellite_name ?? one.station_id ?? one.satellite_id;
+  const onclick = async () => {
+    await call(`/v1/outages/${encodeURIComponent(one.id)}`, { method: "DELETE" });
+    await showOutages();
+  };
+  const label = `Delete the outage of ${what}`;
+  return h(
+    "tr",
+    {},
+    h("th", { scope: "row" }, what),
+    h("td", {}, utc(one.start)),
+    h("td", {}, utc(one.end)),
+    h("td", {}, one.reason),
+    h("td", {}, h("button", { type: "button", class: "quiet needs-submit", "aria-label": label, onclick }, "Delete")),
+  );
+}

@@ -1,0 +1,110 @@
+// @ts-check
+/** One plan: its life, its passes, what happens to it, and the plan that follows. */
+
+import { get, Problem } from "./api.js";
+import { changesTable } from "./changes.js";
+import { ActionDesk } from "./action_desk.js";
+import { byId, fill, h } from "./dom.js";
+import { short, utc, utcLabelled } from "./format.js";
+import { Gantt } from "./gantt.js";
+import { instantOf } from "./instants.js";
+import { startPage, whileBusy } from "./page.js";
+import { showPasses } from "./passes.js";
+import { Plan } from "./plan.js";
+import { move, nextInstant } from "./plan_steps.js";
+import { installReplan } from "./replan.js";
+import { Selection } from "./selection.js";
+import { TimeView } from "./time_view.js";
+import { Wishes } from "./wishes.js";
+
+/** @typedef {import("./types.js").PlanOut} PlanOut */
+
+const planId = decodeURIComponent(location.pathname.split("/").pop() ?? "");
+const planPath = `/v1/plans/${encodeURIComponent(planId)}`;
+/** @type {Record<string, string>} */
+const STEPS = { approved: "Approve", published: "Publish", withdrawn: "Withdraw" };
+
+startPage(async () => {
+  /** @type {PlanOut} */
+  const plan = await get(planPath);
+  const changes = plan.parent_id === null ? null : await get(`${planPath}/changes`);
+  showLife(plan, changes?.freeze_until ?? null);
+  const drawn = new Plan(/** @type {any} */ (await get(`${planPath}/timeline.json`)));
+  const stations = stationsOf(drawn);
+  const nameOf = (/** @type {string} */ id) => drawn.satelliteName(id);
+  const stationOf = (/** @type {string} */ id) => stations.find((one) => one.id === id)?.name ?? id;
+  if (changes) {
+    byId("changes-card").hidden = false;
+    fill(byId("changes"), ...changesTable(changes, nameOf, stationOf));
+  }
+  const selection = new Selection();
+  const wishes = new Wishes();
+  const view = new TimeView(drawn.start, drawn.end);
+  new Gantt(byId("gantt"), drawn, view, selection);
+  await new ActionDesk(plan, drawn, selection, wishes).load();
+  installReplan(plan, stations, wishes, { nameOf, stationOf });
+  await showHistory();
+  await showPasses(plan, stations, nextInstant(plan));
+});
+
+/**
+ * @param {PlanOut} plan
+ * @param {string | null} freezeUntil
+ */
+function showLife(plan, freezeUntil) {
+  document.title = `${plan.name ?? short(plan.id)} - Slewline`;
+  byId("plan-title").textContent = plan.name ?? `Plan ${short(plan.id)}`;
+  fill(byId("plan-state"), h("span", { class: `state ${plan.state}` }, plan.state));
+  fill(
+    byId("plan-about"),
+    `${utc(plan.horizon.start)} to ${utcLabelled(plan.horizon.end)}, `,
+    h("a", { href: `/jobs/${plan.job_id}` }, "its job"),
+    plan.parent_id && ", changes ",
+    plan.parent_id && h("a", { href: `/plans/${plan.parent_id}` }, short(plan.parent_id)),
+  );
+  byId("violations-card").hidden = plan.violations.length === 0;
+  fill(byId("plan-violations"), ...plan.violations.map((one) => h("li", {}, one.detail)));
+  byId("from-place").hidden = !plan.allowed.includes("published");
+  byId("replan-card").hidden = plan.state === "withdrawn" || plan.state === "superseded";
+  const from = /** @type {HTMLInputElement} */ (byId("step-from"));
+  from.value = utc(freezeUntil ?? nextInstant(plan));
+  byId("plan-steps").addEventListener("submit", (event) => event.preventDefault());
+  fill(
+    byId("step-buttons"),
+    ...plan.allowed.map((to) => {
+      const button = h("button", { type: "button", id: `step-${to}`, class: to === "withdrawn" ? "quiet" : "" }, STEPS[to] ?? to);
+      button.addEventListener("click", () =>
+        whileBusy(button, byId("plan-error"), async () => {
+          const reason = /** @type {HTMLInputElement} */ (byId("step-reason")).value.trim();
+          await move(plan, to, reason, to === "published" ? instantOf(from.value) : null);
+          location.reload();
+        }),
+      );
+      return button;
+    }),
+  );
+}
+
+/** @param {Plan} drawn */
+function stationsOf(drawn) {
+  /** @type {Map<string, string>} */
+  const found = new Map();
+  for (const action of drawn.actions.values()) {
+    if (action.station_id !== null) found.set(action.station_id, action.station_name ?? action.station_id);
+  }
+  return [...found].map(([id, name]) => ({ id, name })).sort((a, b) => a.name.localeCompare(b.name));
+}
+
+async function showHistory() {
+  /** @type {{items: import("./types.js").PlanEventOut[]}} */
+  const { items } = await get(`${planPath}/history`).catch((error) => {
+    if (error instanceof Problem) return { items: [] };
+    throw error;
+  });
+  fill(
+    byId("history"),
+    ...items.map((one) =>
+      h("li", {}, `${utc(one.at)} UTC: ${one.to_state} by ${one.key_name ?? one.owner}`, one.reason && `: ${one.reason}`),
+    ),
+  );
+}

@@ -1,0 +1,37 @@
+"""Targets over all plans: what became of each so far."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from service.wire.base import Instant, Open, Wire
+from service.wire.places import TargetIn
+from service.wire.plans import Outcome
+
+TargetState = Literal["open", "planned", "collected", "delivered", "expired", "cancelled"]
+
+
+class TargetCollectOut(Wire):
+    """The image that a target's state rests on."""
+
+    plan_id: str
+    action_id: str
+    satellite_id: str
+    satellite_name: str
+    start: Instant
+    end: Instant
+    outcome: Open[Outcome] | None = Field(description="The last that was reported.")
+
+
+class TargetLifeOut(Wire):
+    """A target of a catalogue, and how far it has come."""
+
+    catalog_id: str
+    catalog_name: str
+    target: TargetIn
+    state: Open[TargetState]
+    collect: TargetCollectOut | None = Field(
+        description="The image that was taken, or else the next one that a published plan has."
+    )
