@@ -30,6 +30,8 @@ _LEFT_OUT: Final = frozenset({
 _FAMILIES: Final[Mapping[str, Mapping[str, float]]] = {
     "drivers.agility_only": {"agility-500": 10.0, "spaced-1000": 12.0},
     "drivers.resources": {"paper-200": 10.0, "weights-1000": 15.0},
+    "drivers.resource_steps": {"paper-200": 10.0, "weights-1000": 15.0},
+    "drivers.resource_fleet": {"fleet-stations-4x2000": 40.0},
     "drivers.fleet": {"fleet-2x500": 10.0, "fleet-4x2000": 6.0},
     "drivers.continuous": {"continuous-1000": 12.0},
     "lns.continuous": {"continuous-1000": 12.0},

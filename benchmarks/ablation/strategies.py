@@ -96,13 +96,13 @@ _STATIONS: Final = {"fleet-stations-4x2000": 60.0}
 STRATEGIES: Final[Mapping[str, Change]] = {
     "cuts after a fleet": Change(patches=_off(f"{DRIVERS}.fleet", "close_in"), families=_FLEET),
     "exhaust": Change(
-        patches=_off(f"{DRIVERS}.resources", "ResourceSearch.exhaust"), families=_RESOURCES
+        patches=_off(f"{DRIVERS}.resource_steps", "ResourceSearch.exhaust"), families=_RESOURCES
     ),
     "turns of windows and choices": Change(
-        patches=_off(f"{DRIVERS}.resources", "ResourceSearch.search"), families=_RESOURCES
+        patches=_off(f"{DRIVERS}.resource_steps", "ResourceSearch.search"), families=_RESOURCES
     ),
     "program search": Change(
-        patches=_off(f"{DRIVERS}.resources", "ProgramSearch", _Idle), families=_STATIONS
+        patches=_off(f"{DRIVERS}.resource_fleet", "ProgramSearch", _Idle), families=_STATIONS
     ),
 }
 """What is left out, or, where the name says so, done in another way."""

@@ -128,9 +128,9 @@ def test_fleets_end_with_a_plan_and_a_bound_around_the_optimum(
     dynamics: Dynamics, seed: int, num_satellites: int
 ) -> None:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("planner_core.certified.drivers.resources._LARGE", 3)
-        patch.setattr("planner_core.certified.drivers.resources._FLEET_PATIENCE", 5)
-        patch.setattr("planner_core.certified.drivers.resources._FLEET_ROUNDS", 40)
+        patch.setattr("planner_core.certified.drivers.resource_steps._LARGE", 3)
+        patch.setattr("planner_core.certified.drivers.resource_fleet._FLEET_PATIENCE", 5)
+        patch.setattr("planner_core.certified.drivers.resource_fleet._FLEET_ROUNDS", 40)
         problem = _problem(seed, dynamics, num_satellites)
         best = best_reward(problem)
         reported: list[Progress] = []

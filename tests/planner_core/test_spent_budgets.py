@@ -100,9 +100,9 @@ def test_a_budget_that_ends_at_any_stage_leaves_a_plan(
     family: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if family.startswith("large"):
-        monkeypatch.setattr("planner_core.certified.drivers.resources._LARGE", 3)
-        monkeypatch.setattr("planner_core.certified.drivers.resources._FLEET_PATIENCE", 3)
-        monkeypatch.setattr("planner_core.certified.drivers.resources._FLEET_ROUNDS", 40)
+        monkeypatch.setattr("planner_core.certified.drivers.resource_steps._LARGE", 3)
+        monkeypatch.setattr("planner_core.certified.drivers.resource_fleet._FLEET_PATIENCE", 3)
+        monkeypatch.setattr("planner_core.certified.drivers.resource_fleet._FLEET_ROUNDS", 40)
     problem = FAMILIES[family]()
     whole = CountingBudget(None)
     Certified().solve(problem, whole, 0)

@@ -1,0 +1,242 @@
+"""The steps with battery and recorder, each towards a better plan or a lower bound.
+
+Which step comes when, `resources.py` says for one satellite, `resource_fleet.py` for several.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from planner_core.budget import ignored
+from planner_core.certified.drivers.agility_only import Effort
+from planner_core.certified.drivers.commitments import best_commitment
+from planner_core.certified.drivers.fleet import solve_without_resources
+from planner_core.certified.incumbent import Incumbent
+from planner_core.certified.lns.alternating import TurnSearch
+from planner_core.certified.lns.choices import ChoiceSearch
+from planner_core.certified.mip.contact_sets import FixedContacts, Relaxation
+from planner_core.certified.multipliers.ascent import Ascent
+from planner_core.certified.multipliers.energy import EnergyPaths, ascent_on_energy
+from planner_core.certified.multipliers.resources import PriceSearch
+from planner_core.certified.proofs.bound import Bound, rounded_bound
+from planner_core.certified.proofs.lagrangian import lagrangian_bound
+from planner_core.problem import CONTACT, Bools, Floats
+from planner_core.solvers.milp import Milp
+
+_FIRST_GOAL: Final = 0.95
+_IDLE_STEPS: Final = 5  # of the search for plans, before others have their turn
+_SETS_AT_A_TIME: Final = 2
+_AS_GOOD: Final = 0.75  # of a target: sets whose prices count
+_OFFERED: Final = (700, 1000)  # tasks in a search with fixed contacts
+_LESS_LIKELY: Final = 0.15  # of a target: what a set is worth less at each further attempt
+_ROOM: Final = 0.5  # of a target: with less the search for a better plan takes long
+_TIGHT: Final = 0.05  # of a target: prices that near to a relaxation are the best
+_MOST_ROWS: Final = 3000  # of a relaxation
+_LARGE: Final = 3000  # opportunities
+_ROUNDS_AT_A_TIME: Final = 100  # of the search for prices by energy alone
+_WORTH_A_STEP: Final = 0.005  # of a bound by the battery alone
+
+
+class ResourceSearch:
+    """A plan and a bound of a problem with resources."""
+
+    def __init__(self, best: Incumbent, seed: int) -> None:
+        self.best, self.problem, self.budget = best, best.problem, best.budget
+        self.seed, self._first = seed, best.bound
+        self._relaxed: dict[tuple[int, ...], Relaxation] = {}
+        # By contacts and number of tasks offered: what no plan was found to be worth.
+        self._missed: dict[tuple[tuple[int, ...], int], float] = {}
+        self._priced = np.inf  # the bound before it was rounded
+        self._one = self.problem.typical_worth
+
+    @property
+    def is_shared(self) -> bool:
+        """Whether there are several satellites."""
+        return sum(len(satellite) > 0 for satellite in self.problem.satellites) > 1
+
+    @property
+    def is_fleet(self) -> bool:
+        """Whether several satellites share so much that the whole program is too large."""
+        return self.is_shared and self.is_large
+
+    @property
+    def is_large(self) -> bool:
+        """Whether steps towards prices take long, and the whole program is out of reach."""
+        return len(self.problem.opportunities) > _LARGE
+
+    def choose(self, unit: float) -> None:
+        """Look for first plans among choices of tasks, and near those of agility alone."""
+        choices = ChoiceSearch(self.problem, unit, self.seed, self.budget.stop)
+        choices.start(self.mask([]), _FIRST_GOAL)
+        self.best.offer(choices.plan)
+        self.best.report("plans")
+        if self.best.bound.proof == "lagrangian" and not self.best.is_done:
+            preferred = self.without_resources()
+            choices.start(preferred, 1.0)
+            self.best.offer(choices.plan)
+
+    def turns(self, unit: float) -> TurnSearch:
+        """Return a search for plans that begins at the best, or where a commitment leads."""
+        committed = best_commitment(self.best, unit, _FIRST_GOAL, self.seed)
+        problem, plan = (
+            (committed.problem, committed.plan) if committed else (self.problem, self.best.plan)
+        )
+        return TurnSearch(problem, plan, unit, self.budget, self.seed)
+
+    def search(self, turns: TurnSearch, num_steps: int) -> bool:
+        """Search for plans from the best, while that leads on; return whether one is better."""
+        before, idle_steps = self.best.reward, 0
+        for _ in range(num_steps):
+            if self.best.is_done or idle_steps == _IDLE_STEPS:
+                break
+            turns.turn(1)
+            is_better = turns.reward > self.best.reward and self.best.offer(turns.plan)
+            idle_steps = 0 if is_better else idle_steps + 1
+        self.best.report("plans")
+        return self.best.reward > before
+
+    def without_resources(self) -> Bools:
+        """Let agility alone bound the plans; return the tasks of the best plan then."""
+        free = replace(self.problem, use_resources=False)
+        # Its plans are not for this problem: they are not reported.
+        quiet = self.budget.part(report=ignored)
+        solution = solve_without_resources(free, quiet, self.seed, self.best.gap, Effort())
+        if solution.proven is not None:
+            self.best.lower(solution.proven)
+        self.best.report("without resources")
+        return self.mask(action.opportunity for action in solution.plan.actions)
+
+    def exhaust(self) -> None:
+        """Leave what remains to the whole program, which ends with a proof if time suffices."""
+        self.best.report("HiGHS")
+        quiet = self.budget.part(report=ignored)
+        solution = Milp(gap=self.best.gap).solve(self.problem, quiet, self.seed)
+        self.best.offer(solution.plan)
+        if solution.proven is not None:
+            self.best.lower(solution.proven)
+        self.best.report("HiGHS")
+
+    def mask(self, rows: Iterable[int]) -> Bools:
+        """Return which opportunities these are."""
+        mask = np.zeros(len(self.problem.opportunities), dtype=np.bool_)
+        mask[list(rows)] = True
+        return mask
+
+    def price(self, prices: PriceSearch, num_steps: int) -> None:
+        """Make steps towards better prices."""
+        for _ in range(num_steps):
+            if self.best.is_done or not prices.step(max(self.best.reward, self.relaxed)):
+                return
+            self._priced = min(self._priced, prices.value)
+            self.best.lower(
+                Bound(value=prices.value, proof="dp", prices=prices.prices, unit=prices.unit)
+            )
+        self.best.report("prices")
+
+    def prices(self) -> Floats:
+        """Return prices to begin with."""
+        known = self.best.bound.prices
+        if known is None or self.best.bound is self._first:
+            known = lagrangian_bound(self.problem, self.best.reward).prices
+        return np.zeros(len(self.problem.target_ids)) if known is None else known
+
+    def first_prices(self) -> PriceSearch:
+        """Return a search for multipliers that begins where battery alone leads.
+
+        To ask the battery alone takes a fiftieth of the time; where that does not lead below what
+        is known by much, the exact programme is not asked at its multipliers either.
+        """
+        best, known = self.best, self.prices()
+        paths = EnergyPaths(self.problem)
+        energy = ascent_on_energy(self.problem, paths, known, _ROUNDS_AT_A_TIME, self.seed)
+        energy.ask()
+        before = energy.value
+        self.ask_energy(energy)
+        value = min(best.bound.value, energy.value)
+        prices = PriceSearch(self.problem, value, energy.multipliers, self.budget.stop)
+        prices.learn(best.plan)
+        if energy.value < before - _WORTH_A_STEP * before:
+            self.price(prices, 1)
+        return prices
+
+    def ask_energy(self, energy: Ascent) -> None:
+        """Look for better prices by energy alone, for a while."""
+        energy.improve(_ROUNDS_AT_A_TIME, self.budget.stop)
+
+    def relax_sets(self, prices: PriceSearch, turns: TurnSearch) -> bool:
+        """Learn prices from the relaxations of sets of contacts; return whether any is new."""
+        table = self.problem.opportunities
+        plans = [self.mask(a.opportunity for a in p.actions) for p in (self.best.plan, turns.plan)]
+        sets = [
+            *(tuple(np.flatnonzero(p & (table.kind == CONTACT)).tolist()) for p in plans),
+            *(key for key, _ in prices.contact_sets.most_common()),
+        ]
+        new = [key for key in dict.fromkeys(sets) if key not in self._relaxed][:_SETS_AT_A_TIME]
+        offered = np.ones(len(table), dtype=np.bool_)
+        if len(table) > _MOST_ROWS:
+            offered = (prices.usage > 0.0) | (turns.usage > 0.0)
+        offered |= self.mask(action.opportunity for action in self.best.plan.actions)
+        for contacts in new:
+            if self.best.is_done:
+                return False
+            program = FixedContacts(self.problem, offered, contacts, self.budget, self.seed)
+            self._relaxed[contacts] = program.relaxation()
+        if not new or not np.isfinite(self.relaxed):
+            return False
+        least = self.relaxed - _AS_GOOD * self._one
+        near = [r.prices for r in self._relaxed.values() if r.value >= least]
+        prices.restart(np.mean(near, axis=0))
+        self.best.report("contacts fixed")
+        return True
+
+    def fix_contacts(self, *, is_last: bool) -> bool:
+        """Search for a better plan with the most promising contacts; return whether it is.
+
+        Where a relaxation leaves little room above a better plan that takes long. Unless this
+        is the last resort it waits for prices, which may show that there is none.
+        """
+        can_sink = self._priced - self.relaxed > _TIGHT * self._one
+        room = _ROOM if can_sink and not is_last else 0.0
+        hopeful = [
+            (relaxation.value - _LESS_LIKELY * attempt * self._one, contacts, size)
+            for contacts, relaxation in self._relaxed.items()
+            for attempt, size in enumerate(_OFFERED)
+            if relaxation.value >= self.best.better + room * self._one - 1e-6
+            and self.best.better < self._missed.get((contacts, size), np.inf)
+        ]
+        if not hopeful or self.best.is_done:
+            return False
+        _, contacts, size = max(hopeful)
+        offered = self.promising(self._relaxed[contacts], size)
+        part = FixedContacts(self.problem, offered, contacts, self.budget, self.seed)
+        relaxed = part.relaxed()
+        if relaxed < self.best.better - 1e-6:
+            self._missed[contacts, size] = self.best.better
+            return False
+        # The last image is the hardest, and may be none: whoever wants it asks again.
+        wanted = rounded_bound(self.problem, relaxed - self._one, self.best.better)
+        if wanted >= self._missed.get((contacts, size), np.inf):
+            wanted = self.best.better
+        self.best.report("contacts fixed")
+        plan = part.plan(wanted)
+        is_better = plan is not None and self.best.offer(plan)
+        if self.best.reward < wanted - 1e-6:
+            self._missed[contacts, size] = wanted
+        return is_better
+
+    def promising(self, relaxation: Relaxation, size: int) -> Bools:
+        """Return the tasks that the relaxation would take at the least loss."""
+        losses = relaxation.losses
+        cut_off = np.sort(losses[np.isfinite(losses)])[:size][-1]
+        own = self.mask(action.opportunity for action in self.best.plan.actions)
+        promising: Bools = (losses <= cut_off) | own
+        return promising
+
+    @property
+    def relaxed(self) -> float:
+        """What the best relaxation with fixed contacts is worth: prices hardly get below."""
+        return max((r.value for r in self._relaxed.values()), default=-np.inf)
