@@ -5,14 +5,25 @@ from __future__ import annotations
 import numpy as np
 
 from planner_core.domain import Satellite, Scenario, Target
+from planner_core.geography.land import may_be_land
 from planner_core.problem import COLLECT, CONTACT, Opportunities
 
 _RADAR = ("sar", "radar")
+_LEAST_TARGETS = 10
+_MUCH_AT_SEA = 0.4
+_SWAPPED_ON_LAND = 0.8
+_MOST_AT_SEA = 0.8
 
 
 def usual_mistakes(scenario: Scenario) -> tuple[str, ...]:
     """Return sentences about a question, before anything of it is worked out."""
-    found = (_at_night(scenario), _no_station(scenario), _too_large(scenario))
+    found = (
+        _at_sea(scenario),
+        _at_night(scenario),
+        _no_station(scenario),
+        _too_large(scenario),
+        _too_hungry(scenario),
+    )
     return tuple(warning for warning in found if warning is not None)
 
 
@@ -61,6 +72,33 @@ def _more_than_contacts_take(scenario: Scenario, table: Opportunities) -> str | 
     )
 
 
+def _at_sea(scenario: Scenario) -> str | None:
+    """Warn where most targets are at sea, and say where swapping their angles would help.
+
+    Targets drawn over the whole globe are no mistake: seven of ten are at sea.
+    """
+    targets = scenario.targets
+    if len(targets) < _LEAST_TARGETS:
+        return None
+    lat_deg, lon_deg = ([getattr(t, name) for t in targets] for name in ("lat_deg", "lon_deg"))
+    at_sea = ~may_be_land(lat_deg, lon_deg)
+    share = float(at_sea.mean())
+    can_swap = np.abs(lon_deg) <= 90.0
+    swapped = np.where(can_swap, may_be_land(np.where(can_swap, lon_deg, 0.0), lat_deg), False)
+    if share > _MUCH_AT_SEA and float(swapped.mean()) > _SWAPPED_ON_LAND:
+        return (
+            f"{at_sea.sum()} of {len(targets)} targets are at sea, and {swapped.sum()} would be on "
+            "land with latitude and longitude swapped: look at the columns of the catalogue."
+        )
+    if share > _MOST_AT_SEA:
+        first = targets[int(np.flatnonzero(at_sea)[0])].id
+        return (
+            f"{at_sea.sum()} of {len(targets)} targets are at sea, {first!r} first: look at signs "
+            "and columns if that is not what is meant."
+        )
+    return None
+
+
 def _at_night(scenario: Scenario) -> str | None:
     """Warn where neither sensor nor target nor quality minds the sun, and the sensor is no radar.
 
@@ -107,6 +145,23 @@ def _too_large(scenario: Scenario) -> str | None:
 def _fits(target: Target, satellite: Satellite) -> bool:
     resources = satellite.resources
     return target.collect_s * resources.collect_fill_per_s <= resources.recorder_max_fraction
+
+
+def _too_hungry(scenario: Scenario) -> str | None:
+    if not scenario.use_resources:
+        return None
+    hungry = [t for t in scenario.targets if not any(_is_fed(t, s) for s in scenario.satellites)]
+    if not hungry:
+        return None
+    return (
+        f"An image of target {hungry[0].id!r}{_others(len(hungry))} takes more energy than the "
+        "battery of any satellite may give: shorten collect_s or enlarge battery_capacity_wh."
+    )
+
+
+def _is_fed(target: Target, satellite: Satellite) -> bool:
+    resources = satellite.resources
+    return target.collect_s * resources.collect_drain_per_s <= 1.0 - resources.battery_min_fraction
 
 
 def _others(number: int) -> str:

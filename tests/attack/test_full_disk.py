@@ -13,7 +13,7 @@ import sqlalchemy as sa
 from service.main import create_app
 from tests.missions import PAPER_ORBIT, drawn_targets, paper_mission
 from tests.service.conftest import serve
-from tests.service.factories import ground_station, post, satellite, target
+from tests.service.factories import ground_station, post, satellite, target, tle
 from tests.service.jobs.conftest import Jobs
 from tests.service.jobs.test_api import finish
 from tests.service.jobs.unwritable import sqlite_pragma
@@ -54,7 +54,7 @@ def writes(client: httpx.Client, jobs: Jobs) -> dict[str, httpx.Request]:
     question = {"scenario_id": jobs.scenario_id, "solver": "rule"}
     many = {"name": "many", "targets": [target(id="x" * 150 + str(n)) for n in range(500)]}
     stations = [post(client, "/v1/ground-stations", ground_station(name=f"S{n}")) for n in (0, 1)]
-    made = post(client, "/v1/satellites", satellite())
+    made = post(client, "/v1/satellites", satellite(tle=tle()))
     job = post(client, "/v1/jobs", question)
     answered = [post(client, "/v1/jobs", question)["id"] for _ in range(2)]
     for job_id in answered:

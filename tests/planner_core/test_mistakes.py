@@ -74,7 +74,8 @@ def test_data_must_have_a_way_down() -> None:
 
 def test_an_image_must_fit_a_recorder() -> None:
     asked = optical()
-    resources = asked.satellites[0].resources
+    resources = replace(asked.satellites[0].resources, collect_drain_per_s=0.0)
+    asked = replace(asked, satellites=(replace(asked.satellites[0], resources=resources),))
     longest_s = resources.recorder_max_fraction / resources.collect_fill_per_s
     targets = list(asked.targets)
     targets[0] = replace(targets[0], collect_s=0.999 * longest_s)
@@ -103,3 +104,52 @@ def test_more_data_than_all_contacts_take_is_told() -> None:
     question = replace(asked, satellites=(replace(asked.satellites[0], resources=half),))
     (warning,) = mistakes_of_accesses(question, table)
     assert " 50 % " in warning
+
+
+def of_places(*places: tuple[float, float]) -> Scenario:
+    asked = optical()
+    first = asked.targets[0]
+    targets = tuple(
+        replace(first, id=f"t{number}", lat_deg=lat_deg, lon_deg=lon_deg)
+        for number, (lat_deg, lon_deg) in enumerate(places)
+    )
+    return replace(asked, targets=targets)
+
+
+EUROPE = tuple(
+    (lat_deg, lon_deg) for lat_deg in (45.0, 47.0, 49.0, 51.0) for lon_deg in (9, 11, 13)
+)
+AFRICA = tuple((lat_deg, lon_deg) for lat_deg in (5, 8, 11) for lon_deg in (20.0, 22.0, 24.0, 26.0))
+# Where it rains in Brazil, and off Antarctica if the columns change places.
+ATLANTIC_COAST = tuple(
+    (float(lat), float(lon)) for lat in (-12, -9, -6) for lon in (-62, -58, -54, -50)
+)
+ATLANTIC = tuple((lat_deg, -35.0) for lat_deg in range(-20, 20, 3))
+
+
+def test_targets_at_sea_are_told_and_how_they_would_be_on_land() -> None:
+    assert usual_mistakes(of_places(*EUROPE, *AFRICA)) == ()
+    (warning,) = usual_mistakes(of_places(*((lon, lat) for lat, lon in ATLANTIC_COAST)))
+    assert "with latitude and longitude swapped" in warning
+    assert usual_mistakes(of_places(*ATLANTIC_COAST)) == ()
+    (warning,) = usual_mistakes(of_places(*ATLANTIC))
+    assert "13 of 14 targets are at sea, 't0' first" in warning
+    assert "swapped" not in warning
+
+
+def test_a_few_targets_and_such_as_are_drawn_over_the_globe_are_no_mistake() -> None:
+    assert usual_mistakes(of_places(*ATLANTIC[:5])) == ()
+    random = np.random.default_rng(0)
+    lat_deg = np.degrees(np.arcsin(random.uniform(-1, 1, 1000)))
+    lon_deg = random.uniform(-180, 180, 1000)
+    assert usual_mistakes(of_places(*zip(lat_deg.tolist(), lon_deg.tolist(), strict=True))) == ()
+
+
+def test_an_image_that_no_battery_can_pay_is_named() -> None:
+    asked = optical()
+    targets = (replace(asked.targets[0], collect_s=9e5), *asked.targets[1:])
+    small = replace(asked.satellites[0].resources, collect_fill_per_s=0.0)
+    satellites = (replace(asked.satellites[0], resources=small),)
+    (warning,) = usual_mistakes(replace(asked, targets=targets, satellites=satellites))
+    assert "more energy" in warning
+    assert repr(targets[0].id) in warning

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import signal
@@ -29,6 +30,8 @@ from tests.missions import (
 )
 from tests.patience import PATIENCE_S, wait_until
 
+# There is one satellite of a catalogue number.
+_NUMBERS = itertools.count(90_001)
 FINAL = ("succeeded", "failed", "cancelled", "expired")
 LONG = {"depth": 9, "breadth": 5}
 """Parameters that keep forward search busy for many minutes."""
@@ -107,9 +110,8 @@ def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
 
 def post_mission(service: Service, targets: list[Document], **flags: Any) -> Document:
     """Send the paper's satellite, its stations and targets, and ask the scenario."""
-    satellite = service.post(
-        "/v1/satellites", {"name": "PAPER", "omm": PAPER_ORBIT, "spacecraft": "paper"}
-    )
+    omm = PAPER_ORBIT | {"NORAD_CAT_ID": next(_NUMBERS)}
+    satellite = service.post("/v1/satellites", {"name": "PAPER", "omm": omm, "spacecraft": "paper"})
     stations = [service.post("/v1/ground-stations", station)["id"] for station in STATIONS]
     catalog = service.post("/v1/target-catalogs", {"name": "land", "targets": targets})
     mission = paper_mission([])

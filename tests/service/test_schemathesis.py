@@ -25,6 +25,7 @@ from tests.service.contract import Contract, Document
 from tests.service.factories import post
 from tests.service.serving import serving
 
+NUMBERS = (99_002, 99_003)
 EXAMPLES = os.environ.get("SLEWLINE_TEST_EXAMPLES")
 CONFIG = Path(__file__).with_name("schemathesis.toml")
 DOCUMENT = "openapi.json"
@@ -104,9 +105,11 @@ class Probed:
 
 def stored(client: httpx.Client) -> Ids:
     """Store two of everything; return the ids, and the names of the solvers."""
-    ids: Ids = {}
+    # The catalogue number of the example is left to who tries it out.
+    example = BODIES["SatelliteIn"]
+    numbered = [example | {"omm": example["omm"] | {"NORAD_CAT_ID": n}} for n in NUMBERS]
+    ids: Ids = {"satellites": [post(client, "/v1/satellites", body)["id"] for body in numbered]}
     for collection, shape in (
-        ("satellites", "SatelliteIn"),
         ("ground-stations", "GroundStationIn"),
         ("target-catalogs", "TargetCatalogIn"),
     ):
@@ -142,6 +145,8 @@ def with_ids(document: Document, ids: Ids) -> Document:
     for shape in ("ScenarioIn", "JobIn", "ComparisonIn"):
         (example,) = document["components"]["schemas"][shape]["examples"]
         example.update((name, known[name]) for name in known.keys() & example)
+    (newer,) = document["components"]["schemas"]["OrbitIn"]["examples"]
+    newer["omm"]["NORAD_CAT_ID"] = NUMBERS[0]
     return document
 
 
