@@ -200,8 +200,8 @@ class ForwardSearch:
         metadata={
             "minimum": 1,
             "maximum": 1000,
-            "description": "Tasks tried in each state, the first in time (N_a max); "
-            "sun-pointing comes on top where resources count.",
+            "description": "How many tasks are tried in each state, the first in time (N_a max in "
+            "the paper); sun-pointing comes on top where resources count.",
         },
     )
     gamma: float = field(
@@ -222,14 +222,14 @@ class ForwardSearch:
     unimaged_only: bool = field(
         default=True,
         metadata={
-            "description": "Leave targets that are already imaged out of A(s); "
-            "the paper keeps them in."
+            "description": "Leave out targets that are imaged already; "
+            "the paper goes on offering them."
         },
     )
     breadth_counts: BreadthCounts = field(
         default="tasks",
         metadata={
-            "description": "tasks: A(s) has breadth tasks (the paper); "
+            "description": "tasks: breadth tasks are tried (the paper); "
             "one_more: one more than that (the authors' code, which stops after the limit)."
         },
     )
@@ -270,7 +270,7 @@ class ForwardSearch:
     contact_above_fraction: float = field(
         default=0.0,
         metadata=contact_above_metadata(
-            "0, the paper's, has every contact in A(s): with few targets the search steps from "
+            "0, the paper's, tries every contact: with few targets the search steps from "
             "contact to contact. With many stations 0.45 takes far more images."
         ),
     )

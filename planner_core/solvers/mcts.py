@@ -72,12 +72,16 @@ class Mcts:
     )
     breadth: int = field(
         default=8,
-        metadata=_described("Tasks in A(s), the first in time (N_a max).", minimum=1, maximum=1000),
+        metadata=_described(
+            "How many tasks are tried in each state, the first in time (N_a max in the paper).",
+            minimum=1,
+            maximum=1000,
+        ),
     )
     breadth_counts: BreadthCounts = field(
         default="tasks",
         metadata=_described(
-            "tasks: A(s) has breadth tasks (the paper); one_more: one more than that "
+            "tasks: breadth tasks are tried (the paper); one_more: one more than that "
             "(the authors' code, which stops after the limit)."
         ),
     )
@@ -105,7 +109,9 @@ class Mcts:
     )
     rollout: Literal["random", "greedy"] = field(
         default="greedy",
-        metadata=_described("random: any of A(s) (the paper); greedy: what the rule would take."),
+        metadata=_described(
+            "random: any possible task (the paper); greedy: what the rule would take."
+        ),
     )
     keep_incumbent: bool = field(
         default=True,
@@ -114,7 +120,7 @@ class Mcts:
     unimaged_only: bool = field(
         default=True,
         metadata=_described(
-            "Leave targets that are already imaged out of A(s); the paper keeps them in."
+            "Leave out targets that are imaged already; the paper goes on offering them."
         ),
     )
     feasibility: Feasibility = field(
@@ -161,7 +167,7 @@ class Mcts:
     contact_above_fraction: float = field(
         default=0.0,
         metadata=contact_above_metadata(
-            "0, the paper's, has every contact in A(s); rollouts heed 0.45 in any case."
+            "0, the paper's, tries every contact; rollouts heed 0.45 in any case."
         ),
     )
 

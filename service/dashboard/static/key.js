@@ -85,7 +85,7 @@ export function installKeyDialog() {
 export function showCaller(me, cameByLink) {
   document.body.dataset.scope = me.scope;
   const name = me.key_name ?? me.owner;
-  byId("key-button").textContent = me.key_id === null ? "No key" : `${name}: ${me.scope}`;
+  byId("key-button").textContent = me.key_id === null ? "Give a key" : `${name}: ${me.scope}`;
   if (cameByLink && me.scope !== "read") {
     notice(
       "warn",

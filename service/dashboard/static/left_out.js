@@ -55,7 +55,7 @@ export function showLeftOut(plan, selection, jobPath) {
  */
 function group(plan, selection, code, source) {
   const table = new PagedTable(
-    `Targets left out for ${code.replaceAll("_", " ")}`,
+    `Left out: ${MEANINGS[code] ?? code.replaceAll("_", " ")}`,
     [
       { title: "Target", cell: (item) => targetButton(plan, selection, item.target_id) },
       { title: "Certainty", cell: (item) => item.reason?.certainty },

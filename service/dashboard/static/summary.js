@@ -49,7 +49,7 @@ function showWarnings(warnings) {
 function downOf(totals) {
   if (totals.downlinked_mbit !== null) return `${number(totals.downlinked_mbit, 0)} Mbit down`;
   if (totals.downlinked_fraction === null) return "";
-  return `${number(totals.downlinked_fraction, 2)} recorder capacities down`;
+  return `downlinked ${number(totals.downlinked_fraction, 2)} times what the recorder holds`;
 }
 
 /**

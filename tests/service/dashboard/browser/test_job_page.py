@@ -229,7 +229,7 @@ def test_pages_fit_and_follow_the_colours_asked_for(
     try:
         for path in ("/", "/new", f"/jobs/{job['id']}"):
             browser.open(path)
-            browser.wait(lambda: browser.text("#key-button") == "No key")
+            browser.wait(lambda: browser.text("#key-button") == "Give a key")
             overflow = "const p = document.scrollingElement; return p.scrollWidth - p.clientWidth"
             assert browser.run(overflow) == 0, path
             ink, paper = browser.run(
@@ -254,7 +254,7 @@ def brightness(color: str) -> float:
 def test_everything_that_can_be_operated_has_a_name(browser: Browser, job: Json) -> None:
     for path in ("/", "/new", f"/jobs/{job['id']}"):
         browser.open(path)
-        browser.wait(lambda: browser.text("#key-button") == "No key")
+        browser.wait(lambda: browser.text("#key-button") == "Give a key")
         if path.startswith("/jobs/"):
             browser.wait_for_answer()
         tree = browser.driver.execute_cdp_cmd("Accessibility.getFullAXTree", {})["nodes"]
