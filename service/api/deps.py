@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated, cast
+from typing import Annotated, Final, cast
 
 from fastapi import Depends, Request, Response
 from fastapi.dependencies.models import Dependant
@@ -18,11 +18,15 @@ from service.access.callers import Caller, Scope
 from service.api.guard import require_scope
 from service.api.questions import QuestionsDep
 from service.db.session import Database
+from service.files.told import media_type_told
 from service.problems.faults import refuse
 from service.problems.kinds import ServiceError
 from service.settings import Settings
 from service.stores import usage_store
 from service.wire.base import is_plain
+
+ANY_FILE: Final = "application/octet-stream"
+"""A file of any form that a call takes. Generated clients can often send nothing else."""
 
 # What needs no thread is async: FastAPI runs everything else in one, which costs more than the
 # work itself.
@@ -117,6 +121,12 @@ def require_media_type(request: Request, *allowed: str) -> str:
             headers={"Accept-Post": ", ".join(allowed)},
         )
     return media_type
+
+
+def file_type(request: Request, data: bytes, *allowed: str) -> str:
+    """Return the media type of a file: 415 where it is none of these; bytes tell it themselves."""
+    kind = require_media_type(request, *allowed, ANY_FILE)
+    return media_type_told(data, allowed) if kind == ANY_FILE else kind
 
 
 async def check_request(request: Request) -> None:

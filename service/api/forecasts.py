@@ -10,9 +10,10 @@ from fastapi import APIRouter, Query, Response
 from sqlalchemy.orm import Session
 
 from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
-from service.api.deps import Call, CallDep, RawBodyDep, require_media_type
+from service.api.deps import ANY_FILE, Call, CallDep, RawBodyDep, file_type
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
+from service.api.imports import BYTES
 from service.api.paging import PagingDep, newest_first
 from service.db.ids import new_id
 from service.db.rows import ForecastRow
@@ -42,6 +43,7 @@ _REQUEST_BODY: dict[str, Any] = {
                     "values by target, `target_id,time,clear_probability`.",
                 }
             },
+            ANY_FILE: BYTES,
             _NETCDF[0]: {
                 "schema": {
                     "type": "string",
@@ -74,7 +76,7 @@ def create_forecast(
     Scenarios that name it take along what it says of their targets, so that deleting it, or
     uploading the next one, changes no stored question.
     """
-    kind = require_media_type(call.request, _CSV, *_NETCDF)
+    kind = file_type(call.request, data, _CSV, *_NETCDF)
     field, notes = read_csv(data) if kind == _CSV else read_netcdf(data)
     block = to_bytes(field)
     with once.transaction() as session:

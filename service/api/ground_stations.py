@@ -13,7 +13,7 @@ from sqlalchemy.orm import Session
 
 from planner_core.errors import Fault
 from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
-from service.api.deps import CallDep, DatabaseDep, RawBodyDep, require_media_type
+from service.api.deps import CallDep, DatabaseDep, RawBodyDep, file_type
 from service.api.errors import problem_responses
 from service.api.filters import NameQuery, by_name
 from service.api.idempotency import OnceDep
@@ -75,7 +75,7 @@ def import_ground_stations(
     CSV: `lat`, `latitude`, `lon`, `lng` and `longitude` are taken as well. GeoJSON: the
     properties that are fields of a station count, others are ignored.
     """
-    kind = require_media_type(call.request, *_IMPORT_TYPES)
+    kind = file_type(call.request, data, *_IMPORT_TYPES)
     good, faults = read_stations(kind, data)
     refuse_if_asked(len(good), faults, on_error)
     with once.transaction() as session:

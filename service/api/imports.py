@@ -4,13 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from enum import StrEnum
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, Final, TypeVar
 
 from fastapi import Query
 
 from planner_core.errors import Fault
+from service.api.deps import ANY_FILE
 from service.problems.faults import refuse
 from service.wire.imports import Imported, RejectedRow
+
+BYTES: Final[dict[str, Any]] = {
+    "schema": {
+        "type": "string",
+        "format": "binary",
+        "description": "A file of any of these forms; its content tells which.",
+    }
+}
 
 T = TypeVar("T")
 
@@ -51,7 +60,8 @@ def _placed(fault: Fault) -> str:
 
 
 def _schema_of(kind: str) -> dict[str, Any]:
-    return {} if kind.endswith("json") else {"type": "string"}
+    # Generators of clients cannot tell a list from a file.
+    return {"type": "object" if kind.endswith("json") else "string"}
 
 
 def body_schemas(**examples: tuple[str, str]) -> dict[str, Any]:
@@ -62,6 +72,7 @@ def body_schemas(**examples: tuple[str, str]) -> dict[str, Any]:
             "content": {
                 kind: {"schema": _schema_of(kind) | {"description": text}}
                 for kind, text in examples.values()
-            },
+            }
+            | {ANY_FILE: BYTES},
         }
     }

@@ -13,7 +13,7 @@ from sqlalchemy.orm import Session
 from planner_core.errors import Fault
 from planner_core.orbits.ingest import read_elements
 from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
-from service.api.deps import CallDep, DatabaseDep, RawBodyDep, require_media_type
+from service.api.deps import CallDep, DatabaseDep, RawBodyDep, file_type
 from service.api.errors import problem_responses
 from service.api.filters import NameQuery, by_name
 from service.api.idempotency import OnceDep
@@ -74,7 +74,7 @@ def create_satellite(body: SatelliteIn, once: OnceDep, call: CallDep) -> Satelli
     "/import",
     openapi_extra=body_schemas(
         tle=("text/plain", "TLE, 2LE or 3LE; or OMM in its keyword form (KVN)."),
-        json=("application/json", "One OMM or a list of them, as CelesTrak serves it."),
+        json=("application/json", "One OMM; or a list of them, as CelesTrak serves it."),
         csv=("text/csv", "OMM keywords in the header, one element set a line."),
         xml=("application/xml", "An omm document, or an ndm with many."),
     ),
@@ -95,7 +95,7 @@ def import_satellites(
     joins that satellite, as a further element set where its epoch is new. Two records of one
     satellite and epoch in a file are one; the second is reported.
     """
-    found = read_elements(data, require_media_type(call.request, *_IMPORT_TYPES))
+    found = read_elements(data, file_type(call.request, data, *_IMPORT_TYPES))
     refuse_if_asked(len(found.entries), found.faults, on_error)
     with once.transaction() as session:
         call.count_stored(session, num_rows=len(found.entries), num_bytes=len(data))

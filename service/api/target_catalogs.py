@@ -14,10 +14,11 @@ from sqlalchemy.orm import Session
 
 from planner_core.errors import Fault
 from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
-from service.api.deps import CallDep, DatabaseDep, RawBodyDep, require_media_type
+from service.api.deps import ANY_FILE, CallDep, DatabaseDep, RawBodyDep, file_type
 from service.api.errors import problem_responses
 from service.api.filters import NameQuery, by_name
 from service.api.idempotency import OnceDep
+from service.api.imports import BYTES
 from service.api.paging import PagingDep, newest_first
 from service.db.ids import new_id
 from service.db.rows import TargetCatalogRow, TargetRow
@@ -57,6 +58,7 @@ _REQUEST_BODY: dict[str, Any] = {
                     "feature's or a property; other fields of a target are properties.",
                 }
             },
+            ANY_FILE: BYTES,
             "text/csv": {
                 "schema": {
                     "type": "string",
@@ -85,7 +87,7 @@ def create_target_catalog(
     ] = None,
 ) -> CreatedCatalog:
     """Store a catalogue. One bad row refuses the whole of it; every bad row is named."""
-    kind = require_media_type(call.request, *_TYPES)
+    kind = file_type(call.request, data, *_TYPES)
     found, targets = read_targets(kind, data)
     with once.transaction() as session:
         call.count_stored(session, num_rows=len(targets), num_bytes=len(data))

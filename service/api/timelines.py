@@ -50,9 +50,17 @@ def timeline_responses(forms: Sequence[Form]) -> dict[int | str, dict[str, Any]]
     """Return the entries of the OpenAPI document for a route that offers these forms and JSON."""
     # JSON stands first: generated clients read the first form they know.
     content: dict[str, Any] = {_JSON: {"schema": _TIMELINE}}
-    content |= {form.media_type: {} for form in forms if form.media_type != _JSON}
+    content |= {
+        form.media_type: {"schema": {"type": "string"}}
+        if form.media_type.startswith("text/")
+        else {}
+        for form in forms
+        if form.media_type != _JSON
+    }
     if _JSON in (form.media_type for form in forms):
-        other = [{"type": "array"}, {"type": "object"}]
+        other = [{"type": "array", "items": {"type": "object"}}, {"type": "object"}]
+        # Generated clients take all of these as text, whatever the suffix asks for.
+        del content[_JSON]
         content[_JSON] = {"schema": {"anyOf": [_TIMELINE, *other]}}
     headers = {
         "Content-Disposition": {

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import importlib
+import io
 import json
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from types import ModuleType
 from typing import Any
 
 import httpx
 import pytest
 
-from tests.missions import drawn_targets, paper_mission
+from tests.missions import PAPER_ORBIT, drawn_targets, paper_mission
+from tests.service.factories import tle
 from tests.service.serving import serving
 
 PACKAGE = "made_slewline_client"
@@ -87,6 +89,7 @@ def plan_a_mission(client: Any, generated: str) -> None:
     ]
     targets = models.TargetCatalogIn.from_dict({"name": "draw", "targets": mission["targets"]})
     catalog = call("target_catalogues.create_target_catalog", targets)
+    read_and_import(call, generated)
     question = models.ScenarioIn.from_dict(
         {
             "horizon": mission["horizon"],
@@ -109,8 +112,37 @@ def plan_a_mission(client: Any, generated: str) -> None:
     assert timeline.totals.collects == len(
         [a for s in timeline.satellites for a in s.actions if a.mode == "collect"]
     )
+    table = sent(client, generated, "timelines.get_timeline_as", job_id=job.id, suffix="csv")
+    assert len(table.splitlines()) > timeline.totals.collects
+    assert table.startswith("action_id,satellite_id,")
     outcomes = call("timelines.list_outcomes", job_id=job.id, limit=100)
     assert len(outcomes.items) == len(mission["targets"])
+
+
+def sent(client: Any, generated: str, operation: str, **fields: Any) -> Any:
+    answer = part(generated, f"api.{operation}").sync_detailed(client=client, **fields)
+    assert answer.status_code == 200
+    return answer.parsed
+
+
+def read_and_import(call: Callable[..., Any], generated: str) -> None:
+    """Send files as bytes, which is all that generated clients know of them."""
+
+    def file(text: str) -> Any:
+        return part(generated, "types").File(payload=io.BytesIO(text.encode()))
+
+    tle_lines, fields = "\n".join(tle(90_101)), {"NORAD_CAT_ID": 90_102, "OBJECT_NAME": "B"}
+    omm = PAPER_ORBIT | fields
+    csv = ",".join(omm) + "\n" + ",".join(map(str, omm.values())) + "\n"
+    for text in (tle_lines, csv, json.dumps([omm | {"NORAD_CAT_ID": 90_103}])):
+        elements = call("satellites.import_satellites", file(text))
+        assert (elements.accepted, elements.rejected) == (1, 0), text
+    stations = "name,lat_deg,lon_deg\nBern,46.9,7.4\n"
+    assert call("ground_stations.import_ground_stations", file(stations)).accepted == 1
+    targets = "id,lat_deg,lon_deg\nbern,46.9,7.4\n"
+    assert call("target_catalogues.create_target_catalog", file(targets)).num_targets == 1
+    skies = "target_id,time,clear_probability\nbern,2019-01-01T00:00:00Z,0.5\n"
+    assert call("forecasts.create_forecast", file(skies)).id
 
 
 def test_a_refusal_is_read_as_a_problem(service_url: str, generated: str) -> None:

@@ -127,6 +127,7 @@ def stored(client: httpx.Client) -> Ids:
     runs = {"scenario_id": ids["scenarios"][0], "runs": [{"solver": "rule"}, {"solver": "graph"}]}
     ids["comparisons"] = [finished(client, post(client, "/v1/comparisons", runs)["id"])]
     ids["jobs"] = [job["id"] for job in client.get("/v1/jobs").json()["items"]]
+    ids["plans"] = [post(client, "/v1/plans", {"job_id": ids["jobs"][0]})["id"] for _ in range(3)]
     webhook = post(client, "/v1/webhooks", BODIES["WebhookIn"])["links"]["self"]
     ids["webhooks"] = [webhook.rpartition("/")[2]]
     ids["deliveries"] = [client.post(f"{webhook}/test").json()["id"] for _ in range(2)]
