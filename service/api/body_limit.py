@@ -21,6 +21,9 @@ MOST_VALUES: Final = 1_000_000
 MOST_COMMAS: Final = 5_000_000
 """Between its values: a number takes two bytes, and thirty once it is read."""
 
+_BEFORE_JSON: Final = b"\xef\xbb\xbf\xff\xfe\x00 \t\r\n"
+"""Marks of an encoding and space, in any of them."""
+
 
 class BodyLimit:
     """Refuse bodies over the limit: at once where the length is declared, else on the way.
@@ -51,22 +54,25 @@ class BodyLimit:
             await response(scope, receive, send)
             return
         is_json = "json" in headers.get("content-type", "").lower()
+        opening = b""
         num_bytes = num_values = num_commas = 0
         in_time = _InTime(asyncio.get_running_loop())
 
         async def receive_within_limit() -> Message:
-            nonlocal num_bytes, num_values, num_commas
+            nonlocal num_bytes, num_values, num_commas, opening
             message = await in_time(receive)
             part = message.get("body", b"")
             num_bytes += len(part)
             if num_bytes > self.max_bytes:
                 raise HTTPException(413, self._too_many_bytes())
-            if is_json:
-                num_values += part.count(b"[") + part.count(b"{")
+            # A file that tells its form itself may be JSON as well.
+            opening = opening or part.lstrip(_BEFORE_JSON)[:1]
+            num_values += part.count(b"[") + part.count(b"{")
+            num_commas += part.count(b",")
+            if is_json or opening in (b"[", b"{"):
                 if num_values > MOST_VALUES:
                     detail = f"The body has more than {MOST_VALUES} objects and lists."
                     raise HTTPException(413, detail)
-                num_commas += part.count(b",")
                 if num_commas > MOST_COMMAS:
                     raise HTTPException(413, f"The body has more than {MOST_COMMAS} values.")
             return message

@@ -18,6 +18,7 @@ from tests.service.factories import ground_station
 from tests.service.problems import assert_problem
 
 JSON = {"Content-Type": "application/json"}
+BYTES = {"Content-Type": "application/octet-stream"}
 LONG_TAG = "<omm " + " ".join(f'a{number}=""' for number in range(500_000)) + "/>"
 MANY_TAGS = "<omm>" + '<a b="" c="" d=""/>' * 600_000 + "</omm>"
 
@@ -30,9 +31,12 @@ def test_attributes_are_counted_before_anything_is_built(text: str, coding: str)
     assert "tag" in found.faults[0].detail or "attributes" in found.faults[0].detail
 
 
-def test_the_values_of_a_body_are_counted_before_it_is_read(client: httpx.Client) -> None:
+@pytest.mark.parametrize("headers", [JSON, BYTES], ids=["json", "bytes"])
+def test_the_values_of_a_body_are_counted_before_it_is_read(
+    client: httpx.Client, headers: dict[str, str]
+) -> None:
     text = b'{"name": "N", "targets": [' + b"0," * (MOST_COMMAS + 1) + b"0]}"
-    answer = client.post("/v1/target-catalogs", content=text, headers=JSON)
+    answer = client.post("/v1/target-catalogs", content=text, headers=headers)
     assert_problem(answer, 413, "body_too_large")
 
 
