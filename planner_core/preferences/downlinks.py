@@ -20,9 +20,9 @@ def with_more_downlinks(problem: Problem, plan: Plan, budget: Budget) -> Plan:
 
     def accepts(trial: View) -> bool:
         nonlocal best
-        reward = trial.timeline.reward
-        is_better = trial.timeline.is_valid and reward > best
-        best = max(best, reward) if is_better else best
-        return is_better
+        if not trial.timeline.is_valid or trial.timeline.reward <= best:
+            return False
+        best = trial.timeline.reward
+        return True
 
     return with_contacts(view, accepts, budget).plan

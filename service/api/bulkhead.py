@@ -35,8 +35,11 @@ LIGHT_TARGETS: Final = 5_000
 
 _HEAVY: Final = re.compile(
     r"/v1/scenarios/[^/]+(/opportunities)?|/v1/jobs/[^/]+/(what-if|diff/.*|targets/.+/explanation)"
-    r"|/v1/plans/[^/]+/(replans|passes(\.[^/]*)?)"
+    r"|/v1/plans/[^/]+/(replans|changes|passes(\.[^/]*)?)|/v1/targets"
 )
+# Decoders of binary files work where memory is limited, however short the file; a plan is read from
+# the whole timeline of its job.
+_HEAVY_POSTS: Final = ("/v1/forecasts", "/v1/plans")
 _IS_LIGHT: Final = "slewline.is_light"
 _CALLER: Final = "x-slewline-caller"
 _ROUTE: Final = b"x-slewline-route"
@@ -185,8 +188,7 @@ def _is_heavy(request: Request) -> bool:
     if "transfer-encoding" in request.headers or not length.isdecimal():
         return True
     path = request.scope["path"]
-    # Decoders of binary files work where memory is limited, however short the file.
-    if request.method == "POST" and path == "/v1/forecasts":
+    if request.method == "POST" and path in _HEAVY_POSTS:
         return True
     return int(length) > LIGHT_BYTES or _HEAVY.fullmatch(path) is not None
 

@@ -47,9 +47,8 @@ class _Row:
             bound = None
         gap = None if not bound else (bound - other.reward) / bound
         totals = {**self.timeline["totals"], "reward": other.reward, "bound": bound, "gap": gap}
-        validity = other.timeline["validity"]
-        told = {"totals": totals, "validity": validity, "termination": "plan above"}
-        plan = {"satellites": other.timeline["satellites"]}
+        plan = {name: other.timeline[name] for name in ("satellites", "validity")}
+        told = {"totals": totals, "termination": "plan above"}
         return replace(self, timeline={**self.timeline, **plan, **told})
 
     def cells(self, first: float) -> tuple[str, ...]:
@@ -67,6 +66,50 @@ class _Row:
             self.timeline["termination"],
             self.timeline["validity"],
         )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Search:
+    """How each row is searched for."""
+
+    solver: str
+    params: Mapping[str, Any]
+    seed: int
+    time_s: float
+
+    def row(self, starts: str, question: Mapping[str, Any]) -> _Row:
+        """Plan a question."""
+        varied = canonical(question)
+        request = PlanRequest(
+            job_id="local",
+            scenario_sha256=sha256_of(varied),
+            content=varied,
+            solver=self.solver,
+            params=self.params,
+            seed=self.seed,
+            limits={"time_s": self.time_s},
+        )
+        budget = Budget(self.time_s)
+        answer = answer_of(request, budget)
+        assert answer.opportunity_block is not None
+        found = ScenarioOpportunities.from_bytes(answer.opportunity_block)
+        return _Row(
+            starts=starts,
+            num_opportunities=len(found.opportunities),
+            timeline=json.loads(answer.timeline),
+            is_cancelled=budget.is_cancelled,
+        )
+
+    def row_from(self, above: _Row, row: _Row, question: Mapping[str, Any]) -> _Row:
+        """Return the best of a row, of another search from the plan above, and of that plan.
+
+        The time was too short: with more freedom the plan above can be flown as well.
+        """
+        if not question["continuous_starts"]:  # no search starts from a plan there
+            replan = {"replan": _from_plan(above, question)}
+            again = self.row(row.starts, {**question, **replan})
+            row = max(row, again, key=lambda one: one.reward)
+        return row if row.reward >= above.reward else row.with_plan_of(above)
 
 
 def compare_spacing(
@@ -112,29 +155,7 @@ def compare_spacing(
     content = read_scenario(path)
     has_quality = bool(quality_from(read_file(content).quality))
     chosen = params_of(parse_params(solver_class(solver), params))
-
-    def search(starts: str, question: Mapping[str, Any]) -> _Row:
-        varied = canonical(question)
-        request = PlanRequest(
-            job_id="local",
-            scenario_sha256=sha256_of(varied),
-            content=varied,
-            solver=solver,
-            params=chosen,
-            seed=seed,
-            limits={"time_s": time_s},
-        )
-        budget = Budget(time_s)
-        answer = answer_of(request, budget)
-        assert answer.opportunity_block is not None
-        return _Row(
-            starts=starts,
-            num_opportunities=len(
-                ScenarioOpportunities.from_bytes(answer.opportunity_block).opportunities
-            ),
-            timeline=json.loads(answer.timeline),
-            is_cancelled=budget.is_cancelled,
-        )
+    search = _Search(solver=solver, params=chosen, seed=seed, time_s=time_s)
 
     print(_line(_HEADER))
     rows: list[tuple[str, ...]] = []
@@ -142,13 +163,9 @@ def compare_spacing(
     above: _Row | None = None
     all_valid = True
     for starts, change in _variants(spacings_s, anywhere=not has_quality):
-        row = search(starts, content | change)
+        row = search.row(starts, content | change)
         if above is not None and not row.is_cancelled and row.reward < above.reward:
-            # The time was too short: with more freedom the plan above can be flown as well.
-            if not change["continuous_starts"]:  # no search starts from a plan there
-                again = search(starts, content | change | {"replan": _from_plan(above, content)})
-                row = max(row, again, key=lambda one: one.reward)
-            row = row if row.reward >= above.reward else row.with_plan_of(above)
+            row = search.row_from(above, row, content | change)
         above = row
         first = row.reward if first is None else first
         rows.append(row.cells(first))

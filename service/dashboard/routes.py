@@ -20,55 +20,19 @@ PAGE_POLICY: Final = (
 )
 """Own files only, nothing inline, and no text that becomes markup."""
 
+_ADDRESSES: Final = {
+    "/": "jobs",
+    "/new": "new",
+    "/jobs/{job_id}": "job",
+    "/comparisons/{comparison_id}": "comparison",
+    "/plans": "plans",
+    "/plans/{plan_id}": "plan",
+    "/fleet": "fleet",
+    "/wall": "wall",
+}
+"""Each page, by the name that `assets.py` knows it by."""
+
 _FOR_EVER: Final = "public, max-age=31536000, immutable"
-
-
-@router.get("/")
-def jobs_page(request: Request) -> Response:
-    """Return the list of jobs."""
-    return _page(request, "jobs")
-
-
-@router.get("/new")
-def new_page(request: Request) -> Response:
-    """Return the form that makes a scenario and a job."""
-    return _page(request, "new")
-
-
-@router.get("/jobs/{job_id}")
-def job_page(request: Request) -> Response:
-    """Return the page of one job; whether there is such a job the API will say."""
-    return _page(request, "job")
-
-
-@router.get("/comparisons/{comparison_id}")
-def comparison_page(request: Request) -> Response:
-    """Return the page of one comparison."""
-    return _page(request, "comparison")
-
-
-@router.get("/plans")
-def plans_page(request: Request) -> Response:
-    """Return the list of plans."""
-    return _page(request, "plans")
-
-
-@router.get("/plans/{plan_id}")
-def plan_page(request: Request) -> Response:
-    """Return the page of one plan."""
-    return _page(request, "plan")
-
-
-@router.get("/fleet")
-def fleet_page(request: Request) -> Response:
-    """Return the page on which satellites, stations and types are changed, and outages reported."""
-    return _page(request, "fleet")
-
-
-@router.get("/wall")
-def wall_page(request: Request) -> Response:
-    """Return the page for a display on the wall."""
-    return _page(request, "wall")
 
 
 @router.get("/static/{version}/{name}")
@@ -92,3 +56,16 @@ def _page(request: Request, name: str) -> Response:
     if matches(request.headers.get("if-none-match"), etag):
         return Response(status_code=304, headers=headers)
     return Response(page.content, media_type=page.media_type, headers=headers)
+
+
+def _show(path: str, name: str) -> None:
+    """Serve a page under an address; whether there is what it is about, the API will say."""
+
+    def page(request: Request) -> Response:
+        return _page(request, name)
+
+    router.add_api_route(path, page, name=name)
+
+
+for _path, _name in _ADDRESSES.items():
+    _show(_path, _name)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import signal
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -73,6 +74,32 @@ def test_what_is_passed_on_is_answered_as_if_it_were_not(program: StartProgram) 
         assert 'route="/v1/scenarios/{scenario_id}/opportunities",status="200"} 1.0' in counted
         assert "x-slewline-route" not in page.headers
         assert run.heavy.pid == held
+
+
+def test_what_reads_whole_timelines_or_catalogues_is_passed_on(program: StartProgram) -> None:
+    asked = [
+        ("GET", "/v1/targets?state=cancelled", None, 200),
+        ("GET", "/v1/plans/none/changes", None, 404),
+        ("GET", "/v1/plans/none/passes", None, 404),
+        ("POST", "/v1/plans", {"job_id": "none"}, 422),
+    ]
+    with program() as run:
+        key, url = run.door.key("submit"), run.door.client.base_url
+
+        def ask(call: tuple[str, str, Any, int]) -> int:
+            method, path, body, _ = call
+            answer = httpx.request(method, url.join(path), json=body, headers=key, timeout=300)
+            return answer.status_code
+
+        run.heavy.send_signal(signal.SIGSTOP)
+        with ThreadPoolExecutor(len(asked)) as threads:
+            answers = [threads.submit(ask, call) for call in asked]
+            for _ in range(20):
+                assert run.door.client.get("/v1/me", headers=key).status_code == 200
+                run.door.submit(key)
+            assert not any(answer.done() for answer in answers)
+            run.heavy.send_signal(signal.SIGCONT)
+            assert [answer.result() for answer in answers] == [call[3] for call in asked]
 
 
 def test_a_body_that_comes_in_pieces_or_is_too_large(program: StartProgram) -> None:
