@@ -27,7 +27,7 @@ from service.jobs.parent import die_with_parent
 from service.jobs.queue import DbosQueue
 from service.jobs.supervisor import environment_of
 from service.main import create_app
-from service.process.logs import configure_logging
+from service.process.logs import STDERR, configure_logging
 from service.process.tracing import start_tracing
 from service.settings import Settings
 
@@ -65,7 +65,7 @@ def _keep(settings: Settings, listener: socket.socket, stopping: threading.Event
     environment = os.environ | environment_of(settings)
     while not stopping.is_set():
         process = subprocess.Popen(  # noqa: S603 - our own command
-            command, env=environment, pass_fds=[number], start_new_session=True
+            command, env=environment, stdout=STDERR, pass_fds=[number], start_new_session=True
         )
         while process.poll() is None and not stopping.wait(_LOOK_EVERY_S):
             if (held_mb := _held_mb(process.pid)) > settings.heavy_memory_mb:

@@ -27,6 +27,7 @@ SEARCH_TIME_S: Final = 20.0
 _ACTIVE: Final = ("queued", "running", "cancelling")
 _HOLD_S: Final = 10
 _READY: Final = "Slewline is ready at "
+_LAST_LINES: Final = 20  # of the log, where the service did not start
 
 
 class DemoFailed(Exception):
@@ -169,11 +170,12 @@ def _start(port: int, workers: int, database_url: str, log: IO[bytes]) -> subpro
 
 def _url_when_ready(process: subprocess.Popen[str], log: Path) -> str:
     assert process.stdout is not None
-    line = process.stdout.readline()
-    if not line.startswith(_READY):
-        said = log.read_text(encoding="utf-8", errors="replace").splitlines()[-1:]
-        raise DemoFailed(f"The service did not start; see {log}. {' '.join(said)}")
-    return line.removeprefix(_READY).split()[0]
+    for line in process.stdout:
+        if line.startswith(_READY):
+            return line.removeprefix(_READY).split()[0]
+    said = log.read_text(encoding="utf-8", errors="replace").splitlines()[-_LAST_LINES:]
+    status = f"It ended with status {process.wait()}; see {log}, which ends:"
+    raise DemoFailed("\n".join(["The service did not start.", status, *said]))
 
 
 def _wait_for_interrupt() -> None:

@@ -12,6 +12,7 @@ import time
 from typing import Final
 
 from service.jobs.runner import Work
+from service.process.logs import STDERR
 from service.settings import Settings
 
 log = logging.getLogger(__name__)
@@ -84,9 +85,10 @@ class _Slot:
             self._process = None
         if self._process is None and now_s >= self._started_s + self._pause_s:
             self._started_s = now_s
-            # In a session of its own, so that Ctrl-C reaches the supervisor alone.
+            # In a session of its own, so that Ctrl-C reaches the supervisor alone; what a library
+            # prints must not be taken for words of the service.
             self._process = subprocess.Popen(  # noqa: S603 - our own command
-                command, env=environment, start_new_session=True
+                command, env=environment, stdout=STDERR, start_new_session=True
             )
 
     def terminate(self) -> None:
