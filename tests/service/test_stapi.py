@@ -253,3 +253,33 @@ def test_bodies_and_pages_have_limits(http: httpx.Client) -> None:
 )
 def test_what_is_not_there_is_not_found(http: httpx.Client, address: str) -> None:
     assert_problem(http.get(address), 404, "not_found")
+
+
+def test_a_bottomless_body_is_no_json(http: httpx.Client) -> None:
+    content = '{"filter":' + "[" * 8_000
+    headers = {"Content-Type": "application/json"}
+    address = "/stapi/products/paper/opportunities"
+    answer = http.post(address, content=content + "]" * 8_000 + "}", headers=headers)
+    assert answer.status_code in (400, 413, 422), answer.text
+    assert answer.headers["content-type"] == "application/problem+json"
+
+
+def test_a_type_without_satellites_is_no_product(http: httpx.Client) -> None:
+    assert_problem(http.get("/stapi/products/generic_sar"), 404, "not_found")
+    found = http.get("/stapi/products/paper/queryables").json()
+    assert set(found["properties"]) == {"off_nadir_deg", "elevation_deg", "sun_elevation_deg"}
+
+
+def test_an_own_type_is_a_product_as_soon_as_it_flies(http: httpx.Client) -> None:
+    made = post(http, "/v1/spacecraft", {"name": "Twin", "resources": "paper"})
+    assert http.get(f"/stapi/products/{made['id']}").status_code == 404
+    orbit = tle(97_900, epoch=DAY)
+    own = post(http, "/v1/satellites", {"name": "TWIN-1", "tle": orbit, "spacecraft": made["id"]})
+    product = http.get(f"/stapi/products/{made['id']}").json()
+    assert product["title"] == "Twin"
+    links = {one["rel"]: one["href"] for one in product["links"]}
+    body = ASKED | {"limit": 100}
+    found = read(Found, http.post(links["opportunities"], json=body)).features
+    assert {one.properties.satellite_id for one in found} == {own["id"]}  # type: ignore[union-attr]
+    assert http.delete(f"/v1/satellites/{own['id']}").status_code == 204
+    assert http.get(f"/stapi/products/{made['id']}").status_code == 404
