@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -232,11 +232,24 @@ def check(options: argparse.Namespace) -> int:
 
 def plan(options: argparse.Namespace) -> int:
     """Have a service plan a scenario, and follow it."""
+    from service.commands.plan_command import run_plan
+
+    return _asked(run_plan, options)
+
+
+def replan(options: argparse.Namespace) -> int:
+    """Have a service replan a plan after what happened, and follow it."""
+    from service.commands.plan_command import run_replan
+
+    return _asked(run_replan, options)
+
+
+def _asked(ask: Callable[[argparse.Namespace], int], options: argparse.Namespace) -> int:
     from service.client import ClientError
-    from service.commands.plan_command import Refused, run_plan
+    from service.commands.plan_command import Refused
 
     try:
-        return run_plan(options)
+        return ask(options)
     except Refused as error:
         raise WrongInput(str(error)) from error
     except ClientError as error:

@@ -14,7 +14,7 @@ from planner_core.domain import Scenario
 from planner_core.problem import COLLECT, Problem
 from planner_core.referee.replay import Timeline, plan_sha256, replay
 from service.answers.reading import READERS, Reading, plan_in
-from service.commands.scenario_files import read_scenario
+from service.commands.scenario_files import read_object
 from service.commands.summary import table
 from service.scenarios.translate import canonical, scenario_from_content, sha256_of
 from service.wire.instants import instant_text
@@ -41,7 +41,7 @@ def check_file(scenario_path: Path, timeline_path: Path) -> int:
     OSError
         Where a file cannot be read.
     """
-    content = canonical(read_scenario(scenario_path))
+    content = canonical(read_object(scenario_path))
     data = timeline_path.read_bytes()
     suffix = timeline_path.suffix.lower()
     records = READERS[suffix](data)

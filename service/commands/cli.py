@@ -95,6 +95,9 @@ def _parser() -> argparse.ArgumentParser:
     _add_plan(
         _command(commands, "plan", bodies.plan, "have a service plan a scenario, and follow it")
     )
+    _add_replan(
+        _command(commands, "replan", bodies.replan, "have a service replan after what happened")
+    )
 
     _command(commands, "openapi", bodies.openapi, "print the description of the HTTP API")
     return parser
@@ -157,12 +160,31 @@ def _add_plan(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scenario", type=Path, nargs="?", metavar="SCENARIO.json")
     parser.add_argument("--scenario-id", metavar="ID", help="a stored scenario, not a file")
     _add_search(parser)
+    _add_service(parser)
+    parser.add_argument("--label", help="a name for the job")
+    parser.add_argument("--priority", type=int, help="0 to 9, the most urgent (5)")
+
+
+def _add_replan(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("plan_id", metavar="PLAN", help="the id of the plan that goes on")
+    parser.add_argument(
+        "happened", type=Path, nargs="?", metavar="HAPPENED.json",
+        help="outages, executions, promises, add_targets ..., as the API takes them",
+    )  # fmt: skip
+    parser.add_argument(
+        "--now", metavar="INSTANT", help="what starts before it stays (the time at the service)"
+    )
+    parser.add_argument("--name", help="a name for the new plan")
+    parser.add_argument("--time-s", type=_positive, help="seconds after which the search stops")
+    parser.add_argument("--out", type=Path, metavar="FILE", help="write the timeline here")
+    _add_service(parser)
+
+
+def _add_service(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--url", help="the service (SLEWLINE_URL, or port 8000 of this machine)")
     parser.add_argument(
         "--key-env", metavar="NAME", help="environment variable with the API key (SLEWLINE_KEY)"
     )
-    parser.add_argument("--label", help="a name for the job")
-    parser.add_argument("--priority", type=int, help="0 to 9, the most urgent (5)")
     parser.add_argument(
         "--detach", action="store_true", help="print the job's id and do not wait for it"
     )

@@ -12,7 +12,7 @@ from typing import Any, Final
 from planner_core.budget import Budget
 from planner_core.build import ScenarioOpportunities
 from planner_core.solvers.registry import solver_class
-from service.commands.scenario_files import read_scenario, require_folder
+from service.commands.scenario_files import read_object, require_folder
 from service.commands.solve import answer_of
 from service.jobs.plan_job import PlanRequest
 from service.jobs.solver_params import params_of, parse_params
@@ -152,7 +152,7 @@ def compare_spacing(
     """
     if out is not None:
         require_folder(out)
-    content = read_scenario(path)
+    content = read_object(path)
     has_quality = bool(quality_from(read_file(content).quality))
     chosen = params_of(parse_params(solver_class(solver), params))
     search = _Search(solver=solver, params=chosen, seed=seed, time_s=time_s)

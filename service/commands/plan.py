@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import secrets
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -64,6 +64,35 @@ def plan(
             idempotency_key=key,
         )
 
+    return follow_to_plan(client, submit, out=out, detach=detach)
+
+
+def follow_to_plan(
+    client: Client,
+    submit: Callable[[], Job],
+    *,
+    out: Path | None,
+    detach: bool,
+    tell: Callable[[Job], None] = lambda _: None,
+) -> int:
+    """Submit a job, follow it, print a summary of its plan; return 0 where that is valid, else 1.
+
+    Parameters
+    ----------
+    submit
+        Posts the job under a key of its own: asked twice, it is the same job.
+    out, detach
+        As ``plan`` takes them.
+    tell
+        Prints what else there is to say of a job that has a plan.
+
+    Raises
+    ------
+    ClientError
+        Where the service refuses, fails or does not answer.
+    OSError
+        Where the timeline cannot be written.
+    """
     try:
         job = submit()
     except KeyboardInterrupt:
@@ -79,6 +108,7 @@ def plan(
         raise JobFailed(job)
     timeline = job.timeline()
     print(summary(timeline.model_dump()))
+    tell(job)
     if out is not None:
         job.download(out)
     return 0 if timeline.validity != "violations" else 1

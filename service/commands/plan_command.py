@@ -1,4 +1,4 @@
-"""What ``slewline plan`` was given on its command line, and where a refusal lies in it."""
+"""What ``slewline plan`` and ``replan`` were given, and where a refusal lies in it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from typing import Final
 from planner_core.errors import PlannerError
 from service.client import Client, ServiceError
 from service.commands.plan import plan
-from service.commands.scenario_files import place_of, read_scenario, require_folder
+from service.commands.replan import replan
+from service.commands.scenario_files import place_of, read_object, require_folder
 
 _SUFFIXES: Final = (".json", ".csv", ".geojson", ".czml", ".ics")  # the service has the last word
 _OPTIONS: Final = {
@@ -21,6 +22,8 @@ _OPTIONS: Final = {
     "/label": "--label",
     "/priority": "--priority",
     "/scenario_id": "--scenario-id",
+    "/now": "--now",
+    "/name": "--name",
 }
 _OF_THE_INPUT: Final = (413, 422)
 
@@ -41,7 +44,7 @@ def run_plan(options: argparse.Namespace) -> int:
     """
     with _placed(options.scenario):
         _check(options)
-        scenario = options.scenario_id or read_scenario(options.scenario)
+        scenario = options.scenario_id or read_object(options.scenario)
         with _client(options) as client:
             return plan(
                 client,
@@ -57,6 +60,32 @@ def run_plan(options: argparse.Namespace) -> int:
             )
 
 
+def run_replan(options: argparse.Namespace) -> int:
+    """Run the command and return its exit status.
+
+    Raises
+    ------
+    Refused
+        Where the input is wrong.
+    ClientError
+        Where the service does not do what was asked.
+    """
+    with _placed(options.happened):
+        _check_out(options)
+        happened = {} if options.happened is None else read_object(options.happened)
+        happened |= {
+            name: value
+            for name, value in (("now", options.now), ("name", options.name))
+            if value is not None
+        }
+        if options.time_s is not None:
+            limits = happened.get("limits")
+            others = limits if isinstance(limits, dict) else {}
+            happened["limits"] = {**others, "time_s": options.time_s}
+        with _client(options) as client:
+            return replan(client, options.plan_id, happened, out=options.out, detach=options.detach)
+
+
 def _client(options: argparse.Namespace) -> Client:
     if options.key_env is not None and options.key_env not in os.environ:
         raise Refused(f"--key-env: there is no variable {options.key_env}")
@@ -70,6 +99,10 @@ def _client(options: argparse.Namespace) -> Client:
 def _check(options: argparse.Namespace) -> None:
     if (options.scenario is None) == (options.scenario_id is None):
         raise Refused("give either SCENARIO.json or --scenario-id")
+    _check_out(options)
+
+
+def _check_out(options: argparse.Namespace) -> None:
     if options.out is None:
         return
     if options.detach:
@@ -80,7 +113,7 @@ def _check(options: argparse.Namespace) -> None:
 
 
 @contextmanager
-def _placed(scenario: Path) -> Iterator[None]:
+def _placed(scenario: Path | None) -> Iterator[None]:
     try:
         yield
     except ServiceError as error:
@@ -93,12 +126,13 @@ def _placed(scenario: Path) -> Iterator[None]:
         raise Refused(f"{error.filename}: {error.strerror}") from error
 
 
-def _faults(error: ServiceError, scenario: Path) -> str:
+def _faults(error: ServiceError, scenario: Path | None) -> str:
     """Return what the service found wrong, a line for each fault."""
+    file = scenario or "the plan"
     lines = []
     for fault in error.errors:
         pointer = fault.pointer or ""
         own = pointer.removeprefix("/scenario/")
-        in_file = f"{scenario} /{own}" if own != pointer else place_of(pointer, scenario)
+        in_file = f"{file} /{own}" if own != pointer else place_of(pointer, file)
         lines.append(f"{_OPTIONS.get(pointer, in_file)}: {fault.detail}")
     return "\n".join(lines) or error.detail

@@ -10,8 +10,8 @@ from typing import Any
 from planner_core.errors import InvalidScenario
 
 
-def read_scenario(path: Path) -> dict[str, Any]:
-    """Return what a scenario file holds, not yet checked beyond being a JSON object."""
+def read_object(path: Path) -> dict[str, Any]:
+    """Return what a file holds, a scenario say, not yet checked beyond being a JSON object."""
     try:
         content = json.loads(path.read_text(encoding="utf-8-sig"))
     except (json.JSONDecodeError, UnicodeDecodeError) as error:
@@ -27,7 +27,7 @@ def require_folder(out: Path) -> None:
         raise FileNotFoundError(errno.ENOENT, "No such folder", str(out.parent))
 
 
-def place_of(pointer: str, scenario: Path) -> str:
+def place_of(pointer: str, scenario: Path | str) -> str:
     """Return where on the command line or in the file a fault lies.
 
     >>> place_of("/params/depth", Path("day.json")), place_of("/horizon/end", Path("day.json"))

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from planner_core.budget import Budget
 from planner_core.solvers.registry import solver_class
-from service.commands.scenario_files import read_scenario, require_folder
+from service.commands.scenario_files import read_object, require_folder
 from service.commands.summary import summary
 from service.jobs.plan_job import PlanAnswer, PlanRequest, run_plan_job
 from service.jobs.solver_params import params_of, parse_params
@@ -54,7 +54,7 @@ def solve_file(
     if out is not None:
         require_folder(out)
     chosen = parse_params(solver_class(solver), params)
-    content = canonical(read_scenario(path))
+    content = canonical(read_object(path))
     request = PlanRequest(
         job_id="local",
         scenario_sha256=sha256_of(content),

@@ -472,7 +472,7 @@ class PlanActionRow(Row):
     """A collect or a contact of a plan. ``action_id`` is its id in the job's timeline.
 
     ``delivered_at`` of a collect is when the plan has its image down; null for never, and in plans
-    of earlier releases.
+    of earlier releases. There ``station_name`` is null too, where the station is no longer stored.
     """
 
     __tablename__ = "plan_action"
@@ -487,6 +487,8 @@ class PlanActionRow(Row):
     target_id: Mapped[str | None]
     station_id: Mapped[str | None]
     delivered_at: Mapped[datetime | None]
+    satellite_name: Mapped[str | None]
+    station_name: Mapped[str | None]
 
 
 class PlanEventRow(Row):

@@ -50,7 +50,7 @@ def add(
         for each in timeline.satellites
     )
     actions = [
-        (satellite.id, action)
+        (satellite, action)
         for satellite in timeline.satellites
         for action in satellite.actions
         if action.mode not in IDLE_MODES
@@ -58,11 +58,12 @@ def add(
     rows = [
         {
             "plan_id": plan.id, "position": position, "action_id": action.id,
-            "satellite_id": satellite_id, "mode": action.mode, "start": action.start,
+            "satellite_id": satellite.id, "mode": action.mode, "start": action.start,
             "end": action.end, "target_id": action.target_id, "station_id": action.station_id,
-            "delivered_at": action.delivered_at,
+            "delivered_at": action.delivered_at, "satellite_name": satellite.name,
+            "station_name": action.station_name,
         }
-        for position, (satellite_id, action) in enumerate(actions)
+        for position, (satellite, action) in enumerate(actions)
     ]  # fmt: skip
     if rows:
         session.execute(sa.insert(PlanActionRow), rows)

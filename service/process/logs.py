@@ -63,7 +63,7 @@ class JsonFormatter(logging.Formatter):
 
 def configure_logging(level: str = "INFO") -> None:
     """Send all logs of this process to standard error as JSON lines, and crashes with stacks."""
-    faulthandler.enable()
+    faulthandler.enable(STDERR)
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(JsonFormatter())
     logging.basicConfig(level=level, handlers=[handler], force=True)

@@ -73,6 +73,7 @@ def replan_file(file: ScenarioFile, body: ReplanIn, happened: Happened) -> Scena
             "horizon": HorizonIn(start=file.horizon.start, end=end),
             "targets": targets,
             "outages": outages,
+            "objective": body.objective or file.objective,
             "pins": file.pins.model_copy(update={"forbid": list(forbid)}),
             "replan": ReplanOfFile(
                 base=list(happened.base),

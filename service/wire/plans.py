@@ -97,11 +97,13 @@ class PlanActionOut(Wire):
 
     id: str = Field(description="As in the timeline; executions name it.")
     satellite_id: str
+    satellite_name: str | None
     mode: Open[Literal["collect", "contact"]]
     start: Instant
     end: Instant
     target_id: str | None
     station_id: str | None
+    station_name: str | None
     outcome: Open[Outcome] | None = Field(description="The last that was reported.")
 
 

@@ -12,6 +12,7 @@ from service.wire.pins import OutageIn
 from service.wire.places import TargetIn
 from service.wire.plan_before import PromiseIn, StabilityIn
 from service.wire.plans import MAX_REPORTED, ExecutionIn, PlanActionOut
+from service.wire.scenarios import AnyObjective
 
 
 class ReplanIn(Body):
@@ -34,6 +35,9 @@ class ReplanIn(Body):
     add_targets: list[TargetIn] = Field([], max_length=10_000)
     add_target_catalog_ids: list[Id] = Field([], max_length=1000)
     drop_targets: list[Id] = Field([], max_length=10_000)
+    objective: AnyObjective | None = Field(
+        None, description="What images earn from now on; that of the plan by default."
+    )
     stability: StabilityIn = StabilityIn()
     name: Name | None = Field(None, description="Of the new plan.")
     solver: Id = Field("certified", description="Which search proves how good the plan is.")

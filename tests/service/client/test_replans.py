@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import json
 from datetime import datetime, timedelta
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from service.client import Client, JobFailed, Plan, PlanAction, ServiceError
+from service.commands.bodies import OK, WRONG_INPUT
+from service.commands.cli import main
 from service.wire.instants import instant_text
 from tests.missions import drawn_targets, paper_mission
 
@@ -29,6 +33,11 @@ def tasks(client: Client, plan: Plan) -> dict[Task, PlanAction]:
         (a.satellite_id, a.mode, a.target_id, a.station_id, a.start): a
         for a in client.plans.actions(plan.id)
     }
+
+
+def scenario_of(client: Client, plan: Plan) -> dict[str, Any]:
+    content: dict[str, Any] = client.scenarios.file(client.jobs.get(plan.job_id).scenario.id)
+    return content
 
 
 def noon(plan: Plan) -> datetime:
@@ -153,3 +162,65 @@ def test_what_cannot_be_asked_is_refused_with_its_place(whole: Client, base: Pla
         whole.plans.replan(base.id, now=base.horizon.end)
     none = whole.plans.changes(base.id)
     assert (none.parent_id, none.items) == (None, ())
+
+
+def test_names_stand_beside_ids(whole: Client, base: Plan) -> None:
+    content = scenario_of(whole, base)
+    satellites = {each["id"]: each["name"] for each in content["satellites"]}
+    stations = {each["id"]: each["name"] for each in content["ground_stations"]}
+    modes = set()
+    for action in whole.plans.actions(base.id):
+        modes.add(action.mode)
+        assert action.satellite_name == satellites[action.satellite_id]
+        assert action.station_name == stations.get(action.station_id or "")
+    assert modes == {"collect", "contact"}
+
+
+def test_what_images_earn_may_change_from_now_on(whole: Client, base: Plan) -> None:
+    asked = {"collected_share": 0.25, "half_life_s": 6 * 3600.0}
+    draft = replanned(whole, base, objective=asked)
+    objective = scenario_of(whole, draft)["objective"]
+    assert {name: objective[name] for name in asked} == asked
+    with pytest.raises(ServiceError) as caught:
+        whole.plans.replan(base.id, now=noon(base), objective={"collected_share": 2.0})
+    assert [fault.pointer for fault in caught.value.errors] == ["/objective/collected_share"]
+
+
+def test_a_shell_replans_and_sees_what_changes(
+    served: str, whole: Client, base: Plan, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    contact = next(
+        a for a in whole.plans.actions(base.id) if a.mode == "contact" and a.start >= noon(base)
+    )
+    start, end = instant_text(contact.start), instant_text(contact.end)
+    happened = tmp_path / "happened.json"
+    happened.write_text(
+        json.dumps({"outages": [{"station_id": contact.station_id, "start": start, "end": end}]})
+    )
+    out = tmp_path / "next.json"
+    arguments = ["replan", base.id, str(happened), "--url", served, "--now"]
+    now = instant_text(noon(base))
+    said = [*arguments, now, "--name", "by hand", "--time-s", "20", "--out", str(out)]
+    assert main(said) == OK
+    printed = capsys.readouterr().out
+    assert "removed" in printed
+    assert "lost" in printed
+    assert contact.station_name is not None
+    assert contact.station_name in printed
+    draft = next(plan for plan in whole.plans.list(parent_id=base.id) if plan.id in printed)
+    assert draft.name == "by hand"
+    assert json.loads(out.read_text())["plan_sha256"] == draft.plan_sha256
+
+    assert main([*arguments, "noon"]) == WRONG_INPUT
+    assert "--now" in capsys.readouterr().err
+    happened.write_text(json.dumps({"outages": [{"station_id": contact.station_id}]}))
+    assert main([*arguments, now]) == WRONG_INPUT
+    assert f"{happened} /outages/0/" in capsys.readouterr().err
+
+
+def test_a_shell_is_told_that_nothing_changes(
+    served: str, base: Plan, capsys: pytest.CaptureFixture[str]
+) -> None:
+    now = instant_text(noon(base))
+    assert main(["replan", base.id, "--url", served, "--now", now, "--time-s", "20"]) == OK
+    assert "Nothing changes." in capsys.readouterr().out
