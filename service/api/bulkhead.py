@@ -36,6 +36,7 @@ LIGHT_TARGETS: Final = 5_000
 _HEAVY: Final = re.compile(
     r"/v1/scenarios/[^/]+(/opportunities)?|/v1/jobs/[^/]+/(what-if|diff/.*|targets/.+/explanation)"
     r"|/v1/plans/[^/]+/(replans|changes|passes(\.[^/]*)?)|/v1/targets"
+    r"|/stapi/orders(/.*)?|/stapi/products/[^/]+/opportunities"
 )
 # Decoders of binary files work where memory is limited, however short the file; a plan is read from
 # the whole timeline of its job.

@@ -134,6 +134,24 @@ class TargetRow(Row):
     body: Mapped[Json]
 
 
+class OrderRow(Row):
+    """An order that came over STAPI; its id is that of its target.
+
+    ``target`` is that target as its catalogue holds it, ``sent`` what the order said.
+    """
+
+    __tablename__ = "stapi_order"
+    __table_args__ = (sa.Index("ix_stapi_order_owner_id", "owner", "id"),)
+
+    id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
+    owner: Mapped[str] = mapped_column(sa.String(64))
+    product_id: Mapped[str] = mapped_column(sa.String(36))
+    catalog_id: Mapped[str] = mapped_column(sa.ForeignKey("target_catalog.id"))
+    target: Mapped[Json]
+    sent: Mapped[Json]
+    created_at: Mapped[datetime]
+
+
 class ScenarioRow(Row):
     """A frozen question. ``content`` is the self-contained scenario file; ``sha256`` its hash."""
 

@@ -177,7 +177,7 @@ def num_targets(session: Session, catalog_ids: Sequence[str]) -> int:
 
 def _expanded(session: Session, body: ScenarioIn) -> ScenarioFile:
     shared = {name: getattr(body, name) for name in Question.model_fields if name != "outages"}
-    satellites = _satellites(session, body.satellite_ids)
+    satellites = satellites_of(session, body.satellite_ids)
     if "objective" not in body.model_fields_set:
         shared["objective"] = default_objective(satellite.spacecraft for satellite in satellites)
     return ScenarioFile(
@@ -198,7 +198,8 @@ def _outages(session: Session, body: ScenarioIn) -> list[PlacedOutage]:
     return [*body.outages, *(outage_store.placed(row) for row in stored if row.id not in named)]
 
 
-def _satellites(session: Session, ids: Sequence[str]) -> list[FileSatellite]:
+def satellites_of(session: Session, ids: Sequence[str]) -> list[FileSatellite]:
+    """Return stored satellites, with the elements in force, as a scenario file holds them."""
     rows = _find(session, SatelliteRow, "satellite", ids)
     elements = satellite_store.in_force(session, ids)
     return [

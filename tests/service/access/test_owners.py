@@ -9,6 +9,7 @@ import sqlalchemy as sa
 from service.db.rows import JobRow
 from tests.service.access.conftest import Door
 from tests.service.access.test_keys import operations
+from tests.service.factories import satellite
 from tests.service.problems import assert_problem
 
 
@@ -141,3 +142,37 @@ def test_polls_at_once_are_answered_to_each_owner_for_itself(door: Door) -> None
         else:
             assert_problem(answer, 404, "not_found")
             assert path.rpartition("/")[2] in answer.json()["detail"]
+
+
+def test_orders_belong_to_an_owner_and_are_recorded(door: Door) -> None:
+    ops, stranger, boss = door.key("submit", "ops"), door.key("submit", "x"), door.key("admin", "a")
+    made = door.client.post("/v1/satellites", json=satellite(), headers=ops)
+    assert made.status_code == 201, made.text
+    body = {
+        "datetime": "2026-11-23T00:00:00Z/2026-11-24T00:00:00Z",
+        "geometry": {"type": "Point", "coordinates": [8.5, 47.4]},
+        "order_parameters": {},
+    }
+    calls = "/stapi/products/paper/orders"
+    reader = door.client.post(calls, json=body, headers=door.key("read", "ops"))
+    assert_problem(reader, 403, "insufficient_scope")
+    placed = [door.client.post(calls, json=body, headers=key) for key in (ops, ops, stranger)]
+    assert [answer.status_code for answer in placed] == [201, 201, 201]
+    first, second, foreign = (answer.json() for answer in placed)
+    catalogs = [one["properties"]["target_catalog_id"] for one in (first, second, foreign)]
+    assert catalogs[0] == catalogs[1] != catalogs[2]
+
+    def listed(key: dict[str, str]) -> list[str]:
+        return [
+            one["id"] for one in door.client.get("/stapi/orders", headers=key).json()["features"]
+        ]
+
+    assert listed(ops) == [second["id"], first["id"]]
+    assert listed(stranger) == [foreign["id"]]
+    assert listed(boss) == [foreign["id"], second["id"], first["id"]]
+    for path in (f"/stapi/orders/{foreign['id']}", f"/stapi/orders/{foreign['id']}/statuses"):
+        assert_problem(door.client.get(path, headers=ops), 404, "not_found")
+        assert door.client.get(path, headers=stranger).status_code == 200
+    events = door.client.get("/v1/audit-events", headers=boss).json()["items"]
+    orders = [(one["owner"], one["object_id"]) for one in events if one["kind"] == "order"]
+    assert orders == [("x", foreign["id"]), ("ops", second["id"]), ("ops", first["id"])]

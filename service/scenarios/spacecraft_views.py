@@ -1,0 +1,70 @@
+"""When the satellites of one type see a place: opportunities without a scenario."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import datetime
+from typing import Final
+
+from sqlalchemy.orm import Session
+
+from planner_core.budget import Budget
+from planner_core.build import check_element_age, check_propagation, compute_opportunities
+from planner_core.errors import Cancelled, InvalidScenario
+from service.db.rows import SatelliteRow
+from service.scenarios.freezing import satellites_of
+from service.scenarios.opportunities import Described
+from service.scenarios.scenario_limits import ScenarioLimits
+from service.scenarios.translate import horizon_from, scenario_from_file
+from service.stores import satellite_store
+from service.wire.scenarios import FileSatellite, FileTarget, HorizonIn, ScenarioFile
+
+_WITHIN_S: Final = 20.0
+
+
+def types_flown(session: Session) -> list[str]:
+    """Return the spacecraft types that satellites are of, by id or built-in name."""
+    wanted = satellite_store.alive().with_only_columns(SatelliteRow.spacecraft).distinct()
+    return sorted(one for one in session.scalars(wanted) if one is not None)
+
+
+def fleet_of(session: Session, spacecraft_id: str) -> list[FileSatellite]:
+    """Return the satellites of one type, with the elements in force."""
+    of_type = satellite_store.alive().where(SatelliteRow.spacecraft == spacecraft_id)
+    ids = session.scalars(of_type.with_only_columns(SatelliteRow.id).order_by(SatelliteRow.id))
+    return satellites_of(session, ids.all())
+
+
+def views_of(
+    satellites: Sequence[FileSatellite],
+    target: FileTarget,
+    start: datetime,
+    end: datetime,
+    limits: ScenarioLimits,
+) -> Described:
+    """Return the opportunities of a target from start to end.
+
+    Raises
+    ------
+    InvalidScenario
+        ``horizon_too_long``, ``scenario_too_large``; elements that are too old.
+    """
+    horizon = HorizonIn(start=start, end=end)
+    limits.check(horizon_from(horizon), len(satellites), 1)
+    file = ScenarioFile(
+        release=2,
+        horizon=horizon,
+        satellites=list(satellites),
+        targets=[target],
+        ground_stations=[],
+        use_resources=False,
+    )
+    scenario = scenario_from_file(file)
+    check_propagation(scenario)
+    check_element_age(scenario)
+    try:
+        computed = compute_opportunities(scenario, Budget(_WITHIN_S))
+    except Cancelled:
+        detail = f"The search took longer than {_WITHIN_S:g} s: ask for a shorter span."
+        raise InvalidScenario("scenario_too_large", detail, pointer="/datetime") from None
+    return Described(scenario=scenario, computed=computed)

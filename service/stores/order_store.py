@@ -1,0 +1,88 @@
+"""Orders in the database: each is a target of its owner's standing catalogue."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from typing import Any, Final
+
+import sqlalchemy as sa
+from sqlalchemy.orm import Session
+
+from service.db.ids import new_id
+from service.db.rows import OrderRow, TargetCatalogRow, TargetRow
+from service.db.session import take_turns
+from service.wire.places import MAX_TARGETS
+
+CATALOG_NAME: Final = "STAPI orders"
+_TURNS: Final = "stapi_orders"
+
+
+def add(
+    session: Session,
+    owner: str,
+    product_id: str,
+    target: Mapping[str, Any],
+    sent: Mapping[str, Any],
+) -> OrderRow:
+    """Store an order, and its target at the end of the owner's standing catalogue.
+
+    Parameters
+    ----------
+    target
+        As catalogues hold it; its id becomes that of the order.
+    sent
+        What the order said, for its readers.
+    """
+    take_turns(session, _TURNS)
+    catalog = _standing(session, owner)
+    # Not the number of targets: nothing says that positions have no gaps.
+    last = sa.select(sa.func.max(TargetRow.position)).where(TargetRow.catalog_id == catalog.id)
+    before = session.scalar(last)
+    session.add(
+        TargetRow(
+            catalog_id=catalog.id,
+            position=0 if before is None else before + 1,
+            target_id=target["id"],
+            body=dict(target),
+        )
+    )
+    catalog.num_targets += 1
+    row = OrderRow(
+        id=target["id"],
+        owner=owner,
+        product_id=product_id,
+        catalog_id=catalog.id,
+        target=dict(target),
+        sent=dict(sent),
+        created_at=datetime.now(UTC),
+    )
+    session.add(row)
+    return row
+
+
+def _standing(session: Session, owner: str) -> TargetCatalogRow:
+    """Return the catalogue that takes the owner's next order; a new one after a deleted one."""
+    newest = (
+        sa.select(TargetCatalogRow)
+        .join(OrderRow, OrderRow.catalog_id == TargetCatalogRow.id)
+        .where(OrderRow.owner == owner)
+        .order_by(OrderRow.id.desc())
+        .limit(1)
+        .with_for_update(of=TargetCatalogRow)
+    )
+    found = session.scalar(newest)
+    if found is not None and found.deleted_at is None and found.num_targets < MAX_TARGETS:
+        return found
+    fresh = TargetCatalogRow(
+        id=new_id(), name=CATALOG_NAME, num_targets=0, created_at=datetime.now(UTC)
+    )
+    session.add(fresh)
+    session.flush()
+    return fresh
+
+
+def visible(owner: str | None) -> sa.Select[OrderRow]:
+    """Return the query of an owner's orders, or of all."""
+    wanted = sa.select(OrderRow)
+    return wanted if owner is None else wanted.where(OrderRow.owner == owner)
