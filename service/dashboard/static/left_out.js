@@ -4,6 +4,7 @@
 import { byId, fill, h } from "./dom.js";
 import { utc } from "./format.js";
 import { OutcomeRows } from "./outcomes.js";
+import { changeOf } from "./settings.js";
 import { actionButton, targetButton } from "./summary.js";
 import { PagedTable } from "./table.js";
 
@@ -97,22 +98,4 @@ function whyOf(reason) {
 export function blockersOf(plan, selection, reason) {
   const ids = reason?.blocking_actions ?? [];
   return h("span", {}, ...ids.flatMap((id) => [actionButton(plan, selection, id), " "]));
-}
-
-/**
- * Say a change in words, whatever fields it has.
- * @param {import("./plan.js").Plan} plan
- * @param {Record<string, unknown> | null} change
- */
-export function changeOf(plan, change) {
-  if (change === null) return "";
-  const parts = [];
-  for (const [name, value] of Object.entries(change)) {
-    if (value === null || name === "opportunity_id") continue;
-    if (name === "satellite_id") parts.push(`on ${plan.satelliteName(String(value))}`);
-    else if (name === "drop_actions") parts.push(`drop ${/** @type {string[]} */ (value).join(", ")}`);
-    else if (typeof value !== "object") parts.push(`${name} = ${value}`);
-    else parts.push(`${name}: ${JSON.stringify(value)}`);
-  }
-  return parts.join(", ");
 }

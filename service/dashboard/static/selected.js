@@ -1,14 +1,18 @@
 // @ts-check
 /** All there is to say about what is selected. */
 
+import { get, pause, Problem } from "./api.js";
 import { byId, fill, h } from "./dom.js";
 import { number, percent, utc, utcLabelled } from "./format.js";
-import { blockersOf, changeOf } from "./left_out.js";
+import { blockersOf } from "./left_out.js";
 import { lanesOf, opportunitiesOf } from "./opportunities.js";
 import { outcomeOf } from "./outcomes.js";
 import { showError } from "./page.js";
+import { changeOf } from "./settings.js";
+import { whatIfButton } from "./what_if.js";
 
 /** @typedef {import("./types.js").OpportunityOut} OpportunityOut */
+/** @typedef {import("./types.js").ExplanationOut} ExplanationOut */
 
 /**
  * @param {import("./plan.js").Plan} plan
@@ -30,8 +34,9 @@ export function watchSelection(plan, selection, job, gantt) {
     }
     const list = factsOf([...(known ? targetFacts(known) : []), ...(action ? actionFacts(plan, action, satelliteId) : [])]);
     const more = h("div", {});
+    const tries = h("div", {});
     const place = h("div", {});
-    fill(byId("selected"), list, more, place);
+    fill(byId("selected"), list, more, tries, place);
     const mine = asked;
     if (known && known.reason !== null) {
       outcomeOf(`/v1/jobs/${encodeURIComponent(job.id)}`, known.id)
@@ -43,6 +48,7 @@ export function watchSelection(plan, selection, job, gantt) {
         })
         .catch(showError);
     }
+    if (known) offer(plan, job, known, tries, () => mine === asked).catch(showError);
     if (known) {
       opportunitiesOf(job.scenario.id, { target_id: known.id })
         .then(({ items }) => {
@@ -55,6 +61,63 @@ export function watchSelection(plan, selection, job, gantt) {
     }
     if (action) gantt.view.reveal(Date.parse(action.start), Date.parse(action.end));
   });
+}
+
+/**
+ * Offer what could be different of a target, to be tried.
+ * @param {import("./plan.js").Plan} plan
+ * @param {import("./types.js").JobOut} job
+ * @param {import("./geography.js").TargetPlace} known
+ * @param {HTMLElement} place
+ * @param {() => boolean} isWanted
+ */
+async function offer(plan, job, known, place, isWanted) {
+  const outcome = h("div", { class: "what-if-outcomes", "aria-live": "polite" });
+  const isTaken = known.reason === null;
+  if (isTaken) {
+    fill(place, whatIfButton(job, `Plan without ${known.id}`, { forbid: [known.id] }, outcome), outcome);
+  } else if (known.reason !== "no_access") {
+    fill(place, whatIfButton(job, `Plan with ${known.id}`, { force: [known.id] }, outcome), outcome);
+  } else {
+    fill(place, h("p", { class: "hint" }, "Looking for what would give it an access …"));
+    const told = await explanationOf(job.id, known.id, isWanted);
+    if (told && isWanted()) fill(place, ...accessChanges(plan, job, told, outcome), outcome);
+  }
+}
+
+/**
+ * Return what the service knows of a target, or null where nobody wants it any more.
+ * @param {string} jobId
+ * @param {string} targetId
+ * @param {() => boolean} isWanted
+ * @returns {Promise<ExplanationOut | null>}
+ */
+async function explanationOf(jobId, targetId, isWanted) {
+  const path = `/v1/jobs/${encodeURIComponent(jobId)}/targets/${encodeURIComponent(targetId)}/explanation`;
+  while (isWanted()) {
+    try {
+      return await get(path);
+    } catch (error) {
+      // It is still being worked out.
+      if (!(error instanceof Problem && error.status === 503)) throw error;
+      await pause(1000);
+    }
+  }
+  return null;
+}
+
+/**
+ * @param {import("./plan.js").Plan} plan
+ * @param {import("./types.js").JobOut} job
+ * @param {ExplanationOut} told
+ * @param {HTMLElement} outcome
+ */
+function accessChanges(plan, job, told, outcome) {
+  if (told.access_changes.length === 0) return [h("p", {}, "No single limit, if lifted, would give it an access.")];
+  const lines = told.access_changes.map((change) =>
+    h("li", {}, whatIfButton(job, `Try ${changeOf(plan, change)}`, { relax: change }, outcome)),
+  );
+  return [h("p", {}, "Each of these would give it an access:"), h("ul", { class: "access-changes" }, ...lines)];
 }
 
 /** @param {[string, import("./dom.js").Child][]} facts */

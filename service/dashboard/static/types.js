@@ -178,6 +178,30 @@
  */
 
 /**
+ * @typedef {object} ExplanationOut
+ * @property {string} target_id
+ * @property {Record<string, unknown>[]} access_changes
+ */
+
+/**
+ * @typedef {object} PlannedOut
+ * @property {string} satellite_id
+ * @property {string | null} satellite_name
+ * @property {string | null} target_id
+ * @property {string | null} station_id
+ * @property {string | null} station_name
+ * @property {string} start
+ */
+
+/**
+ * @typedef {object} DiffOut
+ * @property {PlannedOut[]} added
+ * @property {PlannedOut[]} removed
+ * @property {{before: PlannedOut, after: PlannedOut}[]} moved
+ * @property {Record<string, {before: number | null, after: number | null}>} totals
+ */
+
+/**
  * @typedef {object} Slew
  * @property {number} angle_deg
  * @property {number} needed_s

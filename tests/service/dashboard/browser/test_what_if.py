@@ -1,0 +1,98 @@
+"""What the page of a job says would let a target in, and what comes of trying it."""
+
+from __future__ import annotations
+
+import httpx
+import pytest
+
+from tests.service.dashboard.browser.conftest import Browser
+from tests.service.dashboard.browser.missions import Json, planned
+from tests.service.factories import post, satellite
+
+_SELECT = """
+  for (const folded of document.querySelectorAll("details")) folded.open = true;
+  const buttons = [...document.querySelectorAll("button.link")];
+  const found = buttons.find((one) => one.textContent === arguments[0]);
+  found?.click();
+  return found !== undefined;
+"""
+
+
+@pytest.fixture(scope="module")
+def job(api: httpx.Client) -> Json:
+    """A plan of a satellite that looks down and hardly to the sides: some targets are unseen."""
+    eye = post(api, "/v1/satellites", satellite(sensor={"off_nadir_max_deg": 15.0}))
+    rows = "".join(f"t{i},{lat},{2 * i}\n" for i, lat in enumerate(range(-60, 60, 2)))
+    catalog = api.post(
+        "/v1/target-catalogs?name=Sixty",
+        content=f"id,lat_deg,lon_deg\n{rows}",
+        headers={"Content-Type": "text/csv"},
+    ).json()
+    scenario = {
+        "name": "Straight down",
+        "horizon": {"start": "2026-03-01T00:00:00Z", "end": "2026-03-02T00:00:00Z"},
+        "satellite_ids": [eye["id"]],
+        "target_catalog_ids": [catalog["id"]],
+        "use_resources": False,
+        "objective": "collected",
+    }
+    return planned(api, str(post(api, "/v1/scenarios", scenario)["id"]))
+
+
+def targets(api: httpx.Client, job: Json) -> list[Json]:
+    found: list[Json] = api.get(f"/v1/jobs/{job['id']}/targets?limit=500").json()["items"]
+    return found
+
+
+def tried(browser: Browser, button: str) -> str:
+    """Press a button of the selection's; return what its plan is called, as a job."""
+    browser.click(button)
+    browser.wait(lambda: browser.text(".what-if-outcome"), "no outcome")
+    link = browser.find(".what-if-outcome a").get_attribute("href")
+    assert link is not None
+    return link.rpartition("/")[2]
+
+
+def test_the_angle_that_would_do_is_said_and_tried(
+    browser: Browser, api: httpx.Client, job: Json
+) -> None:
+    unseen = next(
+        item
+        for item in targets(api, job)
+        if item["reason"] and item["reason"]["code"] == "no_access"
+    )
+    browser.open(f"/jobs/{job['id']}")
+    browser.wait_for_answer()
+    group = "#left-out details[data-reason=no_access]"
+    browser.click(f"{group} > summary")
+    browser.click(f"{group} tbody tr:first-child button")
+    browser.wait(lambda: browser.text("#selected-target") == unseen["target_id"])
+    browser.wait(lambda: "off-nadir up to " in browser.text(".access-changes"), "no angle")
+    explained = api.get(f"/v1/jobs/{job['id']}/targets/{unseen['target_id']}/explanation").json()
+    angle_deg = next(
+        change["off_nadir_max_deg"]
+        for change in explained["access_changes"]
+        if "off_nadir_max_deg" in change
+    )
+    assert f"off-nadir up to {angle_deg:.1f}°" in browser.text(".access-changes")
+
+    varied = tried(browser, ".access-changes button")
+    now = {item["target_id"]: item["outcome"] for item in targets(api, {"id": varied})}
+    before = {item["target_id"]: item["outcome"] for item in targets(api, job)}
+    assert now != before
+    assert "added" in browser.text(".what-if-outcomes table")
+
+
+def test_an_image_is_left_out_to_see_what_the_plan_would_be(
+    browser: Browser, api: httpx.Client, job: Json
+) -> None:
+    taken = next(item for item in targets(api, job) if item["action_id"])
+    browser.open(f"/jobs/{job['id']}")
+    browser.wait_for_answer()
+    browser.wait(lambda: browser.run(_SELECT, taken["target_id"]), "no button of the target")
+    browser.wait(lambda: browser.text("#selected-target") == taken["target_id"], "not selected")
+    varied = tried(browser, "#selected button.what-if")
+    now = {item["target_id"]: item["action_id"] for item in targets(api, {"id": varied})}
+    assert now[taken["target_id"]] is None
+    assert taken["target_id"] in browser.text(".what-if-outcomes table")
+    assert "removed" in browser.text(".what-if-outcomes table")
