@@ -43,6 +43,7 @@ _HEAVY: Final = re.compile(
 _HEAVY_POSTS: Final = ("/v1/forecasts", "/v1/plans")
 _IS_LIGHT: Final = "slewline.is_light"
 _CALLER: Final = "x-slewline-caller"
+_SCHEME: Final = "x-slewline-scheme"
 _ROUTE: Final = b"x-slewline-route"
 _OF_ONE_HOP: Final = (
     b"connection",
@@ -174,6 +175,8 @@ class Admitted:
         caller = Caller(**told | {"scope": KeyScope(told["scope"])})
         scope.setdefault("state", {}).update(caller=caller, request_id=own_id)
         request_id.set(own_id)
+        # Of the addresses in an answer: a proxy's word is taken at the door alone.
+        scope["scheme"] = headers[_SCHEME]
 
         async def send_with_route(message: Message) -> None:
             if message["type"] == "http.response.start":
@@ -202,6 +205,7 @@ def _target(scope: Scope) -> httpcore.URL:
 def _headers(request: Request) -> list[tuple[bytes, bytes]]:
     own: dict[str, Any] = {
         _CALLER: json.dumps(asdict(request.state.caller)),
+        _SCHEME: request.scope["scheme"],
         "x-request-id": request.state.request_id,
     }
     inject(own)

@@ -283,3 +283,11 @@ def test_an_own_type_is_a_product_as_soon_as_it_flies(http: httpx.Client) -> Non
     assert {one.properties.satellite_id for one in found} == {own["id"]}  # type: ignore[union-attr]
     assert http.delete(f"/v1/satellites/{own['id']}").status_code == 204
     assert http.get(f"/stapi/products/{made['id']}").status_code == 404
+
+
+def test_links_have_the_scheme_that_the_proxy_tells(http: httpx.Client) -> None:
+    place(http)
+    for path in ("/stapi/products", "/stapi/orders"):  # the second one is served as heavy
+        told = http.get(path, headers={"X-Forwarded-Proto": "https"}).json()
+        (first, *_) = told.get("products") or told["features"]
+        assert {httpx.URL(link["href"]).scheme for link in first["links"]} == {"https"}
