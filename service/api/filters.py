@@ -11,6 +11,12 @@ from fastapi import Depends, Query
 
 from service.wire.base import Instant
 
+SatelliteQuery = Annotated[
+    str | None, Query(max_length=200, description="Only with this satellite, by its id.")
+]
+StationQuery = Annotated[
+    str | None, Query(max_length=200, description="Only with this ground station, by its id.")
+]
 NameQuery = Annotated[
     str | None, Query(max_length=200, description="Only names that hold this text, in any case.")
 ]

@@ -13,7 +13,7 @@ from service.api.conditional import NOT_MODIFIED, require_match_of
 from service.api.deps import CallDep, own_job_only
 from service.api.errors import problem_responses
 from service.api.etags import matches
-from service.api.filters import StoredDep
+from service.api.filters import SatelliteQuery, StationQuery, StoredDep
 from service.api.idempotency import OnceDep
 from service.api.job_shapes import etag_of_job, shown
 from service.api.job_wait import wait_for_change
@@ -60,6 +60,8 @@ def list_jobs(
     solver: Annotated[str | None, Query(description="Only jobs of this solver.")] = None,
     scenario_id: Annotated[str | None, Query(description="Only jobs of this scenario.")] = None,
     label: Annotated[str | None, Query(description="Only jobs with exactly this label.")] = None,
+    satellite_id: SatelliteQuery = None,
+    station_id: StationQuery = None,
 ) -> Listed[JobOut]:
     """List the jobs of the key's owner, newest first; all jobs for the scope `admin`."""
     query = store.matching(
@@ -70,6 +72,7 @@ def list_jobs(
         tenant=call.caller.visible_owner,
     )
     query = stored.narrow(query, JobRow.created_at)
+    query = query.where(*scenario_store.with_parts(JobRow.scenario_id, satellite_id, station_id))
     with call.database.reading() as session:
         page = newest_first(session, query, JobRow.id, paging, size_of(JobRow.change))
         hashes = store.scenario_hashes(session, page.rows)

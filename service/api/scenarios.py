@@ -19,7 +19,7 @@ from service.api.conditional import NOT_MODIFIED, created, require_match, unless
 from service.api.deps import CallDep
 from service.api.errors import problem_responses
 from service.api.etags import etag_of, matches
-from service.api.filters import NameQuery, StoredDep, by_name
+from service.api.filters import NameQuery, SatelliteQuery, StationQuery, StoredDep, by_name
 from service.api.idempotency import OnceDep
 from service.api.paging import PagingDep, newest_first, size_of
 from service.db.rows import ScenarioRow
@@ -62,7 +62,12 @@ def create_scenario(body: ScenarioIn, call: CallDep, once: OnceDep) -> ScenarioO
 
 @router.get("")
 def list_scenarios(
-    call: CallDep, paging: PagingDep, stored: StoredDep, name: NameQuery = None
+    call: CallDep,
+    paging: PagingDep,
+    stored: StoredDep,
+    name: NameQuery = None,
+    satellite_id: SatelliteQuery = None,
+    station_id: StationQuery = None,
 ) -> Listed[ScenarioSummary]:
     """List the scenarios, newest first, without their pins and outages.
 
@@ -71,6 +76,7 @@ def list_scenarios(
     """
     query = sa.select(ScenarioRow).where(scenario_store.seen_by(call.caller.visible_owner))
     query = by_name(stored.narrow(query, ScenarioRow.created_at), ScenarioRow.name, name)
+    query = query.where(*scenario_store.with_parts(ScenarioRow.id, satellite_id, station_id))
     with call.database.reading() as session:
         weight = size_of(ScenarioRow.summary)
         page = newest_first(session, query, ScenarioRow.id, paging, weight)

@@ -125,9 +125,18 @@ class Jobs:
         solver: str | None = None,
         scenario_id: str | None = None,
         label: str | None = None,
+        satellite_id: str | None = None,
+        station_id: str | None = None,
     ) -> Iterator[Job]:
         """Yield the jobs, newest first."""
-        params = {"state": state, "solver": solver, "scenario_id": scenario_id, "label": label}
+        params = {
+            "state": state,
+            "solver": solver,
+            "scenario_id": scenario_id,
+            "label": label,
+            "satellite_id": satellite_id,
+            "station_id": station_id,
+        }
         return map(self._own, self._transport.pages(path_of("jobs"), Job, params))
 
     def get(self, job_id: str, *, known: Job | None = None) -> Job:

@@ -50,9 +50,16 @@ class Scenarios:
             path_of("scenarios"), Scenario, json=body, idempotency_key=idempotency_key
         )
 
-    def list(self) -> Iterator[ScenarioSummary]:
-        """Yield the scenarios, newest first, without their pins."""
-        return self._transport.pages(path_of("scenarios"), ScenarioSummary)
+    def list(
+        self,
+        *,
+        name: str | None = None,
+        satellite_id: str | None = None,
+        station_id: str | None = None,
+    ) -> Iterator[ScenarioSummary]:
+        """Yield the scenarios, newest first, without their pins; of some name, for a part of it."""
+        params = {"name": name, "satellite_id": satellite_id, "station_id": station_id}
+        return self._transport.pages(path_of("scenarios"), ScenarioSummary, params)
 
     def get(self, scenario_id: str) -> Scenario:
         """Return one scenario."""

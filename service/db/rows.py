@@ -174,6 +174,18 @@ class ScenarioOwnerRow(Row):
     owner: Mapped[str] = mapped_column(sa.String(64), primary_key=True)
 
 
+class ScenarioPartRow(Row):
+    """A satellite or a ground station of a scenario: lists are narrowed by it."""
+
+    __tablename__ = "scenario_part"
+
+    part_id: Mapped[str] = mapped_column(primary_key=True)
+    scenario_id: Mapped[str] = mapped_column(
+        sa.ForeignKey("scenario.id"), primary_key=True, index=True
+    )
+    kind: Mapped[str] = mapped_column(sa.String(16), primary_key=True)
+
+
 class ForecastRow(Row):
     """A forecast of clear skies; ``block`` is what it says, compressed (`forecasts.fields`).
 

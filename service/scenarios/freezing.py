@@ -151,6 +151,7 @@ def _insert(session: Session, own_id: str, frozen: FrozenScenario, owner: str | 
         "created_at": datetime.now(UTC),
     }
     session.execute(sa.insert(ScenarioRow).values(**row))
+    store.note_parts(session, own_id, frozen.summary)
     if owner is not None:
         store.let_see(session, own_id, owner)
 

@@ -28,6 +28,7 @@ from service.db.rows import (
     PlanSatelliteRow,
     Row,
     ScenarioOwnerRow,
+    ScenarioPartRow,
     ScenarioRow,
 )
 from service.problems.kinds import ServiceError
@@ -180,6 +181,7 @@ def _delete_scenarios(session: Session, rows: Sequence[tuple[str, str]]) -> None
     _delete(session, OpportunitySetRow, OpportunitySetRow.scenario_sha256.in_(hashes))
     _delete(session, BoundRow, BoundRow.scenario_sha256.in_(hashes))
     _delete(session, ScenarioOwnerRow, ScenarioOwnerRow.scenario_id.in_(ids))
+    _delete(session, ScenarioPartRow, ScenarioPartRow.scenario_id.in_(ids))
     _delete(session, ScenarioRow, ScenarioRow.id.in_(ids))
 
 

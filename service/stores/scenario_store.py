@@ -1,15 +1,21 @@
-"""Who sees which scenario: those that came with a job are seen by the owner of that job."""
+"""Who sees which scenario, and what each is about.
+
+Those that came with a job are seen by the owner of that job.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from typing import Any, cast
+from typing import Any, Final, cast
 
 import sqlalchemy as sa
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
-from service.db.rows import ScenarioOwnerRow, ScenarioRow
+from service.db.rows import ScenarioOwnerRow, ScenarioPartRow, ScenarioRow
+
+_KINDS: Final = {"satellite_ids": "satellite", "ground_station_ids": "station"}
 
 
 def seen_by(owner: str | None) -> sa.ColumnElement[bool]:
@@ -46,3 +52,27 @@ def disown(session: Session, scenario_id: str) -> bool:
     """Let everybody see a scenario; return whether only some did."""
     owners = sa.delete(ScenarioOwnerRow).where(ScenarioOwnerRow.scenario_id == scenario_id)
     return cast("sa.CursorResult[Any]", session.execute(owners)).rowcount > 0
+
+
+def note_parts(session: Session, scenario_id: str, summary: Mapping[str, Any]) -> None:
+    """Store which satellites and ground stations a scenario has, by its summary."""
+    rows = [
+        {"part_id": part_id, "scenario_id": scenario_id, "kind": kind}
+        for name, kind in _KINDS.items()
+        for part_id in summary[name]
+    ]
+    session.execute(sa.insert(ScenarioPartRow), rows)
+
+
+def with_parts(
+    scenario_id: sa.SQLColumnExpression[str], satellite_id: str | None, station_id: str | None
+) -> Iterator[sa.ColumnElement[bool]]:
+    """Yield the conditions that a scenario has a satellite and a station; None asks nothing."""
+    for kind, part_id in (("satellite", satellite_id), ("station", station_id)):
+        if part_id is not None:
+            part = sa.select(ScenarioPartRow.part_id).where(
+                ScenarioPartRow.part_id == part_id,
+                ScenarioPartRow.kind == kind,
+                ScenarioPartRow.scenario_id == scenario_id,
+            )
+            yield part.exists()

@@ -1,7 +1,7 @@
 // @ts-check
 /** The list of jobs, live. */
 
-import { FINAL, get, pause, post } from "./api.js";
+import { FINAL, get, list, pause, post } from "./api.js";
 import { bar, byId, fill, h } from "./dom.js";
 import { duration, gapOf, number, percent, secondsBetween, short, utc } from "./format.js";
 import { showError, startPage } from "./page.js";
@@ -12,6 +12,7 @@ import { stateBadge } from "./state.js";
 /** @typedef {import("./types.js").ComparisonOut} ComparisonOut */
 
 const PAGE = 50;
+const MOST_OFFERED = 2000;
 const WHILE_ACTIVE_MS = 1000;
 const WHILE_QUIET_MS = 5000;
 
@@ -22,6 +23,7 @@ let numWanted = PAGE;
 startPage(async () => {
   const solvers = await get("/v1/solvers");
   for (const solver of solvers.items) byId("filter-solver").append(h("option", {}, solver.name));
+  await Promise.all([offer("satellite_id", "/v1/satellites"), offer("station_id", "/v1/ground-stations")]);
   byId("filters").addEventListener("change", refresh);
   byId("more-jobs").addEventListener("click", () => {
     numWanted += PAGE;
@@ -37,10 +39,21 @@ startPage(async () => {
   }
 });
 
+/**
+ * Offer what is stored, by name.
+ * @param {string} name of the filter
+ * @param {string} path
+ */
+async function offer(name, path) {
+  const { items } = await list(path, MOST_OFFERED);
+  items.sort((/** @type {{name: string}} */ a, b) => a.name.localeCompare(b.name));
+  byId(`filter-${name}`).append(...items.map((one) => h("option", { value: one.id }, one.name)));
+}
+
 /** @returns {Promise<boolean>} whether a job is under way */
 async function refresh() {
   const query = new URLSearchParams({ limit: String(Math.min(numWanted, 500)) });
-  for (const name of ["state", "solver"]) {
+  for (const name of ["state", "solver", "satellite_id", "station_id"]) {
     const { value } = /** @type {HTMLSelectElement} */ (byId(`filter-${name}`));
     if (value) query.set(name, value);
   }
