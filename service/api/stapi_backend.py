@@ -60,8 +60,12 @@ def find_product(call: Call, product_id: str) -> Found:
     with call.database.reading() as session:
         found = _product(session, product_id) if product_id in types_flown(session) else None
     if found is None:
-        raise ServiceError("not_found", f"There is no product {product_id!r}.")
+        raise _no_product(product_id)
     return found
+
+
+def _no_product(product_id: str) -> ServiceError:
+    return ServiceError("not_found", f"There is no product {product_id!r}.")
 
 
 def _product(session: Session, type_id: str) -> Found | None:
@@ -86,6 +90,8 @@ def search(call: Call, product: Found, asked: SearchIn) -> tuple[list[Opportunit
     target = FileTarget.model_validate(_target(asked, new_id(), product).model_dump())
     with call.database.reading() as session:
         fleet = fleet_of(session, product.shown.id)
+    if not fleet:  # the last satellite went a moment ago
+        raise _no_product(product.shown.id)
     described = views_of(fleet, target, start, end, call.settings.scenario_limits)
     first = int(asked.next or 0)
     number = len(described.computed.opportunities)

@@ -82,6 +82,8 @@ def test_what_reads_whole_timelines_or_catalogues_is_passed_on(program: StartPro
         ("GET", "/v1/plans/none/changes", None, 404),
         ("GET", "/v1/plans/none/passes", None, 404),
         ("POST", "/v1/plans", {"job_id": "none"}, 422),
+        ("GET", "/stapi/orders", None, 200),
+        ("POST", "/stapi/products/none/opportunities", {}, 404),
     ]
     with program() as run:
         key, url = run.door.key("submit"), run.door.client.base_url

@@ -13,6 +13,7 @@ import pytest
 
 from tests.fuzz.nasty import JSON, NASTIES
 from tests.fuzz.odd_values import ODD_FILES
+from tests.service.factories import post, satellite
 from tests.service.problems import assert_problem
 from tests.service.serving import serving
 
@@ -53,6 +54,24 @@ def test_a_nasty_body_is_refused(client: httpx.Client, path: str) -> None:
     for data in bodies:
         answer = send(client, path, data, JSON)
         assert_problem(answer, 422, answer.json()["code"])
+
+
+@pytest.mark.parametrize("call", ["opportunities", "orders"])
+@pytest.mark.parametrize("size", [10_000, SIZE])
+def test_a_nasty_body_never_reaches_the_library_of_stapi(
+    client: httpx.Client, call: str, size: int
+) -> None:
+    post(client, "/v1/satellites", satellite())
+    bodies = [data for _, kinds, data in ODD_FILES if JSON in kinds]
+    bodies += [file.make(size) for file in NASTIES if JSON in file.kinds]
+    known = b'{"datetime":"2026-11-23T00:00:00Z/2026-11-24T00:00:00Z","geometry":%s,"filter":%s}'
+    point, deep = b'{"type":"Point","coordinates":[8,47]}', b'{"op":"not","args":[' * 400
+    bodies += [known % (b"{}", b"{}"), known % (point, deep + b"1" + b"]}" * 400)]
+    with httpx.Client(base_url=client.base_url, timeout=60) as plain:
+        for data in bodies:
+            answer = send(plain, f"/stapi/products/paper/{call}", data, JSON)
+            assert_problem(answer, answer.status_code, answer.json()["code"])
+            assert answer.status_code in (400, 413, 422), (answer.status_code, data[:200])
 
 
 @pytest.mark.parametrize("path", [*IMPORTS, *SHAPED])

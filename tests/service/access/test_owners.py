@@ -156,6 +156,8 @@ def test_orders_belong_to_an_owner_and_are_recorded(door: Door) -> None:
     calls = "/stapi/products/paper/orders"
     reader = door.client.post(calls, json=body, headers=door.key("read", "ops"))
     assert_problem(reader, 403, "insufficient_scope")
+    for path in ("/stapi/", "/stapi/products", "/stapi/orders"):
+        assert_problem(door.client.get(path), 401, "authentication_required")
     placed = [door.client.post(calls, json=body, headers=key) for key in (ops, ops, stranger)]
     assert [answer.status_code for answer in placed] == [201, 201, 201]
     first, second, foreign = (answer.json() for answer in placed)
