@@ -13,7 +13,7 @@ from selenium.webdriver import ActionChains
 
 from tests.service.dashboard.browser.conftest import LAPTOP, Browser
 from tests.service.dashboard.browser.missions import Json, planned, small_mission
-from tests.service.factories import post
+from tests.service.factories import post, satellite
 
 WALL = (2560, 1440)
 
@@ -121,6 +121,27 @@ def gap_around(collects: list[Json], action: Json) -> float:
     at = datetime.fromisoformat(action["start"])
     others = [datetime.fromisoformat(a["start"]) for a in collects if a is not action]
     return min(abs((at - other).total_seconds()) for other in others)
+
+
+def test_the_list_is_narrowed_to_a_satellite(
+    browser: Browser, api: httpx.Client, job: Json
+) -> None:
+    own = api.get(f"/v1/scenarios/{job['scenario']['id']}").json()["satellite_ids"][0]
+    idle = post(api, "/v1/satellites", satellite(name="without a job"))["id"]
+    choose = """
+      const field = document.querySelector("#filter-satellite_id");
+      field.value = arguments[0];
+      field.dispatchEvent(new Event("change", {bubbles: true}));
+      return field.value === arguments[0];
+    """
+    browser.open("/")
+    row = f"tr[data-job='{job['id']}']"
+    browser.wait(lambda: browser.text(row), "the job is not listed")
+    browser.wait(lambda: browser.run(choose, idle), "the satellite is not offered")
+    browser.wait(lambda: browser.find("#jobs-empty").is_displayed(), "not narrowed")
+    assert browser.run(choose, own)
+    browser.wait(lambda: browser.text(row), "its job is not listed")
+    assert not browser.find("#jobs-empty").is_displayed()
 
 
 def test_a_left_out_target_tells_its_reason_and_what_blocks_it(
