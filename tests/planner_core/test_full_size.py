@@ -8,9 +8,13 @@ from dataclasses import replace
 import pytest
 
 from benchmarks.missions import paper_scenario, problem_of
+from benchmarks.objective import document
 from benchmarks.paper.settings import MCTS_TUNED, PAPER_FORWARD, PAPER_MCTS, make_solver
 from planner_core.budget import Budget, Termination
+from planner_core.certified.drivers.resource_steps import ResourceSearch
+from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.proofs import documents as proofs
+from planner_core.certified.proofs.resource_bound import quick_bound
 from planner_core.domain import Dynamics, GroundStation
 from planner_core.problem import ACCESS_FOUND, Problem
 from planner_core.referee.replay import Timeline, replay
@@ -23,6 +27,7 @@ from planner_core.solvers.registry import (
     Milp,
     Rule,
 )
+from service.scenarios.translate import scenario_from_content
 from tests.planner_core.budgets import bounds_told, expiring
 
 pytestmark = pytest.mark.full_size
@@ -129,3 +134,15 @@ def test_where_all_targets_fit_in_that_is_proven() -> None:
     assert solution.termination is Termination.OPTIMAL
     reward = replay(problem, solution.plan).reward
     assert solution.bound == reward == (problem.target_access == ACCESS_FOUND).sum()
+
+
+def test_shares_begin_with_the_plan_for_images_where_agility_alone_decides() -> None:
+    """Most of the worth is that of the images, whatever is said of when they come down."""
+    images, shares = (
+        problem_of(scenario_from_content(document(1, share, None))) for share in (1.0, 0.5)
+    )
+    plan = Certified().solve(images, Budget(), 0).plan
+    best = Incumbent(shares, Budget(), 0.01)
+    best.lower(quick_bound(shares, best.reward))
+    ResourceSearch(best, 0).choose(best.bound.value / 2000)
+    assert best.reward >= 0.98 * replay(shares, plan).reward

@@ -37,6 +37,7 @@ _ROOM: Final = 0.5  # of a target: with less the search for a better plan takes 
 _TIGHT: Final = 0.05  # of a target: prices that near to a relaxation are the best
 _MOST_ROWS: Final = 3000  # of a relaxation
 _LARGE: Final = 3000  # opportunities
+_HARDLY: Final = 0.02  # of a bound
 _ROUNDS_AT_A_TIME: Final = 100  # of the search for prices by energy alone
 _WORTH_A_STEP: Final = 0.005  # of a bound by the battery alone
 
@@ -74,10 +75,20 @@ class ResourceSearch:
         choices.start(self.mask([]), _FIRST_GOAL)
         self.best.offer(choices.plan)
         self.best.report("plans")
-        if self.best.bound.proof == "lagrangian" and not self.best.is_done:
+        if self._is_bound_by_agility() and not self.best.is_done:
             preferred = self.without_resources()
             choices.start(preferred, 1.0)
             self.best.offer(choices.plan)
+
+    def _is_bound_by_agility(self) -> bool:
+        """Return whether battery and recorder hardly bound the plans more than agility alone."""
+        if self.best.bound.proof == "lagrangian":
+            return True
+        if not self.problem.counts_delivery or self.problem.objective.is_delivered:
+            return False
+        # What stays on board lowers the other bound by a little, and says nothing of the images.
+        alone = lagrangian_bound(self.problem, self.best.reward)
+        return alone.value <= (1.0 + _HARDLY) * self.best.bound.value
 
     def turns(self, unit: float) -> TurnSearch:
         """Return a search for plans that begins at the best, or where a commitment leads."""
