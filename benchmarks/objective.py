@@ -90,8 +90,8 @@ def _figures(num_satellites: int, share: float, half_life_h: float | None, cpu_s
     )  # fmt: skip
 
 
-def _asked() -> Iterator[tuple[str, float, float | None]]:
-    for mission, share, half_life_h in itertools.product(_MISSIONS, _SHARES, _HALF_LIVES_H):
+def _asked(missions: list[str]) -> Iterator[tuple[str, float, float | None]]:
+    for mission, share, half_life_h in itertools.product(missions, _SHARES, _HALF_LIVES_H):
         # Where all is earned by the image, nothing is left to decay.
         if share < 1.0 or half_life_h is None:
             yield mission, share, half_life_h
@@ -104,13 +104,13 @@ def _rows(table: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-def _plan_all(table: Path, cpu_s: float) -> None:
+def _plan_all(table: Path, missions: list[str], cpu_s: float) -> None:
     known = {(row["mission"], row["collected_share"], row["half_life_h"]) for row in _rows(table)}
     with table.open("a", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         if not known:
             writer.writerow(_COLUMNS)
-        for mission, share, half_life_h in _asked():
+        for mission, share, half_life_h in _asked(missions):
             key = mission, f"{share:g}", "" if half_life_h is None else f"{half_life_h:g}"
             if key not in known:
                 figures = _figures(_MISSIONS[mission], share, half_life_h, cpu_s)
@@ -119,10 +119,11 @@ def _plan_all(table: Path, cpu_s: float) -> None:
 
 
 def _draw(rows: list[dict[str, str]], picture: Path) -> None:
-    figure = Figure(figsize=(9, 6.4), layout="constrained")
-    grid = figure.subplots(2, len(_MISSIONS), sharex=True)
+    missions = list(dict.fromkeys(row["mission"] for row in rows))
+    figure = Figure(figsize=(1 + 4 * len(missions), 6.4), layout="constrained")
+    grid = figure.subplots(2, len(missions), sharex=True, squeeze=False)
     colours = dict(zip(_HALF_LIVES_H, ("#1b1b1b", "#0b6fb8", "#c26a00", "#b3261e"), strict=True))
-    for column, mission in enumerate(_MISSIONS):
+    for column, mission in enumerate(missions):
         counts, ages = grid[0][column], grid[1][column]
         counts.set_title(mission)
         for half_life_h, colour in colours.items():
@@ -132,6 +133,7 @@ def _draw(rows: list[dict[str, str]], picture: Path) -> None:
                 if row["mission"] == mission
                 and (row["half_life_h"] == name or row["collected_share"] == "1")
             ]  # fmt: skip
+            own.sort(key=lambda row: float(row["collected_share"]))
             shares = [float(row["collected_share"]) for row in own]
             label = "no decay" if half_life_h is None else f"half-life {name} h"
             counts.plot(
@@ -157,9 +159,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("table", type=Path)
     parser.add_argument("picture", type=Path)
+    parser.add_argument("--mission", choices=_MISSIONS, action="append", help="(all)")
     parser.add_argument("--cpu-s", type=float, default=8.0, help="CPU, of each search")
     arguments = parser.parse_args()
-    _plan_all(arguments.table, arguments.cpu_s)
+    _plan_all(arguments.table, arguments.mission or list(_MISSIONS), arguments.cpu_s)
     _draw(_rows(arguments.table), arguments.picture)
 
 
