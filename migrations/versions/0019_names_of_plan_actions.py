@@ -16,7 +16,7 @@ def upgrade() -> None:
     satellite = _table("plan_satellite", "plan_id", "satellite_id", "satellite_name")
     station = _table("ground_station", "id", "name")
     for name in _NAMES:
-        op.add_column("plan_action", sa.Column(name, sa.String(), nullable=True))
+        op.add_column("plan_action", sa.Column(name, sa.Text(), nullable=True))
     of_satellite = sa.select(satellite.c.satellite_name).where(
         satellite.c.plan_id == action.c.plan_id,
         satellite.c.satellite_id == action.c.satellite_id,

@@ -17,7 +17,7 @@ _AT_A_TIME = 200
 def upgrade() -> None:
     part = op.create_table(
         "scenario_part",
-        sa.Column("part_id", sa.String(), nullable=False),
+        sa.Column("part_id", sa.Text(), nullable=False),
         sa.Column("scenario_id", sa.String(length=36), nullable=False),
         sa.Column("kind", sa.String(length=16), nullable=False),
         sa.ForeignKeyConstraint(["scenario_id"], ["scenario.id"]),

@@ -61,7 +61,8 @@ def note_parts(session: Session, scenario_id: str, summary: Mapping[str, Any]) -
         for name, kind in _KINDS.items()
         for part_id in summary[name]
     ]
-    session.execute(sa.insert(ScenarioPartRow), rows)
+    if rows:
+        session.execute(sa.insert(ScenarioPartRow), rows)
 
 
 def with_parts(

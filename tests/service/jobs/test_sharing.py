@@ -11,7 +11,8 @@ from tests.service.jobs.conftest import Jobs
 
 
 def test_the_same_scenario_stored_twice_at_once_is_one(jobs: Jobs) -> None:
-    frozen = FrozenScenario(content="{}", sha256="1" * 64, name=None, summary={})
+    summary: dict[str, list[str]] = {"satellite_ids": [], "ground_station_ids": []}
+    frozen = FrozenScenario(content="{}", sha256="1" * 64, name=None, summary=summary)
     found: list[tuple[str, bool]] = []
 
     def store() -> None:
