@@ -57,7 +57,7 @@ class Scenarios:
         satellite_id: str | None = None,
         station_id: str | None = None,
     ) -> Iterator[ScenarioSummary]:
-        """Yield the scenarios, newest first, without their pins; of some name, for a part of it."""
+        """Yield the scenarios, newest first, without their pins; ``name`` may be a part of one."""
         params = {"name": name, "satellite_id": satellite_id, "station_id": station_id}
         return self._transport.pages(path_of("scenarios"), ScenarioSummary, params)
 

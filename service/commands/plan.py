@@ -43,12 +43,7 @@ def plan(
     detach
         Whether to print the job's id and leave it to itself.
 
-    Raises
-    ------
-    ClientError
-        Where the service refuses, fails or does not answer.
-    OSError
-        Where the timeline cannot be written.
+    Raises what ``follow_to_plan`` raises.
     """
     key = secrets.token_hex(16)
 

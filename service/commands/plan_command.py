@@ -33,7 +33,7 @@ class Refused(Exception):
 
 
 def run_plan(options: argparse.Namespace) -> int:
-    """Run the command and return its exit status.
+    """Run ``slewline plan`` and return its exit status.
 
     Raises
     ------
@@ -61,15 +61,7 @@ def run_plan(options: argparse.Namespace) -> int:
 
 
 def run_replan(options: argparse.Namespace) -> int:
-    """Run the command and return its exit status.
-
-    Raises
-    ------
-    Refused
-        Where the input is wrong.
-    ClientError
-        Where the service does not do what was asked.
-    """
+    """Run ``slewline replan``; returns and raises what ``run_plan`` does."""
     with _placed(options.happened):
         _check_out(options)
         happened = {} if options.happened is None else read_object(options.happened)

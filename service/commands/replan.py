@@ -38,16 +38,7 @@ def replan(
     detach
         Whether to print the job's id and leave it to itself.
 
-    Returns
-    -------
-    0 where the new plan is valid, else 1.
-
-    Raises
-    ------
-    ClientError
-        Where the service refuses, fails or does not answer.
-    OSError
-        Where the timeline cannot be written.
+    Returns and raises what ``follow_to_plan`` does.
     """
     key = secrets.token_hex(16)
 

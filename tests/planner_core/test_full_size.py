@@ -136,10 +136,11 @@ def test_where_all_targets_fit_in_that_is_proven() -> None:
     assert solution.bound == reward == (problem.target_access == ACCESS_FOUND).sum()
 
 
-def test_shares_begin_with_the_plan_for_images_where_agility_alone_decides() -> None:
+@pytest.mark.parametrize("share", [0.5, 0.1])
+def test_shares_begin_with_the_plan_for_images_where_agility_alone_decides(share: float) -> None:
     """Most of the worth is that of the images, whatever is said of when they come down."""
     images, shares = (
-        problem_of(scenario_from_content(document(1, share, None))) for share in (1.0, 0.5)
+        problem_of(scenario_from_content(document(1, own, None))) for own in (1.0, share)
     )
     plan = Certified().solve(images, Budget(), 0).plan
     best = Incumbent(shares, Budget(), 0.01)

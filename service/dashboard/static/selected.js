@@ -48,8 +48,8 @@ export function watchSelection(plan, selection, job, gantt) {
         })
         .catch(showError);
     }
-    if (known) offer(plan, job, known, tries, () => mine === asked).catch(showError);
     if (known) {
+      offer(plan, job, known, tries, () => mine === asked).catch(showError);
       opportunitiesOf(job.scenario.id, { target_id: known.id })
         .then(({ items }) => {
           if (mine !== asked) return;
