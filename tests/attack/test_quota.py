@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import httpx
+
 from service.answers.blocks import Block
 from service.jobs import lease
 from service.jobs.lease import Outcome
 from service.stores import usage_store
 from tests.attack.conftest import Door, MakeDoor
-from tests.service.factories import target
+from tests.service.factories import satellite, target
 from tests.service.problems import assert_problem
 
 
@@ -30,6 +32,28 @@ def test_rows_of_files_are_counted_for_their_owner(make_door: MakeDoor) -> None:
         assert used(door, "greedy")[0] == 3  # what was refused is not stored
         assert len(door.client.get("/v1/target-catalogs", headers=greedy).json()["items"]) == 1
         assert send(other) == 201
+
+
+def test_orders_are_counted_for_their_owner(make_door: MakeDoor) -> None:
+    with make_door(require_keys=True, max_rows_per_tenant=2) as door:
+        greedy, other = door.key("submit", "greedy"), door.key("submit", "other")
+        made = door.client.post("/v1/satellites", json=satellite(), headers=other)
+        assert made.status_code == 201
+        order = {
+            "datetime": "2026-03-01T00:00:00Z/2026-03-02T00:00:00Z",
+            "geometry": {"type": "Point", "coordinates": [8.0, 47.0]},
+            "order_parameters": {},
+        }
+
+        def send(key: dict[str, str]) -> httpx.Response:
+            return door.client.post("/stapi/products/paper/orders", json=order, headers=key)
+
+        assert [send(greedy).status_code for _ in range(2)] == [201, 201]
+        assert_problem(send(greedy), 403, "quota_exceeded")
+        assert used(door, "greedy")[0] == 2
+        orders = door.client.get("/stapi/orders", headers=greedy).json()["features"]
+        assert len(orders) == 2
+        assert send(other).status_code == 201
 
 
 def test_what_jobs_find_is_counted_and_who_is_full_sends_no_more(make_door: MakeDoor) -> None:

@@ -10,7 +10,7 @@ from service.api.sites import Sites
 from service.problems.kinds import ServiceError
 from service.settings import Settings
 from tests.attack.conftest import Door, MakeDoor
-from tests.service.factories import tle
+from tests.service.factories import satellite, tle
 from tests.service.problems import assert_problem
 
 EVIL = "https://evil.example"
@@ -36,6 +36,16 @@ def test_a_page_of_a_foreign_origin_imports_nothing(make_door: MakeDoor, origin:
         assert_problem(import_by_form(door, Origin=origin, **key), 403, "foreign_origin")
         own = str(door.client.base_url).rstrip("/")
         assert import_by_form(door, Origin=own).status_code == 200
+
+
+def test_a_page_of_a_foreign_origin_orders_nothing(make_door: MakeDoor) -> None:
+    with make_door() as door:
+        assert door.client.post("/v1/satellites", json=satellite()).status_code == 201
+        path = "/stapi/products/paper/orders"
+        answer = door.client.post(path, json={}, headers={"Origin": EVIL})
+        assert_problem(answer, 403, "foreign_origin")
+        # A body that says nothing is all that is wrong with it otherwise.
+        assert door.client.post(path, json={}).status_code == 422
 
 
 @pytest.mark.parametrize(
