@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from planner_core.budget import Budget
-from planner_core.certified.drivers.commitments import worth_with
+from planner_core.certified.drivers.latency import worth_with
 from planner_core.certified.lns.resource_search import ResourceWindows
 from planner_core.domain import Preference
 from planner_core.preferences.aims import View, figure_of, liking_of, value_of

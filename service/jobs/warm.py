@@ -26,10 +26,12 @@ from planner_core.budget import Budget
 from planner_core.build import build_problem, compute_opportunities
 from planner_core.certified.lns.alternating import TurnSearch
 from planner_core.certified.multipliers.energy import EnergyPaths, ascent_on_energy
+from planner_core.certified.multipliers.latency import LatencyAscent
 from planner_core.domain import (
     Agility,
     GroundStation,
     Horizon,
+    Objective,
     OrbitElements,
     Resources,
     Satellite,
@@ -43,6 +45,7 @@ from planner_core.pins import BlockedInterval, PinnedAction, Pins
 from planner_core.precedence.arcs import arc_network_of
 from planner_core.precedence.relation import excluded_by
 from planner_core.problem import Problem
+from planner_core.problem.delivery import with_objective
 from planner_core.run import plan_scenario
 from planner_core.solvers.base import Solver
 from planner_core.solvers.registry import (
@@ -220,6 +223,8 @@ def _shortage() -> None:
     TurnSearch(problem, plan, problem.typical_worth, Budget(), 0).turn(1)
     paths, nothing = EnergyPaths(problem), np.zeros(len(problem.target_ids))
     ascent_on_energy(problem, paths, nothing, 1, 0).improve(1, Budget().stop)
+    late = with_objective(problem, Objective(collected_share=0.0, half_life_s=3600.0))
+    LatencyAscent(late, nothing).improve(1, 0.0, Budget().stop)
     Mcts(worthless="sunpoint").solve(problem, Budget(), 0)
 
 

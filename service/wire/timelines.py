@@ -396,6 +396,13 @@ class ProofOut(Wire):
     prices: tuple[float, ...] | None = Field(
         None, description="A multiplier for each target, in the order of the scenario."
     )
+    contact_prices: tuple[float, ...] | None = Field(
+        None,
+        description=(
+            "With a half-life: a multiplier for what each contact takes down, by recorder "
+            "capacity, in the order of the opportunities."
+        ),
+    )
     elementary: bool | None = Field(
         None, description="Whether the prices are for paths that take a target once in each pass."
     )

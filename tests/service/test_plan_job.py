@@ -17,6 +17,7 @@ from planner_core.certified.proofs.bound import Bound
 from planner_core.solvers.registry import SOLVERS
 from service.jobs.plan_job import Parcel, PlanAnswer, PlanRequest, run_plan_job
 from service.scenarios.translate import canonical, scenario_from_content, sha256_of
+from service.wire.timelines import ProofOut
 from tests import independent
 from tests.missions import Document, drawn_targets, paper_mission
 
@@ -202,6 +203,24 @@ def test_the_stored_proof_proves_the_bound(
     problem = build_problem(read, compute_opportunities(read, Budget()), Budget())
     assert proofs.is_proven(problem, bound)
     assert not proofs.is_proven(problem, replace(bound, value=bound.value - 1.0))
+
+
+@pytest.mark.parametrize("continuous_starts", [False, True])
+def test_the_proof_with_a_half_life_has_prices_of_contacts(continuous_starts: bool) -> None:
+    scenario = paper_mission(
+        drawn_targets(120),
+        objective={"collected_share": 0.0, "half_life_s": 10_800},
+        continuous_starts=continuous_starts,
+    )
+    answer = run(scenario, "certified")
+    assert answer.proof is not None
+    document = ProofOut.model_validate_json(answer.proof)
+    assert (document.contact_prices is None) == continuous_starts
+    bound = proofs.from_json(answer.proof)
+    read = scenario_from_content(json.loads(canonical(scenario)))
+    problem = build_problem(read, compute_opportunities(read, Budget()), Budget())
+    assert proofs.is_proven(problem, bound)
+    assert not proofs.is_proven(problem, replace(bound, value=0.99 * bound.value))
 
 
 def test_a_known_bound_is_used_again_and_only_a_better_one_replaces_it() -> None:

@@ -118,11 +118,11 @@ def most_by_energy(
     idle[: max(0, levels.start - base + 1)] = 0.0
     merged, best, last = 0, 0.0, -1
     for k in range(m):
-        _sink(idle, base - levels.lowest[k])
+        sink(idle, base - levels.lowest[k])
         base = levels.lowest[k]
         while merged < m and network.idle_from[network.by_idle[merged]] <= k:
             i = network.by_idle[merged]
-            _raise_to(idle, own[i, : num_own[i]], levels.lowest[i] - base)
+            raise_to(idle, own[i, : num_own[i]], levels.lowest[i] - base)
             merged += 1
         num_own[k] = 0
         low = max(0, levels.floor[k] - base)
@@ -131,11 +131,11 @@ def most_by_energy(
             continue
         values = own[k, :high]
         values[:] = -np.inf
-        _raise_to(values[low:], idle, -low - levels.cost[k])
+        raise_to(values[low:], idle, -low - levels.cost[k])
         for at in range(network.straight_first[k], network.straight_first[k + 1]):
             i = network.straight_rows[at]
             up = levels.lowest[i] + levels.give[at] - base - levels.cost[k]
-            _raise_to(values[low:], own[i, : num_own[i]], up - low)
+            raise_to(values[low:], own[i, : num_own[i]], up - low)
         values[:low] = values[low]
         while high > 0 and values[high - 1] == -np.inf:
             high -= 1
@@ -147,7 +147,7 @@ def most_by_energy(
 
 
 @inlined
-def _sink(idle: Floats, levels: int) -> None:
+def sink(idle: Floats, levels: int) -> None:
     """Let the lowest level be so much lower: whoever has more energy has that much as well."""
     if levels > 0:
         width = len(idle)
@@ -159,7 +159,7 @@ def _sink(idle: Floats, levels: int) -> None:
 
 
 @inlined
-def _raise_to(values: Floats, others: Floats, up: int) -> None:
+def raise_to(values: Floats, others: Floats, up: int) -> None:
     """Raise values to those of a table that begins ``up`` levels higher, or lower."""
     if len(others) == 0:
         return
@@ -188,7 +188,7 @@ def _path_to(
         energy += levels.cost[k]
         before = k - 1
         while before >= 0:
-            give = _given_between(network, levels, before, k)
+            give = given_between(network, levels, before, k)
             x = max(0, energy - max(give, 0) - levels.lowest[before])
             if give >= 0 and x < num_own[before] and own[before, x] + weight[k] == gained:
                 energy -= give
@@ -199,7 +199,7 @@ def _path_to(
 
 
 @inlined
-def _given_between(network: Network, levels: EnergyLevels, i: int, k: int) -> int:
+def given_between(network: Network, levels: EnergyLevels, i: int, k: int) -> int:
     """Return the levels that the way from row ``i`` to ``k`` gives back; -1 where there is none."""
     if k >= network.idle_from[i]:
         return 0

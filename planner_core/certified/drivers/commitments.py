@@ -17,16 +17,13 @@ import numpy as np
 
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.choices import ChoiceSearch
-from planner_core.problem import COLLECT, CONTACT, Bools, Floats, Kept, Problem, SatelliteProblem
+from planner_core.problem import COLLECT, Bools, Problem, SatelliteProblem
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
-from planner_core.worth import share_earned
 
 _IMAGES: Final = (40, 20, 10, 5, 2, 0)  # typical ones, of each satellite
 _IMAGES_OF_FLEETS: Final = (20, 5, 0)
 _PATIENCE: Final = 2  # commitments that lead to nothing better
-_HALF_LIVES: Final = (0.25, 0.5, 1.0, 2.0)  # between contacts
-_LEAST_SHARE: Final = 0.4  # of the longest contact: shorter ones bring little down
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -69,81 +66,10 @@ def best_commitment(best: Incumbent, unit: float, first_goal: float, seed: int) 
 def _commitments(problem: Problem) -> Iterator[Problem]:
     """Yield the problem under one commitment after another."""
     yield problem
-    half_life_s = problem.objective.half_life_s
-    if half_life_s is None:
-        fill = _typical_fill(problem)
-        is_fleet = sum(len(satellite) > 0 for satellite in problem.satellites) > 1
-        for num_images in _IMAGES_OF_FLEETS if is_fleet else _IMAGES:
-            yield replace(problem, left_on_board=num_images * fill)
-        return
-    yield replace(problem, left_on_board=0.0)
-    for share in _HALF_LIVES:
-        yield with_contacts(problem, share * half_life_s)
-
-
-def with_contacts(problem: Problem, spacing_s: float) -> Problem:
-    """Return the problem with contacts that must be taken, each satellite's so far apart.
-
-    An image is worth there what it earns that comes down right at the start of the next of them.
-    """
-    chosen = _spaced_contacts(problem, spacing_s)
-    already = {kept.row for kept in problem.pinned.kept}
-    new = tuple(Kept(row=row, pointer="") for row in chosen if row not in already)
-    return replace(
-        problem,
-        worth=worth_with(problem, chosen),
-        pinned=replace(problem.pinned, kept=(*problem.pinned.kept, *new)),
-        left_on_board=0.0,
-    )
-
-
-def _spaced_contacts(problem: Problem, spacing_s: float) -> list[int]:
-    """Return the contact that takes down most in each span, where stations serve them all."""
-    table, chosen = problem.opportunities, list[int]()
-    for satellite in problem.satellites:
-        contacts = np.flatnonzero(satellite.kind == CONTACT)
-        volume = satellite.volume[contacts]
-        contacts = contacts[volume >= _LEAST_SHARE * volume.max(initial=0.0)]
-        free_s = 0.0
-        while True:
-            start_s = satellite.start_s[contacts]
-            first_s = start_s[start_s >= free_s].min(initial=np.inf)
-            within = contacts[(start_s >= free_s) & (start_s < first_s + spacing_s)]
-            rows = [int(r) for r in satellite.rows[within] if _is_served(problem, chosen, int(r))]
-            if not np.isfinite(first_s):
-                break
-            free_s = first_s + spacing_s
-            if rows:
-                own = max(rows, key=lambda row: float(satellite.volume[problem.local_row[row]]))
-                chosen.append(own)
-                free_s = max(free_s, float(table.end_s[own]))
-    return chosen
-
-
-def _is_served(problem: Problem, chosen: list[int], row: int) -> bool:
-    """Return whether the station has an antenna left for a contact beside those chosen."""
-    table = problem.opportunities
-    beside = [
-        other
-        for other in chosen
-        if table.place[other] == table.place[row]
-        and table.start_s[other] < table.end_s[row]
-        and table.end_s[other] > table.start_s[row]
-    ]
-    return len(beside) < int(problem.station_antennas[table.place[row]])
-
-
-def worth_with(problem: Problem, contacts: list[int]) -> Floats:
-    """Return what each image earns that comes down at the start of the next of these contacts."""
-    table = problem.opportunities
-    age_s = np.full(len(table), np.inf)
-    for index, satellite in enumerate(problem.satellites):
-        starts = sorted(float(table.start_s[r]) for r in contacts if table.satellite[r] == index)
-        starts_s = np.array([*starts, np.inf])
-        own = satellite.rows[satellite.kind == COLLECT]
-        age_s[own] = starts_s[np.searchsorted(starts_s[:-1], table.end_s[own])] - table.end_s[own]
-    worth: Floats = problem.worth_on_ground * share_earned(problem.objective, age_s)
-    return np.minimum(worth, problem.worth)
+    fill = _typical_fill(problem)
+    is_fleet = sum(len(satellite) > 0 for satellite in problem.satellites) > 1
+    for num_images in _IMAGES_OF_FLEETS if is_fleet else _IMAGES:
+        yield replace(problem, left_on_board=num_images * fill)
 
 
 def _typical_fill(problem: Problem) -> float:

@@ -14,10 +14,12 @@ from typing import Final
 import numpy as np
 
 from planner_core.budget import Budget
+from planner_core.certified.drivers.latency import close_in_on_the_ground
 from planner_core.certified.drivers.resource_fleet import close_in_fleet
 from planner_core.certified.drivers.resource_steps import ResourceSearch
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.alternating import TurnSearch
+from planner_core.certified.proofs.lagrangian import lagrangian_bound
 from planner_core.certified.proofs.resource_bound import quick_bound
 from planner_core.problem import Problem
 from planner_core.solvers.base import Solution
@@ -39,10 +41,17 @@ def solve_with_resources(problem: Problem, budget: Budget, seed: int, gap: float
     search.best.offer(Rule().solve(problem, Budget(), seed).plan)
     if len(problem.opportunities) == 0:
         return search.best.solution()
-    search.best.lower(quick_bound(problem, search.best.reward))
+    has_half_life = problem.counts_delivery and problem.objective.half_life_s is not None
+    first_bound = lagrangian_bound if has_half_life else quick_bound
+    search.best.lower(first_bound(problem, search.best.reward))
     unit = search.best.unit
     if unit == 0.0 or search.best.bound.value / unit > _MAX_UNITS:
         unit = max(search.best.bound.value / _MAX_UNITS, 1e-12)
+    if has_half_life:
+        close_in_on_the_ground(search, unit)
+        if not (search.best.is_done or search.is_large):
+            search.exhaust()
+        return search.best.solution()
     if search.is_shared and not search.best.is_done:
         close_in_fleet(search, unit)
     if search.is_fleet:

@@ -27,6 +27,9 @@ class Bound:
         Shape ``(num_targets,)``.
     is_elementary
         Whether it is ``elementary_value`` that checks the prices.
+    contact_prices
+        What proves a bound with a half-life, with ``prices`` (``latency.latency_value``), one for
+        each contact. Shape ``(num_contacts,)``.
     unit
         In what the dynamic programmes count worth.
     certificate
@@ -38,6 +41,7 @@ class Bound:
     value: float
     proof: Proof
     prices: Floats | None = None
+    contact_prices: Floats | None = None
     is_elementary: bool = False
     unit: float | None = None
     certificate: Certificate | None = None

@@ -23,9 +23,10 @@ from planner_core.certified.proofs.certificate import (
 )
 from planner_core.certified.proofs.continuous import continuous_value
 from planner_core.certified.proofs.lagrangian import lagrangian_value
+from planner_core.certified.proofs.latency import latency_value
 from planner_core.certified.proofs.resource_bound import resource_value
 from planner_core.certified.proofs.totals import totals_bound
-from planner_core.problem import Problem
+from planner_core.problem import Floats, Problem
 
 VERSION: Final = 1
 _ROUNDING: Final = 1e-8  # relative
@@ -36,6 +37,8 @@ def to_json(bound: Bound) -> str:
     document: dict[str, Any] = {"version": VERSION, "proof": bound.proof, "value": bound.value}
     if bound.prices is not None:
         document["prices"] = bound.prices.tolist()
+    if bound.contact_prices is not None:
+        document["contact_prices"] = bound.contact_prices.tolist()
     if bound.is_elementary:
         document["elementary"] = True
     if bound.unit is not None:
@@ -51,11 +54,16 @@ def to_json(bound: Bound) -> str:
 def from_json(text: str) -> Bound:
     """Return the bound of ``to_json``."""
     document = json.loads(text)
-    prices = document.get("prices")
+
+    def prices(key: str) -> Floats | None:
+        values = document.get(key)
+        return None if values is None else np.array(values, dtype=np.float64)
+
     return Bound(
         value=float(document["value"]),
         proof=cast(Proof, document["proof"]),
-        prices=None if prices is None else np.array(prices, dtype=np.float64),
+        prices=prices("prices"),
+        contact_prices=prices("contact_prices"),
         is_elementary=bool(document.get("elementary", False)),
         unit=document.get("unit"),
         certificate=Certificate(
@@ -88,6 +96,8 @@ def is_proven(problem: Problem, bound: Bound) -> bool | None:
         return None
     if problem.continuous_starts:
         value = continuous_value(problem, bound.prices)
+    elif bound.contact_prices is not None:
+        value = latency_value(problem, bound.prices, bound.contact_prices)
     elif bound.unit is not None:
         value = resource_value(problem, bound.prices, bound.unit)
     elif bound.is_elementary:

@@ -1,0 +1,229 @@
+"""The most that one satellite can gain under its battery where images wait for contacts.
+
+What an image is worth hangs on the contact that takes it down, and that is one after it which the
+plan takes. So there is a layer for each contact, in which that one is the next to be taken, and a
+last one in which none is: a path goes on in a layer until its contact, and from there in any later
+one. Contacts that are too many for layers of their own share them, in groups that follow each
+other: a path may take some contacts of a group.
+
+As in ``energy_labels`` worth is exact, energy in levels, rounded in favour of the satellite, and
+recorders are left out.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from planner_core.bundles import bundle
+from planner_core.certified.dp.energy_labels import (
+    EnergyLevels,
+    given_between,
+    raise_to,
+    sink,
+)
+from planner_core.certified.dp.resource_network import Network
+from planner_core.jit import kernel
+from planner_core.problem import Floats, Ints, Longs
+
+_MOST_LAYERS: Final = 48
+
+PASSED: Final = -np.inf
+"""Weight of a task that no path needs to take."""
+
+
+@bundle
+class Layers(NamedTuple):
+    """Contacts of one satellite in groups, one for each layer but the last.
+
+    Attributes
+    ----------
+    contact
+        Tasks, ascending. Shape ``(num_contacts,)``.
+    first
+        Group ``g`` has the contacts from ``first[g]`` up to ``first[g + 1]``. Shape
+        ``(num_layers,)``.
+    group
+        Of each task that is a contact; -1 for others. Shape ``(m,)``.
+    number
+        Which contact each task is; -1 for others. Shape ``(m,)``.
+    """
+
+    contact: Ints
+    first: Longs
+    group: Ints
+    number: Ints
+
+
+def layers_of(network: Network) -> Layers:
+    """Return as many layers as there are contacts, up to a limit, and one more."""
+    contact = np.flatnonzero(network.is_contact).astype(np.int32)
+    num_groups = min(len(contact), _MOST_LAYERS)
+    first = (np.arange(num_groups + 1) * len(contact)) // max(1, num_groups)
+    group = np.full(len(network.place), -1, dtype=np.int32)
+    number = group.copy()
+    group[contact] = np.repeat(np.arange(num_groups), np.diff(first))
+    number[contact] = np.arange(len(contact))
+    return Layers(contact=contact, first=first.astype(np.int64), group=group, number=number)
+
+
+class _Tables(NamedTuple):
+    """The most gained by a path that ends with a task, by energy, as ``most_by_energy`` has it.
+
+    Attributes
+    ----------
+    own, num_own
+        Of one layer at a time. Shapes ``(m, width)`` and ``(m,)``.
+    at_contact, num_at_contact
+        Of contacts, each in its own layer. Shapes ``(num_contacts, width)`` and
+        ``(num_contacts,)``.
+    """
+
+    own: Floats
+    num_own: Longs
+    at_contact: Floats
+    num_at_contact: Longs
+
+
+@kernel
+def most_by_contacts(
+    network: Network,
+    levels: EnergyLevels,
+    layers: Layers,
+    weight: Floats,
+    own: Floats,
+    num_own: Longs,
+) -> tuple[float, Ints, Ints]:
+    """Return the most that a path gains, the rows of one that does, and the layer of each.
+
+    Parameters
+    ----------
+    weight
+        Worth of each task in each layer, of contacts in that of their own; ``PASSED`` for tasks
+        that no path needs to take. Shape ``(num_layers, m)``.
+    own, num_own
+        Room to work in, of shapes ``(m, width)`` and ``(m,)`` at least.
+    """
+    num_contacts = len(layers.contact)
+    tables = _Tables(
+        own,
+        num_own,
+        np.empty((num_contacts, levels.width)),
+        np.zeros(num_contacts, dtype=np.int64),
+    )
+    num_layers = len(layers.first)
+    best, last = 0.0, -1
+    for layer in range(num_layers):
+        best, last = _fill(network, levels, layers, weight, layer, tables)
+    return best, *_path_to(network, levels, layers, weight, tables, last)
+
+
+@kernel
+def _fill(
+    network: Network,
+    levels: EnergyLevels,
+    layers: Layers,
+    weight: Floats,
+    layer: int,
+    tables: _Tables,
+) -> tuple[float, int]:
+    """Fill the tables of a layer; return the most of any path in it, and its last task."""
+    own, num_own = tables.own, tables.num_own
+    m = weight.shape[1]
+    if layer < len(layers.first) - 1:
+        m = layers.contact[layers.first[layer + 1] - 1] + 1
+    idle = np.full(levels.width, -np.inf)
+    base = levels.lowest[0] if m else 0
+    idle[: max(0, levels.start - base + 1)] = 0.0
+    merged, best, last = 0, 0.0, -1
+    for k in range(m):
+        sink(idle, base - levels.lowest[k])
+        base = levels.lowest[k]
+        while merged < m and network.idle_from[network.by_idle[merged]] <= k:
+            i = network.by_idle[merged]
+            raise_to(idle, own[i, : num_own[i]], levels.lowest[i] - base)
+            merged += 1
+        number = layers.number[k]
+        if number >= 0 and layers.group[k] != layer:
+            # It ends an earlier layer, and begins this one.
+            num_own[k] = tables.num_at_contact[number]
+            own[k, : num_own[k]] = tables.at_contact[number, : num_own[k]]
+        else:
+            num_own[k] = _take(network, levels, k, weight[layer, k], idle, base, own, num_own)
+        if number >= 0 and layers.group[k] == layer:
+            tables.num_at_contact[number] = num_own[k]
+            tables.at_contact[number, : num_own[k]] = own[k, : num_own[k]]
+        if num_own[k] > 0 and own[k, 0] > best:
+            best, last = own[k, 0], k
+    return best, last
+
+
+@kernel
+def _take(
+    network: Network,
+    levels: EnergyLevels,
+    k: int,
+    weight: float,
+    idle: Floats,
+    base: int,
+    own: Floats,
+    num_own: Longs,
+) -> int:
+    """Extend all paths by a task; return how many entries its table has."""
+    low = max(0, levels.floor[k] - base)
+    high = levels.cap[k] - levels.cost[k] - base + 1
+    if weight == PASSED or high <= low:
+        return 0
+    values = own[k, :high]
+    values[:] = -np.inf
+    raise_to(values[low:], idle, -low - levels.cost[k])
+    for at in range(network.straight_first[k], network.straight_first[k + 1]):
+        i = network.straight_rows[at]
+        up = levels.lowest[i] + levels.give[at] - base - levels.cost[k]
+        raise_to(values[low:], own[i, : num_own[i]], up - low)
+    values[:low] = values[low]
+    while high > 0 and values[high - 1] == -np.inf:
+        high -= 1
+    values[:high] += weight
+    return int(high)
+
+
+@kernel
+def _path_to(
+    network: Network,
+    levels: EnergyLevels,
+    layers: Layers,
+    weight: Floats,
+    tables: _Tables,
+    last: int,
+) -> tuple[Ints, Ints]:
+    """Return the rows of a path in the last layer that gains its most, and the layer of each.
+
+    The tables of earlier layers are filled again: all at a time would take too much room.
+    """
+    own, num_own = tables.own, tables.num_own
+    rows = np.empty(weight.shape[1], dtype=np.int32)
+    passed = np.empty(weight.shape[1], dtype=np.int32)
+    length, layer = 0, len(layers.first) - 1
+    k, energy = last, levels.lowest[last] if last >= 0 else 0
+    while k >= 0:
+        if layers.number[k] >= 0 and layers.group[k] != layer:
+            layer = layers.group[k]
+            _fill(network, levels, layers, weight, layer, tables)
+        rows[length], passed[length] = k, layer
+        length += 1
+        energy = max(energy, levels.floor[k])
+        gained = own[k, energy - levels.lowest[k]]
+        energy += levels.cost[k]
+        before = k - 1
+        while before >= 0:
+            give = given_between(network, levels, before, k)
+            x = max(0, energy - max(give, 0) - levels.lowest[before])
+            is_reached = give >= 0 and x < num_own[before]
+            if is_reached and own[before, x] + weight[layer, k] == gained:
+                energy -= give
+                break
+            before -= 1
+        k = before
+    return rows[:length][::-1].copy(), passed[:length][::-1].copy()

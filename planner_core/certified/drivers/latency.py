@@ -1,0 +1,189 @@
+"""Where images are worth less the later they come down: plans by the contacts that they take.
+
+The bound's ascent tells which contacts are worth their energy. Where those must be taken an image
+has one worth, that of the time at which it comes down: at first with the contact after it, then, as
+a plan fills the queue of the recorder, with what that plan leaves to be taken down before. The
+searches for plans go by that, the referee says what it has come to.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from planner_core.certified.drivers.resource_steps import ResourceSearch
+from planner_core.certified.incumbent import Incumbent
+from planner_core.certified.lns.alternating import TurnSearch
+from planner_core.certified.lns.choices import ChoiceSearch
+from planner_core.certified.multipliers.latency import LatencyAscent
+from planner_core.certified.proofs.bound import rounded_bound
+from planner_core.problem import COLLECT, CONTACT, Floats, Ints, Kept, Problem
+from planner_core.problem.plan import Plan
+from planner_core.referee.replay import replay
+from planner_core.worth import share_earned
+
+_FIRST_GOAL: Final = 0.95
+_ROUNDS: Final = 20  # of the ascent at a time
+_QUEUES: Final = 2  # that follow each other with the same contacts
+_STEPS: Final = 2  # of the search for plans with each
+_PATIENCE: Final = 8  # sets of contacts that lead to nothing better
+
+
+def close_in_on_the_ground(search: ResourceSearch, unit: float) -> None:
+    """Search for contacts, bounds and plans in turn, until none gets anywhere."""
+    best = search.best
+    ascent = LatencyAscent(best.problem, search.prices())
+    tried: set[tuple[int, ...]] = set()
+    rng = np.random.default_rng(search.seed)
+    num_idle = number = 0
+    _lower(best, ascent)
+    search.choose(unit)
+    while num_idle < _PATIENCE and not best.is_done:
+        before = best.reward
+        own = _contacts_of(best.problem, best.plan)
+        offered = (*reversed(ascent.contact_sets), own, *_near(best.problem, own, rng))
+        contacts = next((one for one in offered if one not in tried), own)
+        tried.add(contacts)
+        _plan_with(best, contacts, unit, search.seed + number)
+        number += 1
+        num_idle = 0 if best.reward > before else num_idle + 1
+        _lower(best, ascent)
+
+
+def _lower(best: Incumbent, ascent: LatencyAscent) -> None:
+    """Go on with the ascent for a while."""
+    ascent.improve(_ROUNDS, best.reward, best.budget.stop)
+    value = rounded_bound(best.problem, ascent.bound.value, best.reward)
+    best.lower(replace(ascent.bound, value=value))
+    best.report("prices")
+
+
+def _near(
+    problem: Problem, contacts: tuple[int, ...], rng: np.random.Generator
+) -> Iterator[tuple[int, ...]]:
+    """Yield these contacts with one more or less, in random order."""
+    every = np.flatnonzero(problem.opportunities.kind == CONTACT)
+    for row in rng.permutation(every).tolist():
+        yield tuple(sorted({row}.symmetric_difference(contacts)))
+
+
+def _contacts_of(problem: Problem, plan: Plan) -> tuple[int, ...]:
+    rows = (action.opportunity for action in plan.actions)
+    return tuple(sorted(row for row in rows if problem.opportunities.kind[row] == CONTACT))
+
+
+def _plan_with(best: Incumbent, contacts: tuple[int, ...], unit: float, seed: int) -> None:
+    """Look for plans that take these contacts, as far as stations can serve them."""
+    problem = best.problem
+    served = _served(problem, contacts)
+    part = with_contacts(problem, served, None)
+    choices = ChoiceSearch(part, unit, seed, best.budget.stop)
+    choices.start(np.zeros(len(problem.opportunities), dtype=np.bool_), _FIRST_GOAL)
+    plan, reached = choices.plan, 0.0
+    best.offer(plan)
+    for _ in range(_QUEUES):
+        if best.is_done:
+            return
+        turns = TurnSearch(part, plan, unit, best.budget, seed)
+        turns.turn(_STEPS)
+        best.offer(turns.plan)
+        best.report("plans")
+        plan = turns.plan
+        earned = replay(problem, plan).reward
+        if earned <= reached:
+            return
+        reached = earned
+        part = with_contacts(problem, served, plan)
+
+
+def with_contacts(problem: Problem, contacts: list[int], plan: Plan | None) -> Problem:
+    """Return the problem with contacts that must be taken, and what images earn with them.
+
+    Parameters
+    ----------
+    plan
+        What else is in the queue; nothing by default.
+    """
+    already = {kept.row for kept in problem.pinned.kept}
+    new = tuple(Kept(row=row, pointer="") for row in contacts if row not in already)
+    return replace(
+        problem,
+        worth=worth_with(problem, contacts, plan),
+        pinned=replace(problem.pinned, kept=(*problem.pinned.kept, *new)),
+        left_on_board=None if problem.objective.collected_share > 0.0 else 0.0,
+    )
+
+
+def worth_with(problem: Problem, contacts: list[int], plan: Plan | None = None) -> Floats:
+    """Return what each image earns if these contacts are taken, and nothing else changes.
+
+    An image comes down after what a plan has taken before it, and in the first contact after it
+    that has time left. One that the plan holds comes down when it does there. Shape ``(n,)``.
+    """
+    table = problem.opportunities
+    down_s = np.full(len(table), np.inf)
+    taken = np.zeros(0, dtype=np.int64)
+    if plan is not None:
+        images = replay(problem, plan).collected.values()
+        taken = np.array([plan.actions[i.position].opportunity for i in images], dtype=np.int64)
+        down_s[taken] = [np.inf if i.delivered_s is None else i.delivered_s for i in images]
+    for index, satellite in enumerate(problem.satellites):
+        own = satellite.rows[satellite.kind == COLLECT]
+        queue = taken[table.satellite[taken] == index]
+        passes = np.array([c for c in contacts if table.satellite[c] == index], dtype=np.int32)
+        free = own[np.isin(own, queue, invert=True)]
+        down_s[free] = _down_s(problem, passes, queue, down_s[queue], free)
+    age_s = down_s - table.end_s
+    worth: Floats = problem.worth_on_ground * share_earned(problem.objective, age_s)
+    return np.where(table.kind == COLLECT, np.minimum(worth, problem.worth), 0.0)
+
+
+def _down_s(
+    problem: Problem, contacts: Ints, queue: Ints, queue_down_s: Floats, images: Ints
+) -> Floats:
+    """Return when images of a satellite are down that come after others in the queue."""
+    table = problem.opportunities
+    satellite = problem.satellites[int(table.satellite[images[0]])] if len(images) else None
+    found = np.full(len(images), np.inf)
+    if satellite is None or len(contacts) == 0:
+        return found
+    order = np.argsort(table.end_s[queue], kind="stable")
+    last_s = np.append(0.0, np.maximum.accumulate(queue_down_s[order]))
+    before_s = last_s[np.searchsorted(table.end_s[queue][order], table.end_s[images])]
+    ready_s = table.start_s[contacts] + problem.downlinks.stations.setup_s[table.place[contacts]]
+    useful_s = np.maximum(table.end_s[contacts] - ready_s, 1e-9)
+    rate = satellite.volume[problem.local_row[contacts]] / useful_s
+    size = (table.end_s - table.start_s)[images] * satellite.resources.collect_fill_per_s
+    at = np.searchsorted(table.start_s[contacts], table.end_s[images])
+    while np.any(is_open := (at < len(contacts)) & np.isinf(found)):
+        c = np.minimum(at, len(contacts) - 1)
+        down_s = np.maximum(ready_s[c], before_s) + size / np.maximum(rate[c], 1e-12)
+        fits = is_open & (down_s <= table.end_s[contacts[c]])
+        found[fits] = down_s[fits]
+        at += is_open & ~fits
+    return found
+
+
+def _served(problem: Problem, contacts: tuple[int, ...]) -> list[int]:
+    """Return the contacts for which stations have an antenna, the earlier first."""
+    served = list[int]()
+    for row in sorted(contacts, key=lambda row: float(problem.opportunities.start_s[row])):
+        if _is_served(problem, served, row):
+            served.append(row)
+    return served
+
+
+def _is_served(problem: Problem, chosen: list[int], row: int) -> bool:
+    """Return whether the station has an antenna left for a contact beside those chosen."""
+    table = problem.opportunities
+    beside = [
+        other
+        for other in chosen
+        if table.place[other] == table.place[row]
+        and table.start_s[other] < table.end_s[row]
+        and table.end_s[other] > table.start_s[row]
+    ]
+    return len(beside) < int(problem.station_antennas[table.place[row]])

@@ -1,0 +1,133 @@
+"""The ascent on prices of contacts, where images are worth less the later they come down.
+
+Contacts are few, an answer takes hundredths of a second, and what the best plans take of contacts
+is what the search for plans wants to know. So every satellite answers in each round, and the
+multipliers of targets and contacts move together, by what the bound is above the best plan
+(Polyak's step), shorter once the bound no longer falls.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from planner_core.certified.proofs.bound import Bound
+from planner_core.certified.proofs.latency import latency_relaxations
+from planner_core.problem import CONTACT, Bytes, Floats, Problem
+
+_STALLED: Final = 6  # rounds without a lower bound, before steps get shorter
+_SHORTER: Final = 0.6
+_SETTLED: Final = 0.01  # of the first step
+_LOWER: Final = 1e-6  # of a bound: what counts as a lower one
+
+
+class LatencyAscent:
+    """Prices of targets and contacts that get better round by round.
+
+    Parameters
+    ----------
+    begin
+        The prices of targets at first, unless none at all prove more: where energy is short,
+        few targets are taken twice. Shape ``(num_targets,)``.
+
+    Attributes
+    ----------
+    bound
+        The least that was proven so far.
+    contact_sets
+        The contacts of each answer, rows ascending, the latest last, each set once.
+    """
+
+    def __init__(self, problem: Problem, begin: Floats) -> None:
+        self._problem = problem
+        self._satellites = latency_relaxations(problem)
+        self._most = np.append(problem.best_worth, 0.0)
+        self._is_contact = problem.opportunities.kind == CONTACT
+        self._prices = np.zeros(len(begin) + 1)
+        # By typical image, as targets are; contacts of the table, others none.
+        self._tolls = np.zeros(len(problem.opportunities))
+        self._best = self._prices, self._tolls
+        self._length, self._num_idle = 1.0, 0
+        self.contact_sets: dict[tuple[int, ...], None] = {}
+        self.bound = Bound(
+            value=float(problem.best_worth.sum()), proof="lagrangian", prices=problem.best_worth
+        )
+        given = np.append(begin, 0.0)
+        if self._value(given) < self._value(self._prices):
+            self._prices = given
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether more rounds are of little use."""
+        return self._length < _SETTLED
+
+    def improve(self, num_rounds: int, level: float, stop: Bytes) -> None:
+        """Go some rounds on towards a bound at ``level``, which a known plan earns."""
+        for _ in range(num_rounds):
+            if stop[0] or self.is_settled or self.bound.value <= level:
+                return
+            self._go_round(level, stop)
+
+    def _value(self, prices: Floats) -> float:
+        """Return what prices of targets prove alone."""
+        free = (np.zeros(len(one.contacts)) for one in self._satellites)
+        gained = (
+            one.most(prices, tolls)[0] for one, tolls in zip(self._satellites, free, strict=True)
+        )
+        return float(prices.sum()) + sum(gained)
+
+    def _go_round(self, level: float, stop: Bytes) -> None:
+        value = float(self._prices.sum())
+        too_many = np.append(-np.ones(len(self._most) - 1), 0.0)
+        too_much = np.zeros(len(self._tolls))
+        is_taken = np.zeros(len(self._tolls), dtype=np.bool_)
+        for one in self._satellites:
+            if stop[0]:
+                return
+            tolls = self._tolls[one.contacts] / one.typical
+            gained, path, layer = one.most(self._prices, tolls)
+            value += gained
+            np.add.at(too_many, one.target[path], 1.0)
+            too_much[one.contacts] = one.loads(path, layer, tolls) / one.typical
+            is_taken[one.rows[path[one.layers.number[path] >= 0]]] = True
+        too_many[-1] = 0.0
+        contacts = tuple(np.flatnonzero(is_taken).tolist())
+        self.contact_sets.pop(contacts, None)
+        self.contact_sets[contacts] = None
+        if self._is_hopeful(value):
+            self._move(value - level, too_many, too_much)
+
+    def _is_hopeful(self, value: float) -> bool:
+        """Note what the prices of the moment prove; go back to better ones after a while."""
+        if value < self.bound.value * (1.0 - _LOWER):
+            self._best, self._num_idle = (self._prices, self._tolls), 0
+            self.bound = Bound(
+                value=value,
+                proof="dp",
+                prices=self._prices[:-1],
+                contact_prices=self._by_volume(),
+            )
+            return True
+        self._num_idle += 1
+        if self._num_idle < _STALLED:
+            return True
+        self._length, self._num_idle = _SHORTER * self._length, 0
+        self._prices, self._tolls = self._best
+        return False
+
+    def _by_volume(self) -> Floats:
+        tolls = self._tolls.copy()
+        for one in self._satellites:
+            tolls[one.contacts] /= one.typical
+        by_volume: Floats = tolls[self._is_contact]
+        return by_volume
+
+    def _move(self, above: float, too_many: Floats, too_much: Floats) -> None:
+        """Move all multipliers against what the answers take too much of."""
+        too_many = np.where((self._prices <= 0.0) & (too_many < 0.0), 0.0, too_many)
+        too_much = np.where((self._tolls <= 0.0) & (too_much < 0.0), 0.0, too_much)
+        squares = sum(float(np.square(each).sum()) for each in (too_many, too_much))
+        step = self._length * above / squares if squares > 0.0 else 0.0
+        self._prices = np.clip(self._prices + step * too_many, 0.0, self._most)
+        self._tolls = np.maximum(self._tolls + step * too_much, 0.0)

@@ -1,0 +1,237 @@
+r"""An upper bound where images are worth less the later they come down: prices of contacts.
+
+Each target has a price :math:`\lambda_i`, and each contact :math:`c` one for what it takes down by
+volume, :math:`\mu_c`. The bits of an image come down in contacts after it that the plan takes, and
+none before the contact is ready. So an image that takes :math:`s_k` of the recorder is worth no
+more than what it is worth on board and the best of its contacts adds,
+
+.. math::
+
+    w_k = a v_k + \max_c \; (v_k (1 - a) \, 2^{-(t_c - e_k) / h} - \mu_c s_k)^+ ,
+
+and a contact that is taken earns :math:`\mu_c` times what it can take down. No plan earns more
+than :math:`\sum_i \lambda_i` plus, for each satellite, the most that a path under its battery
+gains of :math:`(w_k - \lambda_i)^+` and of contacts. Of an image's contacts the one that the path
+takes next counts, and all later ones (``planner_core.certified.dp.contact_layers``). Left out are
+the order in which bits come down, what telemetry takes of a contact, and stations.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from planner_core.bundles import bundle
+from planner_core.certified.dp.contact_layers import (
+    PASSED,
+    Layers,
+    layers_of,
+    most_by_contacts,
+)
+from planner_core.certified.dp.energy_labels import EnergyLevels, energy_levels
+from planner_core.certified.dp.resource_network import Network, network_of
+from planner_core.jit import kernel
+from planner_core.precedence.relation import is_transitive_on
+from planner_core.problem import (
+    COLLECT,
+    CONTACT,
+    Floats,
+    Ints,
+    Problem,
+    SatelliteProblem,
+)
+from planner_core.worth import surplus
+
+_PER_COLLECT: Final = 24  # levels of energy
+_ROUNDING_S: Final = 1e-5  # the referee forgives a recorder 1e-9 of its capacity
+_ROUNDING: Final = 2e-9
+
+
+@bundle
+class _Terms(NamedTuple):
+    """What images and contacts of a satellite are worth.
+
+    Attributes
+    ----------
+    end_s, on_board, most, size
+        Of each task: when it ends, what it earns on board, what it earns at most, and what it takes
+        of a recorder. Shape ``(m,)``.
+    ready_s, volume
+        Of each contact: from when on it takes down data, and how much of a recorder. Shape
+        ``(num_contacts,)``.
+    decaying
+        What an image earns more if it comes down at once. Shape ``(m,)``.
+    """
+
+    end_s: Floats
+    on_board: Floats
+    decaying: Floats
+    most: Floats
+    size: Floats
+    ready_s: Floats
+    volume: Floats
+    half_life_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LatencyRelaxation:
+    """One satellite's programme.
+
+    Attributes
+    ----------
+    target
+        Of each task; one too far for contacts. Shape ``(m,)``.
+    contacts
+        Rows of the problem's table. Shape ``(num_contacts,)``.
+    typical
+        What an image takes of the recorder, about.
+    """
+
+    rows: Ints
+    target: Ints
+    contacts: Ints
+    volume: Floats
+    size: Floats
+    typical: float
+    needs_all: bool
+    network: Network
+    levels: EnergyLevels
+    layers: Layers
+    terms: _Terms
+
+    @classmethod
+    def of(cls, problem: Problem, satellite: SatelliteProblem) -> LatencyRelaxation:
+        """Return the relaxation of a satellite that has opportunities."""
+        network, rows = network_of(problem, satellite), satellite.rows
+        layers = layers_of(network)
+        is_image = satellite.kind == COLLECT
+        own = satellite.resources
+        size = np.where(is_image, satellite.end_s - satellite.start_s, 0.0) * own.collect_fill_per_s
+        on_board = problem.objective.collected_share * problem.worth_on_ground[rows]
+        setup_s = problem.downlinks.stations.setup_s[satellite.place[layers.contact]]
+        counted = np.maximum(size - _ROUNDING, 0.0)
+        # Where a task leaves no less energy than idling, or leads to others, a path may need it.
+        is_dear = own.sun_pointing == "free" and own.idle_drain_per_s == 0.0
+        return cls(
+            rows=rows,
+            target=np.where(is_image, satellite.place, len(problem.target_ids)).astype(np.int32),
+            contacts=rows[layers.contact],
+            volume=satellite.volume[layers.contact],
+            size=counted,
+            typical=float(np.median(size[is_image])) if is_image.any() else 1.0,
+            needs_all=not (is_dear and is_transitive_on(satellite)),
+            network=network,
+            levels=energy_levels(network, _PER_COLLECT),
+            layers=layers,
+            terms=_Terms(
+                end_s=satellite.end_s,
+                on_board=on_board,
+                decaying=problem.worth_on_ground[rows] - on_board,
+                most=problem.worth[rows],
+                size=counted,
+                ready_s=satellite.start_s[layers.contact] + setup_s - _ROUNDING_S,
+                volume=satellite.volume[layers.contact],
+                half_life_s=problem.objective.half_life_s or np.inf,
+            ),
+        )
+
+    def most(self, prices: Floats, tolls: Floats) -> tuple[float, Ints, Ints]:
+        """Return the most that the satellite can gain, the rows of a path that does, and layers.
+
+        Parameters
+        ----------
+        prices
+            Of targets, and none for contacts. Shape ``(num_targets + 1,)``.
+        tolls
+            Of its contacts, by volume. Shape ``(num_contacts,)``.
+        """
+        m, num_layers = len(self.rows), len(self.layers.first)
+        weight = np.empty((num_layers, m))
+        passed = 0.0 if self.needs_all else PASSED
+        _weigh(self.terms, self.layers, prices[self.target], tolls, passed, weight)
+        own, num_own = np.empty((m, self.levels.width)), np.zeros(m, dtype=np.int64)
+        return most_by_contacts(self.network, self.levels, self.layers, weight, own, num_own)
+
+    def loads(self, path: Ints, layer: Ints, tolls: Floats) -> Floats:
+        """Return what a path lets each contact take down more than it can.
+
+        Parameters
+        ----------
+        path, layer
+            As ``most`` answers them.
+
+        Returns
+        -------
+        Shape ``(num_contacts,)``.
+        """
+        load = np.zeros(len(self.contacts))
+        number = self.layers.number[path]
+        taken = number[number >= 0]
+        load[taken] -= self.volume[taken]
+        if len(load) == 0:
+            return load
+        t, images, own = self.terms, path[number < 0], layer[number < 0]
+        age_s = np.maximum(t.ready_s[None, :] - t.end_s[images, None], 0.0)
+        gain = t.decaying[images, None] * np.exp2(-age_s / t.half_life_s)
+        gain = np.minimum(gain, (t.most - t.on_board)[images, None])
+        gain -= tolls[None, :] * self.size[images, None]
+        may_follow = self.layers.contact[None, :] > images[:, None]
+        may_follow &= np.arange(len(load))[None, :] >= self.layers.first[own, None]
+        gain[~may_follow] = -np.inf
+        best = gain.argmax(axis=1)
+        is_down = gain[np.arange(len(images)), best] > 0.0
+        np.add.at(load, best[is_down], self.size[images[is_down]])
+        return load
+
+
+@kernel
+def _weigh(
+    terms: _Terms, layers: Layers, price: Floats, tolls: Floats, passed: float, weight: Floats
+) -> None:
+    """Fill in what each task is worth in each layer; ``passed`` where that is nothing."""
+    num_layers, m = weight.shape
+    gain = np.zeros(m)
+    for layer in range(num_layers - 1, -1, -1):
+        if layer < num_layers - 1:
+            for c in range(layers.first[layer], layers.first[layer + 1]):
+                for k in range(layers.contact[c]):
+                    age_s = max(terms.ready_s[c] - terms.end_s[k], 0.0)
+                    worth = terms.decaying[k] * 2.0 ** (-age_s / terms.half_life_s)
+                    worth = min(worth, terms.most[k] - terms.on_board[k])
+                    gain[k] = max(gain[k], worth - tolls[c] * terms.size[k])
+        for k in range(m):
+            worth = terms.on_board[k] + gain[k] - price[k]
+            weight[layer, k] = worth if worth > 0.0 else passed
+        if layer < num_layers - 1:
+            for c in range(layers.first[layer], layers.first[layer + 1]):
+                weight[layer, layers.contact[c]] = tolls[c] * terms.volume[c]
+
+
+def latency_relaxations(problem: Problem) -> tuple[LatencyRelaxation, ...]:
+    """Return the programmes of all satellites that have anything to do."""
+    return tuple(
+        LatencyRelaxation.of(problem, satellite)
+        for satellite in problem.satellites
+        if len(satellite)
+    )
+
+
+def latency_value(problem: Problem, prices: Floats, contact_prices: Floats) -> float:
+    """Return the bound that prices of targets and of contacts prove.
+
+    This is the whole proof: it needs no search, only the problem.
+
+    Parameters
+    ----------
+    prices
+        Shape ``(num_targets,)``.
+    contact_prices
+        By volume, of the table's contacts in order. Shape ``(num_contacts,)``.
+    """
+    price = np.append(surplus(prices, problem.best_worth), 0.0)
+    tolls = np.zeros(len(problem.opportunities))
+    tolls[problem.opportunities.kind == CONTACT] = np.maximum(contact_prices, 0.0)
+    gained = (one.most(price, tolls[one.contacts])[0] for one in latency_relaxations(problem))
+    return float(price.sum()) + sum(gained)

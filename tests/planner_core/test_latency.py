@@ -1,0 +1,217 @@
+"""Images that are worth less the later they come down: bounds by contacts, and plans near them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import Literal
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from planner_core.budget import Budget
+from planner_core.certified.dp import contact_layers
+from planner_core.certified.dp.contact_layers import PASSED, Layers, layers_of, most_by_contacts
+from planner_core.certified.dp.energy_labels import EnergyLevels, energy_levels
+from planner_core.certified.dp.resource_network import Network, network_of
+from planner_core.certified.drivers.latency import worth_with
+from planner_core.certified.multipliers.latency import LatencyAscent
+from planner_core.certified.proofs.bound import rounded_bound
+from planner_core.certified.proofs.documents import from_json, is_proven, to_json
+from planner_core.certified.proofs.latency import latency_value
+from planner_core.certified.solver import Certified
+from planner_core.domain import Objective
+from planner_core.problem import COLLECT, CONTACT, Floats, Problem
+from planner_core.problem.delivery import with_objective
+from planner_core.problem.plan import Plan
+from planner_core.referee.replay import replay
+from tests.examples import examples
+from tests.planner_core.brute_force import best_reward
+from tests.planner_core.problems import TIGHT, make_problem, random_problem, varied_problem
+from tests.planner_core.test_delivery import ROOMY, collect, contact
+from tests.planner_core.verdicts import encloses
+
+SEEDS = st.integers(0, 10**6)
+STARVED = replace(TIGHT, battery_min_fraction=0.5, initial_battery_fraction=0.62)
+_problem = partial(varied_problem, scarce=STARVED)
+Dynamics = Literal["physical", "paper"]
+
+
+def best_by_enumeration(
+    network: Network, levels: EnergyLevels, layers: Layers, weight: Floats
+) -> float:
+    """Return the most that any path gains, path by path and layer by layer."""
+    m = len(network.place)
+
+    def from_here(last: int, energy: int, layer: int) -> float:
+        """Return the most from a task on, in a layer that is entered or gone on in."""
+        is_last = layer == len(layers.first) - 1
+        best = 0.0 if is_last else -np.inf
+        for k in range(last + 1, m):
+            near = network.near_rows[network.near_first[last] : network.near_first[last + 1]]
+            if last >= 0 and k < network.idle_from[last] and k not in near:
+                continue
+            left = min(energy, int(levels.cap[k])) - int(levels.cost[k])
+            if left < levels.floor[k]:
+                continue
+            if layers.number[k] >= 0:
+                if layers.group[k] != layer:
+                    continue
+                onward = max(from_here(k, left, up) for up in range(layer, len(layers.first)))
+                best = max(best, float(weight[layer, k]) + onward)
+            elif weight[layer, k] != PASSED:
+                best = max(best, float(weight[layer, k]) + from_here(k, left, layer))
+        return best
+
+    return max(from_here(-1, levels.start, layer) for layer in range(len(layers.first)))
+
+
+@pytest.mark.parametrize("dynamics", ["physical", "paper"])
+@examples(150)
+@given(seed=SEEDS, per_collect=st.sampled_from([1, 3, 24]), num_groups=st.integers(1, 3))
+def test_the_programme_finds_the_best_path(
+    dynamics: Dynamics, seed: int, per_collect: int, num_groups: int
+) -> None:
+    problem = _problem(seed, dynamics, num_contacts=3)
+    network = network_of(problem, problem.satellites[0])
+    levels = energy_levels(network, per_collect)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(contact_layers, "_MOST_LAYERS", num_groups)
+        layers = layers_of(network)
+    rng = np.random.default_rng(seed)
+    m = len(problem.opportunities)
+    weight = rng.uniform(-0.3, 1.0, (len(layers.first), m))
+    is_image = layers.number < 0
+    weight[:, is_image] = np.where(weight[:, is_image] < 0.0, PASSED, weight[:, is_image])
+    own, num_own = np.empty((m, levels.width)), np.zeros(m, dtype=np.int64)
+    value, path, layer = most_by_contacts(network, levels, layers, weight, own, num_own)
+    assert value == pytest.approx(max(0.0, best_by_enumeration(network, levels, layers, weight)))
+    assert weight[layer, path].sum() == pytest.approx(value)
+    assert np.all(np.diff(path) > 0)
+    assert np.all(np.diff(layer) >= 0)
+
+
+def prices_of(problem: Problem, rng: np.random.Generator) -> tuple[Floats, Floats]:
+    """Return prices of targets and contacts, some of them nothing."""
+    num_contacts = int((problem.opportunities.kind == CONTACT).sum())
+    targets = rng.uniform(-0.5, 1.0, len(problem.target_ids)) * problem.best_worth
+    contacts = rng.uniform(-10.0, 20.0, num_contacts)
+    return np.maximum(targets, 0.0), np.maximum(contacts, 0.0)
+
+
+@pytest.mark.parametrize("dynamics", ["physical", "paper"])
+@examples(500)
+@given(
+    seed=SEEDS,
+    collected_share=st.sampled_from([0.0, 0.3, 0.9]),
+    half_life_s=st.floats(60.0, 2000.0),
+    num_satellites=st.integers(1, 2),
+    has_quality=st.booleans(),
+)
+def test_no_plan_beats_any_prices(
+    dynamics: Dynamics,
+    seed: int,
+    collected_share: float,
+    half_life_s: float,
+    num_satellites: int,
+    has_quality: bool,
+) -> None:
+    problem = _problem(seed, dynamics, num_satellites, num_contacts=3, has_quality=has_quality)
+    objective = Objective(collected_share=collected_share, half_life_s=half_life_s)
+    problem = with_objective(problem, objective)
+    best = best_reward(problem)
+    rng = np.random.default_rng(seed)
+    for _ in range(3):
+        targets, contacts = prices_of(problem, rng)
+        assert latency_value(problem, targets, contacts) >= best - 1e-9
+    stop = np.zeros(1, dtype=np.uint8)
+    ascent = LatencyAscent(problem, np.zeros(len(problem.target_ids)))
+    ascent.improve(30, 0.0, stop)
+    assert ascent.bound.value >= best - 1e-9
+
+
+def test_groups_of_contacts_bound_all_plans_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(contact_layers, "_MOST_LAYERS", 2)
+    rng = np.random.default_rng(0)
+    for seed in range(60):
+        problem = _problem(seed, "physical" if seed % 2 else "paper", num_contacts=4)
+        problem = with_objective(problem, Objective(collected_share=0.0, half_life_s=300.0))
+        best = best_reward(problem)
+        assert latency_value(problem, *prices_of(problem, rng)) >= best - 1e-9
+
+
+def test_small_problems_end_at_or_near_the_optimum() -> None:
+    reached = 0
+    for seed in range(40):
+        problem = _problem(seed, "physical" if seed % 2 else "paper", 1, num_contacts=3)
+        problem = with_objective(problem, Objective(collected_share=0.0, half_life_s=400.0))
+        reached += encloses(problem, best_reward(problem))
+    assert reached >= 34
+
+
+def test_a_price_of_contacts_lowers_the_bound() -> None:
+    """Contacts that could each take down a few images only, at next to no energy."""
+    problem = random_problem(3, num_collects=200, num_targets=90, num_contacts=6, span_s=6000.0)
+    problem = with_objective(problem, Objective(collected_share=0.0, half_life_s=900.0))
+    free = latency_value(
+        problem,
+        np.zeros(len(problem.target_ids)),
+        np.zeros(int((problem.opportunities.kind == CONTACT).sum())),
+    )
+    ascent = LatencyAscent(problem, np.zeros(len(problem.target_ids)))
+    ascent.improve(60, 0.0, np.zeros(1, dtype=np.uint8))
+    assert ascent.bound.value < free
+    assert ascent.contact_sets
+
+
+def test_the_bound_of_a_plan_is_proven_by_its_document() -> None:
+    problem = random_problem(3, num_collects=200, num_targets=90, num_contacts=6, span_s=6000.0)
+    problem = with_objective(problem, Objective(collected_share=0.0, half_life_s=900.0))
+    ascent = LatencyAscent(problem, np.zeros(len(problem.target_ids)))
+    ascent.improve(40, 0.0, np.zeros(1, dtype=np.uint8))
+    bound = replace(ascent.bound, value=rounded_bound(problem, ascent.bound.value, 0.0))
+    read = from_json(to_json(bound))
+    assert read.contact_prices is not None
+    assert read.prices is not None
+    assert is_proven(problem, read)
+    assert not is_proven(problem, replace(read, value=0.99 * read.value))
+    dearer = replace(read, contact_prices=read.contact_prices + 1e3)
+    assert not is_proven(problem, dearer)
+
+
+def test_worth_in_a_queue_is_what_the_referee_awards() -> None:
+    """Three images before one contact that takes down two, and another one later."""
+    tasks = [collect(0, 100.0), collect(1, 150.0), collect(2, 200.0)]
+    tasks += [contact(330.0, 390.0), contact(600.0, 700.0)]
+    problem = make_problem(tasks, num_targets=3, resources=ROOMY)
+    problem = with_objective(problem, Objective(collected_share=0.1, half_life_s=300.0))
+    plan = Plan.of(problem, [0, 1, 2, 3, 4])
+    earned = replay(problem, plan).collected
+    worth = worth_with(problem, [3, 4], plan)
+    assert worth[:3] == pytest.approx([earned[target].worth for target in range(3)])
+    # An image more waits for what is in the queue before it, and none for what comes after.
+    alone = worth_with(problem, [3, 4], Plan.of(problem, [0, 3, 4]))
+    assert alone[0] == pytest.approx(worth[0])
+    assert alone[2] > worth[2]
+    assert worth_with(problem, [4])[0] < worth_with(problem, [3, 4])[0]
+    assert worth_with(problem, [])[0] == pytest.approx(0.1)
+
+
+def test_plans_take_contacts_for_young_images() -> None:
+    """With a short half-life a plan takes more contacts than where only the last counts."""
+    problem = random_problem(5, num_collects=240, num_targets=90, num_contacts=8, span_s=9000.0)
+    young = with_objective(problem, Objective(collected_share=0.0, half_life_s=600.0))
+    late = with_objective(problem, Objective.delivered())
+    reward: dict[str, float] = {}
+    for name, asked in (("young", young), ("late", late)):
+        solution = Certified().solve(asked, Budget(), 0)
+        timeline = replay(young, solution.plan)
+        assert timeline.is_valid
+        reward[name] = timeline.reward
+        assert all(
+            young.opportunities.kind[a.opportunity] in (COLLECT, CONTACT)
+            for a in solution.plan.actions
+        )
+    assert reward["young"] > reward["late"]
