@@ -21,6 +21,7 @@ from planner_core.certified.multipliers.latency import LatencyAscent
 from planner_core.certified.proofs.bound import rounded_bound
 from planner_core.certified.proofs.documents import from_json, is_proven, to_json
 from planner_core.certified.proofs.latency import latency_value
+from planner_core.certified.proofs.resource_bound import quick_bound
 from planner_core.certified.solver import Certified
 from planner_core.domain import Objective
 from planner_core.problem import COLLECT, CONTACT, Floats, Problem
@@ -130,6 +131,7 @@ def test_no_plan_beats_any_prices(
     ascent = LatencyAscent(problem, np.zeros(len(problem.target_ids)))
     ascent.improve(30, 0.0, stop)
     assert ascent.bound.value >= best - 1e-9
+    assert quick_bound(problem, 0.0).value >= best - 1e-9
 
 
 def test_groups_of_contacts_bound_all_plans_too(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -164,6 +166,7 @@ def test_a_price_of_contacts_lowers_the_bound() -> None:
     ascent.improve(60, 0.0, np.zeros(1, dtype=np.uint8))
     assert ascent.bound.value < free
     assert ascent.contact_sets
+    assert quick_bound(problem, 0.0).value < free
 
 
 def test_the_bound_of_a_plan_is_proven_by_its_document() -> None:

@@ -19,6 +19,7 @@ from planner_core.problem import CONTACT, Bytes, Floats, Problem
 _STALLED: Final = 6  # rounds without a lower bound, before steps get shorter
 _SHORTER: Final = 0.6
 _SETTLED: Final = 0.01  # of the first step
+_MOST_ABOVE: Final = 0.2  # of a bound: a plan that is poor says little of the best one
 _LOWER: Final = 1e-6  # of a bound: what counts as a lower one
 
 
@@ -128,6 +129,7 @@ class LatencyAscent:
         too_many = np.where((self._prices <= 0.0) & (too_many < 0.0), 0.0, too_many)
         too_much = np.where((self._tolls <= 0.0) & (too_much < 0.0), 0.0, too_much)
         squares = sum(float(np.square(each).sum()) for each in (too_many, too_much))
+        above = min(above, _MOST_ABOVE * self.bound.value)
         step = self._length * above / squares if squares > 0.0 else 0.0
         self._prices = np.clip(self._prices + step * too_many, 0.0, self._most)
         self._tolls = np.maximum(self._tolls + step * too_much, 0.0)

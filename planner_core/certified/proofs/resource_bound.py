@@ -24,6 +24,7 @@ from planner_core.certified.dp.forward_labels import (
     path_of,
 )
 from planner_core.certified.dp.resource_network import Network, network_of
+from planner_core.certified.multipliers.latency import LatencyAscent
 from planner_core.certified.proofs.bound import Bound, rounded_bound
 from planner_core.certified.proofs.lagrangian import lagrangian_bound
 from planner_core.certified.proofs.shares import ROUNDING, Shares
@@ -41,6 +42,8 @@ from planner_core.worth import common_unit, surplus, weights
 
 _MAX_CELLS: Final = 30_000_000  # of one table of least energy
 _MAX_UNITS: Final = 2000
+_OPPORTUNITY_ROUNDS: Final = 100_000  # of an ascent with half-lives, about a second
+_ROUNDS: Final = (2, 20)
 _FIRST_STEP: Final = 0.01
 _SHARES: Final = (0.0, 0.25, 0.5, 0.75, 1.0)  # of prices that hold where agility alone counts
 _TRIED: Final = 2
@@ -404,6 +407,8 @@ def quick_bound(problem: Problem, reward: float) -> Bound:
         What a known plan earns: nothing below it needs proof.
     """
     best = lagrangian_bound(problem, reward)
+    if problem.counts_delivery and problem.objective.half_life_s is not None:
+        return _with_half_life(problem, best, reward)
     # Where all targets are worth the same and energy is short, prices of zero are best.
     is_plain = len(problem.satellites) == 1 and _is_alike(problem)
     satellites: tuple[SatelliteRelaxation, ...] = ()
@@ -427,6 +432,16 @@ def quick_bound(problem: Problem, reward: float) -> Bound:
             rounded = rounded_bound(problem, value, reward)
             best = Bound(value=rounded, proof="dp", prices=prices, unit=unit)
     return best
+
+
+def _with_half_life(problem: Problem, best: Bound, reward: float) -> Bound:
+    """Return a bound that knows what contacts take, which counts for more than recorders."""
+    assert best.prices is not None
+    num_rounds = int(np.clip(_OPPORTUNITY_ROUNDS // max(1, len(problem.opportunities)), *_ROUNDS))
+    ascent = LatencyAscent(problem, best.prices)
+    ascent.improve(num_rounds, reward, np.zeros(1, dtype=np.uint8))
+    value = rounded_bound(problem, ascent.bound.value, reward)
+    return replace(ascent.bound, value=value) if value < best.value else best
 
 
 def _battery_value(
