@@ -7,7 +7,7 @@ from datetime import timedelta
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget
@@ -105,13 +105,18 @@ def test_every_solver_turns_in_time(name: str, seed: int, use_resources: bool) -
 @pytest.mark.parametrize("solver", [Milp(), Certified()])
 @examples(60)
 @given(seed=SEEDS, use_resources=st.booleans())
+@example(seed=1621, use_resources=True)  # even an idle day takes too much of the battery
 def test_exact_solvers_find_the_best_plan(
     solver: Milp | Certified, seed: int, use_resources: bool
 ) -> None:
     problem = sunny_problem(seed, is_moving=True, use_resources=use_resources)
     best = best_reward(problem)
     solution = solver.solve(problem, Budget(), seed)
-    assert solution.proven is not None
+    if solution.proven is None:
+        # HiGHS says that there is no plan, and nothing of what one could earn.
+        assert isinstance(solver, Milp)
+        assert not replay(problem, Plan(())).is_valid
+        return
     assert solution.proven.value >= best - 1e-6
     if replay(problem, Plan(())).is_valid and is_transitive_on(problem.satellites[0]):
         assert replay(problem, solution.plan).reward == pytest.approx(best)
