@@ -10,7 +10,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -23,6 +23,8 @@ from planner_core.problem import (
 from planner_core.problem.plan import Action
 from planner_core.referee.contact_flow import flow
 from planner_core.referee.idle_time import Idle, idle_spans
+
+_SAME: Final = 1e-9  # of a capacity
 
 
 class Point(NamedTuple):
@@ -241,18 +243,17 @@ def _book(
 
 def thin(points: Sequence[Point]) -> tuple[Floats, Floats, Floats]:
     """Return time, battery and recorder without points that lie on a line or repeat."""
-    table = np.array([(p.time_s, p.battery, p.recorder) for p in points])
-    keep = np.ones(len(table), dtype=np.bool_)
-    last = 0
-    for i in range(1, len(table) - 1):
-        span = table[i + 1, 0] - table[last, 0]
-        if span <= 0.0:
-            last = i
-            continue
-        share = (table[i, 0] - table[last, 0]) / span
-        line = table[last, 1:] + share * (table[i + 1, 1:] - table[last, 1:])
-        if np.all(np.abs(line - table[i, 1:]) < 1e-9):
-            keep[i] = False
-        else:
-            last = i
-    return table[keep, 0], table[keep, 1], table[keep, 2]
+    kept = [*points[:1]]
+    for point, after in itertools.pairwise(points[1:]):
+        last = kept[-1]
+        span_s = after.time_s - last.time_s
+        if span_s > 0.0:
+            share = (point.time_s - last.time_s) / span_s
+            battery = last.battery + share * (after.battery - last.battery)
+            recorder = last.recorder + share * (after.recorder - last.recorder)
+            if abs(battery - point.battery) < _SAME and abs(recorder - point.recorder) < _SAME:
+                continue
+        kept.append(point)
+    kept += points[1:][-1:]
+    table = np.array([(p.time_s, p.battery, p.recorder) for p in kept])
+    return table[:, 0], table[:, 1], table[:, 2]
