@@ -218,3 +218,16 @@ def test_plans_take_contacts_for_young_images() -> None:
             for a in solution.plan.actions
         )
     assert reward["young"] > reward["late"]
+
+
+@pytest.mark.parametrize("fill_per_s", [0.0, ROOMY.collect_fill_per_s])
+@pytest.mark.parametrize("num_contacts", [0, 1])
+def test_missions_without_contacts_or_without_data_have_bounds_too(
+    fill_per_s: float, num_contacts: int
+) -> None:
+    tasks = [collect(0, 100.0), collect(1, 150.0), *[contact(330.0, 390.0)] * num_contacts]
+    resources = replace(ROOMY, collect_fill_per_s=fill_per_s)
+    problem = make_problem(tasks, num_targets=2, resources=resources)
+    problem = with_objective(problem, Objective(collected_share=0.5, half_life_s=300.0))
+    assert quick_bound(problem, 0.0).value >= best_reward(problem) - 1e-9
+    assert encloses(problem, best_reward(problem))

@@ -46,7 +46,7 @@ from planner_core.worth import surplus
 
 _PER_COLLECT: Final = 24  # levels of energy
 _ROUNDING_S: Final = 1e-5  # the referee forgives a recorder 1e-9 of its capacity
-_ROUNDING: Final = 2e-9
+_ROUNDING: Final = 2e-9  # of a recorder, by which an image may fall short of being down
 
 
 @bundle
@@ -86,16 +86,16 @@ class LatencyRelaxation:
     contacts
         Rows of the problem's table. Shape ``(num_contacts,)``.
     typical
-        What an image takes of the recorder, about.
+        What an image takes of the recorder, about; 1 where that is nothing.
+    may_need_all
+        Whether a path may need tasks that are worth nothing.
     """
 
     rows: Ints
     target: Ints
     contacts: Ints
-    volume: Floats
-    size: Floats
     typical: float
-    needs_all: bool
+    may_need_all: bool
     network: Network
     levels: EnergyLevels
     layers: Layers
@@ -111,17 +111,14 @@ class LatencyRelaxation:
         size = np.where(is_image, satellite.end_s - satellite.start_s, 0.0) * own.collect_fill_per_s
         on_board = problem.objective.collected_share * problem.worth_on_ground[rows]
         setup_s = problem.downlinks.stations.setup_s[satellite.place[layers.contact]]
-        counted = np.maximum(size - _ROUNDING, 0.0)
-        # Where a task leaves no less energy than idling, or leads to others, a path may need it.
+        # There a path gains nothing by a task that is worth nothing, neither energy nor a turn.
         is_dear = own.sun_pointing == "free" and own.idle_drain_per_s == 0.0
         return cls(
             rows=rows,
             target=np.where(is_image, satellite.place, len(problem.target_ids)).astype(np.int32),
             contacts=rows[layers.contact],
-            volume=satellite.volume[layers.contact],
-            size=counted,
-            typical=float(np.median(size[is_image])) if is_image.any() else 1.0,
-            needs_all=not (is_dear and is_transitive_on(satellite)),
+            typical=(float(np.median(size[is_image])) if is_image.any() else 0.0) or 1.0,
+            may_need_all=not (is_dear and is_transitive_on(satellite)),
             network=network,
             levels=energy_levels(network, _PER_COLLECT),
             layers=layers,
@@ -130,7 +127,7 @@ class LatencyRelaxation:
                 on_board=on_board,
                 decaying=problem.worth_on_ground[rows] - on_board,
                 most=problem.worth[rows],
-                size=counted,
+                size=np.maximum(size - _ROUNDING, 0.0),
                 ready_s=satellite.start_s[layers.contact] + setup_s - _ROUNDING_S,
                 volume=satellite.volume[layers.contact],
                 half_life_s=problem.objective.half_life_s or np.inf,
@@ -149,7 +146,7 @@ class LatencyRelaxation:
         """
         m, num_layers = len(self.rows), len(self.layers.first)
         weight = np.empty((num_layers, m))
-        passed = 0.0 if self.needs_all else PASSED
+        passed = 0.0 if self.may_need_all else PASSED
         _weigh(self.terms, self.layers, prices[self.target], tolls, passed, weight)
         own, num_own = np.empty((m, self.levels.width)), np.zeros(m, dtype=np.int64)
         return most_by_contacts(self.network, self.levels, self.layers, weight, own, num_own)
@@ -169,20 +166,20 @@ class LatencyRelaxation:
         load = np.zeros(len(self.contacts))
         number = self.layers.number[path]
         taken = number[number >= 0]
-        load[taken] -= self.volume[taken]
+        load[taken] -= self.terms.volume[taken]
         if len(load) == 0:
             return load
         t, images, own = self.terms, path[number < 0], layer[number < 0]
         age_s = np.maximum(t.ready_s[None, :] - t.end_s[images, None], 0.0)
         gain = t.decaying[images, None] * np.exp2(-age_s / t.half_life_s)
         gain = np.minimum(gain, (t.most - t.on_board)[images, None])
-        gain -= tolls[None, :] * self.size[images, None]
+        gain -= tolls[None, :] * t.size[images, None]
         may_follow = self.layers.contact[None, :] > images[:, None]
         may_follow &= np.arange(len(load))[None, :] >= self.layers.first[own, None]
         gain[~may_follow] = -np.inf
         best = gain.argmax(axis=1)
         is_down = gain[np.arange(len(images)), best] > 0.0
-        np.add.at(load, best[is_down], self.size[images[is_down]])
+        np.add.at(load, best[is_down], t.size[images[is_down]])
         return load
 
 
