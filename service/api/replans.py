@@ -22,6 +22,7 @@ from service.jobs import submission
 from service.plans import replans
 from service.plans import store as plan_store
 from service.scenarios import freezing, replanning
+from service.scenarios.pin_inputs import with_settled_pins
 from service.scenarios.stored_question import StoredQuestion
 from service.scenarios.translate import read_file
 from service.stores import outage_store
@@ -58,7 +59,10 @@ def create_replan(plan_id: str, body: ReplanIn, call: CallDep, once: OnceDep) ->
         freeze_until = max(body.freeze_until or now, now)
         happened = _happened(session, plan, body, freeze_until)
         asked = replanning.replan_file(file, body, happened)
-        frozen = freezing.freeze_file(asked, call.settings.scenario_limits)
+        with replanning.pointing_into(body):
+            if body.keep or body.skip:
+                asked = with_settled_pins(asked)
+            frozen = freezing.freeze_file(asked, call.settings.scenario_limits)
         row, _ = intake.save(session, call, frozen, call.caller.owner)
         spec = job(
             scenario_id=row.id,

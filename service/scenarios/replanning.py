@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+import re
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from datetime import datetime
+from typing import Final
 
-from planner_core.errors import Fault
+from planner_core.errors import Fault, PlannerError
 from service.problems.faults import refuse
-from service.wire.pins import OutageIn, PinnedActionIn, PlacedOutage
+from service.wire.pins import OutageIn, PinnedActionIn, PinsIn, PlacedOutage
 from service.wire.plan_before import PromiseIn, ReplanOfFile
 from service.wire.replans import ReplanIn
 from service.wire.scenarios import FileTarget, HorizonIn, ScenarioFile
+
+_PIN: Final = re.compile(r"/pins/(keep|skip)/(\d+)")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,6 +62,7 @@ def replan_file(file: ScenarioFile, body: ReplanIn, happened: Happened) -> Scena
         *_faults_of_added(file, body, happened),
         *_faults_of_dropped(file, body, flown),
         *_faults_of_promises(body, {target.id for target in targets}),
+        *_faults_of_rewards(body, {target.id for target in targets}),
     ]
     if faults:
         raise refuse(faults)
@@ -66,15 +72,14 @@ def replan_file(file: ScenarioFile, body: ReplanIn, happened: Happened) -> Scena
         *(one for one in happened.outages if one.id not in known),
         *(PlacedOutage(**dict(outage)) for outage in body.outages if not _is_among(outage, file)),
     ]
-    forbid = dict.fromkeys((*file.pins.forbid, *body.drop_targets))
     return file.model_copy(
         update={
             "name": None,
             "horizon": HorizonIn(start=file.horizon.start, end=end),
-            "targets": targets,
+            "targets": [_with_reward(target, body.rewards) for target in targets],
             "outages": outages,
             "objective": body.objective or file.objective,
-            "pins": file.pins.model_copy(update={"forbid": list(forbid)}),
+            "pins": _pins(file.pins, body),
             "replan": ReplanOfFile(
                 base=list(happened.base),
                 freeze_until=happened.freeze_until,
@@ -83,6 +88,40 @@ def replan_file(file: ScenarioFile, body: ReplanIn, happened: Happened) -> Scena
             ),
         }
     )
+
+
+def _with_reward(target: FileTarget, rewards: Mapping[str, float]) -> FileTarget:
+    if target.id not in rewards:
+        return target
+    return target.model_copy(update={"reward": rewards[target.id]})
+
+
+def _pins(before: PinsIn, body: ReplanIn) -> PinsIn:
+    """Return the pins of both. Those of the body come first: faults find their place in it."""
+    keep = [pin for pin in before.keep if pin not in body.keep and pin not in body.skip]
+    skip = [pin for pin in before.skip if pin not in body.keep and pin not in body.skip]
+    forbid = dict.fromkeys((*before.forbid, *body.drop_targets))
+    return before.model_copy(
+        update={
+            "keep": [*body.keep, *keep],
+            "skip": [*body.skip, *skip],
+            "forbid": list(forbid),
+        }
+    )
+
+
+@contextmanager
+def pointing_into(body: ReplanIn) -> Iterator[None]:
+    """Let faults of the body's pins point to where they stand in it."""
+    try:
+        yield
+    except PlannerError as error:
+        pointer = error.fault.pointer or ""
+        pin = _PIN.match(pointer)
+        if pin is not None and int(pin[2]) < len(getattr(body, pin[1])):
+            placed = f"/{pin[1]}/{pin[2]}{pointer[pin.end() :]}"
+            error.fault = replace(error.fault, pointer=placed)
+        raise
 
 
 def _is_among(outage: OutageIn, file: ScenarioFile) -> bool:
@@ -144,4 +183,13 @@ def _faults_of_promises(body: ReplanIn, known: Collection[str]) -> list[Fault]:
               pointer=f"/promises/{i}/target_id")
         for i, promise in enumerate(body.promises)
         if promise.target_id not in known
+    ]  # fmt: skip
+
+
+def _faults_of_rewards(body: ReplanIn, known: Collection[str]) -> list[Fault]:
+    return [
+        Fault(code="unknown_target", detail=f"There is no target {target_id!r}.",
+              pointer="/rewards/" + target_id.replace("~", "~0").replace("/", "~1"))
+        for target_id in body.rewards
+        if target_id not in known
     ]  # fmt: skip

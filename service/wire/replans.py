@@ -6,9 +6,9 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from service.wire.base import Body, Free, Id, Instant, Name, Open, Wire
+from service.wire.base import Body, Free, Id, Instant, Name, NonNegative, Open, Wire
 from service.wire.jobs import LimitsIn
-from service.wire.pins import OutageIn
+from service.wire.pins import OutageIn, PinnedActionIn
 from service.wire.places import TargetIn
 from service.wire.plan_before import PromiseIn, StabilityIn
 from service.wire.plans import MAX_REPORTED, ExecutionIn, PlanActionOut
@@ -35,6 +35,20 @@ class ReplanIn(Body):
     add_targets: list[TargetIn] = Field([], max_length=10_000)
     add_target_catalog_ids: list[Id] = Field([], max_length=1000)
     drop_targets: list[Id] = Field([], max_length=10_000)
+    keep: list[PinnedActionIn] = Field(
+        [],
+        max_length=10_000,
+        description="Actions that the new plan must hold, as in `pins.keep`. "
+        "Those of the plan itself stay, but for what `skip` names.",
+    )
+    skip: list[PinnedActionIn] = Field(
+        [],
+        max_length=10_000,
+        description="Single actions that it may not hold, as in `pins.skip`.",
+    )
+    rewards: dict[Id, NonNegative] = Field(
+        {}, max_length=10_000, description="By target: what its image earns from now on."
+    )
     objective: AnyObjective | None = Field(
         None, description="What images earn from now on; that of the plan by default."
     )

@@ -224,3 +224,46 @@ def test_a_shell_is_told_that_nothing_changes(
     now = instant_text(noon(base))
     assert main(["replan", base.id, "--url", served, "--now", now, "--time-s", "20"]) == OK
     assert "Nothing changes." in capsys.readouterr().out
+
+
+def test_pins_and_rewards_hold_in_the_new_plan(whole: Client, base: Plan) -> None:
+    later = [a for a in whole.plans.actions(base.id) if a.start > noon(base)]
+    kept, skipped = [a for a in later if a.mode == "collect"][:2]
+    contact = next(a for a in later if a.mode == "contact")
+    draft = replanned(
+        whole, base, keep=[pin(kept), pin(contact)], skip=[pin(skipped)],
+        rewards={kept.target_id: 7.5},
+    )  # fmt: skip
+    held = {place(a) for a in whole.plans.actions(draft.id)}
+    assert {place(kept), place(contact)} <= held
+    assert place(skipped) not in held
+    content = scenario_of(whole, draft)
+    rewards = {each["id"]: each["reward"] for each in content["targets"]}
+    assert rewards[kept.target_id] == 7.5
+    assert len(content["pins"]["keep"]) == 2
+
+    # What was pinned once is let go where the next replan says so.
+    again = replanned(whole, draft, skip=[pin(kept)], keep=[pin(skipped)])
+    held = {place(a) for a in whole.plans.actions(again.id)}
+    assert {place(skipped), place(contact)} <= held
+    assert place(kept) not in held
+
+
+def test_pins_and_rewards_that_cannot_be_are_refused_with_their_place(
+    whole: Client, base: Plan
+) -> None:
+    with pytest.raises(ServiceError) as caught:
+        whole.plans.replan(base.id, now=noon(base), rewards={"no/where": 2.0})
+    assert [fault.pointer for fault in caught.value.errors] == ["/rewards/no~1where"]
+    with pytest.raises(ServiceError) as unseen:
+        whole.plans.replan(base.id, now=noon(base), keep=[{"station_id": "nowhere"}])
+    assert [fault.pointer for fault in unseen.value.errors] == ["/keep/0/station_id"]
+
+
+def pin(action: PlanAction) -> dict[str, Any]:
+    where = {name: getattr(action, name) for name in ("satellite_id", "target_id", "station_id")}
+    return where | {"start": instant_text(action.start), "end": instant_text(action.end)}
+
+
+def place(action: PlanAction) -> tuple[Any, ...]:
+    return (action.satellite_id, action.target_id, action.station_id, action.start)
