@@ -101,6 +101,9 @@ STRATEGIES: Final[Mapping[str, Change]] = {
     "turns of windows and choices": Change(
         patches=_off(f"{DRIVERS}.resource_steps", "ResourceSearch.search"), families=_RESOURCES
     ),
+    "relaxations of a fleet's contacts": Change(
+        patches=_set(f"{DRIVERS}.resource_fleet", "_MOST_RELAXED", 0), families=_STATIONS
+    ),
     "program search": Change(
         patches=_off(f"{DRIVERS}.resource_fleet", "ProgramSearch", _Idle), families=_STATIONS
     ),

@@ -44,7 +44,8 @@ def search_of(
     prices.step(0.0)
     pool = PlanPool(problem, budget, seed)
     pool.add(start)
-    return ProgramSearch(problem, pool, prices, paths.usage, budget, seed), pool
+    losses = np.where(paths.usage > 0.0, 0.0, np.inf)
+    return ProgramSearch(problem, pool, prices, losses, budget, seed), pool
 
 
 @examples(40)

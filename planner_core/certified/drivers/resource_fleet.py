@@ -2,23 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Final
+
+import numpy as np
 
 from planner_core.certified.drivers.resource_steps import ResourceSearch
 from planner_core.certified.lns.alternating import TurnSearch
 from planner_core.certified.mip.program_search import ProgramSearch
 from planner_core.certified.mip.solution_pool import PlanPool
+from planner_core.certified.multipliers.ascent import Ascent, Steps
 from planner_core.certified.multipliers.energy import EnergyPaths, ascent_on_energy
 from planner_core.certified.multipliers.resources import PriceSearch
 from planner_core.problem import Floats
 
 _FLEET_PATIENCE: Final = 60  # turns of a fleet without a better plan
 _TURN: Final = 6  # steps of the search for a fleet's plans
-_BESIDE_PRICES: Final = (2, 12)  # such steps, for few opportunities and for many
+_BESIDE_PRICES: Final = (2, 6)  # such steps, for few opportunities and for many
 _SHORT_PATIENCE: Final = 2  # of a small one
 _FLEET_ROUNDS: Final = 300  # of the search for a fleet's prices
-_FLEET_STEPS: Final = 2  # of prices with recorders, from there
+_SHARES: Final = (0.3, 0.6)  # of those prices that recorders leave, where they are short as well
+_NEAR_ROUNDS, _NEAR_STEP = 40, 3e-3  # of asking near prices
+_LEAST_SHARE: Final = 0.005  # that recorders take from the bound, where relaxations are asked
+_MOST_RELAXED: Final = 12_000  # tasks, in the relaxation of a fleet
+_BESIDE_RELAXATION: Final = 3  # steps of the search for plans
+_CUT_ROUNDS: Final = (0, 1)  # of each such relaxation; the first finds tasks
 
 
 def close_in_fleet(search: ResourceSearch, unit: float) -> None:
@@ -35,7 +44,12 @@ def close_in_fleet(search: ResourceSearch, unit: float) -> None:
         programs = None
         if search.is_fleet and pricing.prices is not None:
             programs = ProgramSearch(
-                search.problem, pool, pricing.prices, pricing.usage, search.budget, search.seed
+                search.problem,
+                pool,
+                pricing.prices,
+                pricing.losses,
+                search.budget,
+                search.seed,
             )
         idle_turns = 0
         while idle_turns < (_FLEET_PATIENCE if programs else _SHORT_PATIENCE):
@@ -74,54 +88,80 @@ def _go_on(other: _FleetPricing | ProgramSearch, pool: PlanPool) -> None:
 
 
 class _FleetPricing:
-    """Prices by energy alone, and what they prove with recorders.
+    """Prices by energy alone, then by relaxations with the plan's contacts; and what they prove.
 
-    Of what recorders take from the bound the exact programmes find nearly all at these prices;
-    to search with them takes fifty times as long, and brings next to nothing.
+    To search with the exact programmes takes fifty times as long as with energy alone, and brings
+    next to nothing. The relaxation of the plan's contacts knows of recorders as well, and its
+    prices are nearly the best for all contacts.
 
     Attributes
     ----------
     prices
         The search that has seen what they prove, once it has come to that.
-    usage
-        How many relaxed plans took each opportunity. Shape ``(n,)``.
+    losses
+        What taking each opportunity costs, about; infinite where no good plan does.
+        Shape ``(n,)``.
     steps_beside
-        How many steps of the search for plans take about as long as a turn.
+        How many steps of the search for plans take about as long as the next turn.
     """
 
     def __init__(self, search: ResourceSearch) -> None:
         self._search = search
-        self.steps_beside = _BESIDE_PRICES[search.is_fleet]
         self._paths = EnergyPaths(search.problem)
-        self._energy = ascent_on_energy(
-            search.problem, self._paths, search.prices(), _FLEET_ROUNDS, search.seed
-        )
-        self._num_steps = 0
         self.prices: PriceSearch | None = None
+        self.is_settled = False
+        self._work = self._steps()
+        self.steps_beside = next(self._work)
 
     @property
-    def usage(self) -> Floats:
-        return self._paths.usage
-
-    @property
-    def is_settled(self) -> bool:
-        return self._num_steps >= _FLEET_STEPS
+    def losses(self) -> Floats:
+        relaxation = self._search.best_relaxation
+        if relaxation is None:
+            return np.where(self._paths.usage > 0.0, 0.0, np.inf)
+        return relaxation.losses
 
     def turn(self) -> None:
-        """Ask by energy alone some more, or prove something."""
-        search, energy = self._search, self._energy
-        if not energy.is_settled:
+        """Ask by energy alone some more, or relax, or prove something."""
+        beside = next(self._work, None)
+        self.is_settled = beside is None
+        self.steps_beside = beside or 1
+
+    def _steps(self) -> Iterator[int]:
+        """Yield how long each turn takes, before it."""
+        search, usage = self._search, self._paths.usage
+        energy = ascent_on_energy(
+            search.problem, self._paths, search.prices(), _FLEET_ROUNDS, search.seed
+        )
+        while not energy.is_settled:
+            yield _BESIDE_PRICES[search.is_fleet]
             # What takes opportunities counts from here on: answers come near the best plans.
-            self._paths.usage[:] = 0.0
+            usage[:] = 0.0
             search.ask_energy(energy)
-            return
-        if self.prices is None:
-            self.prices = PriceSearch(
-                search.problem,
-                min(search.best.bound.value, energy.value),
-                energy.multipliers,
-                search.budget.stop,
-            )
-            self.prices.learn(search.best.plan)
-        search.price(self.prices, 1)
-        self._num_steps += 1
+        yield _BESIDE_PRICES[search.is_fleet]
+        value = min(search.best.bound.value, energy.value)
+        prices = PriceSearch(search.problem, value, energy.multipliers, search.budget.stop)
+        prices.learn(search.best.plan)
+        search.price(prices, 1)
+        self.prices = prices
+        has_full_recorders = prices.value < (1.0 - _LEAST_SHARE) * energy.value
+        is_small = np.count_nonzero(usage) <= _MOST_RELAXED
+        if search.is_fleet and is_small and has_full_recorders:
+            for share in _SHARES:
+                self._ask_near(share * energy.multipliers)
+            for num_rounds in _CUT_ROUNDS:
+                yield _BESIDE_RELAXATION
+                offered = (usage > 0.0) | (prices.usage > 0.0)
+                relaxation = search.relax_plan(offered, num_rounds)
+                if relaxation is None:
+                    break
+                self._ask_near(relaxation.prices)
+                prices.restart(relaxation.prices)
+        yield _BESIDE_PRICES[search.is_fleet]
+        search.price(prices, 1)
+
+    def _ask_near(self, prices: Floats) -> None:
+        """Let satellites answer prices near these, by energy alone: more tasks get to be known."""
+        steps = Steps(first=_NEAR_STEP, last=_NEAR_STEP, num_epochs=_NEAR_ROUNDS)
+        search = self._search
+        ascent = Ascent(self._paths, search.problem.best_worth, prices, steps, search.seed)
+        ascent.improve(_NEAR_ROUNDS, search.budget.stop)

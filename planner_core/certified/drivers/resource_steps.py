@@ -206,6 +206,31 @@ class ResourceSearch:
         self.best.report("contacts fixed")
         return True
 
+    def relax_plan(self, offered: Bools, num_rounds: int) -> Relaxation | None:
+        """Return the relaxation of the best plan's contacts, None where there is no point.
+
+        Parameters
+        ----------
+        offered
+            Tasks that may be taken, beside those of the plan. Shape ``(n,)``.
+        num_rounds
+            Of cutting planes.
+        """
+        table = self.problem.opportunities
+        own = self.mask(action.opportunity for action in self.best.plan.actions)
+        contacts = tuple(np.flatnonzero(own & (table.kind == CONTACT)).tolist())
+        program = FixedContacts(self.problem, offered | own, contacts, self.budget, self.seed)
+        relaxation = program.relaxation(num_rounds)
+        self._relaxed[contacts] = relaxation
+        self.best.report("contacts fixed")
+        return relaxation if np.isfinite(relaxation.value) else None
+
+    @property
+    def best_relaxation(self) -> Relaxation | None:
+        """The most hopeful set of contacts, if any was relaxed."""
+        known = [r for r in self._relaxed.values() if np.isfinite(r.value)]
+        return max(known, key=lambda relaxation: relaxation.value, default=None)
+
     def fix_contacts(self, *, is_last: bool) -> bool:
         """Search for a better plan with the most promising contacts; return whether it is.
 

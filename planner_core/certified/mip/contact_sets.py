@@ -167,11 +167,17 @@ class FixedContacts:
         self._fixed = fixed
         self._point: Floats | None = None  # of the last relaxation
 
-    def relaxation(self) -> Relaxation:
-        """Return what the relaxation tells, with prices amid all that prove it."""
+    def relaxation(self, num_rounds: int = _CENTRAL_ROUNDS) -> Relaxation:
+        """Return what the relaxation tells, with prices amid all that prove it.
+
+        Parameters
+        ----------
+        num_rounds
+            Of cutting planes.
+        """
         prices = np.zeros(len(self._problem.target_ids))
         losses = np.full(len(self._problem.opportunities), np.inf)
-        point = self._cut(_CENTRAL_ROUNDS, self._engine.central)
+        point = self._cut(num_rounds, self._engine.central)
         if point is not None:
             prices = self._model.target_prices(point.row_prices)
             losses[self._rows] = point.losses[: len(self._rows)]

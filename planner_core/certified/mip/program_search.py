@@ -34,11 +34,13 @@ _BEST: Final = 2  # of those sets that are planned with
 _TRIES: Final = 2  # of a program without a better plan
 _DRAWS: Final = 3  # sets of contacts beside those of plans
 _OFF: Final = 0.2  # of a reward: what prices are off by at a draw
+_FEWEST_OFFERED, _MOST_PER_TASK = 1.2, 4.0  # tasks, of which programs choose one
+_MORE: Final = 1.5  # where no better plan is found among them
 _MOST_OFFERED: Final = 6000  # tasks of a program: of a larger fleet it takes some satellites
 # Steps of the other search that take about as long as
-_BESIDE_DRAWS: Final = 18
-_BESIDE_RELAXATIONS: Final = 24
-_BESIDE_PROGRAM: Final = 40
+_BESIDE_DRAWS: Final = 6
+_BESIDE_RELAXATIONS: Final = 6
+_BESIDE_PROGRAM: Final = 6
 
 
 class ProgramSearch:
@@ -50,8 +52,8 @@ class ProgramSearch:
         Where plans come from, and go.
     prices
         The satellites' programmes, and the best prices.
-    usage
-        How many plans that are relaxed at about these prices took each opportunity.
+    losses
+        What taking each opportunity costs, about; infinite where no good plan does.
         Shape ``(n,)``.
 
     Attributes
@@ -65,7 +67,7 @@ class ProgramSearch:
         problem: Problem,
         pool: PlanPool,
         prices: PriceSearch,
-        usage: Floats,
+        losses: Floats,
         budget: Budget,
         seed: int,
     ) -> None:
@@ -73,7 +75,8 @@ class ProgramSearch:
         self._pool = pool
         self._prices, self._unit = prices.prices, prices.unit
         self._satellites = prices.satellites
-        self._is_promising = usage > 0.0
+        self._losses = losses
+        self._offered_per_task = _FEWEST_OFFERED
         self._rng = np.random.default_rng(seed)
         self._work = self._steps()
         self.steps_beside = next(self._work, 1)
@@ -85,21 +88,32 @@ class ProgramSearch:
     def _steps(self) -> Iterator[int]:
         """Yield how long each turn will take, before it."""
         while not self._budget.is_spent():
-            yield _BESIDE_DRAWS
             group = self._group()
             # What satellites beside do stays the same, though the plan may change meanwhile.
             beside = self._tasks_beside(group)
             program = self._program(group, beside)
-            sets = [self._contacts(group, rows) for rows in self._known()]
-            sets += [self._draw(group, beside) for _ in range(_DRAWS)]
+            before = self._pool.reward
             yield _BESIDE_RELAXATIONS
-            worth: dict[Rows, float] = {}
-            for contacts in dict.fromkeys(sets):
-                fixed = (*beside, *contacts)
-                program.fix(fixed)
-                worth[fixed] = program.relaxed()
-            for fixed in sorted(worth, key=lambda fixed: -worth[fixed])[:_BEST]:
-                yield from self._improve(program, fixed)
+            sets = [self._contacts(group, rows) for rows in self._known()]
+            yield from self._improve_best(program, beside, sets)
+            if self._pool.reward == before:
+                yield _BESIDE_DRAWS
+                sets = [self._draw(group, beside) for _ in range(_DRAWS)]
+                yield from self._improve_best(program, beside, sets)
+            if self._pool.reward == before:
+                self._offered_per_task = min(_MORE * self._offered_per_task, _MOST_PER_TASK)
+
+    def _improve_best(
+        self, program: FixedContacts, beside: Rows, sets: Sequence[Rows]
+    ) -> Iterator[int]:
+        """Better the plan with the most hopeful of some sets of contacts."""
+        worth: dict[Rows, float] = {}
+        for contacts in dict.fromkeys(sets):
+            fixed = (*beside, *contacts)
+            program.fix(fixed)
+            worth[fixed] = program.relaxed()
+        for fixed in sorted(worth, key=lambda fixed: -worth[fixed])[:_BEST]:
+            yield from self._improve(program, fixed)
 
     def _improve(self, program: FixedContacts, fixed: Rows) -> Iterator[int]:
         """Better the plan with what is fixed, from one corner of the relaxation after another."""
@@ -116,14 +130,22 @@ class ProgramSearch:
     def _group(self) -> Bools:
         """Return which satellites the next program is for. Shape ``(num_satellites,)``."""
         group = np.zeros(len(self._problem.satellites), dtype=np.bool_)
-        num_offered = 0
+        is_promising, num_offered = self._promising(), 0
         for relaxation in self._rng.permutation(np.array(self._satellites, dtype=object)):
             rows = relaxation.satellite.rows
-            num_offered += int(self._is_promising[rows].sum())
+            num_offered += int(is_promising[rows].sum())
             if num_offered > _MOST_OFFERED and group.any():
                 break
             group[self._problem.opportunities.satellite[rows[0]]] = True
         return group
+
+    def _promising(self) -> Bools:
+        """Return tasks of which good plans are made: so many for each of the best plan."""
+        losses = self._losses
+        num_offered = int(self._offered_per_task * len(self._pool.plan.actions))
+        cut_off = np.sort(losses[np.isfinite(losses)])[:num_offered].max(initial=0.0)
+        promising: Bools = losses <= cut_off
+        return promising
 
     def _known(self) -> tuple[Rows, Rows]:
         """Return the best plan, and the latest one of the other search."""
@@ -131,7 +153,7 @@ class ProgramSearch:
 
     def _program(self, group: Bools, beside: Rows) -> FixedContacts:
         """Return the program of some satellites, beside what the others do."""
-        offered = self._is_promising.copy()
+        offered = self._promising()
         offered[[*chain(*self._known())]] = True
         offered &= group[self._problem.opportunities.satellite]
         return FixedContacts(
