@@ -24,6 +24,7 @@ from planner_core.domain import (
     Sensor,
 )
 from planner_core.errors import Cancelled, InvalidScenario
+from planner_core.idling import started
 from planner_core.orbits import ephemeris as orbits
 from planner_core.orbits.earth_orientation import shipped
 from planner_core.orbits.eclipse import always_sunlit, sunlight
@@ -287,6 +288,8 @@ def build_problem(scenario: Scenario, computed: ScenarioOpportunities, budget: B
         A pin is impossible.
     """
     satellites = []
+    known = scenario.states if scenario.use_resources else ()
+    states = {state.satellite_id: state for state in known}
     sun = sun_path(scenario.horizon)
     downlinks = downlinks_of(scenario, computed.opportunities)
     for index, satellite in enumerate(scenario.satellites):
@@ -300,7 +303,7 @@ def build_problem(scenario: Scenario, computed: ScenarioOpportunities, budget: B
                 id=satellite.id,
                 name=satellite.name,
                 agility=satellite.agility,
-                resources=satellite.resources,
+                resources=started(satellite, states.get(satellite.id), scenario.horizon),
                 downlinks=downlinks,
                 sunlight=computed.sunlight[index] if sees_shadow else everywhere,
                 sun=sun,

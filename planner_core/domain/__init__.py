@@ -20,6 +20,8 @@ Objective
     Which part of that an image earns when it is taken, and which when it is on the ground.
 Outage
     A span in which a satellite or a station is not to be had.
+State
+    What is known of a satellite's battery and recorder before the horizon begins.
 Pin
     What a plan must hold, or must not; see ``planner_core.pins``.
 Off-nadir angle
@@ -52,6 +54,7 @@ from planner_core.domain.spacecraft import (
     SlewModel,
     SunPointing,
 )
+from planner_core.domain.states import State
 
 __all__ = [
     "Agility",
@@ -78,6 +81,7 @@ __all__ = [
     "SkySeries",
     "SlewModel",
     "Stability",
+    "State",
     "SunPointing",
     "Target",
 ]

@@ -17,6 +17,7 @@ from planner_core.domain.places import GroundStation, Target
 from planner_core.domain.quality import Quality
 from planner_core.domain.replan import Replan
 from planner_core.domain.spacecraft import Satellite
+from planner_core.domain.states import State, check_states
 from planner_core.errors import InvalidScenario
 from planner_core.pins import Pins
 
@@ -44,6 +45,8 @@ class Scenario:
         Plan with element sets of any age (see ``build.check_element_age``).
     outages
         What is known to be out, and when.
+    states
+        What satellites had before the horizon began, where that is known: at most one of each.
     replan
         The plan to go on from, where there is one.
     """
@@ -63,6 +66,7 @@ class Scenario:
     allow_old_elements: bool = False
     pins: Pins = field(default_factory=Pins)
     outages: tuple[Outage, ...] = ()
+    states: tuple[State, ...] = ()
     replan: Replan | None = None
     warnings: tuple[str, ...] = field(default=(), compare=False)
 
@@ -132,6 +136,7 @@ class Scenario:
         )
         for position, outage in enumerate(self.outages):
             outage.check(f"/outages/{position}", satellite_ids, station_ids)
+        check_states(self.states, satellite_ids, self.horizon)
         if self.replan is not None:
             require(
                 not self.continuous_starts,

@@ -69,7 +69,7 @@ def list_scenarios(
     satellite_id: SatelliteQuery = None,
     station_id: StationQuery = None,
 ) -> Listed[ScenarioSummary]:
-    """List the scenarios, newest first, without their pins and outages.
+    """List the scenarios, newest first, without their pins, outages and states.
 
     Those that were sent with a job, or made by a what-if, are their owner's and not listed for
     others; the scope `admin` sees all.
@@ -228,7 +228,12 @@ def _find(session: Session, scenario_id: str, caller: Caller) -> ScenarioRow:
 
 def _shown(row: ScenarioRow) -> ScenarioOut:
     question = StoredQuestion(row.content)
-    return ScenarioOut(**dict(_summary(row)), pins=question.pins, outages=question.outages)
+    return ScenarioOut(
+        **dict(_summary(row)),
+        pins=question.pins,
+        outages=question.outages,
+        states=question.states,
+    )
 
 
 def _summary(row: ScenarioRow) -> ScenarioSummary:

@@ -289,7 +289,7 @@ def _find(session: Session, table: type[R], what: str, ids: Sequence[str]) -> li
 
 def _summary(file: ScenarioFile, warnings: Iterable[str]) -> dict[str, Any]:
     shown = file.model_dump(
-        mode="json", include=set(Question.model_fields) - {"name", "pins", "outages"}
+        mode="json", include=set(Question.model_fields) - {"name", "pins", "outages", "states"}
     )
     catalogs = dict.fromkeys(t.catalog_id for t in file.targets if t.catalog_id is not None)
     return shown | {

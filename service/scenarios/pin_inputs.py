@@ -1,14 +1,14 @@
-"""Pins and outages, from what clients send to the core's and back; the core has the last word."""
+"""Pins, outages and states, from what clients send to the core's and back: it has the last word."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from typing import TypeVar
 
-from planner_core.domain import Outage, Promise, Replan, Stability
+from planner_core.domain import Outage, Promise, Replan, Stability, State
 from planner_core.errors import InvalidScenario
 from planner_core.pins import BlockedInterval, PinnedAction, Pins
-from service.wire.pins import BlockedIn, OutageIn, PinnedActionIn, PinsIn
+from service.wire.pins import BlockedIn, OutageIn, PinnedActionIn, PinsIn, StateIn
 from service.wire.plan_before import ReplanOfFile
 from service.wire.scenarios import FileGroundStation, FileSatellite, ScenarioFile
 
@@ -42,6 +42,16 @@ def outage_from(body: OutageIn) -> Outage:
         end=body.end,
         modes=tuple(dict.fromkeys(body.modes)),
         reason=body.reason,
+    )
+
+
+def state_from(body: StateIn) -> State:
+    """Return the state of one body."""
+    return State(
+        satellite_id=body.satellite_id,
+        at=body.at,
+        battery_fraction=body.battery_fraction,
+        recorder_fraction=body.recorder_fraction,
     )
 
 

@@ -22,7 +22,7 @@ from service.scenarios.translate import (
     satellite_from,
     target_from,
 )
-from service.wire.pins import PinsIn, PlacedOutage
+from service.wire.pins import PinsIn, PlacedOutage, StateIn
 from service.wire.plan_before import ReplanOfFile
 from service.wire.scenarios import FileGroundStation, FileSatellite, FileTarget, HorizonIn
 from service.wire.stored import from_store
@@ -56,6 +56,14 @@ class StoredQuestion:
             return ()
         found = self._before_targets[0].get("outages", ())
         return tuple(PlacedOutage.model_validate(one) for one in found)
+
+    @cached_property
+    def states(self) -> tuple[StateIn, ...]:
+        """Return what satellites had before the horizon."""
+        if '"states":' not in self._content:
+            return ()
+        found = self._before_targets[0].get("states", ())
+        return tuple(StateIn.model_validate(one) for one in found)
 
     @cached_property
     def replan(self) -> ReplanOfFile | None:

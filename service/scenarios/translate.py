@@ -34,7 +34,7 @@ from planner_core.orbits.omm import elements_from_omm, omm_from_elements
 from planner_core.orbits.tle import read_tle
 from service.problems.faults import faults_of_validation
 from service.scenarios.forecast_inputs import forecast_from
-from service.scenarios.pin_inputs import outage_from, pins_from, replan_from
+from service.scenarios.pin_inputs import outage_from, pins_from, replan_from, state_from
 from service.wire.places import GroundStationIn, TargetIn
 from service.wire.satellites import (
     AgilityIn,
@@ -155,8 +155,11 @@ def canonical_of_file(file: ScenarioFile) -> str:
     _plain_objective(document)
     for outage in document["outages"]:
         _without_unset(outage, "id", "satellite_id", "station_id", "reason")
-    if not document["outages"]:
-        del document["outages"]
+    for state in document["states"]:
+        _without_unset(state, "battery_fraction", "recorder_fraction")
+    for part in ("outages", "states"):
+        if not document[part]:
+            del document[part]
     for part in ("pins", "quality"):
         if not any(document[part].values()):
             del document[part]
@@ -218,6 +221,7 @@ def scenario_from_file(file: ScenarioFile) -> Scenario:
         allow_old_elements=file.allow_old_elements,
         pins=pins_from(file.pins),
         outages=tuple(outage_from(outage) for outage in file.outages),
+        states=tuple(state_from(state) for state in file.states),
         replan=None if file.replan is None else replan_from(file.replan),
     )
 

@@ -91,6 +91,8 @@ Id = Annotated[str, StringConstraints(min_length=1, max_length=200, pattern=TEXT
 Reason = Annotated[str, StringConstraints(min_length=1, max_length=1000, pattern=TEXT)]
 """Why, for people; printable characters."""
 
+Fraction = Annotated[float, Field(ge=0, le=1)]
+
 MOST: Final = 1e9
 """Of every amount, so that sums and products of amounts stay finite and exact."""
 LEAST: Final = 1e-6

@@ -1,4 +1,4 @@
-"""Pinned actions and outages, as clients write them."""
+"""Pinned actions, outages and states, as clients write them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Final, Literal, get_args
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from service.wire.base import Body, Id, Instant, Open, Reason, Wire
+from service.wire.base import Body, Fraction, Id, Instant, Open, Reason, Wire
 
 PinnedMode = Literal["collect", "contact"]
 
@@ -103,6 +103,17 @@ class OutageOut(Wire):
     modes: tuple[Open[PinnedMode], ...]
     reason: str | None
     created_at: Instant
+
+
+class StateIn(Body):
+    """What a satellite had before the horizon; until that begins it idles."""
+
+    satellite_id: Id
+    at: Instant = Field(description="The horizon's start, or up to seven days before it.")
+    battery_fraction: Fraction | None = Field(
+        None, description="Of capacity at that instant; null for what `resources` say of the start."
+    )
+    recorder_fraction: Fraction | None = Field(None, description="Likewise, of the recorder.")
 
 
 class PinsIn(Body):

@@ -10,6 +10,7 @@ from pydantic_core import PydanticCustomError
 from service.wire.base import (
     TEXT,
     Body,
+    Fraction,
     Free,
     Id,
     Instant,
@@ -24,7 +25,6 @@ from service.wire.base import (
 )
 from service.wire.imports import RejectedRow
 
-Fraction = Annotated[float, Field(ge=0, le=1)]
 SunExclusion = Annotated[float | None, Field(ge=0, le=180)]
 PanelAngle = Annotated[float, Field(ge=0, le=180)]
 DownlinkKnot = Annotated[list[NonNegative], Field(min_length=2, max_length=2)]

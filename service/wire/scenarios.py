@@ -10,7 +10,7 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from service.wire.base import Body, Duration, Id, Instant, Name, Open, Stored, Wire
-from service.wire.pins import PinsIn, PlacedOutage
+from service.wire.pins import PinsIn, PlacedOutage, StateIn
 from service.wire.places import GroundStationIn, TargetIn
 from service.wire.plan_before import ReplanOfFile
 from service.wire.satellites import Nadir, WholeSatellite
@@ -169,6 +169,12 @@ class Question(Body):
         description="What is known to be out, and when. Those stored under `/v1/outages` that "
         "concern the scenario are added when it is stored.",
     )
+    states: list[StateIn] = Field(
+        [],
+        max_length=10_000,
+        description="Battery and recorder of satellites before the horizon begins, at most one "
+        "state of each. Without, their `resources` say what they have at its start.",
+    )
 
 
 class ScenarioIn(Question):
@@ -316,6 +322,7 @@ class ScenarioOut(ScenarioSummary):
     outages: tuple[PlacedOutage, ...] = Field(
         (), description="With the `id` of each that was taken from `/v1/outages`."
     )
+    states: tuple[StateIn, ...] = Field((), description="What satellites had before the horizon.")
 
 
 class ViewOut(Wire):

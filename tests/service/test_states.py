@@ -1,0 +1,78 @@
+"""States of satellites over files and HTTP: part of the question, and where plans begin."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+
+import pytest
+
+from planner_core.errors import InvalidScenario
+from service.scenarios.translate import canonical, scenario_from_content
+from tests.missions import drawn_targets, paper_mission
+from tests.service.conftest import Service
+from tests.service.factories import post
+from tests.service.problems import assert_problem
+from tests.service.test_plan_job import run
+from tests.service.test_scenarios import PATH, question
+
+
+def test_states_are_part_of_the_question_and_none_changes_no_hash() -> None:
+    plain = paper_mission(drawn_targets(20))
+    assert canonical(plain | {"states": []}) == canonical(plain)
+    at = plain["horizon"]["start"]
+    state = {"satellite_id": "PAPER", "at": at, "battery_fraction": 0.5}
+    text = canonical(plain | {"states": [state]})
+    assert text != canonical(plain)
+    (stored,) = json.loads(text)["states"]
+    assert set(stored) == {"satellite_id", "at", "battery_fraction"}
+    assert canonical(json.loads(text)) == text
+    (known,) = scenario_from_content(json.loads(text)).states
+    assert (known.battery_fraction, known.recorder_fraction) == (0.5, None)
+
+
+def test_a_job_begins_where_the_satellite_is() -> None:
+    plain = paper_mission(drawn_targets(60))
+    state = {
+        "satellite_id": "PAPER", "at": plain["horizon"]["start"],
+        "battery_fraction": 0.35, "recorder_fraction": 0.7,
+    }  # fmt: skip
+    full, low = (
+        json.loads(run(file, "rule").timeline) for file in (plain, plain | {"states": [state]})
+    )
+    curve = low["satellites"][0]["resources"]
+    assert curve["battery_fraction"][0] == pytest.approx(0.35)
+    assert curve["recorder_fraction"][0] == pytest.approx(0.7)
+    assert low["violations"] == []
+    assert low["totals"]["reward"] <= full["totals"]["reward"]
+
+
+def test_a_state_of_an_unknown_satellite_is_refused() -> None:
+    plain = paper_mission(drawn_targets(5))
+    state = {"satellite_id": "none", "at": plain["horizon"]["start"]}
+    with pytest.raises(InvalidScenario) as caught:
+        scenario_from_content(plain | {"states": [state]})
+    fault = caught.value.fault
+    assert (fault.code, fault.pointer) == ("unknown_satellite", "/states/0/satellite_id")
+
+
+def test_states_are_stored_with_their_scenario(service: Service) -> None:
+    body = question(service.client)
+    state = {
+        "satellite_id": body["satellite_ids"][0], "at": body["horizon"]["start"],
+        "battery_fraction": 0.6, "recorder_fraction": None,
+    }  # fmt: skip
+    plain = post(service.client, PATH, body)
+    scenario = post(service.client, PATH, body | {"states": [state]})
+    assert plain["states"] == []
+    assert scenario["sha256"] != plain["sha256"]
+    assert scenario["states"] == [state | {"at": "2026-03-01T00:00:00.000Z"}]
+    assert service.client.get(f"{PATH}/{scenario['id']}").json()["states"] == scenario["states"]
+    file = service.client.get(f"{PATH}/{scenario['id']}?expand=true").json()
+    assert hashlib.sha256(canonical(file).encode()).hexdigest() == scenario["sha256"]
+    late = body | {"states": [state | {"at": body["horizon"]["end"]}]}
+    assert_problem(service.client.post(PATH, json=late), 422, "value_out_of_range", "/states/0/at")
+    beyond = body | {"states": [state | {"battery_fraction": 1.5}]}
+    answer = service.client.post(PATH, json=beyond)
+    assert answer.status_code == 422
+    assert answer.json()["errors"][0]["pointer"] == "/states/0/battery_fraction"
