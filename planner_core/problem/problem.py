@@ -367,6 +367,13 @@ class Problem:
         return float(offered.mean()) or 1.0 if len(offered) else 1.0
 
     @cached_property
+    def has_better_images(self) -> bool:
+        """Return whether of some target one image earns more than another that earns anything."""
+        is_worth = (self.opportunities.kind == COLLECT) & (self.worth > 0.0)
+        best = self.best_worth[self.opportunities.place[is_worth]]
+        return bool(np.any(self.worth[is_worth] < best))
+
+    @cached_property
     def reward_unit(self) -> float:
         """Return an amount of which what any plan earns is a multiple; 0 where there is none."""
         if not self.counts_delivery or self.objective.is_delivered:

@@ -38,6 +38,7 @@ _CLEAR: Final = 1e-7
 _REPORT_EVERY_S: Final = 0.25
 _STALLED: Final = 1e-4  # of the bound, in _PATIENCE rounds of cuts
 _PATIENCE: Final = 5
+_RELAXATION_ROUNDS: Final = 10  # of cuts, where the relaxation alone is asked
 _HEURISTIC_EFFORT: Final = 0.05  # what HiGHS does by default
 
 
@@ -139,6 +140,18 @@ class Milp:
         if self.formulation == "antichain":
             _cut(engine, problem, model, self.cut_rounds, watch)
         return engine.search(_columns(best), self.gap, _HEURISTIC_EFFORT, watch)
+
+
+def relaxation_bound(problem: Problem, budget: Budget, seed: int) -> Bound:
+    """Return what the linear relaxation of the whole program says that no plan exceeds."""
+    model = plan_program(problem, "antichain", _TOUCHING)
+    engine = Engine(model.program, budget, seed, is_chained=problem.use_resources)
+    _cut(engine, problem, model, _RELAXATION_ROUNDS, _unwatched)
+    return Bound(value=engine.bound, proof="milp", log=engine.log)
+
+
+def _unwatched(_reward: float, _bound: float) -> None:
+    pass
 
 
 def is_free(problem: Problem) -> bool:

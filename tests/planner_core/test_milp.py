@@ -27,11 +27,12 @@ from planner_core.problem import (
     Sunlight,
 )
 from planner_core.referee.replay import replay
+from planner_core.solvers.milp import relaxation_bound
 from planner_core.solvers.registry import Milp
 from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.budgets import bounds_told, expiring
-from tests.planner_core.problems import TIGHT, Task, make_problem, random_problem
+from tests.planner_core.problems import TIGHT, Task, make_problem, random_problem, varied_problem
 
 SEEDS = st.integers(0, 10**6)
 DYNAMICS = st.sampled_from(["physical", "paper"])
@@ -116,6 +117,18 @@ def test_a_satellite_that_turns_more_slowly_than_it_tracks_is_exact(
         max_turn_deg=max_turn_deg, num_targets=4, num_contacts=1,
     )  # fmt: skip
     assert_equals_brute_force(problem, formulation)
+
+
+@examples(40)
+@given(seed=SEEDS, dynamics=DYNAMICS, num_satellites=st.integers(1, 2), has_quality=st.booleans())
+def test_no_plan_beats_the_relaxation(
+    seed: int, dynamics: Dynamics, num_satellites: int, has_quality: bool
+) -> None:
+    problem = varied_problem(seed, dynamics, num_satellites, scarce=TIGHT, has_quality=has_quality)
+    best = best_reward(problem)
+    bound = relaxation_bound(problem, Budget(), 0)
+    assert best - 1e-6 <= bound.value < np.inf
+    assert not problem.has_better_images or has_quality
 
 
 def test_a_target_already_collected_may_be_the_way_to_another() -> None:

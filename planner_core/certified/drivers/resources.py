@@ -59,6 +59,8 @@ def solve_with_resources(problem: Problem, budget: Budget, seed: int, gap: float
     search.choose(unit)
     turns = search.turns(unit)
     search.search(turns, int(np.clip(len(problem.opportunities) // _TASKS_A_MOVE, *_FIRST_MOVES)))
+    if not search.best.is_done:
+        search.relax_whole()
     _close_in(search, turns)
     if not search.best.is_done:
         search.exhaust()
