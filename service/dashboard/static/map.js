@@ -6,58 +6,31 @@ import { h } from "./dom.js";
 import { utcLabelled } from "./format.js";
 import { firstAbove } from "./plan.js";
 import { positionAt } from "./geography.js";
+import { writeNames } from "./labels.js";
+import { symbolOf } from "./symbols.js";
 
 /** @typedef {import("./geography.js").Geography} Geography */
 /** @typedef {import("./geography.js").Place} Place */
 /** @typedef {import("./geography.js").TargetPlace} TargetPlace */
 /** @typedef {import("./canvas.js").Colors} Colors */
+/** @typedef {import("./labels.js").Mark} Mark */
 
 /** @typedef {CanvasRenderingContext2D | OffscreenCanvasRenderingContext2D} Pen */
 
 const REACH_PX = 8;
+const FONT_PX = 12;
+/** At the bottom stands what instant is shown. */
+const STATUS_PX = 20;
 const TRACK_MS = 50 * 60_000;
 /** Of many satellites, but for the chosen one. */
 const SHORT_TRACK_MS = 6 * 60_000;
-/** Names and long tracks of more would cover the map, unless it is shown this near. */
+/** Long tracks of more would cover the map. */
 const FEW = 10;
 /** More targets are drawn smaller. */
 const FEW_TARGETS = 2000;
 /** Of two targets of one outcome that lie as near as this only one is drawn. */
 const CELL_PX = 1.5;
-const NEAR = 3;
 const OUTCOMES = ["excluded", "unscheduled", "collected", "downlinked"];
-
-/**
- * Return the picture of a target. Shapes differ as well as colours: disc, square, ring, cross.
- * @param {string} outcome
- * @param {number} size
- * @param {string} color
- */
-function symbolOf(outcome, size, color) {
-  const half = Math.ceil(size + 1);
-  const symbol = new OffscreenCanvas(2 * half * devicePixelRatio, 2 * half * devicePixelRatio);
-  const pen = /** @type {OffscreenCanvasRenderingContext2D} */ (symbol.getContext("2d"));
-  pen.scale(devicePixelRatio, devicePixelRatio);
-  pen.translate(half, half);
-  pen.fillStyle = color;
-  pen.strokeStyle = color;
-  pen.lineWidth = 1.2;
-  pen.beginPath();
-  if (outcome === "collected") {
-    pen.fillRect(-size * 0.9, -size * 0.9, size * 1.8, size * 1.8);
-  } else if (outcome === "excluded") {
-    pen.moveTo(-size, -size);
-    pen.lineTo(size, size);
-    pen.moveTo(-size, size);
-    pen.lineTo(size, -size);
-    pen.stroke();
-  } else {
-    pen.arc(0, 0, size, 0, 2 * Math.PI);
-    if (outcome === "downlinked") pen.fill();
-    else pen.stroke();
-  }
-  return symbol;
-}
 
 export class WorldMap {
   /**
@@ -141,8 +114,14 @@ export class WorldMap {
     this.size = { width, height };
     pen.drawImage(this.ground(width, height, colors), 0, 0, width, height);
     const t = this.cursor();
-    for (const track of this.geography.tracks) this.drawTrack(pen, track, t, colors);
-    this.drawSelected(pen, colors);
+    const satellites = this.geography.tracks.flatMap((track) => this.drawTrack(pen, track, t, colors) ?? []);
+    const selected = this.drawSelected(pen, colors);
+    const stations = this.geography.stations.map((station) => this.markOf(station, 6, colors.ink));
+    const isChosen = (/** @type {Mark} */ mark) => mark.color === colors.chosen;
+    // What is chosen has its name before all others, and never twice.
+    const others = stations.filter(({ name }) => !selected.some((one) => one.name === name));
+    const marks = [...selected, ...satellites.filter(isChosen), ...satellites.filter((one) => !isChosen(one)), ...others];
+    writeNames(pen, marks, { width, height: height - STATUS_PX }, FONT_PX);
     pen.fillStyle = colors.ink ?? "";
     pen.fillText(`Satellites at ${utcLabelled(t)}`, 8, height - 10);
   }
@@ -222,6 +201,7 @@ export class WorldMap {
    * @param {import("./geography.js").Track} track
    * @param {number} t
    * @param {Colors} colors
+   * @returns {Mark | null} the satellite where it is at t
    */
   drawTrack(pen, track, t, colors) {
     const isChosen = track.satelliteId === this.selection.now.satelliteId;
@@ -240,13 +220,24 @@ export class WorldMap {
     }
     pen.stroke();
     const at = positionAt(track, t);
-    if (at === null) return;
-    const [x, y] = this.xy(at.lon, at.lat);
-    pen.fillStyle = (isChosen ? colors.chosen : colors.ink) ?? "";
+    if (at === null) return null;
+    const mark = this.markOf({ name: track.name, ...at }, 4, isChosen ? colors.chosen : colors.ink);
+    pen.fillStyle = mark.color ?? "";
     pen.beginPath();
-    pen.arc(x, y, 4, 0, 2 * Math.PI);
+    pen.arc(mark.x, mark.y, mark.reach, 0, 2 * Math.PI);
     pen.fill();
-    if (isChosen || isOneOfFew || this.zoom >= NEAR) pen.fillText(track.name, x + 7, y);
+    return mark;
+  }
+
+  /**
+   * @param {{name: string, lon: number, lat: number}} place
+   * @param {number} reach
+   * @param {string | undefined} color
+   * @returns {Mark}
+   */
+  markOf({ name, lon, lat }, reach, color) {
+    const [x, y] = this.xy(lon, lat);
+    return { name, x, y, reach, color };
   }
 
   /**
@@ -286,14 +277,12 @@ export class WorldMap {
     pen.lineTo(x + 5.5, y + 4);
     pen.lineTo(x - 5.5, y + 4);
     pen.fill();
-    const hasRoom = this.geography.stations.length <= FEW || this.zoom >= NEAR;
-    pen.fillStyle = colors.ink ?? "";
-    if (hasRoom) pen.fillText(station.name, x + 8, y + 1);
   }
 
   /**
    * @param {CanvasRenderingContext2D} pen
    * @param {Colors} colors
+   * @returns {Mark[]} what is selected of targets and stations, if anything
    */
   drawSelected(pen, colors) {
     const { targetId, actionId } = this.selection.now;
@@ -301,15 +290,14 @@ export class WorldMap {
     const chosen =
       this.plan.target.get(targetId ?? "") ??
       this.geography.stations.find((place) => place.id === stationId);
-    if (!chosen) return;
-    const [x, y] = this.xy(chosen.lon, chosen.lat);
+    if (!chosen) return [];
+    const mark = this.markOf(chosen, 10, colors.ink);
     pen.strokeStyle = colors.chosen ?? "";
-    pen.fillStyle = colors.ink ?? "";
     pen.lineWidth = 3;
     pen.beginPath();
-    pen.arc(x, y, 10, 0, 2 * Math.PI);
+    pen.arc(mark.x, mark.y, mark.reach, 0, 2 * Math.PI);
     pen.stroke();
-    pen.fillText(chosen.name, x + 14, y - 8);
+    return [mark];
   }
 
   /**

@@ -44,6 +44,15 @@ export function onBoard(plan, row, at) {
 }
 
 /**
+ * Return an age in whole minutes: nobody reads seconds at four metres.
+ * @param {number} seconds
+ */
+export function age(seconds) {
+  const minutes = Math.floor(seconds / 60);
+  return minutes < 60 ? `${minutes} min` : `${Math.floor(minutes / 60)} h ${String(minutes % 60).padStart(2, "0")}`;
+}
+
+/**
  * @param {import("./types.js").PlanOut} plan
  * @param {PlanChangesOut} changes
  */

@@ -3,8 +3,10 @@
 
 import { Canvas } from "./canvas.js";
 import { positionAt } from "./geography.js";
+import { writeNames } from "./labels.js";
 
 /** @typedef {{geography: import("./geography.js").Geography, satelliteIds: string[]}} Layer */
+/** @typedef {{name: string, lon: number, lat: number}} Named */
 
 const RADIANS = Math.PI / 180;
 const J2000_MS = Date.UTC(2000, 0, 1, 12);
@@ -70,23 +72,38 @@ export class WallMap {
     this.drawNight(pen, x, y, colors);
     const size = Math.max(12, width / 60);
     pen.font = `600 ${size}px system-ui, sans-serif`;
-    const stations = new Map(this.layers.flatMap(({ geography }) => geography.stations.map((one) => [one.id, one])));
+    const markOf = (/** @type {Named} */ { name, lon, lat }, /** @type {string | undefined} */ color) =>
+      ({ name, x: x(lon), y: y(lat), reach: size / 2.5, color });
+    const satellites = this.satellitesNow().map((one) => markOf(one, colors.ink));
+    const stations = this.stations().map((one) => markOf(one, colors.contact));
     pen.fillStyle = colors.contact ?? "";
-    for (const { name, lon, lat } of stations.values()) {
-      pen.fillText("▲", x(lon) - size / 2, y(lat));
-      pen.fillText(name, x(lon) + size / 2, y(lat));
-    }
+    for (const one of stations) drawStation(pen, one.x, one.y, one.reach);
     pen.fillStyle = colors.ink ?? "";
-    for (const { geography, satelliteIds } of this.layers) {
-      for (const track of geography.tracks.filter((one) => satelliteIds.includes(one.satelliteId))) {
-        const at = positionAt(track, this.now());
-        if (at === null) continue;
-        pen.beginPath();
-        pen.arc(x(at.lon), y(at.lat), size / 2.5, 0, 2 * Math.PI);
-        pen.fill();
-        pen.fillText(track.name, x(at.lon) + size / 1.5, y(at.lat) - size / 2);
-      }
+    for (const one of satellites) {
+      pen.beginPath();
+      pen.arc(one.x, one.y, one.reach, 0, 2 * Math.PI);
+      pen.fill();
     }
+    // Operators know where their stations are, and not where a satellite is.
+    writeNames(pen, [...satellites, ...stations], { width, height }, size);
+  }
+
+  /** @returns {import("./geography.js").Place[]} the stations of all plans, each once */
+  stations() {
+    const all = this.layers.flatMap(({ geography }) => geography.stations);
+    return [...new Map(all.map((one) => [one.id, one])).values()];
+  }
+
+  /** @returns {Named[]} */
+  satellitesNow() {
+    return this.layers.flatMap(({ geography, satelliteIds }) =>
+      geography.tracks
+        .filter((track) => satelliteIds.includes(track.satelliteId))
+        .flatMap((track) => {
+          const at = positionAt(track, this.now());
+          return at === null ? [] : [{ name: track.name, ...at }];
+        }),
+    );
   }
 
   /**
@@ -112,4 +129,18 @@ export class WallMap {
     pen.closePath();
     pen.fill();
   }
+}
+
+/**
+ * @param {CanvasRenderingContext2D} pen
+ * @param {number} x
+ * @param {number} y
+ * @param {number} reach
+ */
+function drawStation(pen, x, y, reach) {
+  pen.beginPath();
+  pen.moveTo(x, y - reach);
+  pen.lineTo(x + reach, y + reach);
+  pen.lineTo(x - reach, y + reach);
+  pen.fill();
 }

@@ -3,12 +3,12 @@
 
 import { get, list, pause } from "./api.js";
 import { byId, fill, h } from "./dom.js";
-import { duration, utc } from "./format.js";
+import { utc } from "./format.js";
 import { loadGeography, loadLand } from "./geography.js";
 import { clockOf, countdown } from "./instants.js";
 import { startPage } from "./page.js";
 import { Plan } from "./plan.js";
-import { changeLine, onBoard, resourcesAt, telling } from "./wall_figures.js";
+import { age, changeLine, onBoard, resourcesAt, telling } from "./wall_figures.js";
 import { WallMap } from "./wall_map.js";
 
 /** @typedef {import("./types.js").PlanOut} PlanOut */
@@ -164,8 +164,10 @@ function tick() {
   });
   const satellites = byId("wall-satellites").querySelector("tbody");
   if (satellites) fill(satellites, ...rows);
-  // Nobody scrolls a wall.
-  document.body.classList.toggle("crowded", Math.max(next.length, rows.length) > FEW_ROWS);
+  // Nobody scrolls a wall: the longer table says how large letters may be.
+  const most = Math.max(next.length, rows.length);
+  document.body.classList.toggle("crowded", most > FEW_ROWS);
+  document.body.style.setProperty("--rows", String(most));
 }
 
 /**
@@ -192,9 +194,9 @@ function passRow(one, at) {
   const isOn = aos <= at;
   return h(
     "tr",
-    { class: isOn ? "on" : "", "data-station": one.station_id },
+    { class: `${isOn ? "on" : ""} ${one.planned ? "" : "unplanned"}`, "data-station": one.station_id },
     h("th", { scope: "row" }, one.station_name),
-    h("td", {}, one.satellite_name, !one.planned && h("small", {}, "not planned")),
+    h("td", {}, one.planned ? "" : "○ ", one.satellite_name, !one.planned && h("span", { class: "hidden-text" }, ", not planned")),
     h("td", { class: "number countdown" }, `${isOn ? "LOS" : "AOS"} ${countdown((isOn ? los : aos) - at)}`),
     h("td", { class: "number" }, clockOf(isOn ? one.los : one.aos)),
   );
@@ -215,7 +217,7 @@ function satelliteRow(drawn, row, at) {
     h("td", { class: levels && levels.battery <= (row.curves?.batteryMin ?? 0) ? "bad" : "" }, ...gauge("Battery", levels?.battery)),
     h("td", { class: levels && levels.recorder >= (row.curves?.recorderMax ?? 1) ? "bad" : "" }, ...gauge("Recorder", levels?.recorder)),
     h("td", { class: "number" }, images.count),
-    h("td", { class: "number" }, images.oldest_s === null ? "" : duration(images.oldest_s)),
+    h("td", { class: "number" }, images.oldest_s === null ? "" : age(images.oldest_s)),
   );
 }
 

@@ -1,0 +1,164 @@
+"""20 satellites and 18 stations on the pages: names that can be read, paper that can be carried."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from typing import Any
+
+import httpx
+import pytest
+
+from tests.service.dashboard.browser.conftest import PATIENCE_S, Browser
+from tests.service.dashboard.browser.crowd import NOON_OF_SHIFT, STATIONS, crowded_plan
+from tests.service.dashboard.browser.missions import Json
+from tests.service.serving import serving
+
+WALL = (1920, 1080)
+MOST_SATELLITES = 15
+MOST_STATIONS = 10
+# On a screen 1.2 metres wide a line of this size is 12 mm high.
+LEAST_LETTERS_PX = 19
+LETTERS_PX = "return parseFloat(getComputedStyle(document.querySelector('#wall td')).fontSize)"
+# What lies over the edge of the screen or of its own part of it.
+CUT_OFF = """
+return [...document.querySelectorAll("#wall tr, #wall canvas, #wall p")].filter((one) => {
+  const box = one.getBoundingClientRect();
+  const frame = one.closest("section").getBoundingClientRect();
+  return box.right > Math.min(frame.right, innerWidth) + 1 || box.left < frame.left - 1 ||
+    box.bottom > Math.min(frame.bottom, innerHeight) + 1 || box.top < frame.top - 1;
+}).map((one) => one.innerText || one.tagName);
+"""
+# Notes where each canvas has text, by the ink of the letters and not by what the page believes.
+RECORD = """
+const note = CanvasRenderingContext2D.prototype.fillText;
+const clear = CanvasRenderingContext2D.prototype.clearRect;
+CanvasRenderingContext2D.prototype.clearRect = function (...box) {
+  this.canvas.written = [];
+  return clear.apply(this, box);
+};
+CanvasRenderingContext2D.prototype.fillText = function (text, x, y) {
+  const ink = this.measureText(text);
+  this.canvas.written?.push({
+    text, left: x - ink.actualBoundingBoxLeft, right: x + ink.actualBoundingBoxRight,
+    top: y - ink.actualBoundingBoxAscent, bottom: y + ink.actualBoundingBoxDescent,
+  });
+  return note.apply(this, arguments);
+};
+"""
+
+
+@pytest.fixture(scope="module")
+def service_url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """A service of its own: plans in force would be seen by other tests."""
+    with serving(tmp_path_factory.mktemp("crowd"), "serve", "--workers", "1") as (_, line):
+        yield line.split()[-1]
+
+
+@pytest.fixture(scope="module")
+def api(service_url: str) -> Iterator[httpx.Client]:
+    with httpx.Client(base_url=service_url, timeout=PATIENCE_S, trust_env=False) as client:
+        yield client
+
+
+@pytest.fixture(scope="module")
+def plan(api: httpx.Client) -> Json:
+    return crowded_plan(api)
+
+
+@pytest.fixture
+def recorded(browser: Browser) -> Iterator[Browser]:
+    """A browser that notes what is written on canvases."""
+    script = browser.driver.execute_cdp_cmd(
+        "Page.addScriptToEvaluateOnNewDocument", {"source": RECORD}
+    )
+    yield browser
+    browser.driver.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", script)
+    browser.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+def show_at(browser: Browser, width: int, height: int) -> None:
+    """Give the page just this room: a window of the size has less."""
+    size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
+    browser.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+
+
+def written(browser: Browser, plot: str) -> list[Json]:
+    found: list[Json] = browser.run(
+        "return document.querySelector(`#${arguments[0]} canvas`)?.written ?? []", plot
+    )
+    return found
+
+
+def overprinted(texts: list[Json]) -> list[tuple[Any, Any]]:
+    """Return the pairs of texts that lie on each other."""
+    return [
+        (a["text"], b["text"])
+        for a, b in itertools.combinations(texts, 2)
+        if a["left"] < b["right"]
+        and b["left"] < a["right"]
+        and a["top"] < b["bottom"]
+        and b["top"] < a["bottom"]
+    ]
+
+
+def names_of(plan: Json) -> set[str]:
+    return {one["satellite_name"] for one in plan["satellites"]}
+
+
+def test_names_on_the_map_of_a_job_never_overprint(recorded: Browser, plan: Json) -> None:
+    recorded.open(f"/jobs/{plan['job_id']}")
+    recorded.wait_for_answer()
+    assert overprinted(written(recorded, "map")) == []
+    there = {one["text"] for one in written(recorded, "map")}
+    assert len(there & names_of(plan)) > MOST_SATELLITES
+    assert len(there & set(STATIONS)) > MOST_STATIONS
+    for key in ("+", "+", "ArrowUp"):
+        press(recorded, key)
+        assert overprinted(written(recorded, "map")) == []
+
+
+def test_what_is_selected_is_named_on_the_map_though_others_are_near(
+    recorded: Browser, plan: Json
+) -> None:
+    recorded.open(f"/jobs/{plan['job_id']}")
+    recorded.wait_for_answer()
+    recorded.click("#tables > details:nth-of-type(1) > summary")
+    recorded.wait(lambda: recorded.text("#tables tbody tr button"))
+    target = recorded.text("#tables tbody tr button")
+    recorded.click("#tables tbody tr button")
+    recorded.wait(lambda: target in {one["text"] for one in written(recorded, "map")})
+    assert overprinted(written(recorded, "map")) == []
+
+
+def press(browser: Browser, key: str) -> None:
+    """Press a key on the map, and wait until it is drawn anew."""
+    before = browser.drawn("map")
+    script = """
+      const press = new KeyboardEvent("keydown", {key: arguments[0]});
+      document.querySelector("#map canvas").dispatchEvent(press);
+    """
+    browser.run(script, key)
+    browser.wait(lambda: browser.drawn("map") > before, "the map stands still")
+
+
+def test_the_wall_of_a_crowd_is_on_one_screen_and_its_names_never_overprint(
+    recorded: Browser, plan: Json
+) -> None:
+    show_at(recorded, *WALL)
+    recorded.open(f"/wall#at={NOON_OF_SHIFT}")
+    recorded.wait(lambda: names_of(plan) & {one["text"] for one in written(recorded, "wall-map")})
+    recorded.wait(lambda: "OS" in recorded.text("#wall-passes"), "no countdown")
+    texts = written(recorded, "wall-map")
+    assert overprinted(texts) == []
+    there = {one["text"] for one in texts}
+    assert len(there & names_of(plan)) > MOST_SATELLITES
+    assert len(there & set(STATIONS)) > MOST_STATIONS
+    assert len(rows(recorded, "#wall-satellites")) == len(plan["satellites"])
+    assert len(rows(recorded, "#wall-passes")) == len(STATIONS)
+    assert recorded.run(CUT_OFF) == []
+    assert recorded.run(LETTERS_PX) >= LEAST_LETTERS_PX
+
+
+def rows(browser: Browser, table: str) -> list[Any]:
+    return browser.driver.find_elements("css selector", f"{table} tbody tr")
