@@ -101,7 +101,10 @@ export class CurveChart {
     pen.fillStyle = colors.bad ?? "";
     pen.fillText(`${side} ${percent(what.limit)}`, MARGIN.left + 6, y(what.limit) + (what.isFloor ? 9 : -9));
     pen.fillStyle = colors.soft ?? "";
-    pen.fillText(`${what.name}: ${extreme(time, values, what.isFloor)}`, MARGIN.left + 6, top - 8);
+    // At the right: at the left a high limit's own text may reach up to here.
+    pen.textAlign = "right";
+    pen.fillText(`${what.name}: ${extreme(time, values, what.isFloor)}`, width - MARGIN.right, top - 8);
+    pen.textAlign = "left";
   }
 
   /**

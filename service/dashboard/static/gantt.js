@@ -62,7 +62,7 @@ export class Gantt {
     this.top = plan.rows.length > FEW_ROWS ? AXIS : 0;
     const label =
       "Gantt chart: collects, contacts, slews, sun-pointing and eclipses of each satellite. " +
-      "Arrow keys move, plus and minus zoom; the tables below hold the same data.";
+      "Arrow keys move, plus and minus zoom, Enter selects the next action; the tables below hold the same data.";
     this.canvas = new Canvas(host, label, (pen, width, height, colors) => this.draw(pen, width, height, colors));
     this.canvas.setHeight(this.top + plan.rows.length * this.rowHeight() + AXIS);
     this.tip = h("div", { class: "tip", hidden: true });
@@ -78,7 +78,22 @@ export class Gantt {
     });
     element.addEventListener("keydown", (event) => {
       if (event.key === "Escape") selection.clear();
+      if (event.key === "Enter") this.step(event.shiftKey ? -1 : 1);
     });
+  }
+
+  /**
+   * Select the action after the selected one, or before it; where none is in sight, the first one that is.
+   * @param {1 | -1} by
+   */
+  step(by) {
+    const actions = [...this.plan.actions.values()].sort((a, b) => Date.parse(a.start) - Date.parse(b.start));
+    const { start, end } = this.view;
+    const isInSight = (/** @type {Action} */ one) => Date.parse(one.end) > start && Date.parse(one.start) < end;
+    const now = actions.findIndex((one) => one.id === this.selection.now.actionId);
+    const chosen = actions[now];
+    const next = chosen && isInSight(chosen) ? actions[now + by] : actions.find(isInSight);
+    if (next) this.selection.select(this.plan.about(next.id));
   }
 
   rowHeight() {

@@ -74,7 +74,7 @@ function group(plan, selection, code, source) {
     MEANINGS[code] && h("small", {}, ` ${MEANINGS[code]}`),
   );
   const details = h("details", { "data-reason": code }, summary, table.element);
-  // What is folded away is printed all the same, so its first page is here from the beginning.
+  // Its first page is here before somebody opens it.
   table.showFrom(source);
   selection.onChange(({ targetId }) => {
     const isHere = targetId !== null && plan.target.get(targetId)?.reason === code;

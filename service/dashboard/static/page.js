@@ -19,6 +19,7 @@ export async function startPage(show) {
     event.preventDefault();
     showError(event.reason);
   });
+  addEventListener("keydown", tickByEnter);
   tick();
   setInterval(tick, 1000);
   try {
@@ -28,6 +29,17 @@ export async function startPage(show) {
   } catch (error) {
     showError(error);
   }
+}
+
+/**
+ * Enter ticks what Space ticks, in place of sending the form around it.
+ * @param {KeyboardEvent} event
+ */
+function tickByEnter(event) {
+  if (event.key !== "Enter" || !(event.target instanceof HTMLInputElement)) return;
+  if (event.target.type !== "checkbox" && event.target.type !== "radio") return;
+  event.preventDefault();
+  event.target.click();
 }
 
 function tick() {

@@ -12,6 +12,8 @@ import { whileBusy } from "./page.js";
 /** @typedef {{id: string, name: string}} Named */
 
 const HOUR_MS = 3_600_000;
+/** Of more, paper has the planned ones alone: a shift is carried on two pages. */
+const MOST_ON_PAPER = 100;
 
 /**
  * @param {PlanOut} plan
@@ -67,16 +69,20 @@ async function show(plan, path) {
   /** @type {{items: PassOut[]}} */
   const { items } = await list(`${path}?${wanted}`);
   const planned = items.filter((one) => one.planned).length;
-  byId("passes-caption").textContent =
+  const isLong = items.length > MOST_ON_PAPER;
+  byId("passes").classList.toggle("long", isLong);
+  fill(
+    byId("passes-caption"),
     `${plan.name ?? "Plan"} (${plan.state}): ${items.length} passes, ${planned} planned, ` +
-    `${utc(wanted.get("from"))} to ${utc(wanted.get("to"))} UTC`;
+      `${utc(wanted.get("from"))} to ${utc(wanted.get("to"))} UTC`,
+    isLong && h("span", { class: "on-paper" }, "; here are the planned ones"),
+  );
   const body = byId("passes").querySelector("tbody");
   if (body) fill(body, ...items.map(rowOf));
 }
 
 /** @param {PassOut} one */
 function rowOf(one) {
-  const conflicts = one.conflicts.map((other) => other.satellite_name + (other.planned ? " (planned)" : ""));
   return h(
     "tr",
     { class: one.planned ? "planned" : "" },
@@ -88,8 +94,23 @@ function rowOf(one) {
     h("td", { class: "number" }, `${number(one.max_elevation_deg)}°`),
     h("td", {}, one.planned ? "yes" : ""),
     h("td", { class: "number" }, one.volume_mbit === null ? "" : `${number(one.volume_mbit, 0)} Mbit`),
-    h("td", {}, conflicts.join(", ")),
+    h("td", {}, ...conflictsOf(one)),
   );
+}
+
+/**
+ * Return the passes that overlap this one; on paper by name only those that are planned.
+ * @param {PassOut} one
+ */
+function conflictsOf(one) {
+  const planned = one.conflicts.filter((other) => other.planned).map((other) => `${other.satellite_name} (planned)`);
+  const others = one.conflicts.filter((other) => !other.planned).map((other) => other.satellite_name);
+  const comma = planned.length > 0 && others.length > 0 && ", ";
+  return [
+    planned.join(", "),
+    h("span", { class: "on-screen" }, comma, others.join(", ")),
+    h("span", { class: "on-paper" }, comma, others.length > 0 && `${others.length} not planned`),
+  ];
 }
 
 function printPasses() {

@@ -1,5 +1,5 @@
 // @ts-check
-/** The data of all pictures as tables, for keyboards, screen readers and paper. */
+/** The data of all pictures as tables, for keyboards and screen readers; on paper those that are open. */
 
 import { byId, fill, h } from "./dom.js";
 import { number, percent, utc } from "./format.js";
@@ -50,7 +50,7 @@ function group(title, sections) {
 }
 
 /**
- * Return a table that is made when it is opened or printed.
+ * Return a table that is made when it is opened.
  * @param {string} title
  * @param {number} count
  * @param {() => HTMLElement} make
@@ -58,12 +58,10 @@ function group(title, sections) {
 function section(title, count, make) {
   const details = h("details", {}, h("summary", {}, `${title} (${count})`));
   let isMade = false;
-  const open = () => {
+  details.addEventListener("toggle", () => {
     if (!isMade) details.append(make());
     isMade = true;
-  };
-  details.addEventListener("toggle", open);
-  addEventListener("beforeprint", open);
+  });
   return details;
 }
 
@@ -128,6 +126,9 @@ function targetFilter(plan, table) {
   const outcome = choiceOf("outcome", plan.targets.map((one) => one.outcome));
   const reason = choiceOf("reason", plan.targets.map((one) => one.reason));
   const count = h("span", { role: "status", id: "target-count" });
+  find.addEventListener("keydown", (event) => {
+    if (event.key === "Enter") /** @type {HTMLElement | null} */ (table.body.querySelector("button"))?.click();
+  });
   const narrow = () => {
     const text = find.value.trim().toLowerCase();
     const found = plan.targets.filter(

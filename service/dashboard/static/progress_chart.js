@@ -3,7 +3,8 @@
 
 import { Canvas } from "./canvas.js";
 import { bar, byId, fill } from "./dom.js";
-import { duration, gapOf, number, percent, secondsBetween } from "./format.js";
+import { gapOf, number, percent, secondsBetween } from "./format.js";
+import { ProgressText } from "./progress_text.js";
 
 /** @typedef {import("./types.js").JobOut} JobOut */
 
@@ -19,13 +20,14 @@ export class ProgressChart {
       this.draw(pen, width, height, colors),
     );
     this.canvas.setHeight(HEIGHT);
+    this.text = new ProgressText(byId("progress-text"));
   }
 
   /** @param {JobOut} job */
   show(job) {
     const { progress } = job;
     const seconds = secondsBetween(job.started_at, job.finished_at);
-    byId("progress-text").textContent = textOf(job, seconds);
+    this.text.show(job, textOf(job));
     fill(byId("progress-bar"), progress && bar(progress.fraction, `${progress.phase}, fraction done`));
     if (progress && seconds !== null) {
       this.points.push({ s: seconds, reward: progress.reward, bound: progress.bound });
@@ -87,14 +89,10 @@ export class ProgressChart {
   }
 }
 
-/**
- * @param {JobOut} job
- * @param {number | null} seconds
- */
-function textOf(job, seconds) {
-  const { progress } = job;
-  if (!progress) return job.state === "queued" ? "Waiting for a worker." : "";
-  const parts = [`Phase ${progress.phase}`, `running for ${duration(seconds)}`, `reward ${number(progress.reward)}`];
+/** @param {JobOut} job */
+function textOf({ progress }) {
+  if (!progress) return "";
+  const parts = [`Phase ${progress.phase}`, `reward ${number(progress.reward)}`];
   parts.push(progress.bound === null ? "no bound yet" : `bound ${number(progress.bound)}`);
   const gap = gapOf(progress.reward, progress.bound);
   if (gap !== null) parts.push(`gap ${percent(gap)}`);

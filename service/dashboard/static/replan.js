@@ -8,6 +8,7 @@ import { utc } from "./format.js";
 import { instantOf } from "./instants.js";
 import { whileBusy } from "./page.js";
 import { move, nextInstant } from "./plan_steps.js";
+import { ProgressText } from "./progress_text.js";
 
 /** @typedef {import("./types.js").PlanOut} PlanOut */
 /** @typedef {import("./types.js").JobOut} JobOut */
@@ -108,9 +109,10 @@ async function propose(plan, wishes) {
   const job = await post(`/v1/plans/${encodeURIComponent(plan.id)}/replans`, body);
   /** @type {JobOut} */
   let last = job;
+  const progress = new ProgressText(byId("replan-progress"));
   await follow(job.id, (told) => {
     last = told;
-    byId("replan-progress").textContent = `Replan: ${told.state}${told.progress ? `, ${told.progress.phase}` : ""}`;
+    progress.show(told, `Replan: ${told.state}${told.progress ? `, ${told.progress.phase}` : ""}`);
   });
   if (last.state !== "succeeded") throw new Error(last.error?.detail ?? `The replan ended as ${last.state}.`);
   return get(job.links.plan ?? "");

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import base64
 import itertools
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -10,13 +12,14 @@ import httpx
 import pytest
 
 from tests.service.dashboard.browser.conftest import PATIENCE_S, Browser
-from tests.service.dashboard.browser.crowd import NOON_OF_SHIFT, STATIONS, crowded_plan
+from tests.service.dashboard.browser.crowd import NOON_OF_SHIFT, START, STATIONS, crowded_plan
 from tests.service.dashboard.browser.missions import Json
 from tests.service.serving import serving
 
 WALL = (1920, 1080)
 MOST_SATELLITES = 15
 MOST_STATIONS = 10
+MOST_PAGES = 2
 # On a screen 1.2 metres wide a line of this size is 12 mm high.
 LEAST_LETTERS_PX = 19
 LETTERS_PX = "return parseFloat(getComputedStyle(document.querySelector('#wall td')).fontSize)"
@@ -113,6 +116,8 @@ def test_names_on_the_map_of_a_job_never_overprint(recorded: Browser, plan: Json
     there = {one["text"] for one in written(recorded, "map")}
     assert len(there & names_of(plan)) > MOST_SATELLITES
     assert len(there & set(STATIONS)) > MOST_STATIONS
+    assert overprinted(written(recorded, "gantt")) == []
+    assert overprinted(written(recorded, "curves")) == []
     for key in ("+", "+", "ArrowUp"):
         press(recorded, key)
         assert overprinted(written(recorded, "map")) == []
@@ -162,3 +167,39 @@ def test_the_wall_of_a_crowd_is_on_one_screen_and_its_names_never_overprint(
 
 def rows(browser: Browser, table: str) -> list[Any]:
     return browser.driver.find_elements("css selector", f"{table} tbody tr")
+
+
+def test_a_job_a_plan_and_the_passes_of_a_shift_are_printed_on_two_pages(
+    browser: Browser, api: httpx.Client, plan: Json
+) -> None:
+    browser.open(f"/jobs/{plan['job_id']}")
+    browser.wait_for_answer()
+    browser.wait(lambda: browser.text("#others tbody"))
+    assert num_pages(browser) <= MOST_PAGES
+    browser.open(f"/plans/{plan['id']}")
+    browser.wait(lambda: browser.drawn("gantt") and browser.text("#history li"))
+    shift = {"from": START, "to": NOON_OF_SHIFT, "limit": "500", "planned": "true"}
+    planned = api.get(f"/v1/plans/{plan['id']}/passes", params=shift).json()["items"]
+    browser.run("document.querySelector('#passes-from').value = arguments[0]", START)
+    browser.run("document.querySelector('#passes-hours').value = 6")
+    browser.click("#pass-filters button[type=submit]")
+    own = "#passes tbody tr.planned"
+    browser.wait(lambda: len(browser.driver.find_elements("css selector", own)) == len(planned))
+    assert num_pages(browser) <= MOST_PAGES
+    browser.run("window.print = () => {}")
+    browser.click("#print-passes")
+    assert num_pages(browser) <= MOST_PAGES
+    # Of hundreds of passes paper has those that the shift flies, all of them.
+    browser.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
+    try:
+        on_paper = [one.is_displayed() for one in rows(browser, "#passes")]
+        assert (sum(on_paper), len(on_paper) > 100) == (len(planned), True)
+        assert all(one["station_name"] in browser.text("#passes") for one in planned)
+        assert "planned ones" in browser.text("#passes-caption")
+    finally:
+        browser.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
+
+
+def num_pages(browser: Browser) -> int:
+    paper = browser.driver.execute_cdp_cmd("Page.printToPDF", {"preferCSSPageSize": True})
+    return len(re.findall(rb"/Type\s*/Page\b", base64.b64decode(paper["data"])))

@@ -1,0 +1,47 @@
+// @ts-check
+/** How far a job is, in words, with a clock that moves while nothing else does. */
+
+import { FINAL } from "./api.js";
+import { fill, h } from "./dom.js";
+import { countdown } from "./instants.js";
+
+/** @typedef {import("./types.js").JobOut} JobOut */
+
+export class ProgressText {
+  /** @param {HTMLElement} place */
+  constructor(place) {
+    this.words = h("span");
+    // A timer is not read aloud at each second, though it stands in what is.
+    this.clock = h("span", { role: "timer" });
+    /** @type {JobOut | null} */
+    this.job = null;
+    this.shownAt = performance.now();
+    fill(place, this.words, this.clock);
+    const ticking = setInterval(() => {
+      this.tick();
+      if (this.job && FINAL.has(this.job.state)) clearInterval(ticking);
+    }, 1000);
+  }
+
+  /**
+   * @param {JobOut} job
+   * @param {string} words what there is to say of its progress
+   */
+  show(job, words) {
+    this.job = job;
+    const text = words || (job.state === "queued" ? "Waiting for a worker" : job.state);
+    if (this.words.textContent !== text) this.words.textContent = text;
+    this.tick();
+  }
+
+  tick() {
+    if (this.job === null || FINAL.has(this.job.state)) {
+      this.clock.textContent = "";
+      return;
+    }
+    const since = Date.parse(this.job.started_at ?? this.job.created_at);
+    // A screen whose clock is behind the service's counts from when it began to look.
+    const elapsed = Math.max(Date.now() - since, performance.now() - this.shownAt);
+    this.clock.textContent = `, for ${countdown(elapsed)}`;
+  }
+}
