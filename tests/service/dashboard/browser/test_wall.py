@@ -1,0 +1,67 @@
+"""The wall over a restart of the service: real processes on one database and one port."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import httpx
+from selenium import webdriver
+
+from service.commands import demo_mission
+from tests.service.dashboard.browser.conftest import PATIENCE_S, Browser
+from tests.service.dashboard.browser.missions import Json, planned, small_mission
+from tests.service.factories import post
+from tests.service.serving import serving
+
+AT = demo_mission.HORIZON["start"].replace("T00", "T06")
+
+
+def published(api: httpx.Client) -> Json:
+    """Plan the small mission and put the plan in force."""
+    job = planned(api, small_mission(api))
+    plan = post(api, "/v1/plans", {"job_id": job["id"]})
+    path = f"/v1/plans/{plan['id']}/transitions"
+    post(api, path, {"to": "approved"})
+    return post(api, path, {"to": "published", "effective_from": plan["horizon"]["start"]})
+
+
+def client(url: str) -> httpx.Client:
+    return httpx.Client(base_url=url, timeout=PATIENCE_S, trust_env=False)
+
+
+def test_the_wall_comes_back_by_itself_when_the_service_does(
+    driver: webdriver.Chrome, tmp_path: Path
+) -> None:
+    with serving(tmp_path, "serve", "--workers", "1") as (_, line):
+        url = line.split()[-1]
+        with client(url) as api:
+            plan = published(api)
+        wall = Browser(driver=driver, url=url)
+        wall.watch()
+        wall.open(f"/wall#at={AT}")
+        wall.wait(lambda: "OS" in wall.text("#wall-passes"), "no countdown")
+        wall.run("window.nobodyTouchedIt = true")
+    wall.wait(lambda: "No answer since" in wall.text("#wall-status"), "it does not tell")
+    # What it knows it goes on telling.
+    before = wall.text("#wall-passes")
+    wall.wait(lambda: wall.text("#wall-passes") != before, "the countdown stands still")
+    assert "%" in wall.text("#wall-satellites")
+    port = str(urlsplit(url).port)
+    with serving(tmp_path, "serve", "--workers", "1", "--port", port) as (_, line):
+        assert line.split()[-1] == url
+        wall.wait(lambda: "No answer" not in wall.text("#wall-status"), "it does not come back")
+        with client(url) as api:
+            change = {"freeze_until": AT, "now": AT, "limits": {"time_s": 5}}
+            job = post(api, f"/v1/plans/{plan['id']}/replans", change)
+            while job["state"] in ("queued", "running"):
+                job = api.get(f"/v1/jobs/{job['id']}?wait=10").json()
+            path = f"{job['links']['plan']}/transitions"
+            post(api, path, {"to": "approved"})
+            post(api, path, {"to": "published", "effective_from": AT})
+        wall.wait(lambda: "changed after" in wall.text("#wall-changes"), "nothing new is shown")
+        assert "OS" in wall.text("#wall-passes")
+        assert wall.run("return window.nobodyTouchedIt") is True
+    # Of a service that is gone, or has no worker yet, it may complain.
+    expected = ("ERR_CONNECTION_REFUSED", "/health/ready")
+    assert [one for one in wall.complaints() if not any(e in one for e in expected)] == []
