@@ -59,6 +59,7 @@ LEO_PERIOD_S = 128 * 60.0
 OLD_ELEMENTS_DAYS = 3.0
 _GENERIC = ("generic_optical", "generic_sar")
 REFUSED_ELEMENTS_DAYS = 30.0
+_MOST_NAMED = 20
 
 _REASONS = np.array(
     [
@@ -370,16 +371,23 @@ def check_element_age(scenario: Scenario) -> None:
     """
     if scenario.allow_old_elements:
         return
-    for index, satellite in enumerate(scenario.satellites):
-        age_days = _greatest_age_days(satellite, scenario.horizon)
-        if satellite.orbit.period_s < LEO_PERIOD_S and age_days > REFUSED_ELEMENTS_DAYS:
-            raise InvalidScenario(
-                "elements_too_old",
-                f"Satellite {satellite.name!r}: the element set is up to {age_days:.0f} days from "
-                f"its epoch, more than {REFUSED_ELEMENTS_DAYS:.0f}. Store newer elements, or set "
-                "allow_old_elements.",
-                pointer=f"/satellites/{index}",
-            )
+    ages_days = [_greatest_age_days(one, scenario.horizon) for one in scenario.satellites]
+    old = [
+        index
+        for index, satellite in enumerate(scenario.satellites)
+        if satellite.orbit.period_s < LEO_PERIOD_S and ages_days[index] > REFUSED_ELEMENTS_DAYS
+    ]
+    if not old:
+        return
+    named = [f"{scenario.satellites[i].name!r} {ages_days[i]:.0f}" for i in old[:_MOST_NAMED]]
+    more = f" and {len(old) - _MOST_NAMED} more" if len(old) > _MOST_NAMED else ""
+    raise InvalidScenario(
+        "elements_too_old",
+        f"{len(old)} of {len(scenario.satellites)} element sets are more than "
+        f"{REFUSED_ELEMENTS_DAYS:.0f} days from their epochs within the horizon, in days: "
+        f"{', '.join(named)}{more}. Store newer elements, or set allow_old_elements.",
+        pointer=f"/satellites/{old[0]}",
+    )
 
 
 def orbit_warnings(scenario: Scenario) -> tuple[str, ...]:

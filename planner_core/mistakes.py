@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from planner_core.domain import Satellite, Scenario, Target
 from planner_core.geography.land import may_be_land
+from planner_core.orbits.frames import EARTH_POLAR_RADIUS_M, EARTH_ROTATION_RAD_S
 from planner_core.problem import COLLECT, CONTACT, Opportunities
 
 _RADAR = ("sar", "radar")
@@ -13,6 +16,9 @@ _LEAST_TARGETS = 10
 _MUCH_AT_SEA = 0.4
 _SWAPPED_ON_LAND = 0.8
 _MOST_AT_SEA = 0.8
+_MU_M3_S2 = 3.986004418e14
+# Osculating radii and geodetic nadirs differ from mean and geocentric ones by less.
+_SPARE_RAD = math.radians(1.0)
 
 
 def usual_mistakes(scenario: Scenario) -> tuple[str, ...]:
@@ -23,6 +29,7 @@ def usual_mistakes(scenario: Scenario) -> tuple[str, ...]:
         _no_station(scenario),
         _too_large(scenario),
         _too_hungry(scenario),
+        _too_long(scenario),
     )
     return tuple(warning for warning in found if warning is not None)
 
@@ -162,6 +169,38 @@ def _too_hungry(scenario: Scenario) -> str | None:
 def _is_fed(target: Target, satellite: Satellite) -> bool:
     resources = satellite.resources
     return target.collect_s * resources.collect_drain_per_s <= 1.0 - resources.battery_min_fraction
+
+
+def _too_long(scenario: Scenario) -> str | None:
+    longest_s = max(_longest_access_s(one) for one in scenario.satellites)
+    long = [target for target in scenario.targets if target.collect_s > longest_s]
+    if not long:
+        return None
+    return (
+        f"An image of target {long[0].id!r}{_others(len(long))} takes longer than any satellite "
+        f"sees a place, {longest_s:.0f} s at most: shorten collect_s."
+    )
+
+
+def _longest_access_s(satellite: Satellite) -> float:
+    """Return a time that no access exceeds: from one edge of what is seen to the other.
+
+    The satellite is nowhere farther than at its apogee, and nowhere slower; a place on the ground
+    runs along with it at the Earth's rotation at most.
+    """
+    rate_rad_s = 2.0 * math.pi / satellite.orbit.period_s
+    axis_m = math.cbrt(_MU_M3_S2 / rate_rad_s**2)
+    eccentricity = satellite.orbit.eccentricity
+    apogee_m = axis_m * (1.0 + eccentricity)
+    slowest_rad_s = rate_rad_s * math.sqrt(1.0 - eccentricity**2) * (axis_m / apogee_m) ** 2
+    passing_rad_s = slowest_rad_s - EARTH_ROTATION_RAD_S
+    if passing_rad_s <= 0.0:
+        return math.inf
+    off_nadir_rad = math.radians(satellite.sensor.off_nadir_max_deg)
+    ratio = apogee_m / EARTH_POLAR_RADIUS_M
+    sine = ratio * math.sin(off_nadir_rad)
+    reach_rad = math.asin(sine) - off_nadir_rad if sine < 1.0 else math.acos(1.0 / ratio)
+    return 2.0 * (reach_rad + _SPARE_RAD) / passing_rad_s
 
 
 def _others(number: int) -> str:

@@ -25,6 +25,10 @@ class Certified:
 
     name: ClassVar[str] = "certified"
     title: ClassVar[str] = "Certified planning"
+    about: ClassVar[str] = (
+        "Finds a plan and proves how far it can be from the best one. The one to choose for "
+        "operations."
+    )
     paper: ClassVar[str] = "Not in the paper"
     exact: ClassVar[bool] = True
     honours: ClassVar[frozenset[Constraint]] = frozenset(Constraint) - {Constraint.DUPLICATE}
@@ -42,7 +46,8 @@ class Certified:
         metadata={
             "minimum": 0,
             "maximum": 100_000,
-            "description": "Moves of the window search for each opportunity before the proof.",
+            "description": "How long to improve the plan before the proof: moves for each "
+            "opportunity.",
         },
     )
 

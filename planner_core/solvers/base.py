@@ -71,8 +71,9 @@ class Solver(Protocol):
 
     Attributes
     ----------
-    name, title, paper
-        How it is called in the API; what it is; where the paper describes it.
+    name, title, about, paper
+        How it is called in the API; what it is; what it does and when to choose it, for those who
+        operate satellites; where the paper describes it.
     exact
         Whether it proves its plan optimal when it runs to the end.
     honours
@@ -81,6 +82,7 @@ class Solver(Protocol):
 
     name: ClassVar[str]
     title: ClassVar[str]
+    about: ClassVar[str]
     paper: ClassVar[str]
     exact: ClassVar[bool]
     honours: ClassVar[frozenset[Constraint]]

@@ -187,21 +187,22 @@ class ForwardSearch:
 
     name: ClassVar[str] = "forward_search"
     title: ClassVar[str] = "SMDP forward search"
+    about: ClassVar[str] = "Looks a few actions ahead at each step and takes the best first one."
     paper: ClassVar[str] = "Algorithm 1, section Solution Methods"
     exact: ClassVar[bool] = False
     honours: ClassVar[frozenset[Constraint]] = frozenset(Constraint) - {Constraint.DUPLICATE}
 
     depth: int = field(
         default=3,
-        metadata={"minimum": 1, "maximum": 100, "description": "Actions to look ahead (d_solve)."},
+        metadata={"minimum": 1, "maximum": 100, "description": "How many actions to look ahead."},
     )
     breadth: int = field(
         default=3,
         metadata={
             "minimum": 1,
             "maximum": 1000,
-            "description": "How many tasks are tried in each state, the first in time (N_a max in "
-            "the paper); sun-pointing comes on top where resources count.",
+            "description": "How many of the next images and contacts are tried at each step; "
+            "sun-pointing comes on top where resources count.",
         },
     )
     gamma: float = field(
@@ -209,7 +210,7 @@ class ForwardSearch:
         metadata={
             "exclusiveMinimum": 0,
             "maximum": 1,
-            "description": "Discount per second of plan time.",
+            "description": "How much less later images count: a factor for each second.",
         },
     )
     feasibility: Feasibility = field(

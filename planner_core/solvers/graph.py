@@ -31,6 +31,10 @@ class Graph:
 
     name: ClassVar[str] = "graph"
     title: ClassVar[str] = "Graph search"
+    about: ClassVar[str] = (
+        "Finds the chain of images that is worth most, and only then looks at battery and "
+        "recorder. Quick; strong where images alone count."
+    )
     paper: ClassVar[str] = "Algorithm 3, section Graph Search"
     exact: ClassVar[bool] = False
     honours: ClassVar[frozenset[Constraint]] = frozenset({Constraint.SLEW, Constraint.STATION})

@@ -55,25 +55,39 @@ class Mcts:
 
     name: ClassVar[str] = "mcts"
     title: ClassVar[str] = "SMDP Monte Carlo tree search"
+    about: ClassVar[str] = (
+        "Samples many futures at each step and follows those that turn out well. Finds "
+        "better plans the longer it may take."
+    )
     paper: ClassVar[str] = "Algorithm 2, section Solution Methods"
     exact: ClassVar[bool] = False
     honours: ClassVar[frozenset[Constraint]] = frozenset(Constraint) - {Constraint.DUPLICATE}
 
     num_simulations: int = field(
         default=500,
-        metadata=_described("Simulations per step (N_sim max).", minimum=1, maximum=1_000_000),
+        metadata=_described(
+            "Futures that are sampled at each step: more find better plans, and take longer.",
+            minimum=1,
+            maximum=1_000_000,
+        ),
     )
     depth: int = field(
         default=100,
-        metadata=_described("Actions of a simulation (d_solve).", minimum=1, maximum=1000),
+        metadata=_described(
+            "How many actions ahead each sampled future goes.", minimum=1, maximum=1000
+        ),
     )
     exploration: float = field(
-        default=30.0, metadata=_described("Weight c of the upper confidence bound.", minimum=0)
+        default=30.0,
+        metadata=_described(
+            "How much is tried that has not turned out well so far: higher looks further afield.",
+            minimum=0,
+        ),
     )
     breadth: int = field(
         default=8,
         metadata=_described(
-            "How many tasks are tried in each state, the first in time (N_a max in the paper).",
+            "How many of the next images and contacts are tried at each step.",
             minimum=1,
             maximum=1000,
         ),
@@ -87,7 +101,11 @@ class Mcts:
     )
     gamma: float = field(
         default=0.9999,
-        metadata=_described("Discount, see discount.", exclusiveMinimum=0, maximum=1),
+        metadata=_described(
+            "How much less later images count: a factor, applied as discount says.",
+            exclusiveMinimum=0,
+            maximum=1,
+        ),
     )
     discount: Literal["per_second", "per_decision"] = field(
         default="per_second",

@@ -48,6 +48,10 @@ class Milp:
 
     name: ClassVar[str] = "milp"
     title: ClassVar[str] = "Mixed-integer linear programming"
+    about: ClassVar[str] = (
+        "Hands the whole question to a mathematical solver, and proves the plan best if "
+        "there is time. For small missions."
+    )
     paper: ClassVar[str] = "Section Mixed-Integer Linear Programming"
     exact: ClassVar[bool] = True
     honours: ClassVar[frozenset[Constraint]] = frozenset(Constraint) - {Constraint.DUPLICATE}

@@ -24,6 +24,10 @@ class Rule:
 
     name: ClassVar[str] = "rule"
     title: ClassVar[str] = "Rule-based planner"
+    about: ClassVar[str] = (
+        "Takes what comes next in time, and turns to the sun where battery or recorder "
+        "forbid it. The quickest, for a first look."
+    )
     paper: ClassVar[str] = "Algorithm 4, section Rule-Based Planning"
     exact: ClassVar[bool] = False
     honours: ClassVar[frozenset[Constraint]] = frozenset(Constraint) - {Constraint.DUPLICATE}

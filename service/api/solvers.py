@@ -34,6 +34,7 @@ def _shown(solver: type[Solver]) -> SolverOut:
     return SolverOut(
         name=solver.name,
         title=solver.title,
+        description=solver.about,
         paper=solver.paper,
         kind="exact" if solver.exact else "heuristic",
         honours=[rule.value for rule in sorted(solver.honours)],

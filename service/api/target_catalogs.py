@@ -30,7 +30,7 @@ from service.wire.base import Body, Listed, Name
 from service.wire.places import MAX_TARGETS, CreatedCatalog, TargetCatalogOut, TargetIn
 from service.wire.stored import from_store
 
-router = APIRouter(prefix="/v1/target-catalogs", tags=["target catalogues"])
+router = APIRouter(prefix="/v1/target-catalogs", tags=["target catalogs"])
 
 _TYPES = ("application/json", "application/geo+json", "text/csv")
 _REQUIRED = ("id", "lat_deg", "lon_deg")

@@ -12,7 +12,7 @@ from typing import Any, Generic, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from planner_core.errors import Fault, PlannerError
-from service.files.tables import Table, decoded, read_table
+from service.files.tables import Table, decoded, has_decimal_comma, read_table
 from service.problems.faults import faults_of_validation, refuse
 
 B = TypeVar("B", bound=BaseModel)
@@ -116,6 +116,10 @@ def check(
 
 
 def _with_hint(fault: Fault, fields: Mapping[str, object]) -> Fault:
+    value = fields.get((fault.pointer or "").removeprefix("/"))
+    if isinstance(value, str) and has_decimal_comma(value):
+        hint = "Write it with a point, or put semicolons between cells"
+        return replace(fault, detail=f"{fault.detail} {hint}.")
     lat, lon = fields.get("lat_deg"), fields.get("lon_deg")
     if fault.pointer != "/lat_deg" or not isinstance(lat, float) or not isinstance(lon, float):
         return fault
@@ -176,6 +180,8 @@ def read_csv(
             faults.append(row)
         elif len(row[1]) != len(columns):
             detail = f"The line has {len(row[1])} cells, the header {len(columns)}."
+            if table.delimiter == "," and len(row[1]) > len(columns):
+                detail += " Where commas are decimal signs, put semicolons between cells."
             faults.append(Fault(code="malformed_csv", detail=detail, row=row[0]))
         else:
             cells = zip(columns, (cell.strip() for cell in row[1]), strict=True)

@@ -55,6 +55,11 @@ class Table:
         return cell if match is None else f"{match[1]}.{match[2]}"
 
 
+def has_decimal_comma(cell: str) -> bool:
+    """Return whether a cell may be a number whose decimal sign is a comma."""
+    return _DECIMAL_COMMA.fullmatch(cell) is not None
+
+
 def read_table(
     text: str, columns_of: Callable[[Sequence[str]], Collection[str]], required: Collection[str]
 ) -> Table:

@@ -169,7 +169,9 @@ class FiguresOut(Wire):
     downlinked_mbit: float | None = Field(
         None, description="Null too where a recorder has no capacity in megabits."
     )
-    downlinked_fraction: float | None = Field(None, description="In recorder capacities.")
+    downlinked_fraction: float | None = Field(
+        None, description="In multiples of what the recorders hold."
+    )
     delivered: int | None = Field(None, description="Images on the ground by the end.")
     age_s: AgesOut | None = Field(None, description="Of those images, when they are down.")
     solve_s: float | None = Field(None, description="Of the search alone.")

@@ -39,6 +39,7 @@ class SolverOut(Wire):
 
     name: str
     title: str
+    description: str = Field(description="What it does, and when to choose it.")
     paper: str = Field(description="Where the paper describes it.")
     kind: Open[Literal["exact", "heuristic"]] = Field(
         description="An exact solver proves its plan optimal when it runs to the end."

@@ -112,7 +112,9 @@ class TotalsOut(ImageFiguresOut):
     downlinked_mbit: float | None = Field(
         description="Null where a recorder has no capacity in megabits."
     )
-    downlinked_fraction: float | None = Field(description="In recorder capacities.")
+    downlinked_fraction: float | None = Field(
+        description="In multiples of what the recorders hold."
+    )
     battery_min_fraction: float | None = Field(description="The lowest charge of any satellite.")
     recorder_max_fraction: float | None = Field(description="The highest fill of any recorder.")
     delivered: int | None = Field(

@@ -72,6 +72,11 @@ def test_data_must_have_a_way_down() -> None:
     assert "no image comes down" in warning
 
 
+def but_long(asked: Scenario) -> tuple[str, ...]:
+    """Return what is told but for images that no access has room for."""
+    return tuple(one for one in usual_mistakes(asked) if "takes longer than" not in one)
+
+
 def test_an_image_must_fit_a_recorder() -> None:
     asked = optical()
     resources = replace(asked.satellites[0].resources, collect_drain_per_s=0.0)
@@ -79,10 +84,10 @@ def test_an_image_must_fit_a_recorder() -> None:
     longest_s = resources.recorder_max_fraction / resources.collect_fill_per_s
     targets = list(asked.targets)
     targets[0] = replace(targets[0], collect_s=0.999 * longest_s)
-    assert usual_mistakes(replace(asked, targets=tuple(targets))) == ()
+    assert but_long(replace(asked, targets=tuple(targets))) == ()
     targets[0] = replace(targets[0], collect_s=1.001 * longest_s)
     targets[1] = replace(targets[1], collect_s=2.0 * longest_s)
-    (warning,) = usual_mistakes(replace(asked, targets=tuple(targets)))
+    (warning,) = but_long(replace(asked, targets=tuple(targets)))
     assert repr(targets[0].id) in warning
     assert "and 1 more" in warning
 
@@ -104,6 +109,24 @@ def test_more_data_than_all_contacts_take_is_told() -> None:
     question = replace(asked, satellites=(replace(asked.satellites[0], resources=half),))
     (warning,) = mistakes_of_accesses(question, table)
     assert " 50 % " in warning
+
+
+def test_an_image_longer_than_any_access_is_told_before_there_are_any() -> None:
+    asked = optical()
+    own = asked.satellites[0]
+    free = replace(own.resources, collect_drain_per_s=0.0, collect_fill_per_s=0.0)
+    for off_nadir_max_deg in (20.0, 45.0, 80.0):
+        sensor = replace(own.sensor, off_nadir_max_deg=off_nadir_max_deg, min_elevation_deg=0.0)
+        sensor = replace(sensor, sun_elevation_min_deg=-90.0)
+        wide = replace(asked, satellites=(replace(own, sensor=sensor, resources=free),))
+        table = compute_opportunities(wide, Budget()).opportunities
+        lengths_s = (table.access_end_s - table.access_start_s)[table.kind != CONTACT]
+        # What was found is possible, and no warning of it; half as much again is not.
+        assert lengths_s.size > 3
+        for longest_s, is_told in ((lengths_s.max(), False), (2.0 * lengths_s.max(), True)):
+            targets = (replace(wide.targets[0], collect_s=float(longest_s)), *wide.targets[1:])
+            told = usual_mistakes(replace(wide, targets=targets))
+            assert any("takes longer than" in one for one in told) == is_told, off_nadir_max_deg
 
 
 def of_places(*places: tuple[float, float]) -> Scenario:
@@ -150,6 +173,6 @@ def test_an_image_that_no_battery_can_pay_is_named() -> None:
     targets = (replace(asked.targets[0], collect_s=9e5), *asked.targets[1:])
     small = replace(asked.satellites[0].resources, collect_fill_per_s=0.0)
     satellites = (replace(asked.satellites[0], resources=small),)
-    (warning,) = usual_mistakes(replace(asked, targets=targets, satellites=satellites))
+    (warning,) = but_long(replace(asked, targets=targets, satellites=satellites))
     assert "more energy" in warning
     assert repr(targets[0].id) in warning

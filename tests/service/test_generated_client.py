@@ -88,7 +88,7 @@ def plan_a_mission(client: Any, generated: str) -> None:
         for station in mission["ground_stations"]
     ]
     targets = models.TargetCatalogIn.from_dict({"name": "draw", "targets": mission["targets"]})
-    catalog = call("target_catalogues.create_target_catalog", targets)
+    catalog = call("target_catalogs.create_target_catalog", targets)
     read_and_import(call, generated)
     question = models.ScenarioIn.from_dict(
         {
@@ -140,7 +140,7 @@ def read_and_import(call: Callable[..., Any], generated: str) -> None:
     stations = "name,lat_deg,lon_deg\nBern,46.9,7.4\n"
     assert call("ground_stations.import_ground_stations", file(stations)).accepted == 1
     targets = "id,lat_deg,lon_deg\nbern,46.9,7.4\n"
-    assert call("target_catalogues.create_target_catalog", file(targets)).num_targets == 1
+    assert call("target_catalogs.create_target_catalog", file(targets)).num_targets == 1
     skies = "target_id,time,clear_probability\nbern,2019-01-01T00:00:00Z,0.5\n"
     assert call("forecasts.create_forecast", file(skies)).id
 

@@ -24,6 +24,7 @@ class Example:
 
     name: ClassVar[str] = "example"
     title: ClassVar[str] = "Example"
+    about: ClassVar[str] = ""
     paper: ClassVar[str] = ""
     exact: ClassVar[bool] = False
     honours: ClassVar[frozenset[Constraint]] = frozenset()

@@ -3,7 +3,7 @@
 
 import { byId, fill, h } from "./dom.js";
 import { utc } from "./format.js";
-import { OutcomeRows } from "./outcomes.js";
+import { OutcomeRows, reasonName } from "./outcomes.js";
 import { changeOf } from "./settings.js";
 import { actionButton, targetButton } from "./summary.js";
 import { PagedTable } from "./table.js";
@@ -56,7 +56,7 @@ export function showLeftOut(plan, selection, jobPath) {
  */
 function group(plan, selection, code, source) {
   const table = new PagedTable(
-    `Left out: ${MEANINGS[code] ?? code.replaceAll("_", " ")}`,
+    `Left out: ${MEANINGS[code] ?? reasonName(code)}`,
     [
       { title: "Target", cell: (item) => targetButton(plan, selection, item.target_id) },
       { title: "Certainty", cell: (item) => item.reason?.certainty },
@@ -69,7 +69,7 @@ function group(plan, selection, code, source) {
   const summary = h(
     "summary",
     {},
-    h("strong", {}, code.replaceAll("_", " ")),
+    h("strong", {}, reasonName(code)),
     ` ${source.length}`,
     MEANINGS[code] && h("small", {}, ` ${MEANINGS[code]}`),
   );

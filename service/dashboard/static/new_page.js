@@ -98,7 +98,7 @@ function showSource() {
 function showSolver() {
   const solver = solvers.find((one) => one.name === input("solver").value);
   if (!solver) return;
-  byId("solver-about").textContent = `${solver.title}. ${solver.kind}; ${solver.paper}.`;
+  byId("solver-about").textContent = `${solver.title}: ${solver.description}`;
   params = new SchemaForm("param", solver.params_schema);
   fill(byId("params"), params.element);
 }

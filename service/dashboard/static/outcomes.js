@@ -6,6 +6,13 @@ import { get } from "./api.js";
 /** @typedef {import("./types.js").TargetItem} TargetItem */
 
 const PAGE = 100;
+/** Reasons whose code is no phrase of its own. @type {Record<string, string>} */
+const REASONS = { displaced_by: "displaced by other images" };
+
+/** @param {string} code of a reason */
+export function reasonName(code) {
+  return REASONS[code] ?? code.replaceAll("_", " ");
+}
 
 /** The targets of a job that are left out for one reason. */
 export class OutcomeRows {

@@ -3,6 +3,7 @@
 
 import { byId, fill, h } from "./dom.js";
 import { number, percent, utc } from "./format.js";
+import { reasonName } from "./outcomes.js";
 import { spanOf } from "./plan.js";
 import { targetButton, actionButton } from "./summary.js";
 import { PagedTable } from "./table.js";
@@ -106,7 +107,7 @@ function targetTable(plan, selection) {
       { title: "Satellite", cell: (one) => one.satelliteId && plan.satelliteName(one.satelliteId) },
       { title: "Action", cell: (one) => one.actionId && actionButton(plan, selection, one.actionId) },
       { title: "Start (UTC)", cell: (one) => utc(plan.actions.get(one.actionId ?? "")?.start) },
-      { title: "Reason", cell: (one) => one.reason?.replaceAll("_", " ") },
+      { title: "Reason", cell: (one) => one.reason && reasonName(one.reason) },
       { title: "Why", cell: (one) => one.why },
     ],
     (/** @type {TargetPlace} */ one) => one.id,
@@ -157,7 +158,7 @@ function targetFilter(plan, table) {
  */
 function choiceOf(what, values) {
   const known = [...new Set(values.filter((value) => value !== null))].sort();
-  const options = known.map((value) => h("option", { value }, value.replaceAll("_", " ")));
+  const options = known.map((value) => h("option", { value }, reasonName(value)));
   return h("select", { id: `target-${what}` }, h("option", { value: "" }, "any"), ...options);
 }
 

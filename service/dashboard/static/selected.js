@@ -6,7 +6,7 @@ import { byId, fill, h } from "./dom.js";
 import { number, percent, utc, utcLabelled } from "./format.js";
 import { blockersOf } from "./left_out.js";
 import { lanesOf, opportunitiesOf } from "./opportunities.js";
-import { outcomeOf } from "./outcomes.js";
+import { outcomeOf, reasonName } from "./outcomes.js";
 import { showError } from "./page.js";
 import { changeOf } from "./settings.js";
 import { whatIfButton } from "./what_if.js";
@@ -132,7 +132,7 @@ function factsOf(facts) {
 function targetFacts({ id, outcome, reason, why }) {
   /** @type {[string, import("./dom.js").Child][]} */
   const facts = [["Target", h("strong", { id: "selected-target" }, id)], ["Outcome", outcome]];
-  if (reason !== null) facts.push(["Reason", reason.replaceAll("_", " ")], ["Why", why]);
+  if (reason !== null) facts.push(["Reason", reasonName(reason)], ["Why", why]);
   return facts;
 }
 

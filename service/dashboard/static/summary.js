@@ -19,7 +19,7 @@ export function showSummary(plan, selection) {
   const { targets } = totals;
   const figures = [
     ["Reward", number(totals.reward), ""],
-    ["Bound", number(totals.bound), totals.bound_proof ? `no plan earns more (${totals.bound_proof})` : ""],
+    ["Bound", number(totals.bound), totals.bound === null ? "none proven" : "proven: no plan earns more"],
     ["Gap", percent(totals.gap), totals.gap === null ? "no bound" : bar(1 - totals.gap, "Reward as a share of the bound")],
     ["Validity", timeline.validity, "by the referee, not by the solver"],
     ["Targets", `${totals.collects} collected`, `${targets.downlinked} on the ground, ${targets.unscheduled} left out, ${targets.excluded} excluded`],

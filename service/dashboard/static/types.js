@@ -105,6 +105,7 @@
  * @typedef {object} SolverOut
  * @property {string} name
  * @property {string} title
+ * @property {string} description
  * @property {string} paper
  * @property {string} kind
  * @property {string[]} honours

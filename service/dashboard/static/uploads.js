@@ -3,7 +3,7 @@
 
 import { list, upload } from "./api.js";
 import { byId, fill, h } from "./dom.js";
-import { utc } from "./format.js";
+import { counted, utc } from "./format.js";
 import { describe } from "./page.js";
 
 const SHOWN = 500;
@@ -109,13 +109,15 @@ export class Choices {
 
 /** @typedef {{row: number | null, code: string, detail: string}} Rejected */
 
+const MEANT_AS_REWARD = new Set(["priority", "weight", "value", "score", "importance"]);
+
 /**
  * @param {{accepted: number, rejected: number, errors: Rejected[]}} answer
  * @param {string} noun
  */
 function told(answer, noun) {
   /** @type {(HTMLElement | string)[]} */
-  const parts = [`${answer.accepted} ${noun} taken, ${answer.rejected} refused.`];
+  const parts = [`${counted(answer.accepted, noun)} taken, ${answer.rejected} refused.`];
   const lines = answer.errors.slice(0, 20).map((error) =>
     h("li", {}, `${error.row === null ? "" : `Line ${error.row}: `}${error.detail}`),
   );
@@ -141,8 +143,8 @@ async function sendSatellites(file) {
   /** @type {any} */
   const answer = await upload("/v1/satellites/import", file, mediaType);
   const ids = answer.items.map((/** @type {{id: string}} */ item) => item.id);
-  const parts = told(answer, "element sets");
-  parts.push(" Satellites get the agility, sensor and resources of the paper unless entered one by one.");
+  const parts = told(answer, "satellite");
+  parts.push(" New ones have the figures of the built-in type generic_optical: change them under Fleet.");
   return { told: parts, ids };
 }
 
@@ -152,7 +154,7 @@ async function sendStations(file) {
   /** @type {any} */
   const answer = await upload("/v1/ground-stations/import", file, mediaType);
   const ids = answer.items.map((/** @type {{id: string}} */ item) => item.id);
-  return { told: told(answer, "stations"), ids };
+  return { told: told(answer, "station"), ids };
 }
 
 /** @param {File} file */
@@ -161,8 +163,13 @@ async function sendTargets(file) {
   const path = `/v1/target-catalogs?name=${name}`;
   /** @type {any} */
   const answer = await upload(path, file, await mediaTypeOfTargets(file));
-  const ignored = answer.ignored_columns.join(", ");
-  const parts = [`${answer.num_targets} targets taken.`, ignored && ` Not used: ${ignored}.`];
+  const ignored = answer.ignored_columns;
+  const meansReward = ignored.some((/** @type {string} */ name) => MEANT_AS_REWARD.has(name.toLowerCase()));
+  const parts = [
+    `${counted(answer.num_targets, "target")} taken.`,
+    ignored.length > 0 && ` Not used: ${ignored.join(", ")}.`,
+    meansReward && " How much an image counts is read from the column reward.",
+  ].filter((part) => part !== false);
   return { told: parts, ids: [answer.id] };
 }
 

@@ -7,6 +7,7 @@ from typing import Final
 import httpx
 
 from service.commands import demo_mission
+from tests.service.dashboard.browser.conftest import Browser
 from tests.service.dashboard.browser.missions import Json, planned
 from tests.service.factories import ground_station, post, satellite, tle
 
@@ -24,6 +25,23 @@ STATIONS: Final = {
     "White Sands": (32.5, -106.6), "South Point": (19.0, -155.7), "Santiago": (-33.1, -70.7),
     "Hartebeesthoek": (-25.9, 27.7), "Dongara": (-29.1, 115.6), "Singapore": (1.3, 103.7),
 }  # fmt: skip
+
+SCREENS: Final = ((1920, 1080), (1280, 720), (1400, 757), (3840, 2160))
+# What lies over the edge of the screen or of its own part of it.
+CUT_OFF: Final = """
+return [...document.querySelectorAll("#wall tr, #wall canvas, #wall p")].filter((one) => {
+  const box = one.getBoundingClientRect();
+  const frame = one.closest("section").getBoundingClientRect();
+  return box.right > Math.min(frame.right, innerWidth) + 1 || box.left < frame.left - 1 ||
+    box.bottom > Math.min(frame.bottom, innerHeight) + 1 || box.top < frame.top - 1;
+}).map((one) => one.innerText || one.tagName);
+"""
+
+
+def show_at(browser: Browser, width: int, height: int) -> None:
+    """Give the page just this room: a window of the size has less."""
+    size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
+    browser.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
 
 
 def crowded_plan(api: httpx.Client) -> Json:

@@ -12,7 +12,15 @@ import httpx
 import pytest
 
 from tests.service.dashboard.browser.conftest import PATIENCE_S, Browser
-from tests.service.dashboard.browser.crowd import NOON_OF_SHIFT, START, STATIONS, crowded_plan
+from tests.service.dashboard.browser.crowd import (
+    CUT_OFF,
+    NOON_OF_SHIFT,
+    SCREENS,
+    START,
+    STATIONS,
+    crowded_plan,
+    show_at,
+)
 from tests.service.dashboard.browser.missions import Json
 from tests.service.serving import serving
 
@@ -23,15 +31,6 @@ MOST_PAGES = 2
 # On a screen 1.2 metres wide a line of this size is 12 mm high.
 LEAST_LETTERS_PX = 19
 LETTERS_PX = "return parseFloat(getComputedStyle(document.querySelector('#wall td')).fontSize)"
-# What lies over the edge of the screen or of its own part of it.
-CUT_OFF = """
-return [...document.querySelectorAll("#wall tr, #wall canvas, #wall p")].filter((one) => {
-  const box = one.getBoundingClientRect();
-  const frame = one.closest("section").getBoundingClientRect();
-  return box.right > Math.min(frame.right, innerWidth) + 1 || box.left < frame.left - 1 ||
-    box.bottom > Math.min(frame.bottom, innerHeight) + 1 || box.top < frame.top - 1;
-}).map((one) => one.innerText || one.tagName);
-"""
 # Notes where each canvas has text, by the ink of the letters and not by what the page believes.
 RECORD = """
 const note = CanvasRenderingContext2D.prototype.fillText;
@@ -78,12 +77,6 @@ def recorded(browser: Browser) -> Iterator[Browser]:
     yield browser
     browser.driver.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", script)
     browser.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
-
-
-def show_at(browser: Browser, width: int, height: int) -> None:
-    """Give the page just this room: a window of the size has less."""
-    size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
-    browser.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
 
 
 def written(browser: Browser, plot: str) -> list[Json]:
@@ -161,8 +154,10 @@ def test_the_wall_of_a_crowd_is_on_one_screen_and_its_names_never_overprint(
     assert len(there & set(STATIONS)) > MOST_STATIONS
     assert len(rows(recorded, "#wall-satellites")) == len(plan["satellites"])
     assert len(rows(recorded, "#wall-passes")) == len(STATIONS)
-    assert recorded.run(CUT_OFF) == []
     assert recorded.run(LETTERS_PX) >= LEAST_LETTERS_PX
+    for size in SCREENS:
+        show_at(recorded, *size)
+        recorded.wait(lambda: recorded.run(CUT_OFF) == [], f"cut off at {size}")
 
 
 def rows(browser: Browser, table: str) -> list[Any]:

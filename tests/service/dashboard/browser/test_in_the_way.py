@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from functools import partial
+from pathlib import Path
 
 import httpx
 import pytest
@@ -12,6 +13,7 @@ from selenium.webdriver import Keys
 from tests.service.dashboard.browser.conftest import Browser
 from tests.service.dashboard.browser.missions import Json, planned, small_mission
 from tests.service.factories import post
+from tests.service.test_first_impressions import JARGON
 
 
 @pytest.fixture(scope="module")
@@ -139,3 +141,64 @@ def test_on_a_laptop_no_table_goes_over_the_edge(browser: Browser, job: Json) ->
         assert browser.run(TOO_WIDE) == []
     finally:
         browser.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+def test_a_contact_is_told_by_the_name_of_its_station(
+    browser: Browser, job: Json, timeline: Json
+) -> None:
+    actions = timeline["satellites"][0]["actions"]
+    contact = next(one for one in actions if one["mode"] == "contact")
+    open_job(browser, job)
+    browser.click("#tables > details:nth-of-type(2) > summary")
+    rows = "#tables > details:nth-of-type(2) tbody"
+    browser.wait(lambda: contact["station_name"] in browser.text(rows), "no name")
+    assert contact["station_id"] not in browser.text(rows)
+
+
+def test_a_plan_that_breaks_limits_is_not_green_in_the_list(
+    browser: Browser, api: httpx.Client, scenario_id: str
+) -> None:
+    body = {"scenario_id": scenario_id, "solver": "graph", "params": {"feasibility": "penalty"}}
+    job = post(api, "/v1/jobs", body)
+    while job["state"] in ("queued", "running"):
+        job = api.get(f"/v1/jobs/{job['id']}?wait=10").json()
+    assert (job["state"], job["validity"]) == ("succeeded", "violations")
+    browser.open("/")
+    badge = f"tr[data-job='{job['id']}'] .state"
+    browser.wait(lambda: "breaks limits" in browser.text(badge), "nothing is said")
+    color = "return getComputedStyle(document.querySelector(arguments[0])).color"
+    bad = "return getComputedStyle(document.documentElement).getPropertyValue('--bad')"
+    probe = (
+        f"const bad = (() => {{ {bad} }})(); const one = document.createElement('i');"
+        "one.style.color = bad; document.body.append(one); return getComputedStyle(one).color"
+    )
+    assert browser.run(color, badge) == browser.run(probe)
+
+
+def test_a_priority_column_is_spoken_of(browser: Browser, tmp_path: Path) -> None:
+    file = tmp_path / "urgent.csv"
+    file.write_text("id,lat_deg,lon_deg,priority\nharbour,53.54,9.98,9\n")
+    browser.open("/new")
+    browser.wait(lambda: browser.text("#solver-about"))
+    browser.find("#targets-file").send_keys(str(file))
+    browser.wait(lambda: "1 target taken." in browser.text("#targets .outcome"), "not taken")
+    assert "Not used: priority." in browser.text("#targets .outcome")
+    assert "column reward" in browser.text("#targets .outcome")
+
+
+def test_the_form_speaks_of_solvers_in_operators_words(browser: Browser) -> None:
+    browser.open("/new")
+    browser.wait(lambda: browser.text("#solver-about"))
+    names = browser.run("return [...document.querySelector('#solver').options].map((o) => o.value)")
+    assert "certified" in names
+    browser.click("#solver-params > summary")
+    choose = """
+      const choice = document.querySelector("#solver");
+      choice.value = arguments[0];
+      choice.dispatchEvent(new Event("change"));
+      return document.querySelector("main").innerText;
+    """
+    for name in names:
+        text = browser.run(choose, name)
+        assert [phrase for phrase in JARGON if re.search(phrase, text)] == []
+        assert "undefined" not in text

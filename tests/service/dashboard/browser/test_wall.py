@@ -10,6 +10,7 @@ from selenium import webdriver
 
 from service.commands import demo_mission
 from tests.service.dashboard.browser.conftest import PATIENCE_S, Browser
+from tests.service.dashboard.browser.crowd import CUT_OFF, SCREENS, show_at
 from tests.service.dashboard.browser.missions import Json, planned, small_mission
 from tests.service.factories import post
 from tests.service.serving import serving
@@ -42,6 +43,10 @@ def test_the_wall_comes_back_by_itself_when_the_service_does(
         wall.open(f"/wall#at={AT}")
         wall.wait(lambda: "OS" in wall.text("#wall-passes"), "no countdown")
         wall.run("window.nobodyTouchedIt = true")
+        for size in SCREENS:
+            show_at(wall, *size)
+            wall.wait(lambda: wall.run(CUT_OFF) == [], f"cut off at {size}")
+        driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
     wall.wait(lambda: "No answer since" in wall.text("#wall-status"), "it does not tell")
     # What it knows it goes on telling.
     before = wall.text("#wall-passes")
