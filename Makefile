@@ -11,7 +11,7 @@ LOCK := $(UV) pip compile --universal --python-version 3.11 --generate-hashes \
 	--no-emit-index-url
 PIP := $(BIN)/python -m pip -qq --disable-pip-version-check
 
-.PHONY: help setup demo serve test chaos fuzz browser screenshots check check-types \
+.PHONY: help setup demo serve test chaos fuzz flight browser screenshots check check-types \
 	check-rest format lock dist paper paper-quick clean
 
 help:
@@ -21,6 +21,7 @@ help:
 	@echo "              also runs of real size, and five times the examples"
 	@echo "make chaos    500 jobs while processes are killed and databases fail (needs Debian and root)"
 	@echo "make fuzz     files made by coverage-guided fuzzing, against every parser (Linux)"
+	@echo "make flight   an hour of plans flown in Basilisk (0.6 GB to install)"
 	@echo "make browser  the dashboard in a real browser (needs Chromium, or Debian and root)"
 	@echo "make screenshots  the pictures of the dashboard in docs/images (likewise)"
 	@echo "make check    lint, format, types, import contracts, examples in docstrings"
@@ -79,6 +80,13 @@ fuzz: setup
 	@$(PIP) install --require-hashes -r tests/fuzz/requirements.lock
 	$(BIN)/python -m tests.fuzz.guided
 
+# Basilisk wants versions of its own, and so an environment of its own.
+flight: setup
+	@$(PYTHON) -m venv build/flight
+	@build/flight/bin/python -m pip -qq --disable-pip-version-check install --no-compile \
+		--require-hashes -r benchmarks/flight/requirements.lock
+	SLEWLINE_TEST_FLIGHT_PYTHON=build/flight/bin/python $(BIN)/python -m pytest tests/flight
+
 browser: setup
 	.ci/browser $(BIN)/python -m pytest tests/service/dashboard/browser
 
@@ -106,6 +114,7 @@ lock:
 	$(LOCK) pyproject.toml --extra otel --extra build -o requirements.lock
 	$(LOCK) pyproject.toml --extra otel --extra build --extra dev --extra study -c requirements.lock \
 		-o requirements-dev.lock
+	$(LOCK) benchmarks/flight/requirements.in -o benchmarks/flight/requirements.lock
 	$(LOCK) tests/fuzz/requirements.in -o tests/fuzz/requirements.lock
 
 dist: $(TOOLS)

@@ -1,0 +1,119 @@
+"""Whole days flown: each planner's timeline of a scenario file and its variants, as a table.
+
+``python -m benchmarks.flight_days SCENARIO.json FOLDER`` plans a scenario file's mission with
+and without resources, and with several starts in each access, by every solver named, flies all in
+Basilisk (``benchmarks.flight``, in the interpreter that ``--python`` names), and prints a table
+of Markdown. Scenario files, timelines and what each flight said are left in the folder. With
+``--first-release`` plans are made of what the first release knew of the spacecraft, and flown by
+the spacecraft as it is.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from pathlib import Path
+from typing import Any, Final
+
+Document = dict[str, Any]
+
+
+def _without_resources(scenario: Document) -> Document:
+    # Without them nothing comes down, so an objective that asks for delivery has no meaning.
+    return {key: scenario[key] for key in scenario if key != "objective"} | {"use_resources": False}
+
+
+VARIANTS: Final[Mapping[str, Callable[[Document], Document]]] = {
+    "resources": lambda scenario: scenario,
+    "no resources": _without_resources,
+    "15 s apart": lambda scenario: {**scenario, "collect_spacing_s": 15.0},
+    "15 s apart, no resources": lambda scenario: {
+        **_without_resources(scenario), "collect_spacing_s": 15.0
+    },
+    "continuous": lambda scenario: {**scenario, "continuous_starts": True},
+    "continuous, no resources": lambda scenario: {
+        **_without_resources(scenario), "continuous_starts": True
+    },
+}  # fmt: skip
+SOLVERS: Final = ("rule", "forward_search", "mcts", "certified")
+
+_FIGURES: Final = {
+    "on target": r"collects on target +([\d.]+% of \d+)",
+    "turns longer than gaps": r"turns longer than gaps +(\d+)",
+    "contacts on station": r"contacts on station +([\d.]+% of \d+)",
+    "below the curve": r"battery.* at most (\S+) below",
+    "recorder within": r"recorder +within (\S+)",
+    "torque": r"body rate, wheel torque .* and ([\d.]+)",
+}
+
+
+def known_before(scenario: Document) -> Document:
+    """Return a scenario with the spacecraft as the first release knew it.
+
+    Turns from rest to rest, charge whenever nothing else is done, no load between tasks, and one
+    rate of downlink: the mean of its knots.
+    """
+    satellites = []
+    for satellite in scenario["satellites"]:
+        knots = satellite["resources"]["downlink_rate_mbit_s"]
+        if isinstance(knots, list):
+            knots = sum(rate for _, rate in knots) / len(knots)
+        resources = {**satellite["resources"], "sun_pointing": "free", "idle_power_w": 0.0,
+                     "eclipse_aware": False, "downlink_rate_mbit_s": knots}  # fmt: skip
+        agility = {**satellite["agility"], "slew_model": "rest"}
+        satellites.append({**satellite, "agility": agility, "resources": resources})
+    return {**scenario, "satellites": satellites}
+
+
+def row_of(scenario: Path, solver: str, options: argparse.Namespace) -> str:
+    """Plan and fly one day, and return its row of the table."""
+    planned = scenario
+    if options.first_release:
+        planned = scenario.with_name(f"{scenario.stem}-before.json")
+        planned.write_text(json.dumps(known_before(json.loads(scenario.read_text()))))
+    timeline = planned.with_name(f"{planned.stem}-{solver}.json")
+    if not timeline.exists():
+        subprocess.run([sys.executable, "-m", "service", "solve", str(planned), "--solver",
+                        solver, "--time-s", str(options.time_s), "--out", str(timeline)],
+                       check=True, capture_output=True)  # fmt: skip
+    flown = subprocess.run([options.python, "-m", "benchmarks.flight", str(scenario),
+                            str(timeline), "--require", "0.995"],
+                           capture_output=True, text=True, check=False)  # fmt: skip
+    timeline.with_suffix(".txt").write_text(flown.stdout + flown.stderr, encoding="utf-8")
+    figures = [re.search(pattern, flown.stdout) for pattern in _FIGURES.values()]
+    told = [figure[1] if figure else "" for figure in figures]
+    return " | ".join([solver, *told, "yes" if flown.returncode == 0 else "no"])
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("scenario", type=Path)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--python", default=sys.executable, help="an interpreter with Basilisk")
+    parser.add_argument("--variants", nargs="*", choices=VARIANTS, default=list(VARIANTS))
+    parser.add_argument("--solvers", nargs="*", default=list(SOLVERS))
+    parser.add_argument("--first-release", action="store_true",
+                        help="plan with what the first release knew")  # fmt: skip
+    parser.add_argument("--time-s", type=float, default=20.0, help="of the clock, for each plan")
+    options = parser.parse_args()
+    options.folder.mkdir(parents=True, exist_ok=True)
+    mission = json.loads(options.scenario.read_text())
+    print(f"| mission | solver | {' | '.join(_FIGURES)} | flyable |")
+    print(f"|{'---|' * (len(_FIGURES) + 3)}")
+    with ThreadPoolExecutor(max_workers=2) as pool:
+        for name in options.variants:
+            path = options.folder / f"{name.replace(', ', '-').replace(' ', '-')}.json"
+            path.write_text(json.dumps(VARIANTS[name](mission)), encoding="utf-8")
+            for row in pool.map(partial(row_of, path, options=options), options.solvers):
+                print(f"| {name} | {row} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
