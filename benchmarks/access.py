@@ -30,6 +30,7 @@ from planner_core.domain import (
     Satellite,
     Sensor,
     Target,
+    mean_elements,
 )
 from planner_core.orbits.ephemeris import propagate
 from planner_core.orbits.places import Places
@@ -110,7 +111,8 @@ def brahe_windows(case: Case, brahe: Any) -> int:
             )
         )
     propagators = [
-        brahe.SGPPropagator.from_tle(*export_tle(satrec(s.orbit))) for s in case.satellites
+        brahe.SGPPropagator.from_tle(*export_tle(satrec(mean_elements(s.orbit))))
+        for s in case.satellites
     ]
     locations = [brahe.PointLocation(t.lon_deg, t.lat_deg, 0.0) for t in case.targets]
     start = brahe.Epoch.from_datetime(START.year, START.month, START.day, 0, 0, 0.0, 0.0, brahe.UTC)

@@ -25,6 +25,7 @@ from planner_core.domain import (
     Satellite,
     Scenario,
     Target,
+    mean_elements,
 )
 from planner_core.orbits.tle import parse_tle
 
@@ -88,7 +89,7 @@ def satellites(path: Path, number: int) -> tuple[Satellite, ...]:
             id=f"s{i + 1}",
             name=f"Spacecraft {i + 1}",
             orbit=replace(
-                first.orbit,
+                mean_elements(first.orbit),
                 name=f"Spacecraft {i + 1}",
                 norad_cat_id=i + 1,
                 raan_deg=360.0 * i / number,

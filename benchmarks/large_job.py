@@ -23,7 +23,7 @@ import psutil
 
 from benchmarks.fleet_missions import Files, fleet_scenario
 from benchmarks.service import Json, Served, post, served
-from planner_core.domain import Satellite, Scenario
+from planner_core.domain import Satellite, Scenario, mean_elements
 from planner_core.orbits.omm import omm_from_elements
 from service.wire.instants import instant_text
 
@@ -83,7 +83,7 @@ def satellite_of(satellite: Satellite) -> Json:
     agility = satellite.agility
     return {
         "name": satellite.name,
-        "omm": omm_from_elements(satellite.orbit),
+        "omm": omm_from_elements(mean_elements(satellite.orbit)),
         "agility": {"slew_rate_deg_s": agility.slew_rate_deg_s, "settle_s": agility.settle_s},
     }
 

@@ -19,6 +19,7 @@ from planner_core.access.windows import Accesses, find_accesses
 from planner_core.budget import Budget, Progress
 from planner_core.domain import (
     Horizon,
+    OrbitEphemeris,
     Satellite,
     Scenario,
     Sensor,
@@ -355,9 +356,21 @@ def _pointing(scenario: Scenario) -> Pointing:
 
 
 def check_propagation(scenario: Scenario) -> None:
-    """Raise ``PropagationFailed`` for the first satellite that SGP4 cannot carry through."""
-    for satellite in scenario.satellites:
-        orbits.check_propagation(satellite, scenario.horizon)
+    """Refuse the first satellite whose orbit does not reach over the horizon.
+
+    Raises
+    ------
+    PropagationFailed
+        SGP4 cannot carry it through.
+    InvalidScenario
+        ``orbit_outside_span`` where an ephemeris ends before, or begins later.
+    """
+    for position, satellite in enumerate(scenario.satellites):
+        try:
+            orbits.check_propagation(satellite, scenario.horizon)
+        except InvalidScenario as error:
+            error.fault = replace(error.fault, pointer=f"/satellites/{position}")
+            raise
 
 
 def check_element_age(scenario: Scenario) -> None:
@@ -375,7 +388,7 @@ def check_element_age(scenario: Scenario) -> None:
     old = [
         index
         for index, satellite in enumerate(scenario.satellites)
-        if satellite.orbit.period_s < LEO_PERIOD_S and ages_days[index] > REFUSED_ELEMENTS_DAYS
+        if ages_days[index] > REFUSED_ELEMENTS_DAYS and satellite.orbit.period_s < LEO_PERIOD_S
     ]
     if not old:
         return
@@ -415,6 +428,8 @@ def orbit_warnings(scenario: Scenario) -> tuple[str, ...]:
 
 def _age_warning(satellite: Satellite, horizon: Horizon) -> str | None:
     orbit = satellite.orbit
+    if isinstance(orbit, OrbitEphemeris):
+        return None
     age_days = _greatest_age_days(satellite, horizon)
     if orbit.epoch > horizon.end:
         return (
@@ -431,5 +446,7 @@ def _age_warning(satellite: Satellite, horizon: Horizon) -> str | None:
 
 def _greatest_age_days(satellite: Satellite, horizon: Horizon) -> float:
     """Return how far from its epoch an element set is used at most, before or after."""
+    if isinstance(satellite.orbit, OrbitEphemeris):
+        return 0.0  # it is used within its own span alone
     epoch_s = horizon.offset_s(satellite.orbit.epoch)
     return max(epoch_s, horizon.duration_s - epoch_s) / 86400.0

@@ -37,6 +37,11 @@ from __future__ import annotations
 from planner_core.domain.forecast import Forecast, SkySeries
 from planner_core.domain.horizon import Horizon
 from planner_core.domain.objective import Objective, Preference
+from planner_core.domain.orbit_ephemeris import (
+    EphemerisSegment,
+    Frame,
+    OrbitEphemeris,
+)
 from planner_core.domain.outages import Outage
 from planner_core.domain.places import GroundStation, Target
 from planner_core.domain.quality import Curve, Quality
@@ -46,6 +51,7 @@ from planner_core.domain.spacecraft import (
     Agility,
     LookSide,
     Nadir,
+    Orbit,
     OrbitDirection,
     OrbitElements,
     Resources,
@@ -53,6 +59,7 @@ from planner_core.domain.spacecraft import (
     Sensor,
     SlewModel,
     SunPointing,
+    mean_elements,
 )
 from planner_core.domain.states import State
 
@@ -61,14 +68,18 @@ __all__ = [
     "CollectAlignment",
     "Curve",
     "Dynamics",
+    "EphemerisSegment",
     "Forecast",
+    "Frame",
     "GroundStation",
     "Horizon",
     "LookSide",
     "Nadir",
     "Objective",
+    "Orbit",
     "OrbitDirection",
     "OrbitElements",
+    "OrbitEphemeris",
     "Outage",
     "Preference",
     "Promise",
@@ -84,4 +95,5 @@ __all__ = [
     "State",
     "SunPointing",
     "Target",
+    "mean_elements",
 ]

@@ -17,6 +17,7 @@ from planner_core.domain.checks import (
     require,
     require_finite,
 )
+from planner_core.domain.orbit_ephemeris import OrbitEphemeris
 
 Nadir = Literal["geodetic", "geocentric"]
 LookSide = Literal["left", "right", "any"]
@@ -55,6 +56,16 @@ class OrbitElements:
     def period_s(self) -> float:
         """Return the mean (Kozai) orbital period."""
         return 86400.0 / self.mean_motion_rev_day
+
+
+Orbit = OrbitElements | OrbitEphemeris
+
+
+def mean_elements(orbit: Orbit) -> OrbitElements:
+    """Return an orbit that is given by elements; `TypeError` where it is an ephemeris."""
+    if isinstance(orbit, OrbitElements):
+        return orbit
+    raise TypeError(f"The orbit of {orbit.name!r} is an ephemeris.")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -290,7 +301,7 @@ class Satellite:
 
     id: str
     name: str
-    orbit: OrbitElements
+    orbit: Orbit
     agility: Agility = Agility()
     sensor: Sensor = Sensor()
     resources: Resources

@@ -68,6 +68,12 @@ class EarthOrientation:
             np.asarray(np.interp(mjd, self.mjd, self.yp_rad)),
         )
 
+    def tai_utc_at(self, jd_midnight: float, fraction: Floats) -> Floats:
+        """Return TAI - UTC in seconds at each instant; parameters as those of ``at``."""
+        mjd = jd_midnight - _MJD_ZERO + fraction
+        row = np.clip(np.searchsorted(self.mjd, mjd, side="right") - 1, 0, len(self.mjd) - 1)
+        return np.asarray(self.tai_utc_s[row])
+
     def covers(self, horizon: Horizon) -> bool:
         """Return whether the table reaches over the whole horizon."""
         first, last = (sum(julian_date(t)) - _MJD_ZERO for t in (horizon.start, horizon.end))

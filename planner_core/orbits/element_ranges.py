@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 
-from planner_core.domain import OrbitElements
+from planner_core.domain import Orbit, OrbitElements
 from planner_core.errors import Fault, InvalidElements
 
 LARGEST_NORAD_CAT_ID = 999_999_999
@@ -56,7 +56,7 @@ def is_plain_text(text: str) -> bool:
     return len(text) <= LONGEST_TEXT and text.isprintable()
 
 
-def epoch_key(elements: OrbitElements) -> tuple[int | str, datetime]:
+def epoch_key(elements: Orbit) -> tuple[int | str, datetime]:
     """Return what tells two element sets apart: the satellite and the epoch.
 
     Number 0 stands for "not catalogued", so there the name tells satellites apart.

@@ -1,4 +1,4 @@
-"""A satellite's path over the horizon: SGP4 at nodes, cubics between them.
+"""A satellite's path over the horizon: SGP4, or an ephemeris, at nodes, and cubics between them.
 
 SGP4 runs once a minute (twice for eccentric orbits). Between nodes a cubic Hermite
 polynomial is within 0.4 m of SGP4 in low Earth orbit, which moves an access edge by less than
@@ -15,11 +15,12 @@ import numpy as np
 import numpy.typing as npt
 from sgp4.api import SGP4_ERRORS
 
-from planner_core.domain import Horizon, Nadir, Satellite
+from planner_core.domain import Horizon, Nadir, OrbitElements, OrbitEphemeris, Satellite
 from planner_core.errors import PropagationFailed
 from planner_core.jit import kernel
 from planner_core.orbits import frames
 from planner_core.orbits.earth_orientation import EarthOrientation, shipped
+from planner_core.orbits.oem_states import positions_teme_km, require_covered
 from planner_core.orbits.sgp4_record import satrec
 from planner_core.orbits.sun import sun_direction_teme
 
@@ -154,12 +155,20 @@ def propagate(
     ------
     PropagationFailed
         SGP4 gives an error code, or no finite state, at some node.
+    InvalidScenario
+        ``orbit_outside_span`` where an ephemeris does not cover the horizon.
     """
-    position, jd, fraction = _sgp4_nodes(satellite, horizon)
-    step_s = horizon.duration_s / (len(fraction) - 1)
-    velocity = _rate_at_nodes(position, step_s)
-    dut1_s, xp, yp = (orientation or shipped()).at(jd, fraction)
+    orientation = orientation or shipped()
+    t_s, jd, fraction = _nodes(satellite, horizon)
+    step_s = horizon.duration_s / (len(t_s) - 1)
+    dut1_s, xp, yp = orientation.at(jd, fraction)
     gmst = frames.gmst82_rad(jd, fraction + dut1_s / 86400.0)
+    if isinstance(satellite.orbit, OrbitEphemeris):
+        turned = gmst, xp, yp
+        position = 1000.0 * positions_teme_km(satellite.orbit, horizon, t_s, orientation, turned)
+    else:
+        position = _sgp4_positions(satellite.name, satellite.orbit, horizon, t_s)
+    velocity = _rate_at_nodes(position, step_s)
     position_itrf, velocity_itrf = frames.teme_to_itrf(position, velocity, gmst, xp, yp)
     return Ephemeris(
         satellite=satellite.name,
@@ -177,30 +186,40 @@ def propagate(
 
 
 def check_propagation(satellite: Satellite, horizon: Horizon) -> None:
-    """Raise ``PropagationFailed`` where ``propagate`` would; cheaper."""
-    _sgp4_nodes(satellite, horizon)
+    """Raise where ``propagate`` would; cheaper."""
+    if isinstance(satellite.orbit, OrbitEphemeris):
+        require_covered(satellite.orbit, horizon)
+        return
+    t_s, _, _ = _nodes(satellite, horizon)
+    _sgp4_positions(satellite.name, satellite.orbit, horizon, t_s)
 
 
-def _sgp4_nodes(satellite: Satellite, horizon: Horizon) -> tuple[Floats, float, Floats]:
+def _nodes(satellite: Satellite, horizon: Horizon) -> tuple[Floats, float, Floats]:
+    """Return the nodes: seconds since the horizon's start, and as Julian dates in UTC."""
     eccentric = satellite.orbit.eccentricity > _ECCENTRIC
     step_s = _ECCENTRIC_STEP_S if eccentric else _STEP_S
     num_intervals = max(_STENCIL - 1, math.ceil(horizon.duration_s / step_s - 1e-9))
     jd, start = frames.julian_date(horizon.start)
     t_s = np.linspace(0.0, horizon.duration_s, num_intervals + 1)
+    return t_s, jd, start + t_s / 86400.0
+
+
+def _sgp4_positions(name: str, elements: OrbitElements, horizon: Horizon, t_s: Floats) -> Floats:
+    """Return positions in metres. Shape ``(n, 3)``."""
+    jd, start = frames.julian_date(horizon.start)
     fraction = start + t_s / 86400.0
-    record = satrec(satellite.orbit)
-    codes, position_km, _ = record.sgp4_array(np.full_like(fraction, jd), fraction)
+    codes, position_km, _ = satrec(elements).sgp4_array(np.full_like(fraction, jd), fraction)
     failed = np.flatnonzero((codes != 0) | ~np.isfinite(position_km).all(axis=1))
     if len(failed) > 0:
         code = int(codes[failed[0]])
         at = horizon.instant(float(t_s[failed[0]])).isoformat(timespec="seconds")
         raise PropagationFailed(
-            satellite.name,
+            name,
             code,
-            f"Satellite {satellite.name!r}: SGP4 stops at {at} with error {code} "
+            f"Satellite {name!r}: SGP4 stops at {at} with error {code} "
             f"({SGP4_ERRORS.get(code, 'no finite state')}).",
         )
-    return position_km * 1000.0, jd, fraction
+    return np.asarray(position_km * 1000.0)
 
 
 def _rate_at_nodes(value: Floats, step_s: float) -> Floats:

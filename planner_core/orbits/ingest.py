@@ -1,9 +1,9 @@
-"""Files of element sets in any form we take: which form it is, and what stands in it.
+"""Files of orbits in any form we take: which form it is, and what stands in it.
 
 Codes of a file that cannot be read as a whole: ``unsupported_media_type``, ``empty_file``,
 ``not_utf8``, ``not_json``, ``not_csv``, ``not_xml``, ``xml_forbidden``, ``no_elements``,
 ``too_many_rows``.
-Codes of single sets: those of `tle.parse_tle` and `omm.elements_from_omm`, and
+Codes of single sets: those of `tle.parse_tle`, `omm.elements_from_omm` and `oem`, and
 ``tle_name``, ``csv_columns``, ``omm_syntax``, ``omm_unknown_keyword``, ``omm_duplicate_key``,
 ``omm_unit``, ``unsupported_message``, ``duplicate_element_set``.
 """
@@ -12,13 +12,22 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import Any
+from xml.etree.ElementTree import Element
 
-from planner_core.domain import OrbitElements
+from planner_core.domain import Orbit, OrbitEphemeris
 from planner_core.errors import Fault, InvalidElements
 from planner_core.orbits.element_ranges import epoch_key
+from planner_core.orbits.oem import (
+    Lines,
+    ephemeris_of,
+    kvn_messages,
+    kvn_segments,
+    tidy_lines,
+)
+from planner_core.orbits.oem_xml import xml_segments
 from planner_core.orbits.omm import elements_from_omm, omm_from_elements
 from planner_core.orbits.omm_files import (
     Message,
@@ -27,6 +36,8 @@ from planner_core.orbits.omm_files import (
     read_json,
     read_kvn,
     read_xml,
+    tag_of,
+    xml_messages,
 )
 from planner_core.orbits.tle_file import read_tle_text
 
@@ -35,24 +46,28 @@ _TEXT_FORMS: dict[str, Callable[[str], Read]] = {
     "text/csv": read_csv,
 }
 _XML_TYPES = ("application/xml", "text/xml")
+_OEM = "CCSDS_OEM_VERS"
+_OEM_START = re.compile(rf"^\s*{_OEM}", re.MULTILINE)
+_HEAD = 4096  # characters within which a message says what it is, after its comments
 _KVN_START = re.compile(r"(CCSDS_[A-Z_]+|[A-Z][A-Z0-9_]*)[ \t]*=|COMMENT[ \t\n]")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Entry:
-    """One element set that was accepted.
+    """One element set or ephemeris that was accepted.
 
     Attributes
     ----------
     orbit
-        ``{"tle": [line1, line2]}`` with tidy lines, or ``{"omm": {...}}``.
+        ``{"tle": [line1, line2]}`` with tidy lines, ``{"omm": {...}}``, or
+        ``{"oem": [lines of KVN]}``.
     row
         Line of the file where the set starts (line 1 of a TLE), or None for JSON and XML.
     warnings
         What was put right on the way in.
     """
 
-    elements: OrbitElements
+    elements: Orbit
     orbit: dict[str, Any]
     row: int | None = None
     warnings: tuple[Fault, ...] = ()
@@ -76,8 +91,9 @@ def read_elements(data: bytes, media_type: str) -> Ingested:
     data
         The file; text is UTF-8, with or without a byte order mark, lines end in LF, CRLF or CR.
     media_type
-        ``text/plain`` (TLE, 2LE, 3LE, or OMM KVN: the content decides), ``application/json``,
-        ``text/csv``, ``application/xml`` or ``text/xml``; parameters are ignored.
+        ``text/plain`` (TLE, 2LE, 3LE, or KVN of OMM or OEM: the content decides),
+        ``application/json``, ``text/csv``, ``application/xml`` or ``text/xml``; parameters are
+        ignored.
     """
     kind = media_type.partition(";")[0].strip().lower()
     if kind not in (*_TEXT_FORMS, *_XML_TYPES, "text/plain"):
@@ -85,14 +101,23 @@ def read_elements(data: bytes, media_type: str) -> Ingested:
     if not data.strip(b" \t\r\n\xef\xbb\xbf"):
         return _refuse("empty_file", "The file is empty")
     if kind in _XML_TYPES:
-        return _from_messages(read_xml(data))
+        elements = xml_messages(data)
+        if isinstance(elements, Fault):
+            return Ingested(faults=(elements,))
+        if elements and tag_of(elements[0]) == "oem":
+            return _from_ephemerides(map(_read_oem_element, enumerate(elements)))
+        return _from_messages(read_xml(elements))
     try:
         text = data.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
     except UnicodeDecodeError as error:
         return _refuse("not_utf8", f"The file is not UTF-8: byte {error.start} does not fit")
     if kind in _TEXT_FORMS:
         return _from_messages(_TEXT_FORMS[kind](text))
-    return _from_messages(read_kvn(text)) if _is_kvn(text) else _from_tle(text)
+    if not _is_kvn(text):
+        return _from_tle(text)
+    if _OEM_START.search(text[:_HEAD]) is not None:
+        return _from_ephemerides(map(_read_oem_lines, kvn_messages(text.splitlines())))
+    return _from_messages(read_kvn(text))
 
 
 def _refuse(code: str, detail: str) -> Ingested:
@@ -115,6 +140,42 @@ def _from_tle(text: str) -> Ingested:
         for record in records
     ]
     return _without_duplicates([(entry, f"row {entry.row}", None) for entry in entries], faults)
+
+
+def _read_oem_lines(lines: Lines) -> tuple[OrbitEphemeris | Fault, str, int | None]:
+    row = lines[0][0]
+    try:
+        if not lines[0][1].startswith(_OEM):
+            detail = f"Expected an OEM, got a message that starts with {lines[0][1][:40]!a}"
+            raise InvalidElements("unsupported_message", detail, row=row)
+        return ephemeris_of(kvn_segments(lines)), f"row {row}", row
+    except InvalidElements as error:
+        return replace(error.fault, pointer=None, row=error.fault.row or row), f"row {row}", row
+
+
+def _read_oem_element(at: tuple[int, Element]) -> tuple[OrbitEphemeris | Fault, str, None]:
+    pointer = f"/{at[0]}"
+    try:
+        if tag_of(at[1]) != "oem":
+            detail = f"Expected an oem message, got {tag_of(at[1])[:40]!a}"
+            raise InvalidElements("unsupported_message", detail)
+        return ephemeris_of(xml_segments(at[1])), f"entry {pointer}", None
+    except InvalidElements as error:
+        return replace(error.fault, pointer=pointer, row=None), f"entry {pointer}", None
+
+
+def _from_ephemerides(
+    read: Iterable[tuple[OrbitEphemeris | Fault, str, int | None]],
+) -> Ingested:
+    placed: list[tuple[Entry, str, str | None]] = []
+    faults = []
+    for orbit, place, row in read:
+        if isinstance(orbit, Fault):
+            faults.append(orbit)
+        else:
+            entry = Entry(elements=orbit, orbit={"oem": tidy_lines(orbit)}, row=row)
+            placed.append((entry, place, None if row is not None else place.removeprefix("entry ")))
+    return _without_duplicates(placed, faults)
 
 
 def _from_messages(read: Read) -> Ingested:

@@ -211,8 +211,13 @@ def _kvn_parts(text: str) -> Iterator[list[tuple[int, str]]]:
         yield lines
 
 
-def read_xml(data: bytes) -> Read:
-    """Return the messages of a bare ``omm`` element or of an ``ndm`` of several.
+def read_xml(elements: Iterable[Element]) -> Read:
+    """Return the messages of the elements of a document."""
+    return _sorted_out(_xml_message(element, f"/{at}") for at, element in enumerate(elements))
+
+
+def xml_messages(data: bytes) -> list[Element] | Fault:
+    """Return the messages of a document: its root, or what stands in its ``ndm``.
 
     Document types are refused, and with them entities of every kind.
     """
@@ -224,13 +229,12 @@ def read_xml(data: bytes) -> Read:
             builder.note_piece()
         root: Element = parser.close()
     except DefusedXmlException:
-        return [], [Fault("xml_forbidden", "The XML declares a document type or an entity")]
+        return Fault("xml_forbidden", "The XML declares a document type or an entity")
     except ParseError as error:
-        return [], [Fault("not_xml", f"The text is not XML: {error}", row=error.position[0])]
+        return Fault("not_xml", f"The text is not XML: {error}", row=error.position[0])
     except (ValueError, LookupError) as error:
-        return [], [Fault("not_xml", f"The text is not XML: {error}")]
-    found = [root] if _tag(root) != "ndm" else [e for e in root if _tag(e) not in _NDM_TEXTS]
-    return _sorted_out(_xml_message(element, f"/{at}") for at, element in enumerate(found))
+        return Fault("not_xml", f"The text is not XML: {error}")
+    return [root] if tag_of(root) != "ndm" else [e for e in root if tag_of(e) not in _NDM_TEXTS]
 
 
 class _Builder(TreeBuilder):
@@ -270,20 +274,21 @@ class _Builder(TreeBuilder):
         return super().end(tag)
 
 
-def _tag(element: Element) -> str:
+def tag_of(element: Element) -> str:
+    """Return the name of an element, without its namespace."""
     return element.tag.rpartition("}")[2]
 
 
 def _xml_message(element: Element, pointer: str) -> Message | Fault:
-    if _tag(element) != "omm":
-        detail = f"Expected an omm message, got {_shown(_tag(element))}"
+    if tag_of(element) != "omm":
+        detail = f"Expected an omm message, got {_shown(tag_of(element))}"
         return Fault("unsupported_message", detail, pointer=pointer)
     draft = _Draft(pointer=pointer)
     draft.add("CCSDS_OMM_VERS", element.get("version", ""))
     for leaf in element.iter():
-        if leaf is element or _tag(leaf) in _XML_GROUPS:
+        if leaf is element or tag_of(leaf) in _XML_GROUPS:
             continue
-        key = _tag(leaf)
+        key = tag_of(leaf)
         if key == "USER_DEFINED":
             key = f"USER_DEFINED_{leaf.get('parameter', '')}"
         draft.add(key, (leaf.text or "").strip(), unit=leaf.get("units"))

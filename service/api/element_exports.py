@@ -9,6 +9,7 @@ from typing import Annotated, Any, Final
 from fastapi import APIRouter, Path, Request, Response
 from sqlalchemy.orm import Session
 
+from planner_core.domain import OrbitEphemeris
 from planner_core.orbits import omm_writing
 from planner_core.orbits.omm_writing import Outgoing
 from service.api.conditional import NOT_MODIFIED
@@ -57,6 +58,8 @@ Suffix = Annotated[
 def get_all_omm(suffix: Suffix, call: CallDep) -> Response:
     """Return the element set in force of every satellite, oldest satellite first.
 
+    Satellites whose orbit is an ephemeris are left out.
+
     `POST /v1/satellites/import` takes the file back, with the media type that it comes in.
     """
     form = _form_of(suffix)
@@ -81,7 +84,32 @@ def get_omm(satellite_id: str, suffix: Suffix, call: CallDep) -> Response:
         row = find_satellite(session, satellite_id)
         form = _form_of(suffix)
         messages = _messages(session, [row])
+    if not messages:
+        detail = f"The orbit of {row.name!r} is an ephemeris, without elements: ask for oem.kvn."
+        raise ServiceError("not_acceptable", detail)
     return _answer(call.request, form, messages, f"{satellite_id}.omm.{suffix}")
+
+
+@router.get(
+    "/{satellite_id}/oem.kvn",
+    response_class=Response,
+    responses={
+        200: {"description": "The message.", "content": {"text/plain": {}}},
+        **NOT_MODIFIED,
+        **problem_responses(404, 406),
+    },
+)
+def get_oem(satellite_id: str, call: CallDep) -> Response:
+    """Return the ephemeris in force of one satellite, as an Orbit Ephemeris Message."""
+    with call.database.reading() as session:
+        row = find_satellite(session, satellite_id)
+        orbit = store.in_force(session, [row.id])[row.id].orbit
+    if "oem" not in orbit:
+        raise ServiceError(
+            "not_acceptable", f"The orbit of {row.name!r} is an element set: ask for omm.json."
+        )
+    text = "\n".join([*orbit["oem"], ""])
+    return _sent(call.request, text, "text/plain", f"{satellite_id}.oem.kvn")
 
 
 def _form_of(suffix: str) -> _Form:
@@ -97,6 +125,8 @@ def _messages(session: Session, rows: Sequence[SatelliteRow]) -> list[Outgoing]:
     for row in rows:
         stored = in_force[row.id]
         elements = orbit_from(OrbitIn(**stored.orbit)).elements
+        if isinstance(elements, OrbitEphemeris):
+            continue  # states over time have no mean elements
         # A TLE has no name of its own.
         named = replace(elements, name=elements.name or row.name)
         messages.append(Outgoing(elements=named, created_at=stored.created_at))
@@ -106,11 +136,14 @@ def _messages(session: Session, rows: Sequence[SatelliteRow]) -> list[Outgoing]:
 def _answer(
     request: Request, form: _Form, messages: Sequence[Outgoing], file_name: str
 ) -> Response:
-    text = form.write(messages)
+    return _sent(request, form.write(messages), form.media_type, file_name)
+
+
+def _sent(request: Request, text: str, media_type: str, file_name: str) -> Response:
     headers = {
         "ETag": etag_of(text),
         "Content-Disposition": f'inline; filename="{file_name}"',
     }
     if matches(request.headers.get("if-none-match"), headers["ETag"]):
         return Response(status_code=304, headers=headers)
-    return Response(text, media_type=form.media_type, headers=headers)
+    return Response(text, media_type=media_type, headers=headers)

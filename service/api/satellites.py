@@ -12,6 +12,7 @@ from sqlalchemy.orm import Session
 
 from planner_core.errors import Fault
 from planner_core.orbits.ingest import read_elements
+from planner_core.orbits.oem import read_oem
 from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
 from service.api.deps import CallDep, DatabaseDep, RawBodyDep, file_type
 from service.api.errors import problem_responses
@@ -25,12 +26,13 @@ from service.problems.kinds import ServiceError
 from service.scenarios.translate import orbit_from, satellite_from
 from service.stores import satellite_store as store
 from service.stores import spacecraft_store
-from service.wire.base import Listed
+from service.wire.base import Json, Listed
 from service.wire.imports import Imported
 from service.wire.satellites import (
     AgilityIn,
     ElementsOut,
     ImportedSatellite,
+    OemOut,
     OrbitIn,
     RecordWarning,
     SatelliteIn,
@@ -73,10 +75,10 @@ def create_satellite(body: SatelliteIn, once: OnceDep, call: CallDep) -> Satelli
 @router.post(
     "/import",
     openapi_extra=body_schemas(
-        tle=("text/plain", "TLE, 2LE or 3LE; or OMM in its keyword form (KVN)."),
+        tle=("text/plain", "TLE, 2LE or 3LE; or OMM or OEM in the keyword form (KVN)."),
         json=("application/json", "One OMM; or a list of them, as CelesTrak serves it."),
         csv=("text/csv", "OMM keywords in the header, one element set a line."),
-        xml=("application/xml", "An omm document, or an ndm with many."),
+        xml=("application/xml", "An omm or oem document, or an ndm with many of one kind."),
     ),
     responses=problem_responses(413, 415),
 )
@@ -89,11 +91,12 @@ def import_satellites(
         str, Query(description="Id of the new satellites' type, or the name of one built in.")
     ] = DEFAULT,
 ) -> Imported[ImportedSatellite]:
-    """Store the element sets of a file; new satellites are of one type of spacecraft.
+    """Store the element sets or ephemerides of a file; new satellites are of one spacecraft type.
 
     Importing the same file again changes nothing: a record whose catalogue number is stored
     joins that satellite, as a further element set where its epoch is new. Two records of one
-    satellite and epoch in a file are one; the second is reported.
+    satellite and epoch in a file are one; the second is reported. An ephemeris (OEM) has no
+    catalogue number: it joins the satellite of its object's name, where there is one.
     """
     found = read_elements(data, file_type(call.request, data, *_IMPORT_TYPES))
     refuse_if_asked(len(found.entries), found.faults, on_error)
@@ -218,8 +221,7 @@ def _changed(session: Session, before: SatelliteOut, body: SatellitePatch) -> Wh
         base = TypedFigures(**_figures_of(session, body.spacecraft))
     return WholeSatellite(
         name=body.name or before.name,
-        tle=None if before.tle is None else list(before.tle),
-        omm=before.omm,
+        **store.in_force(session, [before.id])[before.id].orbit,
         spacecraft=base.spacecraft,
         agility=_merged(base.agility, body.agility),
         sensor=_merged(base.sensor, body.sensor),
@@ -236,7 +238,8 @@ def _merged(before: P, changes: P | None) -> P:
 
 
 def _require_same_object(row: SatelliteRow, norad_cat_id: int, body: OrbitIn) -> None:
-    if norad_cat_id == row.norad_cat_id:
+    # An ephemeris has no catalogue number.
+    if norad_cat_id == row.norad_cat_id or body.oem is not None:
         return
     raise refuse(
         [
@@ -261,6 +264,7 @@ def _shown(session: Session, rows: Sequence[SatelliteRow]) -> list[SatelliteOut]
                 "epoch": elements[row.id].epoch,
                 "tle": elements[row.id].orbit.get("tle"),
                 "omm": elements[row.id].orbit.get("omm"),
+                "oem": _told(elements[row.id].orbit),
                 "spacecraft": row.spacecraft,
                 "agility": row.agility,
                 "sensor": row.sensor,
@@ -273,12 +277,27 @@ def _shown(session: Session, rows: Sequence[SatelliteRow]) -> list[SatelliteOut]
     ]
 
 
+def _told(orbit: Json) -> OemOut | None:
+    """Return what an answer tells of an ephemeris, whose states are many."""
+    if "oem" not in orbit:
+        return None
+    ephemeris = read_oem(orbit["oem"])
+    return OemOut(
+        object_name=ephemeris.name or "",
+        object_id=ephemeris.object_id,
+        start=ephemeris.epoch,
+        stop=ephemeris.stop,
+        num_states=ephemeris.num_states,
+    )
+
+
 def _shown_elements(row: ElementSetRow) -> ElementsOut:
     return ElementsOut(
         id=row.id,
         epoch=row.epoch,
         tle=row.orbit.get("tle"),
         omm=row.orbit.get("omm"),
+        oem=_told(row.orbit),
         created_at=row.created_at,
     )
 

@@ -25,13 +25,14 @@ class Satellites:
         *,
         tle: Sequence[str] | None = None,
         omm: Mapping[str, Any] | None = None,
+        oem: Sequence[str] | None = None,
         agility: Mapping[str, Any] | None = None,
         sensor: Mapping[str, Any] | None = None,
         resources: str | Mapping[str, Any] | None = None,
         spacecraft: str | None = None,
         idempotency_key: str | None = None,
     ) -> Satellite:
-        """Store a satellite; its orbit is ``tle``, two lines, or ``omm``, keywords.
+        """Store a satellite; its orbit is ``tle``, two lines, ``omm``, keywords, or ``oem``, lines.
 
         It is of the type ``spacecraft``, an id or the name of one that is built in
         (``generic_optical`` by default), but for the figures given.
@@ -39,6 +40,7 @@ class Satellites:
         optional = {
             "tle": None if tle is None else list(tle),
             "omm": omm,
+            "oem": None if oem is None else list(oem),
             "agility": agility,
             "sensor": sensor,
             "resources": resources,
@@ -58,7 +60,7 @@ class Satellites:
         spacecraft: str | None = None,
         idempotency_key: str | None = None,
     ) -> Import[ImportedSatellite]:
-        """Store the element sets of a file: ``tle``, ``kvn``, ``json``, ``csv`` or ``xml``.
+        """Store the orbits of a file: ``tle``, ``kvn``, ``json``, ``csv`` or ``xml``.
 
         Records whose catalogue number is known join that satellite, so that importing the
         same file again changes nothing.

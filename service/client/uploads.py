@@ -17,7 +17,14 @@ MEDIA_TYPES: Final = {
     "netcdf": "application/netcdf",
     "xml": "application/xml",
 }
-_SUFFIXES: Final = {".txt": "tle", ".2le": "tle", ".3le": "tle", ".nc": "netcdf", ".nc4": "netcdf"}
+_SUFFIXES: Final = {
+    ".txt": "tle",
+    ".2le": "tle",
+    ".3le": "tle",
+    ".oem": "kvn",
+    ".nc": "netcdf",
+    ".nc4": "netcdf",
+}
 
 
 def upload(source: Source, form: str | None) -> tuple[bytes, dict[str, str]]:

@@ -37,6 +37,7 @@ from planner_core.domain import (
     Satellite,
     Scenario,
     Target,
+    mean_elements,
 )
 from planner_core.errors import InvalidScenario
 from planner_core.jit import all_stamps
@@ -283,7 +284,7 @@ def _built(scenario: Scenario) -> Problem:
 
 def _two(satellite: Satellite) -> tuple[Satellite, Satellite]:
     """Return a satellite and another that follows it."""
-    later = replace(satellite.orbit, mean_anomaly_deg=20.0, norad_cat_id=2)
+    later = replace(mean_elements(satellite.orbit), mean_anomaly_deg=20.0, norad_cat_id=2)
     return satellite, replace(satellite, id="later", orbit=later)
 
 

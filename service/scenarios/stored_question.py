@@ -106,7 +106,7 @@ class StoredQuestion:
         satellites = []
         for one in members["satellites"]:
             body = from_store(FileSatellite, one)
-            unset = {"omm", "spacecraft", "tle"} - body.model_fields_set
+            unset = {"oem", "omm", "spacecraft", "tle"} - body.model_fields_set
             satellites.append(body.model_dump(mode="json", exclude=unset))
         head: dict[str, Any] = {} if name is None else {"name": name}
         # What is not said of the objective is the paper's, which files of release 2 must say.

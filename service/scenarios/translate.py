@@ -21,7 +21,6 @@ from planner_core.domain import (
     GroundStation,
     Horizon,
     Objective,
-    OrbitElements,
     Quality,
     Resources,
     Satellite,
@@ -29,7 +28,9 @@ from planner_core.domain import (
     Sensor,
     Target,
 )
-from planner_core.errors import InvalidScenario, PlannerError
+from planner_core.domain import Orbit as Elements
+from planner_core.errors import InvalidElements, InvalidScenario, PlannerError
+from planner_core.orbits.oem import read_oem, tidy_lines
 from planner_core.orbits.omm import elements_from_omm, omm_from_elements
 from planner_core.orbits.tle import read_tle
 from service.problems.faults import faults_of_validation
@@ -132,7 +133,7 @@ def canonical_of_file(file: ScenarioFile) -> str:
     """Return the canonical form of a file that `read_file` has made."""
     document = file.model_dump(mode="json", exclude={"name", "release"})
     for satellite in document["satellites"]:
-        del satellite["omm" if satellite["omm"] is None else "tle"]
+        _without_unset(satellite, "tle", "omm", "oem")
         if satellite["spacecraft"] not in (None, "paper", "paper_code"):
             continue  # what it leaves out would be its type's
         del satellite["spacecraft"]
@@ -285,9 +286,9 @@ def quality_from(body: QualityIn) -> Quality:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Orbit:
-    """Elements, and their tidy form as stored: ``{"tle": [...]}`` or ``{"omm": {...}}``."""
+    """An orbit, and its tidy form as stored: of ``tle``, ``omm`` and ``oem`` the one given."""
 
-    elements: OrbitElements
+    elements: Elements
     stored: dict[str, Any]
 
 
@@ -299,6 +300,15 @@ def orbit_from(body: OrbitIn) -> Orbit:
     InvalidElements
         With a pointer such as ``/tle/1`` or ``/omm/EPOCH``.
     """
+    if body.oem is not None:
+        try:
+            ephemeris = read_oem(body.oem)
+        except InvalidElements as error:
+            if error.fault.row is not None:
+                pointer = f"/oem/{error.fault.row - 1}"
+                error.fault = replace(error.fault, pointer=pointer, row=None)
+            raise
+        return Orbit(elements=ephemeris, stored={"oem": tidy_lines(ephemeris)})
     if body.tle is not None:
         reading = read_tle(body.tle)
         return Orbit(elements=reading.elements, stored={"tle": list(reading.lines)})

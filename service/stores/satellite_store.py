@@ -10,7 +10,7 @@ from typing import Any, Final, Literal
 import sqlalchemy as sa
 from sqlalchemy.orm import Session, aliased
 
-from planner_core.domain import OrbitElements
+from planner_core.domain import Orbit, OrbitEphemeris
 from planner_core.orbits.ingest import Entry
 from service.db.ids import new_id
 from service.db.rows import ElementSetRow, SatelliteRow
@@ -41,7 +41,7 @@ def alive() -> sa.Select[SatelliteRow]:
 
 
 def add_satellite(
-    session: Session, body: WholeSatellite, elements: OrbitElements, orbit: dict[str, Any]
+    session: Session, body: WholeSatellite, elements: Orbit, orbit: dict[str, Any]
 ) -> SatelliteRow:
     """Store a new satellite with its first element set, parsed and in its tidy form.
 
@@ -157,6 +157,8 @@ class _Import:
         elements = entry.elements
         name = (elements.name or f"NORAD {elements.norad_cat_id}")[:_LONGEST_NAME]
         key = _key(elements.norad_cat_id, name)
+        if isinstance(elements, OrbitEphemeris):
+            key = self._only_one_named(name) or key
         status: Status = "elements_added"
         if key not in self._known:
             self._known[key] = _new_satellite(name, elements.norad_cat_id, self._figures)
@@ -169,6 +171,11 @@ class _Import:
             self._epochs.add((satellite.id, _tick(elements.epoch)))
             self.new_elements.append(_element_set(satellite.id, elements.epoch, entry.orbit))
         return ImportedEntry(satellite=satellite, status=status, entry=entry)
+
+    def _only_one_named(self, name: str) -> tuple[int, str] | None:
+        """Return the key of the satellite of a name, where there is one and no other."""
+        keys = [key for key, row in self._known.items() if row.name == name]
+        return keys[0] if len(keys) == 1 else None
 
 
 def _element_set(satellite_id: str, epoch: datetime, orbit: dict[str, Any]) -> ElementSetRow:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, Discriminator, Field, StringConstraints, Tag, model_validator
 from pydantic_core import PydanticCustomError
@@ -174,8 +174,12 @@ ResourcesField = Annotated[
 ]
 
 
+_MOST_LINES: Final = 110_000
+OemLine = Annotated[str, StringConstraints(max_length=300, pattern=TEXT)]
+
+
 class OrbitIn(Body):
-    """An element set for SGP4: either ``tle`` or ``omm``."""
+    """An element set for SGP4, ``tle`` or ``omm``, or an ephemeris, ``oem``."""
 
     tle: list[str] | None = Field(
         None, min_length=2, max_length=2, description="Line 1 and line 2 of a two-line element set."
@@ -183,11 +187,16 @@ class OrbitIn(Body):
     omm: Free[dict[str, Any]] | None = Field(
         None, description="The keywords of a CCSDS OMM with mean elements for SGP4."
     )
+    oem: list[OemLine] | None = Field(
+        None,
+        max_length=_MOST_LINES,
+        description="The lines of a CCSDS OEM in its keyword form (KVN): states over time.",
+    )
 
     @model_validator(mode="after")
     def _one_form(self) -> OrbitIn:
-        if (self.tle is None) == (self.omm is None):
-            raise PydanticCustomError("one_orbit", "Give the orbit either as tle or as omm")
+        if sum(form is not None for form in (self.tle, self.omm, self.oem)) != 1:
+            raise PydanticCustomError("one_orbit", "Give the orbit as one of tle, omm and oem")
         return self
 
 
@@ -294,13 +303,24 @@ class SatellitePatch(Patch):
     resources: ResourcesField | None = Field(None, description="Replaces them as a whole.")
 
 
+class OemOut(Stored):
+    """An ephemeris: what it is of, when it may be used, and how many states it has."""
+
+    object_name: str
+    object_id: str
+    start: Instant
+    stop: Instant
+    num_states: int
+
+
 class ElementsOut(Stored):
-    """One element set of a satellite."""
+    """One element set of a satellite, or an ephemeris."""
 
     id: str
     epoch: Instant
     tle: tuple[str, ...] | None
     omm: Json | None
+    oem: OemOut | None = None
     created_at: Instant
 
 
@@ -313,6 +333,7 @@ class SatelliteOut(Stored):
     epoch: Instant
     tle: tuple[str, ...] | None
     omm: Json | None
+    oem: OemOut | None = None
     spacecraft: str | None = Field(
         None, description="The type it was made from; its figures stay what they are."
     )

@@ -14,7 +14,7 @@ from planner_core.budget import Budget
 from planner_core.build import build_problem, compute_opportunities
 from planner_core.certified.proofs.resource_bound import quick_bound, resource_value
 from planner_core.certified.proofs.totals import totals_bound
-from planner_core.domain import Dynamics, GroundStation, Resources, Scenario, Target
+from planner_core.domain import Dynamics, GroundStation, Resources, Scenario, Target, mean_elements
 from planner_core.errors import InvalidScenario
 from planner_core.mdp.track import NO_TASK, STRICT, compile_track, take
 from planner_core.pins import PinnedAction, Pins
@@ -207,7 +207,7 @@ def test_volumes_follow_the_elevation_that_another_library_sees() -> None:
     table, volume = problem.opportunities, problem.satellites[0].volume
     contacts = np.flatnonzero(table.kind == CONTACT)
     assert len(contacts) > 6
-    path = SkyfieldPath(scenario.satellites[0].orbit, scenario.horizon)
+    path = SkyfieldPath(mean_elements(scenario.satellites[0].orbit), scenario.horizon)
     for row in contacts.tolist():
         station = scenario.ground_stations[int(table.place[row])]
         begin_s = float(table.start_s[row]) + station.setup_s

@@ -11,6 +11,7 @@ import pytest
 
 from service.wire.jobs import ACTIVE
 from tests.patience import PATIENCE_S
+from tests.planner_core.orbits.test_oem import lines, states
 from tests.service.contract import Contract, Document
 from tests.service.serving import serving
 
@@ -144,6 +145,9 @@ def read_all(client: Client) -> None:
     for template, operation in client.operations("get"):
         path = client.path(template, operation)
         assert path is not None, template
+        if template.endswith("/oem.kvn"):
+            read_ephemeris(client, path)
+            continue
         answer = settled(client, path)
         assert answer.status_code == 200, answer.text
         if "304" in operation["responses"]:
@@ -153,6 +157,19 @@ def read_all(client: Client) -> None:
             ids = [line[4:] for line in answer.text.splitlines() if line.startswith("id: ")]
             seen = {"Last-Event-ID": ids[-1]}
             assert client.http.get(path, headers=seen).status_code == 204
+
+
+def read_ephemeris(client: Client, path_of_elements: str) -> None:
+    """Ask for an ephemeris of a satellite that has none, and of one that has."""
+    assert client.http.get(path_of_elements).status_code == 406
+    body = {"name": "FD", "oem": lines(*states()), "spacecraft": "paper"}
+    made = client.http.post("/v1/satellites", json=body).json()
+    path = f"/v1/satellites/{made['id']}"
+    answer = client.http.get(f"{path}/oem.kvn")
+    assert answer.status_code == 200, answer.text
+    known = {"If-None-Match": answer.headers["etag"]}
+    assert client.http.get(f"{path}/oem.kvn", headers=known).status_code == 304
+    assert client.http.delete(path).status_code == 204
 
 
 def settled(client: Client, path: str) -> httpx.Response:

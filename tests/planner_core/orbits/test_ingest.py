@@ -156,7 +156,7 @@ def test_uncatalogued_satellites_are_told_apart_by_name() -> None:
         (b'"', "text/csv", "not_csv"),
         (b"<omm>", "application/xml", "not_xml"),
         (b"<ndm/>", "text/xml", "no_elements"),
-        (b"<oem/>", "text/xml", "unsupported_message"),
+        (b"<opm/>", "text/xml", "unsupported_message"),
         (b'<?xml version="1.0" encoding="no-such"?><ndm/>', "text/xml", "not_xml"),
         (b"{}", "application/zip", "unsupported_media_type"),
         (b"{}", "", "unsupported_media_type"),
@@ -310,7 +310,7 @@ def test_kvn_holds_several_messages_with_comments_and_units() -> None:
         (kvn(REF_FRAME="GCRF"), "unsupported_frame", 3),
         ([line for line in kvn() if "REF_FRAME" not in line], "omm_missing_key", 1),
         (kvn()[1:], "omm_missing_key", 1),
-        (["CCSDS_OEM_VERS = 2.0", "ORIGINATOR = X"], "unsupported_message", 1),
+        (["CCSDS_OPM_VERS = 2.0", "ORIGINATOR = X"], "unsupported_message", 1),
     ],
 )
 def test_a_bad_line_refuses_its_message_only(lines: list[str], code: str, row: int) -> None:
