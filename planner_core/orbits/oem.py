@@ -30,6 +30,7 @@ MOST_STATES: Final = 100_000
 
 _GM_KM3_S2: Final = 398_600.4418
 _LOWEST_KM, _HIGHEST_KM = 6_400.0, 500_000.0
+_FASTEST_KM_S: Final = 20.0
 _TT_TAI_S, _TAI_GPS_S = 32.184, 19.0
 _FRAMES: Final[Mapping[str, Frame]] = {
     **{name: name for name in get_args(Frame)}, "J2000": "EME2000", "GCRS": "GCRF", "ICRF": "GCRF",
@@ -144,6 +145,8 @@ def kvn_segments(lines: Lines) -> list[OemSegment]:
         if line == "META_START":
             segments.append(OemSegment())
             part = "meta"
+        elif not segments and "=" not in line:
+            raise _refused("oem_syntax", f"Expected META_START, got {_shown(line)}", row)
         elif line in {"META_STOP", "COVARIANCE_STOP"}:
             part = "data"
         elif line == "COVARIANCE_START":
@@ -159,8 +162,6 @@ def kvn_segments(lines: Lines) -> list[OemSegment]:
                 detail = f"Expected an epoch and 6 numbers, got {_shown(line)}"
                 raise _refused("oem_syntax", detail, row)
             segments[-1].states.append((epoch, numbers[:6], row))
-        elif part == "header" and "=" not in line:
-            raise _refused("oem_syntax", f"Expected KEYWORD = value, got {_shown(line)}", row)
     return segments
 
 
@@ -267,7 +268,7 @@ def _rule(meta: Mapping[str, str], rows: Mapping[str, int]) -> tuple[str, int]:
     text = meta.get("INTERPOLATION_DEGREE", "")
     if not text:
         raise _refused("oem_missing_key", "INTERPOLATION_DEGREE is missing", row)
-    degree = int(text) if text.isascii() and text.isdigit() else 0
+    degree = int(text) if text.isascii() and text.isdigit() and len(text) < 4 else 0
     row = rows.get("INTERPOLATION_DEGREE")
     if not 1 <= degree <= _MOST_DEGREE:
         detail = f"INTERPOLATION_DEGREE is {_shown(text)}, must be from 1 to {_MOST_DEGREE}"
@@ -288,7 +289,7 @@ def _instant(text: str, row: int | None) -> datetime:
             instant = first + timedelta(days=int(tidy[5:8]) - 1)
         else:
             instant = datetime.fromisoformat(tidy)
-    except ValueError:
+    except (ValueError, OverflowError):
         instant = None
     if instant is None or instant.tzinfo is not None or "T" not in tidy:
         detail = f"{_shown(text)} is no instant: write 2026-01-31T12:00:00.000"
@@ -325,8 +326,11 @@ def _numbers(texts: Sequence[str], row: int | None) -> list[float]:
                 "oem_number_format", f"{name} is {_shown(text)}, no number", row
             ) from None
     radius_km = math.sqrt(sum(x * x for x in numbers[:3]))
-    if not _LOWEST_KM <= radius_km <= _HIGHEST_KM or not all(map(math.isfinite, numbers)):
+    if not _LOWEST_KM <= radius_km <= _HIGHEST_KM:
         detail = f"The state is {radius_km:.0f} km from the Earth's centre, in kilometres"
+        raise _refused("value_out_of_range", detail, row)
+    if not all(abs(rate) <= _FASTEST_KM_S for rate in numbers[3:]):
+        detail = f"A velocity is beyond {_FASTEST_KM_S:.0f} km/s: velocities are in km/s"
         raise _refused("value_out_of_range", detail, row)
     return numbers
 

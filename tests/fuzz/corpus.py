@@ -37,7 +37,7 @@ def seeds(parser: str) -> list[bytes]:
         text = example if isinstance(example, str) else json.dumps(example)
         found.append(text.encode())
     if parser == f"elements {TEXT}":
-        found += [f"A\n{a}\n{b}\n".encode() for a, b in _TLES] + [_KVN.encode()]
+        found += [f"A\n{a}\n{b}\n".encode() for a, b in _TLES] + [_KVN.encode(), _OEM.encode()]
     return found
 
 
@@ -54,6 +54,21 @@ def shared_seeds(parser: str, folder: Path) -> list[bytes]:
 
 
 _TLES: Final = ((LINE_1, LINE_2), (PAPER_LINE_1, PAPER_LINE_2))
+_OEM: Final = """CCSDS_OEM_VERS = 2.0
+META_START
+OBJECT_NAME = MADE UP
+OBJECT_ID = 2016-001A
+CENTER_NAME = EARTH
+REF_FRAME = TEME
+TIME_SYSTEM = UTC
+START_TIME = 2022-08-15T06:00:00
+STOP_TIME = 2022-08-15T06:01:00
+INTERPOLATION = HERMITE
+INTERPOLATION_DEGREE = 3
+META_STOP
+2022-08-15T06:00:00 7000.0 0.0 0.0 0.0 1.0 7.4
+2022-227T06:01:00 6985.0 60.0 444.0 -0.5 1.0 7.4
+"""
 _KVN: Final = """CCSDS_OMM_VERS = 2.0
 OBJECT_NAME = MADE UP
 OBJECT_ID = 2016-001A

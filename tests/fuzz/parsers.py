@@ -12,8 +12,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import astuple
 from typing import Any, Final
 
+from planner_core.domain import OrbitEphemeris
 from planner_core.errors import Fault
 from planner_core.orbits.ingest import Entry, read_elements
+from planner_core.orbits.oem import read_oem, tidy_lines
 from planner_core.orbits.omm import elements_from_omm
 from planner_core.orbits.tle import read_tle
 from service.api.ground_stations import read_stations
@@ -44,9 +46,13 @@ def _elements(media_type: str) -> Parser:
 
 
 def _check_entry(entry: Entry) -> None:
+    _check_storable(entry.orbit)
+    if isinstance(entry.elements, OrbitEphemeris):
+        assert tidy_lines(read_oem(entry.orbit["oem"])) == entry.orbit["oem"]
+        assert math.isfinite(entry.elements.period_s)
+        return
     for value in astuple(entry.elements):
         assert not isinstance(value, float) or math.isfinite(value)
-    _check_storable(entry.orbit)
     if "tle" in entry.orbit:
         again = read_tle(entry.orbit["tle"]).elements
         assert astuple(again)[1:] == astuple(entry.elements)[1:]  # the name stood beside it

@@ -35,6 +35,7 @@ Ids = dict[str, list[str]]
 
 
 LUCK = {
+    ("GET", "/v1/satellites/{satellite_id}/oem.kvn"),  # of a satellite whose orbit came as one
     ("POST", "/v1/jobs/{job_id}/cancel"),  # before the job has ended
     ("POST", "/v1/plans/{plan_id}/executions"),  # of a published plan, by its actions' own ids
     ("POST", "/v1/plans/{plan_id}/replans"),  # from an instant of its own

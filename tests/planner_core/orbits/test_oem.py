@@ -211,6 +211,7 @@ def test_tidy_lines_give_the_same_orbit() -> None:
         ({"INTERPOLATION": "SPLINE"}, "oem_unsupported", 12),
         ({"INTERPOLATION_DEGREE": "8"}, "value_out_of_range", 13),
         ({"INTERPOLATION_DEGREE": "seven"}, "value_out_of_range", 13),
+        ({"INTERPOLATION_DEGREE": "9" * 5000}, "value_out_of_range", 13),
         ({"INTERPOLATION_DEGREE": ""}, "oem_missing_key", 12),
         ({"OBJECT_ID": ""}, "oem_missing_key", 5),
         ({"STOP_TIME": "tomorrow"}, "oem_epoch", 11),
@@ -230,6 +231,8 @@ def test_headers_are_refused_by_their_line(changes: dict[str, Any], code: str, r
         ("2019-01-01T00:06:00 7000 0 0 0 seven 0", "oem_number_format"),
         ("2019-01-01T00:06:00 7000 0 0 0 nan 0", "value_out_of_range"),
         ("2019-01-01T00:06:00 7000000 0 0 0 7.5 0", "value_out_of_range"),
+        ("2019-01-01T00:06:00 7000 0 0 0 7500 0", "value_out_of_range"),
+        ("9999-999T00:00:00 7000 0 0 0 7.5 0", "oem_epoch"),
         ("2018-12-31T00:00:00 7000 0 0 0 7.5 0", "oem_times"),
         ("2019-13-01T00:00:00 7000 0 0 0 7.5 0", "oem_epoch"),
     ],
@@ -247,6 +250,8 @@ def test_too_few_states_and_no_segments_are_refused() -> None:
     for message, code in (
         (lines(position[:3], velocity[:3], offsets_s=OFFSETS_S[:3]), "oem_too_few_states"),
         (["CCSDS_OEM_VERS = 2.0"], "oem_syntax"),
+        (["META_STOP", "2019-01-01T00:06:00 7000 0 0 0 7.5 0"], "oem_syntax"),
+        (["COVARIANCE_STOP", "A = 1"], "oem_syntax"),
         ([], "oem_syntax"),
     ):
         with pytest.raises(InvalidElements) as caught:
