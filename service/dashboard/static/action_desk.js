@@ -1,10 +1,13 @@
 // @ts-check
-/** What can be done with the chosen action: report it, promise it, drop it, forbid its pass. */
+/** What can be done with what is selected: actions are reported, wishes of the next plan are made. */
 
 import { list, post } from "./api.js";
 import { byId, fill, h } from "./dom.js";
 import { utc } from "./format.js";
+import { openMenu } from "./menu.js";
+import { offersOfContact, offersOfImage, offersOfTarget, weighed } from "./offers.js";
 import { describe } from "./page.js";
+import { askForPriority, installPriorityDialog } from "./priority_dialog.js";
 
 /** @typedef {import("./types.js").PlanOut} PlanOut */
 /** @typedef {import("./types.js").PlanActionOut} PlanActionOut */
@@ -33,6 +36,8 @@ export class ActionDesk {
       this.choice.value = actionId !== null && this.actions.has(actionId) ? actionId : "";
       this.show();
     });
+    selection.onOpen((anchor) => this.openMenu(anchor));
+    installPriorityDialog();
   }
 
   async load() {
@@ -59,14 +64,56 @@ export class ActionDesk {
   }
 
   show() {
-    const action = this.actions.get(this.selection.now.actionId ?? "");
     const place = byId("chosen-action");
-    if (!action) {
-      fill(place);
-      return;
-    }
-    const wishes = action.mode === "collect" ? this.imageWishes(action) : this.contactWishes(action);
-    fill(place, h("p", {}, this.words(action)), h("p", { class: "buttons needs-submit" }, ...this.reports(action), ...wishes));
+    const { actionId, targetId } = this.selection.now;
+    const action = this.actions.get(actionId ?? "");
+    const target = this.drawn.target.get(targetId ?? "");
+    const reports = action ? this.reports(action) : [];
+    const wishes = this.offers().map((offer) =>
+      h("button", { type: "button", class: "quiet", id: `wish-${offer.id}`, onclick: () => this.take(offer) }, offer.text),
+    );
+    if (!action && !target) fill(place);
+    else fill(place, h("p", {}, this.title()), h("p", { class: "buttons needs-submit" }, ...reports, ...wishes));
+  }
+
+  /** What is selected, in words. */
+  title() {
+    const { actionId, targetId } = this.selection.now;
+    const action = this.actions.get(actionId ?? "");
+    if (action) return this.words(action);
+    const target = this.drawn.target.get(targetId ?? "");
+    return target ? `${target.id}: ${target.outcome}${target.why ? `, ${target.why}` : ""}` : "";
+  }
+
+  /** What can be wished of what is selected. @returns {import("./offers.js").Offer[]} */
+  offers() {
+    // Nobody goes on from a plan that is withdrawn or superseded.
+    if (byId("replan-card").hidden) return [];
+    const { actionId, targetId } = this.selection.now;
+    const action = this.actions.get(actionId ?? "");
+    const target = this.drawn.target.get(targetId ?? "") ?? null;
+    const names = {
+      satelliteOf: (/** @type {string} */ id) => this.drawn.satelliteName(id),
+      stationOf: (/** @type {PlanActionOut} */ one) => this.station(one),
+    };
+    if (action?.mode === "collect") return offersOfImage(action, target, names);
+    if (action) return offersOfContact(action, names);
+    return target && target.actionId === null ? offersOfTarget(target) : [];
+  }
+
+  /** @param {import("./selection.js").Anchor} anchor */
+  openMenu(anchor) {
+    if (document.body.dataset.scope === "read") return;
+    const lines = this.offers().map((offer) => ({ id: offer.id, text: offer.text, choose: () => this.take(offer) }));
+    if (lines.length > 0) openMenu(this.title(), lines, anchor);
+  }
+
+  /** @param {import("./offers.js").Offer} offer */
+  async take({ wish, weigh }) {
+    if (wish) this.wishes.add(wish);
+    if (!weigh) return;
+    const reward = await askForPriority(weigh.id, weigh.reward);
+    if (reward !== null) this.wishes.add(weighed(weigh.id, reward));
   }
 
   /** @param {PlanActionOut} action */
@@ -88,39 +135,5 @@ export class ActionDesk {
     } catch (error) {
       byId("chosen-action").append(h("div", { class: "notice bad", role: "alert" }, h("div", {}, ...describe(error))));
     }
-  }
-
-  /** @param {PlanActionOut} action */
-  imageWishes(action) {
-    const target = action.target_id;
-    const keep = { text: `Promised: ${target} is imaged.`, field: /** @type {const} */ ("promises"), value: { target_id: target } };
-    const drop = { text: `Skipped: ${target} is no longer wanted.`, field: /** @type {const} */ ("drop_targets"), value: target };
-    return [this.button("promise", "Promise it", keep), this.button("drop", "Skip its target", drop)];
-  }
-
-  /** @param {PlanActionOut} action */
-  contactWishes(action) {
-    const { satellite_id, station_id, start, end } = action;
-    const over = `${this.drawn.satelliteName(satellite_id)} over ${this.station(action)} at ${utc(start)} UTC`;
-    const forbid = {
-      text: `Lost: ${over}.`,
-      field: /** @type {const} */ ("outages"),
-      value: { satellite_id, start, end, modes: ["contact"], reason: "Lost pass." },
-    };
-    const out = {
-      text: `${this.station(action)} is out from ${utc(start)} to ${utc(end)} UTC.`,
-      field: /** @type {const} */ ("outages"),
-      value: { station_id, start, end },
-    };
-    return [this.button("lose", "The pass is lost", forbid), this.button("station-out", "The station is out", out)];
-  }
-
-  /**
-   * @param {string} id
-   * @param {string} text
-   * @param {import("./wishes.js").Wish} wish
-   */
-  button(id, text, wish) {
-    return h("button", { type: "button", class: "quiet", id: `wish-${id}`, onclick: () => this.wishes.add(wish) }, text);
   }
 }

@@ -79,6 +79,7 @@ export class Gantt {
     element.addEventListener("keydown", (event) => {
       if (event.key === "Escape") selection.clear();
       if (event.key === "Enter") this.step(event.shiftKey ? -1 : 1);
+      if (event.key === " ") this.openByKey(event);
     });
   }
 
@@ -202,8 +203,27 @@ export class Gantt {
    */
   click(x, y) {
     const action = this.actionAt(x, y);
-    if (action) this.selection.select(this.plan.about(action.id));
-    else this.selection.clear();
+    if (action) {
+      this.selection.select(this.plan.about(action.id));
+      this.selection.open({ element: this.canvas.element, x, y });
+    } else this.selection.clear();
+  }
+
+  /**
+   * Open the menu of the selected action where it lies.
+   * @param {KeyboardEvent} event
+   */
+  openByKey(event) {
+    event.preventDefault(); // the page would scroll
+    const { actionId, satelliteId } = this.selection.now;
+    const action = this.plan.actions.get(actionId ?? "");
+    const row = this.plan.rows.findIndex(({ id }) => id === satelliteId);
+    if (!action || row < 0) return;
+    const element = this.canvas.element;
+    const span = element.clientWidth - MARGIN.left - MARGIN.right;
+    const share = (Date.parse(action.start) - this.view.start) / (this.view.end - this.view.start);
+    const x = MARGIN.left + Math.min(Math.max(share, 0), 1) * span;
+    this.selection.open({ element, x, y: this.top + (row + 0.5) * this.rowHeight() });
   }
 
   /**

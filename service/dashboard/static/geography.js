@@ -23,6 +23,7 @@ import { firstAbove } from "./plan.js";
  * @property {string | null} why
  * @property {string | null} actionId
  * @property {string | null} satelliteId
+ * @property {number} reward what its image earns at best
  */
 
 /**
@@ -47,11 +48,11 @@ export async function loadLand() {
 }
 
 /**
- * @param {string} jobId
+ * @param {string} path of a job or a plan
  * @returns {Promise<Geography>}
  */
-export async function loadGeography(jobId) {
-  const { features } = await (await call(`/v1/jobs/${encodeURIComponent(jobId)}/timeline.geojson`)).json();
+export async function loadGeography(path) {
+  const { features } = await (await call(`${path}/timeline.geojson`)).json();
   /** @type {Geography} */
   const found = { targets: [], stations: [], circles: [], tracks: [] };
   for (const { geometry, properties } of features) {
@@ -64,6 +65,7 @@ export async function loadGeography(jobId) {
         why: properties.reason_detail,
         actionId: properties.action_id,
         satelliteId: properties.satellite_id,
+        reward: properties.reward,
       });
     } else if (kind === "station") {
       found.stations.push(place(geometry, properties.station_id, properties.name));

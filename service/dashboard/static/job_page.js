@@ -98,7 +98,7 @@ function showState(job) {
 /** @param {JobOut} job */
 async function showAnswer(job) {
   // Each thing is asked for once: the map's places are the tables' targets too.
-  const asked = Promise.all([loadGeography(job.id), loadLand()]);
+  const asked = Promise.all([loadGeography(jobPath), loadLand()]);
   asked.catch(() => {}); // told where it is waited for
   const plan = new Plan(/** @type {any} */ (await get(`${jobPath}/timeline.json`)));
   const view = new TimeView(plan.start, plan.end);

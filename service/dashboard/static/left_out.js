@@ -1,11 +1,11 @@
 // @ts-check
 /** Targets that the plan leaves out, by reason, and what would let them in. */
 
+import { actionButton, targetButton } from "./buttons.js";
 import { byId, fill, h } from "./dom.js";
 import { utc } from "./format.js";
 import { OutcomeRows, reasonName } from "./outcomes.js";
 import { changeOf } from "./settings.js";
-import { actionButton, targetButton } from "./summary.js";
 import { PagedTable } from "./table.js";
 
 /** @typedef {import("./types.js").TargetItem} TargetItem */

@@ -7,6 +7,7 @@ import { utcLabelled } from "./format.js";
 import { firstAbove } from "./plan.js";
 import { positionAt } from "./geography.js";
 import { writeNames } from "./labels.js";
+import { takeMapInput } from "./map_input.js";
 import { symbolOf } from "./symbols.js";
 
 /** @typedef {import("./geography.js").Geography} Geography */
@@ -66,13 +67,14 @@ export class WorldMap {
     this.size = { width: 0, height: 0 };
     const label =
       "Map of targets by outcome, ground tracks around the chosen time, and stations with the " +
-      "circles in which they see a satellite. The table of targets holds the same data.";
+      "circles in which they see a satellite. Arrow keys move, plus and minus zoom, Enter selects the " +
+      "next target; the table of targets holds the same data.";
     this.canvas = new Canvas(host, label, (pen, width, height, colors) => this.draw(pen, width, height, colors));
     this.tip = h("div", { class: "tip", hidden: true });
     host.append(this.tip);
     view.onChange(() => this.canvas.redraw());
     selection.onChange(() => this.canvas.redraw());
-    this.takeInput();
+    takeMapInput(this);
   }
 
   /** The instant that satellites are shown at: of the selection, else now, else the view's. */
@@ -339,64 +341,6 @@ export class WorldMap {
     this.canvas.redraw();
   }
 
-  takeInput() {
-    const { element } = this.canvas;
-    /** @type {{x: number, y: number, hasMoved: boolean} | null} */
-    let grip = null;
-    element.addEventListener("pointerdown", (event) => {
-      grip = { x: event.offsetX, y: event.offsetY, hasMoved: false };
-      element.setPointerCapture(event.pointerId);
-    });
-    element.addEventListener("pointermove", (event) => {
-      if (grip === null) {
-        this.hover(event.offsetX, event.offsetY);
-        return;
-      }
-      const [dx, dy] = [event.offsetX - grip.x, event.offsetY - grip.y];
-      if (!grip.hasMoved && Math.hypot(dx, dy) < 4) return;
-      grip = { x: event.offsetX, y: event.offsetY, hasMoved: true };
-      this.center.lon -= dx / this.scale();
-      this.center.lat += dy / this.scale();
-      this.keepInside();
-    });
-    element.addEventListener("pointerup", (event) => {
-      if (grip && !grip.hasMoved) this.click(event.offsetX, event.offsetY);
-      grip = null;
-    });
-    element.addEventListener("pointerleave", () => {
-      this.tip.hidden = true;
-    });
-    element.addEventListener("dblclick", (event) => this.zoomBy(2, event.offsetX, event.offsetY));
-    element.addEventListener(
-      "wheel",
-      (event) => {
-        if (!event.ctrlKey && !event.metaKey) return; // the page scrolls
-        event.preventDefault();
-        this.zoomBy(2 ** (-event.deltaY / 200), event.offsetX, event.offsetY);
-      },
-      { passive: false },
-    );
-    element.addEventListener("keydown", (event) => this.key(event));
-  }
-
-  /** @param {KeyboardEvent} event */
-  key(event) {
-    const step = 30 / this.zoom;
-    const moves = /** @type {Record<string, () => void>} */ ({
-      ArrowLeft: () => (this.center.lon -= step),
-      ArrowRight: () => (this.center.lon += step),
-      ArrowUp: () => (this.center.lat += step),
-      ArrowDown: () => (this.center.lat -= step),
-      "+": () => this.zoomBy(1.5),
-      "-": () => this.zoomBy(1 / 1.5),
-    });
-    const move = moves[event.key];
-    if (!move) return;
-    event.preventDefault();
-    move();
-    this.keepInside();
-  }
-
   /**
    * @param {number} x
    * @param {number} y
@@ -415,7 +359,9 @@ export class WorldMap {
    */
   click(x, y) {
     const target = this.targetAt(x, y);
-    if (target) this.selection.select(this.plan.aboutTarget(target.id));
-    else this.selection.clear();
+    if (target) {
+      this.selection.select(this.plan.aboutTarget(target.id));
+      this.selection.open({ element: this.canvas.element, x, y });
+    } else this.selection.clear();
   }
 }

@@ -1,11 +1,11 @@
 // @ts-check
 /** The data of all pictures as tables, for keyboards and screen readers; on paper those that are open. */
 
+import { actionButton, targetButton } from "./buttons.js";
 import { byId, fill, h } from "./dom.js";
 import { number, percent, utc } from "./format.js";
 import { reasonName } from "./outcomes.js";
 import { spanOf } from "./plan.js";
-import { targetButton, actionButton } from "./summary.js";
 import { PagedTable } from "./table.js";
 
 /** @typedef {import("./plan.js").Plan} Plan */

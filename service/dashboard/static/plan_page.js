@@ -7,9 +7,12 @@ import { ActionDesk } from "./action_desk.js";
 import { byId, fill, h } from "./dom.js";
 import { short, utc, utcLabelled } from "./format.js";
 import { Gantt } from "./gantt.js";
+import { loadGeography, loadLand } from "./geography.js";
 import { instantOf } from "./instants.js";
+import { WorldMap } from "./map.js";
 import { startPage, whileBusy } from "./page.js";
 import { showPasses } from "./passes.js";
+import { showTables } from "./plain_tables.js";
 import { Plan } from "./plan.js";
 import { move, nextInstant } from "./plan_steps.js";
 import { installReplan } from "./replan.js";
@@ -27,6 +30,8 @@ const STEPS = { approved: "Approve", published: "Publish", withdrawn: "Withdraw"
 startPage(async () => {
   /** @type {PlanOut} */
   const plan = await get(planPath);
+  const asked = Promise.all([loadGeography(planPath), loadLand()]);
+  asked.catch(() => {}); // told where it is waited for
   const changes = plan.parent_id === null ? null : await get(`${planPath}/changes`);
   showLife(plan, changes?.freeze_until ?? null);
   const drawn = new Plan(/** @type {any} */ (await get(`${planPath}/timeline.json`)));
@@ -42,10 +47,26 @@ startPage(async () => {
   const view = new TimeView(drawn.start, drawn.end);
   new Gantt(byId("gantt"), drawn, view, selection);
   await new ActionDesk(plan, drawn, selection, wishes).load();
+  await showPlaces(asked, drawn, view, selection);
   installReplan(plan, stations, wishes, { nameOf, stationOf });
   await showHistory();
   await showPasses(plan, stations, nextInstant(plan));
 });
+
+/**
+ * Show all targets, with those that have no image, on the map and as tables.
+ * @param {Promise<[import("./geography.js").Geography, {credit: string, rings: number[][]}]>} asked
+ * @param {Plan} drawn
+ * @param {TimeView} view
+ * @param {Selection} selection
+ */
+async function showPlaces(asked, drawn, view, selection) {
+  const [geography, land] = await asked;
+  drawn.setTargets(geography.targets);
+  byId("map-credit").textContent = land.credit;
+  new WorldMap(byId("map"), geography, land.rings, drawn, view, selection);
+  showTables(drawn, selection);
+}
 
 /**
  * @param {PlanOut} plan

@@ -102,7 +102,7 @@ async function propose(plan, wishes) {
     freeze_until: freeze,
     // A plan of another day is tried out as of its own time.
     ...(isUnderWay ? {} : { now: freeze }),
-    ...wishes.lists(),
+    ...wishes.fields(),
     limits: { time_s: Number(field("replan-time").value) },
   };
   /** @type {JobOut & {links: Record<string, string>}} */

@@ -3,6 +3,8 @@
 
 /** @typedef {{actionId: string | null, targetId: string | null, satelliteId: string | null}} Selected */
 
+/** @typedef {{element: HTMLElement, x?: number, y?: number}} Anchor where a menu opens: at an element, or at a point of it */
+
 const NOTHING = Object.freeze({ actionId: null, targetId: null, satelliteId: null });
 
 export class Selection {
@@ -11,6 +13,8 @@ export class Selection {
     this.now = NOTHING;
     /** @type {((selected: Selected) => void)[]} */
     this.listeners = [];
+    /** @type {((anchor: Anchor) => void)[]} */
+    this.openers = [];
   }
 
   /** @param {(selected: Selected) => void} listener */
@@ -22,6 +26,19 @@ export class Selection {
   select(what) {
     this.now = { ...NOTHING, ...what };
     for (const listener of this.listeners) listener(this.now);
+  }
+
+  /**
+   * Hear of it when somebody wants to work on what is selected.
+   * @param {(anchor: Anchor) => void} opener
+   */
+  onOpen(opener) {
+    this.openers.push(opener);
+  }
+
+  /** @param {Anchor} anchor */
+  open(anchor) {
+    for (const opener of this.openers) opener(anchor);
   }
 
   clear() {

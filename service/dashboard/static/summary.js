@@ -1,6 +1,7 @@
 // @ts-check
 /** What a plan is worth: its figures, and before all else what is wrong with it. */
 
+import { actionButton } from "./buttons.js";
 import { bar, byId, fill, h } from "./dom.js";
 import { counted, duration, number, percent, utc } from "./format.js";
 
@@ -88,27 +89,4 @@ function showViolations(plan, selection) {
       ),
     ),
   );
-}
-
-/**
- * Return a button that selects an action.
- * @param {Plan} plan
- * @param {import("./selection.js").Selection} selection
- * @param {string} id
- */
-export function actionButton(plan, selection, id) {
-  const onclick = () => selection.select(plan.about(id));
-  return h("button", { type: "button", class: "link", onclick }, id);
-}
-
-/**
- * Return a button that selects a target.
- * @param {Plan} plan
- * @param {import("./selection.js").Selection} selection
- * @param {string | null} id
- */
-export function targetButton(plan, selection, id) {
-  if (id === null) return "";
-  const onclick = () => selection.select(plan.aboutTarget(id));
-  return h("button", { type: "button", class: "link", onclick }, id);
 }

@@ -112,7 +112,7 @@ function satellitesInForce(plan) {
 async function read(plan) {
   const [timeline, geography] = await Promise.all([
     get(`/v1/plans/${encodeURIComponent(plan.id)}/timeline.json`),
-    loadGeography(plan.job_id),
+    loadGeography(`/v1/plans/${encodeURIComponent(plan.id)}`),
   ]);
   return { plan, drawn: new Plan(/** @type {any} */ (timeline)), geography };
 }
