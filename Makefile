@@ -21,7 +21,7 @@ help:
 	@echo "              also runs of real size, and five times the examples"
 	@echo "make chaos    500 jobs while processes are killed and databases fail (needs Debian and root)"
 	@echo "make fuzz     files made by coverage-guided fuzzing, against every parser (Linux)"
-	@echo "make flight   an hour of plans flown in Basilisk (0.6 GB to install)"
+	@echo "make flight   two hours of plans flown in Basilisk (0.6 GB to install)"
 	@echo "make browser  the dashboard in a real browser (needs Chromium, or Debian and root)"
 	@echo "make screenshots  the pictures of the dashboard in docs/images (likewise)"
 	@echo "make check    lint, format, types, import contracts, examples in docstrings"

@@ -3,14 +3,12 @@
 ``python -m benchmarks.sun_turns`` plans the paper's mission at four sizes and three agilities, and
 prints the gap of ``certified`` after 20 CPU seconds and what share of its plan the planners
 without a proof reach. ``--fleet SPACECRAFT CITIES STATIONS`` plans four satellites over 2,000
-cities as well, in 60 seconds of the clock on all cores.
+cities as well, in 60.
 """
 
 from __future__ import annotations
 
 import argparse
-import math
-import os
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -20,12 +18,12 @@ from typing import Final
 from benchmarks.cpu_budget import CpuBudget
 from benchmarks.fleet_missions import Files, fleet_scenario
 from benchmarks.missions import paper_scenario, problem_of
-from planner_core.budget import Budget
+from benchmarks.suite.engine import LEVELS, Result, solve
 from planner_core.domain import Agility, Scenario
 from planner_core.problem import Problem
 from planner_core.referee.replay import replay
 from planner_core.solvers.base import Solver
-from planner_core.solvers.registry import Certified, ForwardSearch, Mcts, Rule
+from planner_core.solvers.registry import ForwardSearch, Mcts, Rule
 
 AGILITIES: Final = {
     "A0": Agility(),
@@ -84,40 +82,19 @@ def cases(sizes: list[int], draws: int) -> Iterator[Case]:
                        draw=draw, eclipse_aware=True)  # fmt: skip
 
 
-def reward_of(problem: Problem, solver: Solver, budget: Budget) -> float:
-    """Return the reward of a valid plan."""
+def share_of(problem: Problem, solver: Solver, reward: float) -> float:
+    """Return what share of a reward a solver's valid plan reaches."""
+    budget = CpuBudget(_SOLVE_S, time.time() + 10.0 * _SOLVE_S)
     timeline = replay(problem, solver.solve(problem, budget, 0).plan)
     assert timeline.is_valid, timeline.violations[:3]
-    return timeline.reward
+    return timeline.reward / reward
 
 
-def certified_row(problem: Problem, budget: Budget) -> tuple[float, float, str]:
-    """Return plan and bound, and when the gap was first within 2, 1 and 0.5 %."""
-    began_s, reward, bound = time.process_time(), 0.0, math.inf
-    near: dict[float, float] = {}
-
-    def watch(progress: object) -> None:
-        nonlocal reward, bound
-        reward = max(reward, getattr(progress, "reward", None) or 0.0)
-        bound = min(bound, getattr(progress, "bound", None) or math.inf)
-        for level in (0.02, 0.01, 0.005):
-            if math.isfinite(bound) and bound - reward <= level * bound:
-                near.setdefault(level, time.process_time() - began_s)
-
-    budget.report = watch
-    solution = Certified().solve(problem, budget, 0)
-    timeline = replay(problem, solution.plan)
-    assert timeline.is_valid, timeline.violations[:3]
-    assert solution.bound is not None
-    reached = " ".join(
-        f"{near[level]:5.1f}" if level in near else "    -" for level in (0.02, 0.01, 0.005)
-    )
-    return timeline.reward, solution.bound, reached
-
-
-def cpu_budget(cpu_s: float) -> Budget:
-    """Return a budget of CPU seconds."""
-    return CpuBudget(cpu_s, time.time() + 10.0 * cpu_s)
+def told(name: str, result: Result) -> str:
+    """Return plan, bound and gap of ``certified``, and when gaps were reached."""
+    gap = 100.0 * (1.0 - result.reward / result.bound)
+    reached = " ".join("    -" if s is None else f"{s:5.1f}" for s in result.to_level_s)
+    return f"{name:>20} {result.reward:6.0f} {result.bound:7.1f} {gap:5.2f}% {reached}"
 
 
 def main() -> None:
@@ -129,30 +106,23 @@ def main() -> None:
     options = parser.parse_args()
     warm = problem_of(Case(name="", num_targets=100, agility=AGILITIES["A0"], draw=9,
                            eclipse_aware=True).scenario())  # fmt: skip
-    for solver in (Certified(), *_SIMPLE.values()):
-        solver.solve(warm, cpu_budget(5.0), 0)
-    print(f"{'mission':>20} {'plan':>6} {'bound':>7} {'gap':>6} "
-          f"{'2 %':>5} {'1 %':>5} {'0.5 %':>5}  "
-          + " ".join(f"{name:>14}" for name in _SIMPLE))  # fmt: skip
+    solve(warm, 0, _SOLVE_S)
+    levels = " ".join(f"{100.0 * level:3g} %" for level in LEVELS)
+    simple = " ".join(f"{name:>14}" for name in _SIMPLE)
+    print(f"{'mission':>20} {'plan':>6} {'bound':>7} {'gap':>6} {levels}  {simple}")
     for case in cases(options.sizes, options.draws):
         problem = problem_of(case.scenario())
-        reward, bound, near = certified_row(problem, cpu_budget(_SOLVE_S))
-        shares = [reward_of(problem, s, cpu_budget(_SOLVE_S)) / reward for s in _SIMPLE.values()]
-        print(f"{case.num_targets:5} {case.draw} {case.name:>12} {reward:6.0f} {bound:7.1f} "
-              f"{100 * (1 - reward / bound):5.2f}% {near}  "
-              + " ".join(f"{100 * share:13.1f}%" for share in shares), flush=True)  # fmt: skip
+        result = solve(problem, 0, _SOLVE_S)
+        shares = [share_of(problem, solver, result.reward) for solver in _SIMPLE.values()]
+        name = f"{case.num_targets} {case.draw} {case.name}"
+        shown = " ".join(f"{100.0 * share:13.1f}%" for share in shares)
+        print(f"{told(name, result)}  {shown}", flush=True)
     if options.fleet:
-        files = Files(
-            spacecraft=options.fleet[0], cities=options.fleet[1], stations=options.fleet[2]
-        )  # fmt: skip
-        scenario = with_sun_turns(
-            fleet_scenario(files, 4, 2000, use_resources=True), None, eclipse_aware=False
-        )
-        budget = Budget(_FLEET_S)
-        budget.num_threads = os.cpu_count() or 1
-        reward, bound, near = certified_row(problem_of(scenario), budget)
-        print(f"fleet of 4 x 2,000   {reward:6.0f} {bound:7.1f} "
-              f"{100 * (1 - reward / bound):5.2f}% {near}")  # fmt: skip
+        spacecraft, cities, stations = options.fleet
+        files = Files(spacecraft=spacecraft, cities=cities, stations=stations)
+        scenario = fleet_scenario(files, 4, 2000, use_resources=True)
+        problem = problem_of(with_sun_turns(scenario, None, eclipse_aware=False))
+        print(told("4 x 2000 cities", solve(problem, 0, _FLEET_S)))
 
 
 if __name__ == "__main__":

@@ -71,13 +71,3 @@ class OrbitEphemeris:
     def epoch(self) -> datetime:
         """Return the first instant at which the states may be used."""
         return self.segments[0].start
-
-    @property
-    def stop(self) -> datetime:
-        """Return the last instant at which the states may be used."""
-        return self.segments[-1].stop
-
-    @property
-    def num_states(self) -> int:
-        """Return how many states there are."""
-        return sum(len(segment.t_s) for segment in self.segments)

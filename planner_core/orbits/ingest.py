@@ -10,6 +10,7 @@ Codes of single sets: those of `tle.parse_tle`, `omm.elements_from_omm` and `oem
 
 from __future__ import annotations
 
+import io
 import math
 import re
 from collections.abc import Callable, Iterable
@@ -21,17 +22,18 @@ from planner_core.domain import Orbit, OrbitEphemeris
 from planner_core.errors import Fault, InvalidElements
 from planner_core.orbits.element_ranges import epoch_key
 from planner_core.orbits.oem import (
-    Lines,
+    MOST_LINES,
     ephemeris_of,
-    kvn_messages,
     kvn_segments,
     tidy_lines,
 )
 from planner_core.orbits.oem_xml import xml_segments
 from planner_core.orbits.omm import elements_from_omm, omm_from_elements
 from planner_core.orbits.omm_files import (
+    Lines,
     Message,
     Read,
+    kvn_messages,
     read_csv,
     read_json,
     read_kvn,
@@ -116,7 +118,7 @@ def read_elements(data: bytes, media_type: str) -> Ingested:
     if not _is_kvn(text):
         return _from_tle(text)
     if _OEM_START.search(text[:_HEAD]) is not None:
-        return _from_ephemerides(map(_read_oem_lines, kvn_messages(text.splitlines())))
+        return _from_ephemerides(map(_read_oem_lines, kvn_messages(io.StringIO(text), MOST_LINES)))
     return _from_messages(read_kvn(text))
 
 

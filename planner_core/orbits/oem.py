@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from typing import Final, get_args
@@ -24,9 +24,13 @@ from planner_core.errors import InvalidElements
 from planner_core.orbits import frames
 from planner_core.orbits.earth_orientation import shipped
 from planner_core.orbits.element_ranges import is_plain_text
+from planner_core.orbits.omm_files import Lines, kvn_messages
 
 MOST_STATES: Final = 100_000
 """Of one message: ten weeks of a state a minute."""
+
+MOST_LINES: Final = 2 * MOST_STATES
+"""Of one message, with covariances."""
 
 _GM_KM3_S2: Final = 398_600.4418
 _LOWEST_KM, _HIGHEST_KM = 6_400.0, 500_000.0
@@ -107,28 +111,10 @@ def read_oem(lines: Iterable[str]) -> OrbitEphemeris:
     InvalidElements
         Where it cannot be read.
     """
-    messages = list(kvn_messages(lines))
+    messages = list(kvn_messages(lines, MOST_LINES))
     if len(messages) != 1:
         raise _refused("oem_syntax", f"Expected one message, got {len(messages)}")
     return ephemeris_of(kvn_segments(messages[0]))
-
-
-Lines = list[tuple[int, str]]
-
-
-def kvn_messages(text: Iterable[str]) -> Iterator[Lines]:
-    """Yield the lines of each message, with their numbers; comments and blank lines left out."""
-    lines: Lines = []
-    for row, line in enumerate(text, start=1):
-        stripped = line.strip()
-        if not stripped or stripped.split(maxsplit=1)[0] == "COMMENT":
-            continue
-        if stripped.startswith("CCSDS_") and lines:
-            yield lines
-            lines = []
-        lines.append((row, stripped))
-    if lines:
-        yield lines
 
 
 def kvn_segments(lines: Lines) -> list[OemSegment]:
@@ -137,10 +123,12 @@ def kvn_segments(lines: Lines) -> list[OemSegment]:
     Raises
     ------
     InvalidElements
-        ``oem_syntax`` for a line that has no place.
+        ``oem_syntax`` for a line that has no place, ``too_many_rows``.
     """
     segments: list[OemSegment] = []
     part = "header"
+    if len(lines) > MOST_LINES:
+        raise _refused("too_many_rows", f"The message has more than {MOST_LINES} lines; split it")
     for row, line in lines:
         if line == "META_START":
             segments.append(OemSegment())
@@ -168,7 +156,7 @@ def kvn_segments(lines: Lines) -> list[OemSegment]:
 def tidy_lines(orbit: OrbitEphemeris) -> list[str]:
     """Return the lines of the message in KVN, as it is stored: all that counts, in UTC.
 
-    Reading them give the same states to the last bit.
+    Read again they give the same states to the last bit.
     """
     lines = [
         "CCSDS_OEM_VERS = 2.0",
@@ -196,6 +184,37 @@ def tidy_lines(orbit: OrbitEphemeris) -> list[str]:
             epoch = _text(segment.first + timedelta(seconds=t_s))
             lines.append(" ".join([epoch, *map(repr, state)]))
     return lines
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outline:
+    """What an ephemeris is of, when it may be used, and how many states it has."""
+
+    object_name: str
+    object_id: str
+    start: datetime
+    stop: datetime
+    num_states: int
+
+
+def outline_of(tidy: Sequence[str]) -> Outline:
+    """Return the outline of tidy lines, whose states need not be read for it."""
+    header: dict[str, str] = {}
+    num_headers = 0
+    for line in tidy:
+        key, equals, value = line.partition("=")
+        if equals or line.startswith("META_"):
+            num_headers += 1
+        # Of several segments the first tells the start, the last the stop.
+        if equals and not (key == "USEABLE_START_TIME " and key in header):
+            header[key] = value.strip()
+    return Outline(
+        object_name=header["OBJECT_NAME "],
+        object_id=header["OBJECT_ID "],
+        start=_instant(header["USEABLE_START_TIME "], None),
+        stop=_instant(header["USEABLE_STOP_TIME "], None),
+        num_states=len(tidy) - num_headers,
+    )
 
 
 def _segment(read: OemSegment) -> EphemerisSegment:

@@ -96,6 +96,7 @@ class Message:
 
 
 Read = tuple[list[Message], list[Fault]]
+Lines = list[tuple[int, str]]
 
 
 def read_json(text: str) -> Read:
@@ -170,7 +171,8 @@ def read_kvn(text: str) -> Read:
 
     A message starts at its ``CCSDS_OMM_VERS``. A bad line refuses its message only.
     """
-    return _sorted_out(_kvn_message(lines) for lines in _kvn_parts(text))
+    parts = kvn_messages(io.StringIO(text), _MOST_LINES)
+    return _sorted_out(_kvn_message(lines) for lines in parts)
 
 
 def _sorted_out(read: Iterable[Message | Fault]) -> Read:
@@ -186,7 +188,7 @@ def _sorted_out(read: Iterable[Message | Fault]) -> Read:
     return messages, faults
 
 
-def _kvn_message(lines: list[tuple[int, str]]) -> Message | Fault:
+def _kvn_message(lines: Lines) -> Message | Fault:
     if len(lines) > _MOST_LINES:
         detail = f"The message has more than {_MOST_LINES} lines"
         return Fault("omm_syntax", detail, row=lines[0][0])
@@ -196,16 +198,20 @@ def _kvn_message(lines: list[tuple[int, str]]) -> Message | Fault:
     return draft.finish()
 
 
-def _kvn_parts(text: str) -> Iterator[list[tuple[int, str]]]:
-    lines: list[tuple[int, str]] = []
-    for row, line in enumerate(io.StringIO(text), start=1):
+def kvn_messages(text: Iterable[str], most_lines: int) -> Iterator[Lines]:
+    """Yield the lines of each message, numbered from 1; comments and blank lines are left out.
+
+    Of a message that is too long one line more than the limit is kept.
+    """
+    lines: Lines = []
+    for row, line in enumerate(text, start=1):
         stripped = line.strip()
         if not stripped or stripped.split(maxsplit=1)[0] == "COMMENT":
             continue
         if stripped.startswith("CCSDS_") and lines:
             yield lines
             lines = []
-        if len(lines) <= _MOST_LINES:
+        if len(lines) <= most_lines:
             lines.append((row, stripped))
     if lines:
         yield lines

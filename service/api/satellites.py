@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from datetime import UTC, datetime
 from typing import Annotated, Any, Final, TypeVar
 
@@ -12,7 +13,7 @@ from sqlalchemy.orm import Session
 
 from planner_core.errors import Fault
 from planner_core.orbits.ingest import read_elements
-from planner_core.orbits.oem import read_oem
+from planner_core.orbits.oem import outline_of
 from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
 from service.api.deps import CallDep, DatabaseDep, RawBodyDep, file_type
 from service.api.errors import problem_responses
@@ -281,14 +282,7 @@ def _told(orbit: Json) -> OemOut | None:
     """Return what an answer tells of an ephemeris, whose states are many."""
     if "oem" not in orbit:
         return None
-    ephemeris = read_oem(orbit["oem"])
-    return OemOut(
-        object_name=ephemeris.name or "",
-        object_id=ephemeris.object_id,
-        start=ephemeris.epoch,
-        stop=ephemeris.stop,
-        num_states=ephemeris.num_states,
-    )
+    return OemOut(**asdict(outline_of(orbit["oem"])))
 
 
 def _shown_elements(row: ElementSetRow) -> ElementsOut:

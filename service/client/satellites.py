@@ -104,10 +104,12 @@ class Satellites:
         *,
         tle: Sequence[str] | None = None,
         omm: Mapping[str, Any] | None = None,
+        oem: Sequence[str] | None = None,
         if_match: str | None = None,
     ) -> Satellite:
-        """Store a further element set, where the satellite is still as ``if_match`` says."""
-        body = {"omm": omm} if tle is None else {"tle": list(tle)}
+        """Store a further orbit, where the satellite is still as ``if_match`` says."""
+        forms = {"tle": tle, "omm": omm, "oem": oem}
+        body = {form: value for form, value in forms.items() if value is not None}
         headers = {} if if_match is None else {"If-Match": if_match}
         path = path_of("satellites", satellite_id, "elements")
         answer = self._transport.request("PUT", path, json=body, headers=headers)

@@ -5,7 +5,9 @@ from __future__ import annotations
 import pytest
 
 from planner_core.budget import Budget, Progress, Termination
-from planner_core.certified.drivers import resources
+from planner_core.certified.drivers import resource_steps, resources
+from planner_core.certified.drivers.agility_only import Effort
+from planner_core.certified.drivers.resource_steps import ResourceSearch
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.solver import Certified
 from planner_core.problem import Problem
@@ -72,6 +74,25 @@ def test_fleets_with_continuous_starts_and_resources_work_on_all_threads(
     monkeypatch.setattr("planner_core.certified.solver.solve_with_resources", watched)
     Certified().solve(problem, Budget(num_threads=2), 0)
     assert given == [2]
+
+
+def test_agility_alone_leaves_most_of_the_time_to_plans_with_resources(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    problem = random_problem(3, num_collects=40, num_targets=20, num_contacts=4)
+    left_s: list[float | None] = []
+    solve = resource_steps.solve_without_resources
+
+    def watched(free: Problem, budget: Budget, seed: int, gap: float, effort: Effort) -> Solution:
+        left_s.append(budget.remaining_s())
+        return solve(free, budget, seed, gap, effort)
+
+    monkeypatch.setattr(resource_steps, "solve_without_resources", watched)
+    whole = Budget(10_000.0)
+    ResourceSearch(Incumbent(problem, whole, 0.0), 0).without_resources()
+    (alone_s,) = left_s
+    assert alone_s is not None
+    assert 0.0 < alone_s < 3_000.0
 
 
 def test_a_job_that_is_cancelled_in_its_last_part_says_so(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -42,6 +42,9 @@ _MOST_WHOLE: Final = 6000  # of a relaxed program: 4,200 take a second, 13,000 m
 # Of the best bound, how far above it that of agility alone may be: 0 to 3 % where agility decides
 # (the demonstration's mission), 76 % and more where energy does (the paper's draws).
 _HARDLY: Final = 0.2
+# Of the time left, for the plan and the bound of agility alone. With starts 15 s apart these take
+# all there is: 253 of 290 after 20 s with all of the time, 280 with a quarter (docs/bounds.md).
+_ALONE: Final = 0.25
 _ROUNDS_AT_A_TIME: Final = 100  # of the search for prices by energy alone
 _WORTH_A_STEP: Final = 0.005  # of a bound by the battery alone
 
@@ -118,7 +121,7 @@ class ResourceSearch:
         """Let agility alone bound the plans; return the tasks of the best plan then."""
         free = replace(self.problem, use_resources=False)
         # Its plans are not for this problem: they are not reported.
-        quiet = self.budget.part(report=ignored)
+        quiet = self.budget.part(_ALONE, ignored)
         solution = solve_without_resources(free, quiet, self.seed, self.best.gap, Effort())
         if solution.proven is not None:
             self.best.lower(solution.proven)
