@@ -7,6 +7,7 @@ import pytest
 from planner_core.budget import Budget, Progress, Termination
 from planner_core.certified.drivers import resource_steps, resources
 from planner_core.certified.drivers.agility_only import Effort
+from planner_core.certified.drivers.fleet import solve_without_resources
 from planner_core.certified.drivers.resource_steps import ResourceSearch
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.solver import Certified
@@ -81,7 +82,7 @@ def test_agility_alone_leaves_most_of_the_time_to_plans_with_resources(
 ) -> None:
     problem = random_problem(3, num_collects=40, num_targets=20, num_contacts=4)
     left_s: list[float | None] = []
-    solve = resource_steps.solve_without_resources
+    solve = solve_without_resources
 
     def watched(free: Problem, budget: Budget, seed: int, gap: float, effort: Effort) -> Solution:
         left_s.append(budget.remaining_s())
