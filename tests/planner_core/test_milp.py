@@ -243,6 +243,8 @@ def test_an_answer_does_not_wait_for_highs(
     monkeypatch: pytest.MonkeyPatch, num_questions: int
 ) -> None:
     """HiGHS is held where it asks whether to go on: what is known by then comes back."""
+    for thread in highs_threads():  # of earlier tests: they would ask this one's budget
+        thread.join()
     budget, may_go_on = Budget(), threading.Event()
     asked = 0
 
