@@ -11,14 +11,15 @@ LOCK := $(UV) pip compile --universal --python-version 3.11 --generate-hashes \
 	--no-emit-index-url
 PIP := $(BIN)/python -m pip -qq --disable-pip-version-check
 
-.PHONY: help setup demo serve test chaos fuzz flight browser screenshots check check-types \
-	check-rest format lock dist paper paper-quick clean
+.PHONY: help setup demo serve test explore chaos fuzz flight browser screenshots check \
+	check-types check-rest format lock dist paper paper-quick clean
 
 help:
 	@echo "make demo     plan a real-size mission through the service's own API, and end"
 	@echo "make serve    the same, and keep serving"
 	@echo "make test     every check and every test; with SLEWLINE_TEST_PROFILE=full"
 	@echo "              also runs of real size, and five times the examples"
+	@echo "make explore  the property tests with new examples"
 	@echo "make chaos    500 jobs while processes are killed and databases fail (needs Debian and root)"
 	@echo "make fuzz     files made by coverage-guided fuzzing, against every parser (Linux)"
 	@echo "make flight   two hours of plans flown in Basilisk (0.6 GB to install)"
@@ -68,6 +69,10 @@ serve: $(PRODUCT)
 # A process for each core, each with a module at a time; see docs/testing.md.
 test: check
 	$(BIN)/python -m pytest -n logical $(if $(filter full,$(SLEWLINE_TEST_PROFILE)),-m "")
+
+# The property tests with new examples, all that each asks for.
+explore: setup
+	SLEWLINE_TEST_PROFILE=explore $(BIN)/python -m pytest -n logical -m hypothesis
 
 # On a SQLite file, then on a PostgreSQL server that is killed as well.
 chaos: export SLEWLINE_TEST_CHAOS_JOBS ?= 500
