@@ -25,7 +25,7 @@ from planner_core.domain import (
     Sensor,
 )
 from planner_core.errors import Cancelled, InvalidScenario
-from planner_core.idling import started
+from planner_core.idling import started, sunlit_from
 from planner_core.orbits import ephemeris as orbits
 from planner_core.orbits.earth_orientation import shipped
 from planner_core.orbits.eclipse import always_sunlit, sunlight
@@ -290,14 +290,16 @@ def build_problem(scenario: Scenario, computed: ScenarioOpportunities, budget: B
         A pin is impossible.
     """
     satellites = []
-    known = scenario.states if scenario.use_resources else ()
-    states = {state.satellite_id: state for state in known}
+    states = {state.satellite_id: state for state in scenario.states}
     sun = sun_path(scenario.horizon)
     downlinks = downlinks_of(scenario, computed.opportunities)
     for index, satellite in enumerate(scenario.satellites):
         _go_on(budget, index / len(scenario.satellites), "compile")
         sees_shadow = scenario.use_resources and satellite.resources.eclipse_aware
-        everywhere = always_sunlit(scenario.horizon.duration_s)
+        lit = computed.sunlight[index]
+        if not sees_shadow:
+            lit = always_sunlit(scenario.horizon.duration_s)
+        start = started(scenario, index, states.get(satellite.id), computed.opportunities)
         satellites.append(
             build_satellite_problem(
                 index,
@@ -305,10 +307,11 @@ def build_problem(scenario: Scenario, computed: ScenarioOpportunities, budget: B
                 id=satellite.id,
                 name=satellite.name,
                 agility=satellite.agility,
-                resources=started(satellite, states.get(satellite.id), scenario.horizon),
+                resources=start.resources,
                 downlinks=downlinks,
-                sunlight=computed.sunlight[index] if sees_shadow else everywhere,
+                sunlight=sunlit_from(lit, start.sun_from_s) if start.sun_from_s > 0.0 else lit,
                 sun=sun,
+                heading=start.heading,
             )
         )
     _go_on(budget, 1.0, "compile")

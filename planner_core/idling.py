@@ -1,29 +1,84 @@
-"""Battery and recorder while a satellite does nothing but look at the sun."""
+"""From the state of a satellite to the horizon: it does nothing but look at the sun."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from datetime import timedelta
 
-from planner_core.domain import Horizon, Resources, Satellite, State
+import numpy as np
+
+from planner_core.domain import (
+    Attitude,
+    GroundStation,
+    Horizon,
+    Resources,
+    Satellite,
+    Scenario,
+    State,
+    Target,
+)
+from planner_core.errors import InvalidScenario
 from planner_core.orbits.eclipse import always_sunlit, sunlight
 from planner_core.orbits.ephemeris import propagate
-from planner_core.problem import Sunlight
+from planner_core.orbits.places import Places, line_of_sight_teme, los_rate_deg_s
+from planner_core.orbits.sun import sun_path
+from planner_core.problem import COLLECT, Floats, Heading, Opportunities, Sunlight
+from planner_core.problem.sun_turns import sun_turn_s
+
+_A_MOMENT = timedelta(minutes=1)  # of orbit, to see what a satellite looks at
 
 
-def started(satellite: Satellite, state: State | None, horizon: Horizon) -> Resources:
-    """Return a satellite's resources with what it has at the horizon's start.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Start:
+    """What a satellite begins the horizon with.
 
-    From the state's instant on it idles: panels at the sun, where that is seen, and telemetry into
-    the recorder. No turn is counted, since where it pointed is not known.
+    Attributes
+    ----------
+    heading
+        Where it looks; None where that is not known.
+    sun_from_s
+        When it can have its panels at the sun first.
+    """
+
+    resources: Resources
+    heading: Heading | None = None
+    sun_from_s: float = 0.0
+
+
+def started(scenario: Scenario, index: int, state: State | None, table: Opportunities) -> Start:
+    """Return what a satellite has, and where it looks, at the horizon's start.
+
+    From the state's instant on it idles: it turns to the sun, its panels charge where that is
+    seen, and telemetry runs into the recorder. No turn is counted where it is not known where the
+    satellite looked.
 
     Raises
     ------
     PropagationFailed
         SGP4 stops before the horizon begins.
+    InvalidScenario
+        The attitude names an opportunity that the satellite does not have.
     """
-    resources = satellite.resources
+    satellite = scenario.satellites[index]
     if state is None:
-        return resources
+        return Start(resources=satellite.resources)
+    seen = None if state.attitude is None else _heading(scenario, index, state, table)
+    if not scenario.use_resources:
+        return Start(resources=satellite.resources, heading=seen)
+    waited_s = (scenario.horizon.start - state.at).total_seconds()
+    turn_s = _turn_to_sun_s(satellite, state, seen)
+    resources = _carried(satellite, state, scenario.horizon, turn_s)
+    is_free = satellite.resources.sun_pointing == "free"
+    if seen is not None and not is_free and turn_s <= waited_s:
+        # By then it is at the sun, as whoever idles is.
+        seen = Heading(free_from_s=0.0)
+    return Start(resources=resources, heading=seen, sun_from_s=max(0.0, turn_s - waited_s))
+
+
+def _carried(satellite: Satellite, state: State, horizon: Horizon, turn_s: float) -> Resources:
+    resources = satellite.resources
     waited_s = (horizon.start - state.at).total_seconds()
     battery, recorder = state.battery_fraction, state.recorder_fraction
     if waited_s > 0.0:
@@ -31,7 +86,7 @@ def started(satellite: Satellite, state: State | None, horizon: Horizon) -> Reso
             lit = always_sunlit(waited_s)
             if resources.eclipse_aware:
                 lit = sunlight(propagate(satellite, Horizon(start=state.at, end=horizon.start)))
-            battery = battery_after(resources, battery, lit, waited_s)
+            battery = battery_after(resources, battery, sunlit_from(lit, turn_s), waited_s)
         if recorder is not None:
             recorder = min(1.0, recorder + resources.telemetry_per_s * waited_s)
     return replace(
@@ -43,6 +98,75 @@ def started(satellite: Satellite, state: State | None, horizon: Horizon) -> Reso
             resources.initial_recorder_fraction if recorder is None else recorder
         ),
     )
+
+
+def _turn_to_sun_s(satellite: Satellite, state: State, seen: Heading | None) -> float:
+    if seen is None or seen.line_of_sight is None:
+        return 0.0
+    then = Horizon(start=state.at, end=state.at + _A_MOMENT)
+    return sun_turn_s(
+        satellite.resources, satellite.agility, sun_path(then), seen.line_of_sight, 0.0,
+        seen.moving_deg_s,
+    )  # fmt: skip
+
+
+def _heading(scenario: Scenario, index: int, state: State, table: Opportunities) -> Heading:
+    attitude = state.attitude
+    assert attitude is not None
+    free_from_s = scenario.horizon.offset_s(state.at)
+    if attitude.at_sun:
+        return Heading(free_from_s=free_from_s)
+    if attitude.line_of_sight is not None:
+        vector = np.array(attitude.line_of_sight)
+        return Heading(
+            free_from_s=free_from_s, line_of_sight=_triple(vector / np.linalg.norm(vector))
+        )
+    satellite = scenario.satellites[index]
+    place = Places.of([_tracked(scenario, index, attitude, table)])
+    path = propagate(satellite, Horizon(start=state.at, end=state.at + _A_MOMENT))
+    at_s, is_moving = np.zeros(1), satellite.agility.tracks
+    return Heading(
+        free_from_s=free_from_s,
+        line_of_sight=_triple(line_of_sight_teme(path, place, at_s)[0]),
+        moving_deg_s=_triple(los_rate_deg_s(path, place, at_s)[0]) if is_moving else (0.0,) * 3,
+    )
+
+
+def _triple(vector: Floats) -> tuple[float, float, float]:
+    return float(vector[0]), float(vector[1]), float(vector[2])
+
+
+def _tracked(
+    scenario: Scenario, index: int, attitude: Attitude, table: Opportunities
+) -> Target | GroundStation:
+    """Return the place that an attitude names."""
+    named: Sequence[Target | GroundStation]
+    if attitude.opportunity_id is not None:
+        found = re.fullmatch(r"o(\d{1,9})", attitude.opportunity_id, re.ASCII)
+        row = int(found[1]) if found else -1
+        if not 0 <= row < len(table) or table.satellite[row] != index:
+            position = next(
+                i
+                for i, state in enumerate(scenario.states)
+                if state.satellite_id == scenario.satellites[index].id
+            )
+            raise InvalidScenario(
+                "unknown_opportunity",
+                f"The satellite has no opportunity {attitude.opportunity_id!r}.",
+                pointer=f"/states/{position}/attitude/opportunity_id",
+            )
+        named = scenario.targets if table.kind[row] == COLLECT else scenario.ground_stations
+        return named[int(table.place[row])]
+    named, own_id = scenario.targets, attitude.target_id
+    if attitude.station_id is not None:
+        named, own_id = scenario.ground_stations, attitude.station_id
+    return next(place for place in named if place.id == own_id)
+
+
+def sunlit_from(lit: Sunlight, from_s: float) -> Sunlight:
+    """Return the time in sunlight from an instant on."""
+    is_left = lit.exit_s > from_s
+    return Sunlight(enter_s=np.maximum(lit.enter_s[is_left], from_s), exit_s=lit.exit_s[is_left])
 
 
 def battery_after(resources: Resources, battery: float, lit: Sunlight, span_s: float) -> float:

@@ -21,7 +21,7 @@ Objective
 Outage
     A span in which a satellite or a station is not to be had.
 State
-    What is known of a satellite's battery and recorder before the horizon begins.
+    What is known of a satellite's battery, recorder and attitude before the horizon begins.
 Pin
     What a plan must hold, or must not; see ``planner_core.pins``.
 Off-nadir angle
@@ -61,10 +61,11 @@ from planner_core.domain.spacecraft import (
     SunPointing,
     mean_elements,
 )
-from planner_core.domain.states import State
+from planner_core.domain.states import Attitude, State
 
 __all__ = [
     "Agility",
+    "Attitude",
     "CollectAlignment",
     "Curve",
     "Dynamics",

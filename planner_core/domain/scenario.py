@@ -136,14 +136,15 @@ class Scenario:
         )
         for position, outage in enumerate(self.outages):
             outage.check(f"/outages/{position}", satellite_ids, station_ids)
-        check_states(self.states, satellite_ids, self.horizon)
+        target_ids = {t.id for t in self.targets}
+        check_states(self.states, satellite_ids, target_ids, station_ids, self.horizon)
         if self.replan is not None:
             require(
                 not self.continuous_starts,
                 "continuous_starts",
                 "a plan to go on from has opportunities at fixed starts",
             )
-            self.replan.check(satellite_ids, {t.id for t in self.targets}, station_ids)
+            self.replan.check(satellite_ids, target_ids, station_ids)
 
     def _check_downlinks(self) -> None:
         """Refuse passes in which telemetry may fill the recorder faster than it is emptied.

@@ -19,7 +19,11 @@ import numpy as np
 from planner_core.domain import Replan, Scenario
 from planner_core.errors import InvalidScenario
 from planner_core.pinning.limits import check_limits
-from planner_core.pinning.pinned_starts import whole_accesses, with_pinned_starts
+from planner_core.pinning.pinned_starts import (
+    open_when_turned_to,
+    whole_accesses,
+    with_pinned_starts,
+)
 from planner_core.pins import PinnedAction
 from planner_core.precedence.relation import excluded_by
 from planner_core.problem import (
@@ -36,6 +40,7 @@ from planner_core.problem import (
     Problem,
     Struck,
 )
+from planner_core.problem.first_turns import too_soon
 from planner_core.problem.restrict import restricted
 from planner_core.problem.slew import TIME_TOLERANCE_S
 
@@ -44,7 +49,7 @@ _KINDS = {"collect": COLLECT, "contact": CONTACT}
 
 
 def pinned_problem(scenario: Scenario, problem: Problem) -> Problem:
-    """Return the problem of a scenario with its pins compiled in.
+    """Return the problem of a scenario with its pins, and first turns, compiled in.
 
     Raises
     ------
@@ -52,7 +57,8 @@ def pinned_problem(scenario: Scenario, problem: Problem) -> Problem:
         ``pin_without_opportunity``, ``pin_ambiguous``, ``pins_conflict`` or
         ``pin_breaks_limits``, with a pointer into ``/pins``.
     """
-    if not (scenario.pins or scenario.outages or scenario.replan):
+    has_heading = any(satellite.heading is not None for satellite in problem.satellites)
+    if not (scenario.pins or scenario.outages or scenario.replan or has_heading):
         return problem
     pins, table = scenario.pins, problem.opportunities
     whole = table if problem.pointing is None else whole_accesses(problem)
@@ -63,6 +69,7 @@ def pinned_problem(scenario: Scenario, problem: Problem) -> Problem:
     if problem.pointing is not None:
         accesses = [table.access[rows] for rows in skipped]
         problem, kept = with_pinned_starts(scenario, problem, kept)
+        problem, kept = open_when_turned_to(problem, kept)
         skipped = [
             np.flatnonzero(np.isin(problem.opportunities.access, own)).tolist() for own in accesses
         ]
@@ -269,7 +276,7 @@ def _why_none(scenario: Scenario, table: Opportunities, named: Longs, pin: Pinne
 
 
 def apply_pins(problem: Problem, pinned: Pinned) -> Problem:
-    """Return the problem without what the pins rule out.
+    """Return the problem without what the pins rule out, and what nobody can turn to in time.
 
     Raises
     ------
@@ -279,7 +286,7 @@ def apply_pins(problem: Problem, pinned: Pinned) -> Problem:
     """
     pinned = replace(pinned, kept=_without_repeats(pinned.kept))
     _check_conflicts(problem, pinned)
-    in_outage = _in_outages(problem, pinned)
+    in_outage, is_too_soon = _in_outages(problem, pinned), too_soon(problem)
     n = len(problem.opportunities)
     beside = _kept_that_exclude(problem, pinned)
     is_struck = _ruled_out(problem, pinned)
@@ -296,11 +303,12 @@ def apply_pins(problem: Problem, pinned: Pinned) -> Problem:
         pinned=replace(
             part.pinned,
             skipped={},
-            struck=_struck(problem, is_struck, keepers, in_outage),
+            struck=_struck(problem, is_struck, keepers, in_outage, is_too_soon),
         ),
         target_access=_access_left(problem, part),
     )
-    check_limits(problem, list(_pins_that_rule_out(problem, pinned)), beside, in_outage)
+    facts = in_outage | is_too_soon
+    check_limits(problem, list(_pins_that_rule_out(problem, pinned)), beside, facts)
     return part
 
 
@@ -314,11 +322,15 @@ def _without_repeats(kept: Iterable[Kept]) -> tuple[Kept, ...]:
 def _check_conflicts(problem: Problem, pinned: Pinned) -> None:
     """Raise where a kept action is ruled out, or excludes another one."""
     table = problem.opportunities
-    ruled_out = _ruled_out(problem, pinned)
+    ruled_out, is_too_soon = _ruled_out(problem, pinned), too_soon(problem)
     ordered = sorted(pinned.kept, key=lambda kept: kept.row)
     promised: dict[int, Kept] = {}
     last: dict[int, Kept] = {}
     for kept in ordered:
+        if is_too_soon[kept.row]:
+            raise _conflict(
+                kept, "the satellite cannot turn to it in time from where it looked at the start"
+            )
         if ruled_out[kept.row]:
             raise _conflict(kept, "another pin or an outage rules it out")
         satellite = int(table.satellite[kept.row])
@@ -356,9 +368,9 @@ def _conflict(kept: Kept, why: str) -> InvalidScenario:
 
 
 def _ruled_out(problem: Problem, pinned: Pinned) -> Bools:
-    """Return the opportunities that are forbidden, skipped, blocked or in an outage."""
+    """Return the opportunities that are forbidden, skipped, blocked, out or too soon."""
     table = problem.opportunities
-    is_out: Bools = _in_outages(problem, pinned)
+    is_out: Bools = _in_outages(problem, pinned) | too_soon(problem)
     if pinned.frozen_until_s > 0.0:
         is_frozen = table.start_s < pinned.frozen_until_s - TIME_TOLERANCE_S
         is_frozen[[kept.row for kept in pinned.kept]] = False
@@ -444,9 +456,13 @@ def _without_antenna(problem: Problem, row: int, kept: Longs) -> Bools:
 
 
 def _struck(
-    problem: Problem, is_struck: Bools, keepers: list[tuple[int, Bools]], in_outage: Bools
+    problem: Problem,
+    is_struck: Bools,
+    keepers: list[tuple[int, Bools]],
+    in_outage: Bools,
+    is_too_soon: Bools,
 ) -> dict[int, tuple[Struck, ...]]:
-    """Return the collects that the pins rule out, by target."""
+    """Return the collects that are ruled out, by target."""
     table = problem.opportunities
     found: dict[int, tuple[Struck, ...]] = {}
     for row in np.flatnonzero(is_struck & (table.kind == COLLECT)):
@@ -456,7 +472,7 @@ def _struck(
             start_s=float(table.start_s[row]),
             end_s=float(table.end_s[row]),
             kept=tuple(kept for kept, excluded in keepers if excluded[row]),
-            by_outage=bool(in_outage[row]),
+            why="outage" if in_outage[row] else "heading" if is_too_soon[row] else "pin",
         )
         target = int(table.place[row])
         found[target] = (*found.get(target, ()), struck)

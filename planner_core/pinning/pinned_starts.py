@@ -22,6 +22,7 @@ from planner_core.problem import (
     Problem,
     line_of_sight,
 )
+from planner_core.problem.first_turns import first_start_s
 from planner_core.problem.plan import Action, Plan
 from planner_core.problem.pointing import (
     Agile,
@@ -32,6 +33,7 @@ from planner_core.problem.pointing import (
     latest_start_s,
 )
 from planner_core.problem.retimed import offered, with_starts
+from planner_core.problem.slew import TIME_TOLERANCE_S
 
 
 def whole_accesses(problem: Problem) -> Opportunities:
@@ -90,6 +92,37 @@ def starts_of(problem: Problem, row: int) -> tuple[float, float]:
     open_s = max(0.0, float(table.access_start_s[row]))
     close_s = min(problem.horizon_s, float(table.access_end_s[row])) - length_s
     return open_s, round(close_s, 3)
+
+
+def open_when_turned_to(problem: Problem, kept: list[int]) -> tuple[Problem, list[int]]:
+    """Return the problem whose accesses begin once their satellite can have turned to them.
+
+    Each of those is offered from then on as well. The rows of what is kept come with it.
+    """
+    table = problem.opportunities
+    opens_s: dict[int, float] = {}
+    for satellite, own in enumerate(problem.satellites):
+        if own.heading is None:
+            continue
+        for row in _first_rows(problem, satellite).tolist():
+            open_s, close_s = starts_of(problem, row)
+            first_s = first_start_s(problem, row, open_s, close_s)
+            if open_s < first_s < np.inf:
+                opens_s[row] = first_s
+    if not opens_s:
+        return problem, kept
+    rows = np.array(list(opens_s), dtype=np.int32)
+    made = with_starts(problem, rows, np.array(list(opens_s.values())))
+    whole, start_s = made.problem.opportunities, table.start_s[made.source]
+    by_access = {int(table.access[row]): first_s for row, first_s in opens_s.items()}
+    own_s = np.array([by_access.get(access, -np.inf) for access in whole.access.tolist()])
+    opened = replace(whole, access_start_s=np.maximum(whole.access_start_s, own_s))
+    at = {
+        int(row): i
+        for i, row in enumerate(made.source)
+        if abs(whole.start_s[i] - start_s[i]) <= TIME_TOLERANCE_S
+    }
+    return replace(made.problem, opportunities=opened), [at[row] for row in kept]
 
 
 def _first_rows(problem: Problem, satellite: int) -> Ints:

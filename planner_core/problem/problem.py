@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -137,6 +137,25 @@ class Sunlight:
         return np.where(i == 0, 0.0, before[last] + into)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Heading:
+    """Where a satellite looks when its horizon begins.
+
+    Attributes
+    ----------
+    free_from_s
+        From when on it may turn, at most 0.
+    line_of_sight
+        Unit vector, inertial; None for panels at the sun.
+    moving_deg_s
+        How that moves, where turns mind.
+    """
+
+    free_from_s: float
+    line_of_sight: tuple[float, float, float] | None = None
+    moving_deg_s: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
 @dataclass(frozen=True, slots=True, weakref_slot=True, kw_only=True, eq=False)
 class SatelliteProblem:
     """One satellite's part: its rows of the opportunity table, and what may follow what.
@@ -158,6 +177,9 @@ class SatelliteProblem:
         Of each row to the sun and back; no time where pointing at the sun is free.
     volume
         What each contact takes down, in recorder capacities; 0 for collects. Shape ``(m,)``.
+    heading
+        No task begins before the satellite can have turned to it from there; None where that is
+        not known.
     """
 
     id: str
@@ -176,6 +198,7 @@ class SatelliteProblem:
     sun: SunPath | None
     turns: SunTurns
     volume: Floats
+    heading: Heading | None = None
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -229,7 +252,7 @@ class Blocked:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Struck:
-    """A collect that pins or outages rule out.
+    """A collect that pins, outages or where its satellite looked at the start rule out.
 
     Attributes
     ----------
@@ -237,8 +260,9 @@ class Struck:
         Of the scenario's table, which the problem no longer has.
     kept
         Rows of the problem that it cannot stand beside; none where it is ruled out itself.
-    by_outage
-        Whether it lies in an outage.
+    why
+        A pin, an outage that it lies in, or that its satellite cannot turn to it in time from
+        where it looked at the start.
     """
 
     row: int
@@ -246,7 +270,7 @@ class Struck:
     start_s: float
     end_s: float
     kept: tuple[int, ...] = ()
-    by_outage: bool = False
+    why: Literal["pin", "outage", "heading"] = "pin"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

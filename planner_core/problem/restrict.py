@@ -79,6 +79,7 @@ def with_table(
                 downlinks=problem.downlinks,
                 sun=satellite.sun,
                 events=own,
+                heading=satellite.heading,
             )
             for index, (satellite, own) in enumerate(zip(problem.satellites, events, strict=True))
         ),

@@ -9,6 +9,7 @@ from planner_core.problem.downlink import Downlinks
 from planner_core.problem.problem import (
     CONTACT,
     Floats,
+    Heading,
     Ints,
     Opportunities,
     SatelliteProblem,
@@ -30,6 +31,7 @@ def build_satellite_problem(
     downlinks: Downlinks,
     sun: SunPath | None = None,
     events: tuple[Floats, Ints] | None = None,
+    heading: Heading | None = None,
 ) -> SatelliteProblem:
     """Return one satellite's view of the table.
 
@@ -93,4 +95,5 @@ def build_satellite_problem(
             moved=moved,
         ),
         volume=volume,
+        heading=heading,
     )

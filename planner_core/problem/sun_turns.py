@@ -63,6 +63,18 @@ def sun_turn_s(
     return float(_turns_s(resources, agility, sun, lines, np.array([t_s]), moving)[0])
 
 
+def angle_to_sun_deg(
+    resources: Resources, sun: SunPath | None, line_of_sight: Vector, t_s: float
+) -> float:
+    """Return the angle that panels turn by between a line of sight and the sun."""
+    if resources.sun_pointing == "free" or sun is None:
+        return 0.0
+    hour = np.arange(len(sun.directions)) * sun.step_s
+    direction = np.array([np.interp(t_s, hour, axis) for axis in sun.directions.T])
+    direction /= np.linalg.norm(direction)
+    return abs(float(angle_between_deg(direction, line_of_sight)) - resources.panel_angle_deg)
+
+
 def sun_turns(
     resources: Resources,
     agility: Agility,

@@ -62,6 +62,10 @@ NO_ACCESS: Final = {
 _EXCLUDED: Final = "A pin forbids it."
 _BLOCKED: Final = "Pins rule all its opportunities out."
 _OUT: Final = "An outage takes all its opportunities."
+_TOO_SOON: Final = (
+    "Each of its opportunities begins before a satellite can have turned to it from where that "
+    "looked at the start."
+)
 _ROUNDED: Final = 1e4  # fractions of capacity are stated to as many parts
 _SURE: Final = 2e-9  # of capacity: a stated limit is not touched
 
@@ -130,8 +134,10 @@ def _without_opportunity(problem: Problem, positions: Mapping[int, int], target:
     if detail is not None:
         return Reason(code="no_access", certainty="proven", detail=detail)
     struck = problem.pinned.struck.get(target, ())
-    if struck and all(each.by_outage for each in struck):
+    if struck and all(each.why == "outage" for each in struck):
         return Reason(code="outage", certainty="proven", detail=_OUT)
+    if struck and all(each.why == "heading" for each in struck):
+        return Reason(code="slew_conflict", certainty="proven", detail=_TOO_SOON)
     kept = {row for each in struck for row in each.kept}
     if not kept:
         return Reason(code="excluded", certainty="proven", detail=_BLOCKED)

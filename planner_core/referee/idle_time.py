@@ -22,7 +22,7 @@ class Idle(NamedTuple):
     sun_from_s, sun_until_s
         The stay at the sun, between the two turns; of no length where there is no time for it.
     turn_to_s, turn_back_s
-        To the sun, none at the start of the horizon; and from it, none at its end.
+        To the sun, at the start of the horizon what is left of it; and from it, none at its end.
     """
 
     start_s: float
@@ -43,7 +43,8 @@ def idle_spans(
 ) -> tuple[Idle, ...]:
     """Return the idle spans of a satellite around its own actions, in order of start.
 
-    The satellite begins the horizon with its panels at the sun.
+    The satellite begins the horizon with its panels at the sun where it is not known to look
+    elsewhere.
     """
 
     def turn_s(action: Action | None, is_end: bool) -> float:
@@ -64,6 +65,8 @@ def idle_spans(
         until_s = problem.horizon_s if after is None else after.start_s
         if until_s > free_from_s + TIME_TOLERANCE_S:
             turn_to_s, turn_back_s = turn_s(before, True), turn_s(after, False)
+            if before is None:
+                turn_to_s = _first_turn_s(satellite)
             sun_from_s = free_from_s + turn_to_s
             sun_until_s = max(sun_from_s, until_s - turn_back_s)
             spans.append(
@@ -72,3 +75,15 @@ def idle_spans(
         if after is not None and after.end_s > free_from_s:
             free_from_s, before = after.end_s, after
     return tuple(spans)
+
+
+def _first_turn_s(satellite: SatelliteProblem) -> float:
+    """Return how long after the horizon's start a satellite is at the sun, by its heading."""
+    heading = satellite.heading
+    if heading is None or heading.line_of_sight is None:
+        return 0.0
+    at_sun_s = heading.free_from_s + sun_turn_s(
+        satellite.resources, satellite.agility, satellite.sun, heading.line_of_sight,
+        heading.free_from_s, heading.moving_deg_s,
+    )  # fmt: skip
+    return max(0.0, at_sun_s)

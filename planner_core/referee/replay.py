@@ -32,7 +32,7 @@ from planner_core.referee.resource_profile import (
     integrate,
     thin,
 )
-from planner_core.referee.sight import turn_between
+from planner_core.referee.sight import turn_between, turn_from_start
 from planner_core.worth import share_earned
 
 Mode = Literal["collect", "contact", "sunpoint", "hold"]
@@ -309,7 +309,17 @@ def _turns(
     busy_until: Action | None = None
     for position in positions:
         action = plan.actions[position]
-        slews[position] = None
+        slews[position] = first = _first_slew(problem, index, action)
+        if first is not None and first.available_s < first.needed_s - TIME_TOLERANCE_S:
+            detail = (
+                f"The turn of {first.angle_deg:.2f} deg from where it looked at the start takes "
+                f"{first.needed_s:.3f} s."
+            )
+            found.append(
+                Violation(code="slew", satellite=index, at_s=action.start_s,
+                          needed=first.needed_s, available=first.available_s, detail=detail,
+                          blamed=(position,))
+            )  # fmt: skip
         if previous is not None and busy_until is not None:
             angle_deg, needed_s = turn_between(problem, index, previous, action)
             available_s = action.start_s - previous.end_s
@@ -331,6 +341,15 @@ def _turns(
         if busy_until is None or action.end_s > busy_until.end_s:
             busy_until = action
     return found, slews
+
+
+def _first_slew(problem: Problem, index: int, action: Action) -> Slew | None:
+    """Return the turn to an action from where its satellite looked at the start, if known."""
+    heading, turn = problem.satellites[index].heading, turn_from_start(problem, index, action)
+    if heading is None or turn is None:
+        return None
+    available_s = action.start_s - heading.free_from_s
+    return Slew(angle_deg=turn[0], needed_s=turn[1], available_s=available_s)
 
 
 def _stations(problem: Problem, plan: Plan) -> list[Violation]:

@@ -14,6 +14,7 @@ from planner_core.problem.slew import (
     angle_between_deg,
     slew_s,
 )
+from planner_core.problem.sun_turns import angle_to_sun_deg, sun_turn_s
 
 _Triple = tuple[float, float, float]
 
@@ -67,6 +68,39 @@ def turn_between(
         # The least time is known to a microsecond or so; what fits, fits.
         needed_s = available_s
     return angle_deg, needed_s
+
+
+def turn_from_start(problem: Problem, index: int, action: Action) -> tuple[float, float] | None:
+    """Return angle (deg) and time (s) of the turn from where a satellite looked at the start.
+
+    None where that is not known. For panels at the sun the angle is the one that they turn by.
+    """
+    satellite = problem.satellites[index]
+    heading, agility = satellite.heading, satellite.agility
+    if heading is None:
+        return None
+    v, moving = looks(problem, action), moving_deg_s(problem, action, is_end=False)
+    if heading.line_of_sight is None:
+        x, y, z = moving
+        # The turn to the sun, backward in time.
+        needed_s = sun_turn_s(
+            satellite.resources, agility, satellite.sun, v, action.start_s, (-x, -y, -z)
+        )
+        return angle_to_sun_deg(satellite.resources, satellite.sun, v, action.start_s), needed_s
+    angle_deg = angle_between_deg(heading.line_of_sight, v)
+    if not agility.tracks:
+        acceleration = agility.acceleration_deg_s2 or INSTANT
+        turn_s = slew_s(angle_deg, agility.slew_rate_deg_s, acceleration)
+        return angle_deg, turn_s + agility.settle_s
+    turn = rotation_deg(heading.line_of_sight, _triple(v))
+    limits = float(agility.slew_rate_deg_s), float(agility.acceleration_deg_s2 or INSTANT)
+    turn_s = moving_turn_s(turn, heading.moving_deg_s, moving, *limits)
+    available_s = action.start_s - heading.free_from_s - agility.settle_s
+    if turn_s > available_s and turns_in(
+        available_s + TIME_TOLERANCE_S, turn, heading.moving_deg_s, moving, *limits
+    ):
+        turn_s = available_s
+    return angle_deg, turn_s + agility.settle_s
 
 
 def _triple(vector: Vector) -> _Triple:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import TypeVar
 
-from planner_core.domain import Outage, Promise, Replan, Stability, State
+from planner_core.domain import Attitude, Outage, Promise, Replan, Stability, State
 from planner_core.errors import InvalidScenario
 from planner_core.pins import BlockedInterval, PinnedAction, Pins
-from service.wire.pins import BlockedIn, OutageIn, PinnedActionIn, PinsIn, StateIn
+from service.wire.pins import AttitudeIn, BlockedIn, OutageIn, PinnedActionIn, PinsIn, StateIn
 from service.wire.plan_before import ReplanOfFile
 from service.wire.scenarios import FileGroundStation, FileSatellite, ScenarioFile
 
@@ -52,6 +52,19 @@ def state_from(body: StateIn) -> State:
         at=body.at,
         battery_fraction=body.battery_fraction,
         recorder_fraction=body.recorder_fraction,
+        attitude=None if body.attitude is None else attitude_from(body.attitude),
+    )
+
+
+def attitude_from(body: AttitudeIn) -> Attitude:
+    """Return the attitude of one body."""
+    look = body.line_of_sight
+    return Attitude(
+        opportunity_id=body.opportunity_id,
+        target_id=body.target_id,
+        station_id=body.station_id,
+        line_of_sight=None if look is None else (look[0], look[1], look[2]),
+        at_sun=bool(body.sun),
     )
 
 

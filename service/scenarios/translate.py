@@ -157,7 +157,9 @@ def canonical_of_file(file: ScenarioFile) -> str:
     for outage in document["outages"]:
         _without_unset(outage, "id", "satellite_id", "station_id", "reason")
     for state in document["states"]:
-        _without_unset(state, "battery_fraction", "recorder_fraction")
+        _without_unset(state, "battery_fraction", "recorder_fraction", "attitude")
+        if "attitude" in state:
+            _without_unset(state["attitude"], *tuple(state["attitude"]))
     for part in ("outages", "states"):
         if not document[part]:
             del document[part]

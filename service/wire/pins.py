@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final, Literal, get_args
+from typing import Annotated, Final, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
@@ -105,6 +105,34 @@ class OutageOut(Wire):
     created_at: Instant
 
 
+class AttitudeIn(Body):
+    """Where a satellite looks: exactly one of these. `"sun"` is short for `{"sun": true}`."""
+
+    sun: Literal[True] | None = Field(None, description="Its panels are at the sun.")
+    target_id: Id | None = Field(None, description="It tracks this target.")
+    station_id: Id | None = Field(None, description="It tracks this ground station.")
+    opportunity_id: Id | None = Field(
+        None, description="It tracks the place of this opportunity of the scenario."
+    )
+    line_of_sight: Annotated[list[float], Field(min_length=3, max_length=3)] | None = Field(
+        None, description="A unit vector in TEME at that instant; the satellite is at rest."
+    )
+
+    @model_validator(mode="after")
+    def _one(self) -> Self:
+        if sum(value is not None for _, value in self) != 1:
+            raise PydanticCustomError(
+                "one_attitude",
+                "Give exactly one of sun, target_id, station_id, opportunity_id and line_of_sight",
+            )
+        return self
+
+    @model_validator(mode="before")
+    @classmethod
+    def _named(cls, value: object) -> object:
+        return {"sun": True} if value == "sun" else value
+
+
 class StateIn(Body):
     """What a satellite had before the horizon; until that begins it idles."""
 
@@ -114,6 +142,11 @@ class StateIn(Body):
         None, description="Of capacity at that instant; null for what `resources` say of the start."
     )
     recorder_fraction: Fraction | None = Field(None, description="Likewise, of the recorder.")
+    attitude: AttitudeIn | None = Field(
+        None,
+        description="Where it looked: no task begins before it can have turned to it from there. "
+        "Null where that is not known: the first task needs no turn.",
+    )
 
 
 class PinsIn(Body):

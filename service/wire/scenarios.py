@@ -172,8 +172,8 @@ class Question(Body):
     states: list[StateIn] = Field(
         [],
         max_length=10_000,
-        description="Battery and recorder of satellites before the horizon begins, at most one "
-        "state of each. Without, their `resources` say what they have at its start.",
+        description="Battery, recorder and attitude of satellites before the horizon begins, at "
+        "most one state of each. Without, their `resources` say what they have at its start.",
     )
 
 

@@ -66,7 +66,7 @@ def test_states_are_stored_with_their_scenario(service: Service) -> None:
     scenario = post(service.client, PATH, body | {"states": [state]})
     assert plain["states"] == []
     assert scenario["sha256"] != plain["sha256"]
-    assert scenario["states"] == [state | {"at": "2026-03-01T00:00:00.000Z"}]
+    assert scenario["states"] == [state | {"at": "2026-03-01T00:00:00.000Z", "attitude": None}]
     assert service.client.get(f"{PATH}/{scenario['id']}").json()["states"] == scenario["states"]
     file = service.client.get(f"{PATH}/{scenario['id']}?expand=true").json()
     assert hashlib.sha256(canonical(file).encode()).hexdigest() == scenario["sha256"]
@@ -76,3 +76,66 @@ def test_states_are_stored_with_their_scenario(service: Service) -> None:
     answer = service.client.post(PATH, json=beyond)
     assert answer.status_code == 422
     assert answer.json()["errors"][0]["pointer"] == "/states/0/battery_fraction"
+
+
+@pytest.mark.parametrize(
+    "attitude",
+    ["sun", {"station_id": "sv"}, {"target_id": "t1"}, {"line_of_sight": [0.0, 0.6, 0.8]}],
+)
+def test_attitudes_come_back_as_they_are_sent(attitude: str | dict[str, object]) -> None:
+    plain = paper_mission(drawn_targets(5))
+    if isinstance(attitude, dict) and "station_id" in attitude:
+        attitude = {"station_id": plain["ground_stations"][0]["name"]}
+    if isinstance(attitude, dict) and "target_id" in attitude:
+        attitude = {"target_id": plain["targets"][1]["id"]}
+    state = {"satellite_id": "PAPER", "at": plain["horizon"]["start"], "attitude": attitude}
+    text = canonical(plain | {"states": [state]})
+    (stored,) = json.loads(text)["states"]
+    assert stored["attitude"] == ({"sun": True} if attitude == "sun" else attitude)
+    assert canonical(json.loads(text)) == text
+    (known,) = scenario_from_content(json.loads(text)).states
+    assert known.attitude is not None
+    assert known.attitude.at_sun == (attitude == "sun")
+
+
+@pytest.mark.parametrize(
+    ("attitude", "pointer"),
+    [
+        ("moon", ""),
+        ({}, ""),
+        ({"sun": False}, "/sun"),
+        ({"station_id": "a", "target_id": "b"}, ""),
+        ({"line_of_sight": [1.0, 0.0]}, "/line_of_sight"),
+        ({"line_of_sight": [1.0, 1.0, 0.0]}, "/line_of_sight"),
+        ({"target_id": "none"}, "/target_id"),
+    ],
+)
+def test_attitudes_that_cannot_be_are_refused(
+    attitude: str | dict[str, object], pointer: str
+) -> None:
+    plain = paper_mission(drawn_targets(5))
+    state = {"satellite_id": "PAPER", "at": plain["horizon"]["start"], "attitude": attitude}
+    with pytest.raises(InvalidScenario) as caught:
+        scenario_from_content(plain | {"states": [state]})
+    assert (caught.value.fault.pointer or "").startswith("/states/0/attitude")
+    assert (caught.value.fault.pointer or "").endswith(pointer)
+
+
+def test_a_job_turns_from_where_the_satellite_looks() -> None:
+    plain = paper_mission(drawn_targets(60))
+    for satellite in plain["satellites"]:
+        satellite["agility"] = {"slew_rate_deg_s": 0.2}
+    state = {
+        "satellite_id": "PAPER", "at": plain["horizon"]["start"],
+        "attitude": {"line_of_sight": [0.0, 1.0, 0.0]},
+    }  # fmt: skip
+    free, turned = (
+        json.loads(run(file, "rule").timeline) for file in (plain, plain | {"states": [state]})
+    )
+    assert turned["validity"] == "valid"
+    tasks = [[a for a in line["satellites"][0]["actions"] if a["target_id"]]
+             for line in (free, turned)]  # fmt: skip
+    assert tasks[0][0]["slew"] is None
+    slew = tasks[1][0]["slew"]
+    assert 0.0 < slew["needed_s"] <= slew["available_s"]
+    assert slew["needed_s"] == pytest.approx(slew["angle_deg"] / 0.2, rel=1e-6)
