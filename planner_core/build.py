@@ -25,7 +25,7 @@ from planner_core.domain import (
     Sensor,
 )
 from planner_core.errors import Cancelled, InvalidScenario
-from planner_core.idling import started, sunlit_from
+from planner_core.idling import images_on_board, started, sunlit_from
 from planner_core.orbits import ephemeris as orbits
 from planner_core.orbits.earth_orientation import shipped
 from planner_core.orbits.eclipse import always_sunlit, sunlight
@@ -49,6 +49,7 @@ from planner_core.problem import (
     build_satellite_problem,
 )
 from planner_core.problem.delivery import with_objective
+from planner_core.problem.on_board import with_on_board
 from planner_core.problem.pointing import Path, Pointing
 from planner_core.valuation import worth_of_opportunities
 
@@ -331,7 +332,8 @@ def build_problem(scenario: Scenario, computed: ScenarioOpportunities, budget: B
         opportunities=computed.opportunities,
         satellites=tuple(satellites),
     )
-    return pinned_problem(scenario, with_objective(problem, scenario.objective))
+    problem = with_objective(problem, scenario.objective)
+    return pinned_problem(scenario, with_on_board(problem, images_on_board(scenario)))
 
 
 def has_continuous_starts(scenario: Scenario) -> bool:

@@ -24,7 +24,14 @@ from planner_core.orbits.eclipse import always_sunlit, sunlight
 from planner_core.orbits.ephemeris import propagate
 from planner_core.orbits.places import Places, line_of_sight_teme, los_rate_deg_s
 from planner_core.orbits.sun import sun_path
-from planner_core.problem import COLLECT, Floats, Heading, Opportunities, Sunlight
+from planner_core.problem import (
+    COLLECT,
+    Floats,
+    Heading,
+    ImageOnBoard,
+    Opportunities,
+    Sunlight,
+)
 from planner_core.problem.sun_turns import sun_turn_s
 
 _A_MOMENT = timedelta(minutes=1)  # of orbit, to see what a satellite looks at
@@ -80,7 +87,8 @@ def started(scenario: Scenario, index: int, state: State | None, table: Opportun
 def _carried(satellite: Satellite, state: State, horizon: Horizon, turn_s: float) -> Resources:
     resources = satellite.resources
     waited_s = (horizon.start - state.at).total_seconds()
-    battery, recorder = state.battery_fraction, state.recorder_fraction
+    battery = state.battery_fraction
+    recorder = state.recorder(resources.recorder_capacity_mbit)
     if waited_s > 0.0:
         if battery is not None:
             lit = always_sunlit(waited_s)
@@ -161,6 +169,29 @@ def _tracked(
     if attitude.station_id is not None:
         named, own_id = scenario.ground_stations, attitude.station_id
     return next(place for place in named if place.id == own_id)
+
+
+def images_on_board(scenario: Scenario) -> tuple[ImageOnBoard, ...]:
+    """Return the images that recorders hold when the horizon begins, each satellite's in order."""
+    satellites = {satellite.id: i for i, satellite in enumerate(scenario.satellites)}
+    targets = {target.id: i for i, target in enumerate(scenario.targets)}
+    found = []
+    for state in scenario.states:
+        index = satellites[state.satellite_id]
+        capacity_mbit = scenario.satellites[index].resources.recorder_capacity_mbit
+        for image in state.on_board:
+            target = targets[image.target_id]
+            reward = scenario.targets[target].reward
+            found.append(
+                ImageOnBoard(
+                    satellite=index,
+                    target=target,
+                    amount=image.amount(capacity_mbit),
+                    collected_s=scenario.horizon.offset_s(image.collected_at),
+                    worth=reward if image.worth is None else image.worth,
+                )
+            )
+    return tuple(found)
 
 
 def sunlit_from(lit: Sunlight, from_s: float) -> Sunlight:

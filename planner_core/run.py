@@ -19,6 +19,7 @@ from planner_core.domain import Scenario
 from planner_core.preferences.downlinks import with_more_downlinks
 from planner_core.preferences.polish import Effect, polished
 from planner_core.problem import Problem
+from planner_core.problem.on_board import most_on_board, without_on_board
 from planner_core.reasons.explain import explain
 from planner_core.reasons.reason import Search, TargetOutcome
 from planner_core.referee.replay import Timeline, replay
@@ -96,7 +97,7 @@ def plan_scenario(
     problem = build_problem(scenario, opportunities, budget)
     clock.append(time.perf_counter())
     budget.report(Progress(phase="solve", fraction=0.0))
-    relieved = within_limits(problem)
+    relieved = without_on_board(within_limits(problem))
     # A replan changes as little as it must; nothing else may ask for more changes.
     aims = scenario.objective.prefer if scenario.replan is None else ()
     if scenario.replan is None:
@@ -104,10 +105,11 @@ def plan_scenario(
         solution = solver.solve(relieved, search, seed)
     else:
         solution = solve_replan(question_of(scenario, relieved), solver, budget, seed)
-    solution = flyable(problem, relieved, solution)
+    solution = flyable(without_on_board(problem), relieved, solution)
     if problem.continuous_starts:
         solution = with_own_starts(problem, solution, budget)
-    if scenario.replan is None and solution.termination is not Termination.OPTIMAL:
+    is_optimal = solution.termination is Termination.OPTIMAL
+    if problem.on_board or (scenario.replan is None and not is_optimal):
         more = with_more_downlinks(problem, solution.plan, budget)
         solution = replace(solution, plan=more)
     effects: tuple[Effect, ...] = ()
@@ -118,6 +120,11 @@ def plan_scenario(
     budget.report(Progress(phase="verify", fraction=0.0))
     timeline = replay(problem, solution.plan)
     bound = _best_bound(relieved, solution, timeline, budget, known_bound)
+    on_board = most_on_board(problem)
+    if on_board > 0.0:
+        bound = bound and bound.with_on_board(on_board, timeline.reward)
+        if not _is_met(bound, timeline) and solution.termination is Termination.OPTIMAL:
+            solution = replace(solution, termination=Termination.HORIZON_COMPLETE)
     budget.report(
         Progress(
             phase="verify",
@@ -152,10 +159,12 @@ def _best_bound(
 ) -> Bound | None:
     """Return the lowest of what is known, what the solver has proven and a quick bound.
 
-    A plan that may not be flown can earn more than any that may: no bound is below its reward.
+    Each of them is of what new images earn. A plan that may not be flown can earn more than any
+    that may: no bound is below its reward.
     A valid plan that does shows a fault in the bound, which is then not repeated.
     """
-    reward = timeline.reward
+    reward = timeline.earned_by_new
+    known = known and known.without_on_board()
     claimed = (bound for bound in (known, solution.proven) if bound is not None)
     sound = [bound for bound in claimed if not _is_beaten(bound, timeline)]
     # Prices that a search has settled on are better than those of a moment.
@@ -182,11 +191,17 @@ def _quick_bound(problem: Problem, reward: float, budget: Budget) -> Bound:
     )
 
 
+def _is_met(bound: Bound | None, timeline: Timeline) -> bool:
+    """Return whether a plan earns all that is proven, to rounding."""
+    return bound is not None and timeline.reward >= bound.value * (1.0 - _ROUNDING)
+
+
 def _is_beaten(bound: Bound, timeline: Timeline) -> bool:
     """Return whether a valid plan earns more than the bound allows, and say so if it does."""
     allowed = bound.value + _ROUNDING * max(1.0, abs(bound.value))
-    is_beaten = timeline.is_valid and timeline.reward > allowed
+    reward = timeline.earned_by_new
+    is_beaten = timeline.is_valid and reward > allowed
     if is_beaten:
         log.error("the %s bound %r is below %r, which a valid plan earns", bound.proof,
-                  bound.value, timeline.reward)  # fmt: skip
+                  bound.value, reward)  # fmt: skip
     return is_beaten

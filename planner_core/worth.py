@@ -118,12 +118,21 @@ def share_earned(objective: Objective, age_s: Floats) -> Floats:
     >>> share_earned(Objective(collected_share=0.5, half_life_s=3600.0), np.array([3600.0, np.inf]))
     array([0.75, 0.5 ])
     """
-    a, half_life_s = objective.collected_share, objective.half_life_s
+    return objective.collected_share + delivery_share(objective, age_s)
+
+
+def delivery_share(objective: Objective, age_s: Floats) -> Floats:
+    """Return which part of its worth an image earns by being on the ground at this age.
+
+    >>> delivery_share(Objective(collected_share=0.5), np.array([3600.0, np.inf]))
+    array([0.5, 0. ])
+    """
+    half_life_s = objective.half_life_s
     if half_life_s is None:
         left = np.isfinite(age_s).astype(np.float64)
     else:
         left = np.exp2(-age_s / half_life_s)
-    return a + (1.0 - a) * left
+    return (1.0 - objective.collected_share) * left
 
 
 def best_worths(target: _Indices, worth: Floats, num_targets: int) -> Floats:

@@ -21,7 +21,8 @@ Objective
 Outage
     A span in which a satellite or a station is not to be had.
 State
-    What is known of a satellite's battery, recorder and attitude before the horizon begins.
+    What is known of a satellite's battery, recorder, attitude and images before the
+    horizon begins.
 Pin
     What a plan must hold, or must not; see ``planner_core.pins``.
 Off-nadir angle
@@ -61,7 +62,7 @@ from planner_core.domain.spacecraft import (
     SunPointing,
     mean_elements,
 )
-from planner_core.domain.states import Attitude, State
+from planner_core.domain.states import Attitude, OnBoard, State
 
 __all__ = [
     "Agility",
@@ -77,6 +78,7 @@ __all__ = [
     "LookSide",
     "Nadir",
     "Objective",
+    "OnBoard",
     "Orbit",
     "OrbitDirection",
     "OrbitElements",

@@ -137,7 +137,7 @@ class Scenario:
         for position, outage in enumerate(self.outages):
             outage.check(f"/outages/{position}", satellite_ids, station_ids)
         target_ids = {t.id for t in self.targets}
-        check_states(self.states, satellite_ids, target_ids, station_ids, self.horizon)
+        check_states(self.states, self.satellites, target_ids, station_ids, self.horizon)
         if self.replan is not None:
             require(
                 not self.continuous_starts,

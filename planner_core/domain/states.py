@@ -9,11 +9,13 @@ from datetime import datetime, timedelta
 from typing import Final
 
 from planner_core.domain.horizon import Horizon
+from planner_core.domain.spacecraft import Satellite
 from planner_core.errors import InvalidScenario
 
 OLDEST_STATE: Final = timedelta(days=7)
 """Before the horizon; idling for longer says nothing of where a satellite is."""
 
+_ROUNDING: Final = 1e-6  # of a recorder
 _UNIT: Final = 1e-3  # how far from 1 the length of a unit vector may be
 
 
@@ -75,6 +77,68 @@ class Attitude:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class OnBoard:
+    """An image that a recorder holds.
+
+    Attributes
+    ----------
+    collected_at
+        When its collect ended.
+    mbit, recorder_fraction
+        How much of it is left, in megabits or as a fraction of the recorder: exactly one of the
+        two. 0 for an image that is on the ground already: its target needs no other.
+    worth
+        Of the image, whole. None for its target's reward.
+    """
+
+    target_id: str
+    collected_at: datetime
+    mbit: float | None = None
+    recorder_fraction: float | None = None
+    worth: float | None = None
+
+    def amount(self, capacity_mbit: float | None) -> float:
+        """Return how much is left, as a fraction of a recorder of this size."""
+        if self.mbit is None:
+            return self.recorder_fraction or 0.0
+        return self.mbit / (capacity_mbit or math.inf)
+
+    def check(
+        self, pointer: str, at: datetime, target_ids: Collection[str], capacity_mbit: float | None
+    ) -> None:
+        """Check the image against what the scenario holds.
+
+        Raises
+        ------
+        InvalidScenario
+            With a pointer that begins with ``pointer``.
+        """
+        faults: list[tuple[bool, str, str]] = [
+            (self.collected_at > at, "collected_at", "An image on board was collected before."),
+            (
+                (self.mbit is None) == (self.recorder_fraction is None),
+                "mbit",
+                "Give either mbit or recorder_fraction.",
+            ),
+            (
+                self.mbit is not None and capacity_mbit is None,
+                "mbit",
+                "The recorder's size in megabits is not known: give recorder_fraction instead.",
+            ),
+        ]
+        for name in ("mbit", "recorder_fraction", "worth"):
+            value = getattr(self, name)
+            is_fine = value is None or 0.0 <= value < math.inf
+            faults.append((not is_fine, name, f"{name} must be 0 or more."))
+        if self.target_id not in target_ids:
+            detail = f"The scenario has no target {self.target_id!r}."
+            raise InvalidScenario("unknown_target", detail, pointer=f"{pointer}/target_id")
+        for is_fault, field, detail in faults:
+            if is_fault:
+                raise InvalidScenario("value_out_of_range", detail, pointer=f"{pointer}/{field}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class State:
     """What telemetry says of a satellite at an instant; until the horizon it idles.
 
@@ -86,6 +150,8 @@ class State:
         Of capacity. None for what the satellite's ``resources`` say of the horizon's start.
     attitude
         Where it looks. None where that is not known: then the first task needs no turn.
+    on_board
+        Images that come down first, in this order, and then what else the recorder holds.
     """
 
     satellite_id: str
@@ -93,11 +159,18 @@ class State:
     battery_fraction: float | None = None
     recorder_fraction: float | None = None
     attitude: Attitude | None = None
+    on_board: tuple[OnBoard, ...] = ()
+
+    def recorder(self, capacity_mbit: float | None) -> float | None:
+        """Return what the recorder holds: what the images come to where that is all we know."""
+        if self.recorder_fraction is not None or not self.on_board:
+            return self.recorder_fraction
+        return min(1.0, math.fsum(image.amount(capacity_mbit) for image in self.on_board))
 
 
 def check_states(
     states: Sequence[State],
-    satellite_ids: Collection[str],
+    satellites: Sequence[Satellite],
     target_ids: Collection[str],
     station_ids: Collection[str],
     horizon: Horizon,
@@ -109,10 +182,11 @@ def check_states(
     InvalidScenario
         With a pointer that begins with ``/states/`` and the position.
     """
+    by_id = {satellite.id: satellite for satellite in satellites}
     known: set[str] = set()
     for position, state in enumerate(states):
         pointer = f"/states/{position}"
-        if state.satellite_id not in satellite_ids:
+        if state.satellite_id not in by_id:
             raise InvalidScenario(
                 "unknown_satellite",
                 f"The scenario has no satellite {state.satellite_id!r}.",
@@ -141,3 +215,20 @@ def check_states(
                 )
         if state.attitude is not None:
             state.attitude.check(f"{pointer}/attitude", target_ids, station_ids)
+        capacity_mbit = by_id[state.satellite_id].resources.recorder_capacity_mbit
+        _check_on_board(state, pointer, target_ids, capacity_mbit)
+
+
+def _check_on_board(
+    state: State, pointer: str, target_ids: Collection[str], capacity_mbit: float | None
+) -> None:
+    for number, image in enumerate(state.on_board):
+        image.check(f"{pointer}/on_board/{number}", state.at, target_ids, capacity_mbit)
+    held = 1.0 if state.recorder_fraction is None else state.recorder_fraction
+    listed = math.fsum(image.amount(capacity_mbit) for image in state.on_board)
+    if listed > held + _ROUNDING:
+        raise InvalidScenario(
+            "value_out_of_range",
+            f"The images come to {listed:.6g} of the recorder, which holds {held:g}.",
+            pointer=f"{pointer}/on_board",
+        )

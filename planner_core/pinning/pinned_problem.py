@@ -41,6 +41,7 @@ from planner_core.problem import (
     Struck,
 )
 from planner_core.problem.first_turns import too_soon
+from planner_core.problem.on_board import imaged_before
 from planner_core.problem.restrict import restricted
 from planner_core.problem.slew import TIME_TOLERANCE_S
 
@@ -58,7 +59,8 @@ def pinned_problem(scenario: Scenario, problem: Problem) -> Problem:
         ``pin_breaks_limits``, with a pointer into ``/pins``.
     """
     has_heading = any(satellite.heading is not None for satellite in problem.satellites)
-    if not (scenario.pins or scenario.outages or scenario.replan or has_heading):
+    asked = scenario.pins or scenario.outages or scenario.replan
+    if not (asked or has_heading or problem.on_board):
         return problem
     pins, table = scenario.pins, problem.opportunities
     whole = table if problem.pointing is None else whole_accesses(problem)
@@ -368,13 +370,16 @@ def _conflict(kept: Kept, why: str) -> InvalidScenario:
 
 
 def _ruled_out(problem: Problem, pinned: Pinned) -> Bools:
-    """Return the opportunities that are forbidden, skipped, blocked, out or too soon."""
+    """Return the opportunities that are forbidden, skipped, blocked, out, too soon or no use."""
     table = problem.opportunities
     is_out: Bools = _in_outages(problem, pinned) | too_soon(problem)
     if pinned.frozen_until_s > 0.0:
         is_frozen = table.start_s < pinned.frozen_until_s - TIME_TOLERANCE_S
         is_frozen[[kept.row for kept in pinned.kept]] = False
         is_out |= is_frozen
+    is_done = imaged_before(problem)
+    is_done[[kept.row for kept in pinned.kept]] = False
+    is_out |= is_done
     is_out |= (table.kind == COLLECT) & np.isin(table.place, sorted(pinned.forbidden))
     for _, rows in _pins_that_rule_out(problem, pinned):
         is_out[rows] = True

@@ -80,7 +80,13 @@ def _by_gap(view: View, satellite: SatelliteProblem, taken: Ints) -> Iterator[li
     free = free[~np.isin(free, local[contacts])]
     taken_s, free_s = np.sort(table.start_s[contacts]), satellite.start_s[free]
     images = view.image_rows[np.isin(view.image_rows, taken)]
-    ends_s = np.sort(table.end_s[images])
+    index = problem.satellites.index(satellite)
+    on_board_s = [
+        min(0.0, one.collected_s)
+        for one in problem.on_board
+        if one.satellite == index and one.amount > 0.0
+    ]
+    ends_s = np.sort(np.append(table.end_s[images], on_board_s))
     gap = np.searchsorted(taken_s, free_s, side="right")
     last_s, next_s = np.append(-np.inf, taken_s)[gap], np.append(taken_s, problem.horizon_s)[gap]
     num_waiting = np.searchsorted(ends_s, free_s) - np.searchsorted(ends_s, last_s)

@@ -59,7 +59,7 @@ def _first_down_s(
     r, links = satellite.resources, problem.downlinks
     contacts = np.flatnonzero(satellite.kind == CONTACT)
     contacts = contacts[np.argsort(satellite.start_s[contacts], kind="stable")]
-    fastest_per_s = _fastest_per_s(problem, satellite, contacts)
+    fastest_per_s = fastest_downlink_per_s(problem, satellite, contacts)
     if fastest_per_s <= 0.0:
         return np.full(len(end_s), np.inf)
     starts_s = satellite.start_s[contacts]
@@ -72,7 +72,7 @@ def _first_down_s(
     return np.where(down_s <= last_s + _ROUNDING_S, down_s, np.inf)
 
 
-def _fastest_per_s(problem: Problem, satellite: SatelliteProblem, contacts: Longs) -> float:
+def fastest_downlink_per_s(problem: Problem, satellite: SatelliteProblem, contacts: Longs) -> float:
     """Return the highest rate at any instant of these contacts; 0 without any."""
     links = problem.downlinks
     access = problem.opportunities.access[satellite.rows[contacts]]

@@ -138,6 +138,27 @@ class Sunlight:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ImageOnBoard:
+    """An image that a recorder holds when the horizon begins.
+
+    Attributes
+    ----------
+    amount
+        What is left of it, in recorder capacities; 0 where it is on the ground already.
+    collected_s
+        When its collect ended, before the horizon begins.
+    worth
+        Of the image on the ground at once.
+    """
+
+    satellite: int
+    target: int
+    amount: float
+    collected_s: float
+    worth: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Heading:
     """Where a satellite looks when its horizon begins.
 
@@ -334,6 +355,9 @@ class Problem:
         Opportunities that pins rule out are not in the table; those to be kept are named here.
     origin
         Row of each opportunity in the scenario's table, where that is another one. Shape ``(n,)``.
+    on_board
+        Images that each recorder holds at the start; they come down first, in this order. New
+        images of their targets earn nothing.
     """
 
     horizon_s: float
@@ -354,6 +378,7 @@ class Problem:
     pointing: Pointing | None = None
     pinned: Pinned = Pinned()
     origin: Ints | None = None
+    on_board: tuple[ImageOnBoard, ...] = ()
 
     @cached_property
     def kept_rows(self) -> Ints:

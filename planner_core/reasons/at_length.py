@@ -67,7 +67,7 @@ def explain_target(
     A target that is collected has no attempts.
     """
     outcome = explain(problem, plan, timeline, search)[target]
-    if target in timeline.collected:
+    if outcome.outcome in ("collected", "downlinked"):
         return Explanation(outcome=outcome, attempts=())
     attempts = [
         *_forced(problem, plan, timeline, target),

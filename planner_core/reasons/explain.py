@@ -74,11 +74,12 @@ def explain(
     problem: Problem, plan: Plan, timeline: Timeline, search: Search = UNKNOWN_SEARCH
 ) -> tuple[TargetOutcome, ...]:
     """Return every target exactly once, with its outcome and, if left out, a true reason."""
+    before = {image.target: image for image in timeline.brought_down}
     reasons = _settled_reasons(problem, plan, timeline)
     left = [
         target
         for target in range(len(problem.target_ids))
-        if target not in timeline.collected and target not in reasons
+        if target not in timeline.collected and target not in reasons and target not in before
     ]
     targets = np.array(left, dtype=np.int64)
     if problem.pointing is None:
@@ -91,6 +92,9 @@ def explain(
         reasons = weighed_by_delivery(problem, plan, timeline, reasons)
     outcomes = []
     for target in range(len(problem.target_ids)):
+        if target in before:
+            outcomes.append(_imaged_before(problem, timeline, target))
+            continue
         collected, reason = timeline.collected.get(target), reasons.get(target)
         outcome: Outcome = "unscheduled"
         if collected is not None:
@@ -107,6 +111,22 @@ def explain(
             )
         )
     return tuple(outcomes)
+
+
+def _imaged_before(problem: Problem, timeline: Timeline, target: int) -> TargetOutcome:
+    """Return the outcome of a target with an image from before the horizon."""
+    images = [image for image in timeline.brought_down if image.target == target]
+    is_down = any(
+        image.delivered_s is not None or problem.on_board[image.image].amount == 0.0
+        for image in images
+    )
+    return TargetOutcome(
+        target=target,
+        outcome="downlinked" if is_down else "collected",
+        position=None,
+        satellite=images[0].satellite,
+        reason=None,
+    )
 
 
 def _settled_reasons(problem: Problem, plan: Plan, timeline: Timeline) -> dict[int, Reason]:

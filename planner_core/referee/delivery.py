@@ -37,11 +37,22 @@ def delivered_s(
     """
     kind = problem.opportunities.kind
     queued = np.array([point.recorded for point in profile.after])
-    time_s, removed = _removal(problem, satellite, actions, profile)
-    found = down_s(queued, time_s, removed)
+    found = on_ground_s(problem, satellite, actions, profile, queued)
     is_contact = [kind[action.opportunity] == CONTACT for action in actions]
     found[np.array(is_contact, dtype=np.bool_)] = np.nan
     return found
+
+
+def on_ground_s(
+    problem: Problem,
+    satellite: SatelliteProblem,
+    actions: Sequence[Action],
+    profile: Profile,
+    queued: Floats,
+) -> Floats:
+    """Return when so much of a recorder's queue is on the ground; see ``down_s``."""
+    time_s, removed = _removal(problem, satellite, actions, profile)
+    return down_s(queued, time_s, removed)
 
 
 def down_s(queued: Floats, time_s: Floats, removed: Floats) -> Floats:

@@ -23,6 +23,7 @@ from planner_core.problem import (
 )
 from planner_core.problem.plan import Action, Plan
 from planner_core.problem.slew import TIME_TOLERANCE_S
+from planner_core.referee.brought_down import BroughtDown, brought_down_of
 from planner_core.referee.delivery import delivered_s
 from planner_core.referee.idle_time import Idle
 from planner_core.referee.pinned_plan import breaches
@@ -162,7 +163,8 @@ class Timeline:
     Attributes
     ----------
     reward
-        Sum over targets of the best worth of their collects by actions that break nothing.
+        Sum over targets of the best worth of their collects by actions that break nothing, and
+        of what images earn that were on board at the start.
     collected
         By target index.
     downlinked, on_board
@@ -170,6 +172,8 @@ class Timeline:
         capacities.
     battery_min, recorder_max
         The lowest battery and the highest recorder of any satellite at any instant.
+    brought_down
+        Of each image that a recorder held at the start, in the problem's order.
     """
 
     satellites: tuple[SatelliteTimeline, ...]
@@ -180,6 +184,12 @@ class Timeline:
     on_board: tuple[float, ...]
     battery_min: float | None
     recorder_max: float | None
+    brought_down: tuple[BroughtDown, ...] = ()
+
+    @property
+    def earned_by_new(self) -> float:
+        """What the images of the plan itself earn."""
+        return math.fsum(image.worth for image in self.collected.values())
 
     @property
     def is_valid(self) -> bool:
@@ -248,6 +258,7 @@ def replay(problem: Problem, plan: Plan) -> Timeline:
     collected, duplicates = _collected(problem, plan, blamed, worth, down_s)
     violations += duplicates
     earned = {c.position: c.worth for c in collected.values()}
+    brought_down = brought_down_of(problem, plan, by_satellite, profiles)
     points = [point for profile in profiles if profile for point in profile.points]
     return Timeline(
         satellites=tuple(
@@ -257,12 +268,13 @@ def replay(problem: Problem, plan: Plan) -> Timeline:
             for positions, profile in zip(by_satellite, profiles, strict=True)
         ),
         violations=tuple(sorted(violations, key=lambda v: (v.at_s, v.satellite, v.code))),
-        reward=math.fsum(earned.values()),
+        reward=math.fsum((*earned.values(), *(image.earned for image in brought_down))),
         collected=collected,
         downlinked=tuple(profile.points[-1].removed if profile else 0.0 for profile in profiles),
         on_board=tuple(profile.points[-1].recorder if profile else 0.0 for profile in profiles),
         battery_min=min((p.battery for p in points), default=None),
         recorder_max=max((p.recorder for p in points), default=None),
+        brought_down=brought_down,
     )
 
 
@@ -482,7 +494,11 @@ def _collected(
             images.setdefault(int(table.place[i]), []).append(position)
     collected: dict[int, Collected] = {}
     duplicates = []
+    on_board = {image.target for image in problem.on_board}
     for target, positions in images.items():
+        if target in on_board:
+            duplicates += [_has_been_imaged(problem, plan, position) for position in positions]
+            continue
         best = int(np.argmax(worth[positions]))
         satellites = [int(table.satellite[plan.actions[p].opportunity]) for p in positions]
         image_down_s = float(down_s[positions[best]])
@@ -504,6 +520,16 @@ def _collected(
                           detail=f"Target {problem.target_ids[target]} {why}.")
             )  # fmt: skip
     return collected, duplicates
+
+
+def _has_been_imaged(problem: Problem, plan: Plan, position: int) -> Violation:
+    action, table = plan.actions[position], problem.opportunities
+    target = problem.target_ids[int(table.place[action.opportunity])]
+    return Violation(
+        code="duplicate", satellite=int(table.satellite[action.opportunity]), needed=1.0,
+        available=2.0, at_s=action.start_s, blamed=(),
+        detail=f"Target {target} has an image from before the horizon.",
+    )  # fmt: skip
 
 
 def _delivered(

@@ -59,7 +59,12 @@ def satellite_totals(
     on_board = timeline.on_board[index]
     is_known = problem.use_resources and capacity_mbit is not None
     return SatelliteTotalsOut(
-        reward=math.fsum(action.reward for action in line.actions),
+        reward=math.fsum(
+            (
+                *(action.reward for action in line.actions),
+                *(one.earned for one in timeline.brought_down if one.satellite == index),
+            )
+        ),
         collects=sum(action.mode == "collect" for action in line.actions),
         contacts=sum(action.mode == "contact" for action in line.actions),
         delivered=num_delivered(problem, images),

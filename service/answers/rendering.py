@@ -34,6 +34,7 @@ from service.wire.scenarios import HorizonOut
 from service.wire.timelines import (
     ActionOut,
     ModelsOut,
+    OnBoardOut,
     Outcome,
     PreferredOut,
     ReasonOut,
@@ -107,6 +108,8 @@ class Wording:
         target = self.scenario.targets[found.target]
         satellite = None if found.satellite is None else self.problem.satellites[found.satellite]
         collected = self._timeline.collected.get(found.target)
+        old = [one for one in self._timeline.brought_down if one.target == found.target]
+        worth = None if collected is None else collected.worth
         return TargetItem(
             target_id=target.id,
             target_catalog_id=target.catalog_id,
@@ -114,7 +117,7 @@ class Wording:
             action_id=None if found.position is None else self.action_ids[found.position],
             satellite_id=None if satellite is None else satellite.id,
             satellite_name=None if satellite is None else satellite.name,
-            worth=None if collected is None else collected.worth,
+            worth=sum(one.earned for one in old) if old else worth,
             reason=None if found.reason is None else self._reason(found.reason, target.reward),
         )
 
@@ -204,6 +207,7 @@ class Documents(Wording):
                 id=satellite.id,
                 name=satellite.name,
                 actions=(),
+                on_board=tuple(self._on_board(index)),
                 totals=satellite_totals(
                     self.scenario, self.problem, judged.timeline, index, self._images.of(index)
                 ),
@@ -217,6 +221,22 @@ class Documents(Wording):
                 ),
             )
             yield about, (self._action(f"a{next(numbers)}", action) for action in line.actions)
+
+    def _on_board(self, index: int) -> Iterator[OnBoardOut]:
+        capacity_mbit = self.scenario.satellites[index].resources.recorder_capacity_mbit
+        for one in self._timeline.brought_down:
+            image, down_s = self.problem.on_board[one.image], one.delivered_s
+            if image.satellite == index:
+                yield OnBoardOut(
+                    target_id=self.problem.target_ids[image.target],
+                    collected_at=self.instant(image.collected_s),
+                    mbit=None if capacity_mbit is None else round(image.amount * capacity_mbit, 6),
+                    recorder_fraction=round(image.amount, 9),
+                    worth=image.worth,
+                    delivered_at=None if down_s is None else self.instant(down_s),
+                    age_s=_rounded(one.age_s, 3),
+                    reward=one.earned,
+                )
 
     def targets(self) -> Iterator[TargetItem]:
         """Yield every target once, with outcome and reason."""

@@ -159,5 +159,5 @@ def run_plan_job(request: PlanRequest, budget: Budget) -> PlanAnswer:
 def _satellites(documents: Documents) -> Iterator[tuple[Json, Iterator[Json], Json]]:
     """Yield what stands before the actions of each satellite, those, and what stands behind."""
     for about, actions in documents.satellites():
-        before, behind = {"id", "name"}, {"totals", "eclipses", "resources"}
+        before, behind = {"id", "name"}, {"on_board", "totals", "eclipses", "resources"}
         yield dumped(about, include=before), map(dumped, actions), dumped(about, include=behind)

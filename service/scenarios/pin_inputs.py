@@ -5,10 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import TypeVar
 
-from planner_core.domain import Attitude, Outage, Promise, Replan, Stability, State
+from planner_core.domain import Attitude, OnBoard, Outage, Promise, Replan, Stability, State
 from planner_core.errors import InvalidScenario
 from planner_core.pins import BlockedInterval, PinnedAction, Pins
-from service.wire.pins import AttitudeIn, BlockedIn, OutageIn, PinnedActionIn, PinsIn, StateIn
+from service.wire.pins import (
+    AttitudeIn,
+    BlockedIn,
+    OnBoardIn,
+    OutageIn,
+    PinnedActionIn,
+    PinsIn,
+    StateIn,
+)
 from service.wire.plan_before import ReplanOfFile
 from service.wire.scenarios import FileGroundStation, FileSatellite, ScenarioFile
 
@@ -53,6 +61,10 @@ def state_from(body: StateIn) -> State:
         battery_fraction=body.battery_fraction,
         recorder_fraction=body.recorder_fraction,
         attitude=None if body.attitude is None else attitude_from(body.attitude),
+        on_board=tuple(
+            OnBoard(**{name: getattr(image, name) for name in OnBoardIn.model_fields})
+            for image in body.on_board
+        ),
     )
 
 

@@ -158,6 +158,10 @@ def canonical_of_file(file: ScenarioFile) -> str:
         _without_unset(outage, "id", "satellite_id", "station_id", "reason")
     for state in document["states"]:
         _without_unset(state, "battery_fraction", "recorder_fraction", "attitude")
+        if not state["on_board"]:
+            del state["on_board"]
+        for image in state.get("on_board", ()):
+            _without_unset(image, "mbit", "recorder_fraction", "worth")
         if "attitude" in state:
             _without_unset(state["attitude"], *tuple(state["attitude"]))
     for part in ("outages", "states"):

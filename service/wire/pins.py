@@ -7,7 +7,7 @@ from typing import Annotated, Final, Literal, Self, get_args
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from service.wire.base import Body, Fraction, Id, Instant, Open, Reason, Wire
+from service.wire.base import Body, Fraction, Id, Instant, NonNegative, Open, Reason, Wire
 
 PinnedMode = Literal["collect", "contact"]
 
@@ -133,6 +133,24 @@ class AttitudeIn(Body):
         return {"sun": True} if value == "sun" else value
 
 
+class OnBoardIn(Body):
+    """An image that a recorder holds."""
+
+    target_id: Id
+    collected_at: Instant = Field(description="The end of its collect.")
+    mbit: NonNegative | None = Field(
+        None,
+        description="What is left of it; 0 where it is on the ground, and its target needs no "
+        "other image.",
+    )
+    recorder_fraction: Fraction | None = Field(
+        None, description="The same in place of `mbit`, as a fraction of the recorder."
+    )
+    worth: NonNegative | None = Field(
+        None, description="Of the image, whole; null for its target's reward."
+    )
+
+
 class StateIn(Body):
     """What a satellite had before the horizon; until that begins it idles."""
 
@@ -146,6 +164,12 @@ class StateIn(Body):
         None,
         description="Where it looked: no task begins before it can have turned to it from there. "
         "Null where that is not known: the first task needs no turn.",
+    )
+    on_board: list[OnBoardIn] = Field(
+        [],
+        max_length=100_000,
+        description="Images that come down first, in this order, and then what else the recorder "
+        "holds. New images of their targets earn nothing.",
     )
 
 

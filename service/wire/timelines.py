@@ -210,12 +210,30 @@ class SatelliteTotalsOut(ImageFiguresOut):
     on_board_mbit_end: float | None
 
 
+class OnBoardOut(Wire):
+    """What became of an image that the recorder held when the horizon began."""
+
+    target_id: str
+    collected_at: Instant
+    mbit: float | None = Field(
+        description="What was left of it; null where the recorder has no size in megabits."
+    )
+    recorder_fraction: float
+    worth: float
+    delivered_at: Instant | None = Field(description="Null for never.")
+    age_s: float | None
+    reward: float = Field(description="What it earns by coming down.")
+
+
 class SatelliteTimelineOut(Wire):
     """What one satellite does, in order."""
 
     id: str
     name: str
     actions: tuple[ActionOut, ...]
+    on_board: tuple[OnBoardOut, ...] = Field(
+        (), description="Images that its recorder held at the start, the first to come down first."
+    )
     totals: SatelliteTotalsOut | None = None
     eclipses: tuple[HorizonOut, ...] = Field((), description="Spans in the Earth's shadow.")
     resources: ResourceCurvesOut | None = Field(description="Null without resources.")
@@ -415,3 +433,8 @@ class ProofOut(Wire):
     amount: float | None = Field(None, description="What `refutation` shows to be out of reach.")
     refutation: RefutationOut | None = None
     log: str | None = Field(None, description="Of the solver that has proven it, where one has.")
+    on_board: float | None = Field(
+        None,
+        description="What of the value is the most that images can earn which were on board at "
+        "the start; the proof is of the rest.",
+    )

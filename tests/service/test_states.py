@@ -66,7 +66,8 @@ def test_states_are_stored_with_their_scenario(service: Service) -> None:
     scenario = post(service.client, PATH, body | {"states": [state]})
     assert plain["states"] == []
     assert scenario["sha256"] != plain["sha256"]
-    assert scenario["states"] == [state | {"at": "2026-03-01T00:00:00.000Z", "attitude": None}]
+    told = {"at": "2026-03-01T00:00:00.000Z", "attitude": None, "on_board": []}
+    assert scenario["states"] == [state | told]
     assert service.client.get(f"{PATH}/{scenario['id']}").json()["states"] == scenario["states"]
     file = service.client.get(f"{PATH}/{scenario['id']}?expand=true").json()
     assert hashlib.sha256(canonical(file).encode()).hexdigest() == scenario["sha256"]
@@ -139,3 +140,30 @@ def test_a_job_turns_from_where_the_satellite_looks() -> None:
     slew = tasks[1][0]["slew"]
     assert 0.0 < slew["needed_s"] <= slew["available_s"]
     assert slew["needed_s"] == pytest.approx(slew["angle_deg"] / 0.2, rel=1e-6)
+
+
+def test_what_is_on_board_is_told_with_the_plan() -> None:
+    plain = paper_mission(drawn_targets(60))
+    begin = plain["horizon"]["start"]
+    names = [target["id"] for target in plain["targets"]]
+    state = {
+        "satellite_id": "PAPER", "at": begin, "recorder_fraction": 0.2,
+        "on_board": [
+            {"target_id": names[0], "collected_at": begin, "recorder_fraction": 0.01, "worth": 5.0},
+            {"target_id": names[1], "collected_at": begin, "recorder_fraction": 0.01},
+        ],
+    }  # fmt: skip
+    file = plain | {"states": [state], "objective": "delivered"}
+    text = canonical(file)
+    assert canonical(json.loads(text)) == text
+    answer = run(file, "certified")
+    timeline = json.loads(answer.timeline)
+    (line,) = timeline["satellites"]
+    first, second = line["on_board"]
+    assert (first["target_id"], first["worth"], first["reward"]) == (names[0], 5.0, 5.0)
+    assert first["delivered_at"] < second["delivered_at"]
+    assert first["mbit"] is None
+    assert timeline["totals"]["reward"] == pytest.approx(line["totals"]["reward"])
+    assert timeline["totals"]["reward"] <= timeline["totals"]["bound"]
+    earned = sum(a["reward"] for a in line["actions"]) + first["reward"] + second["reward"]
+    assert timeline["totals"]["reward"] == pytest.approx(earned)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 import numpy as np
@@ -36,6 +36,9 @@ class Bound:
         What proves a Lagrangian bound that took cuts (``is_refuted`` checks it).
     log
         What the MILP solver reported, for a bound that it has proven.
+    on_board
+        What of the value is for images that were on board at the start
+        (``planner_core.problem.on_board``); the proof is of the rest.
     """
 
     value: float
@@ -46,6 +49,17 @@ class Bound:
     unit: float | None = None
     certificate: Certificate | None = None
     log: str | None = None
+    on_board: float = 0.0
+
+    def with_on_board(self, most: float, reward: float) -> Bound:
+        """Return the bound of new images and of those on board, never below a plan's reward."""
+        return replace(self, value=max(self.value + most, reward), on_board=most)
+
+    def without_on_board(self) -> Bound:
+        """Return the bound of new images alone."""
+        if self.on_board == 0.0:
+            return self
+        return replace(self, value=self.value - self.on_board, on_board=0.0)
 
 
 def reward_unit(problem: Problem) -> float:

@@ -27,6 +27,7 @@ from planner_core.certified.proofs.latency import latency_value
 from planner_core.certified.proofs.resource_bound import resource_value
 from planner_core.certified.proofs.totals import totals_bound
 from planner_core.problem import Floats, Problem
+from planner_core.problem.on_board import most_on_board
 
 VERSION: Final = 1
 _ROUNDING: Final = 1e-8  # relative
@@ -48,6 +49,8 @@ def to_json(bound: Bound) -> str:
         document["refutation"] = _refutation_to_json(bound.certificate.refutation)
     if bound.log is not None:
         document["log"] = bound.log
+    if bound.on_board > 0.0:
+        document["on_board"] = bound.on_board
     return json.dumps(document)
 
 
@@ -73,6 +76,7 @@ def from_json(text: str) -> Bound:
         if "refutation" in document
         else None,
         log=document.get("log"),
+        on_board=float(document.get("on_board", 0.0)),
     )
 
 
@@ -83,6 +87,9 @@ def is_proven(problem: Problem, bound: Bound) -> bool | None:
     ``problem``, whose value is a bound whatever they are. What HiGHS has proven has its log.
     """
     room = _ROUNDING * max(1.0, abs(bound.value))
+    if bound.on_board < most_on_board(problem) - room:
+        return False
+    bound = bound.without_on_board()
     if problem.continuous_starts and bound.certificate is not None:
         # It strikes out tasks at the starts of opportunities, and others remain.
         return False
