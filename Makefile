@@ -68,7 +68,7 @@ serve: $(PRODUCT)
 
 # A process for each core, each with a module at a time; see docs/testing.md.
 test: check
-	$(BIN)/python -m pytest -n logical $(if $(filter full,$(SLEWLINE_TEST_PROFILE)),-m "")
+	$(BIN)/python -m pytest -n logical --durations=25 $(if $(filter full,$(SLEWLINE_TEST_PROFILE)),-m "")
 
 # The property tests with new examples, all that each asks for.
 explore: setup

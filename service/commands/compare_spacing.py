@@ -14,7 +14,7 @@ from planner_core.build import ScenarioOpportunities
 from planner_core.solvers.registry import solver_class
 from service.commands.scenario_files import read_object, require_folder
 from service.commands.solve import answer_of
-from service.jobs.plan_job import PlanRequest
+from service.jobs.plan_request import PlanRequest
 from service.jobs.solver_params import params_of, parse_params
 from service.scenarios.translate import canonical, quality_from, read_file, sha256_of
 

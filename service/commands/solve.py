@@ -13,7 +13,8 @@ from planner_core.budget import Budget
 from planner_core.solvers.registry import solver_class
 from service.commands.scenario_files import read_object, require_folder
 from service.commands.summary import summary
-from service.jobs.plan_job import PlanAnswer, PlanRequest, run_plan_job
+from service.jobs.plan_job import run_plan_job
+from service.jobs.plan_request import PlanAnswer, PlanRequest
 from service.jobs.solver_params import params_of, parse_params
 from service.scenarios.translate import canonical, sha256_of
 

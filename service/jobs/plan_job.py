@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
-from typing import Any, cast
+from collections.abc import Callable, Iterator
+from typing import cast
 
 from planner_core import __version__
 from planner_core.budget import Budget
@@ -14,103 +13,12 @@ from planner_core.certified.proofs import documents as proofs
 from planner_core.run import plan_scenario
 from planner_core.solvers.base import Solver
 from planner_core.solvers.registry import solver_class
-from service.answers.blocks import (
-    Block,
-    target_blocks,
-    targets_text,
-    timeline_blocks,
-    timeline_text,
-)
+from service.answers.blocks import target_blocks, timeline_blocks
 from service.answers.rendering import Documents, figures_of
+from service.jobs.plan_request import PlanAnswer, PlanRequest
 from service.scenarios.translate import scenario_from_content
 from service.wire.base import Json, dumped
 from service.wire.timelines import SolverUsed
-
-
-class Parcel:
-    """Bytes that are handed on once: who takes them is alone in holding them."""
-
-    def __init__(self, content: bytes | None):
-        self._content = content
-
-    def take(self) -> bytes | None:
-        """Return the bytes the first time; None where there are none, or no longer."""
-        content, self._content = self._content, None
-        return content
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PlanRequest:
-    """The frozen question of one job, as it travels to the solver's process.
-
-    Attributes
-    ----------
-    run
-        Which run of the job this is, from 1.
-    content
-        The canonical scenario file (JSON text).
-    params
-        The solver's parameters, defaults filled in.
-    limits
-        ``time_s`` and ``memory_mb``.
-    opportunity_block
-        The scenario's stored opportunities; none where they are still to be computed.
-    bound
-        The best bound known of the scenario with its proof (JSON text), or None.
-    """
-
-    job_id: str
-    scenario_sha256: str
-    content: str
-    solver: str
-    params: Mapping[str, Any]
-    seed: int
-    limits: Mapping[str, Any]
-    run: int = 1
-    opportunity_block: Parcel = field(default_factory=lambda: Parcel(None))
-    bound: str | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PlanAnswer:
-    """What a job leaves behind.
-
-    Attributes
-    ----------
-    blocks
-        The timeline document, and every target with its outcome.
-    termination
-        Why the search ended.
-    reward, bound
-        What the referee awarded; what no plan can exceed, where it is known.
-    proof
-        That bound with what proves it (JSON text).
-    opportunity_block
-        Opportunities to store, where this job was the first to compute them.
-    figures
-        The timeline's numbers for tables.
-    warnings
-        What the timeline says to people.
-    """
-
-    blocks: tuple[Block, ...]
-    termination: str
-    reward: float
-    bound: float | None = None
-    proof: str | None = None
-    opportunity_block: bytes | None = None
-    figures: Mapping[str, Any] | None = None
-    warnings: tuple[str, ...] = ()
-
-    @property
-    def timeline(self) -> str:
-        """Return the timeline document (JSON text)."""
-        return timeline_text(self.blocks)
-
-    @property
-    def targets(self) -> str:
-        """Return every target with its outcome (JSON text of a list)."""
-        return targets_text(self.blocks)
 
 
 def run_plan_job(request: PlanRequest, budget: Budget) -> PlanAnswer:

@@ -28,7 +28,7 @@ from service.jobs.child import (
     Started,
     Stopped,
 )
-from service.jobs.plan_job import PlanRequest
+from service.jobs.plan_request import PlanRequest
 
 log = logging.getLogger(__name__)
 

@@ -26,7 +26,7 @@ from service.db.session import Database
 from service.jobs import lease
 from service.jobs.child import Answered, Ending, Refused, Stopped
 from service.jobs.lease import Lease, Outcome
-from service.jobs.plan_job import Parcel, PlanAnswer, PlanRequest
+from service.jobs.plan_request import Parcel, PlanAnswer, PlanRequest
 from service.jobs.queue import DbosConsumer, DbosQueue
 from service.jobs.reconcile import Reconciler
 from service.jobs.renewal import Renewal

@@ -14,7 +14,7 @@ from service.commands import compare_spacing
 from service.commands.bodies import OK, WRONG_INPUT
 from service.commands.cli import main
 from service.commands.solve import answer_of
-from service.jobs.plan_job import PlanAnswer, PlanRequest
+from service.jobs.plan_request import PlanAnswer, PlanRequest
 from service.scenarios.translate import canonical
 from tests.missions import drawn_targets, paper_mission
 

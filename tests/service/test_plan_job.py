@@ -15,7 +15,8 @@ from planner_core.build import ScenarioOpportunities, build_problem, compute_opp
 from planner_core.certified.proofs import documents as proofs
 from planner_core.certified.proofs.bound import Bound
 from planner_core.solvers.registry import SOLVERS
-from service.jobs.plan_job import Parcel, PlanAnswer, PlanRequest, run_plan_job
+from service.jobs.plan_job import run_plan_job
+from service.jobs.plan_request import Parcel, PlanAnswer, PlanRequest
 from service.scenarios.translate import canonical, scenario_from_content, sha256_of
 from service.wire.timelines import ProofOut
 from tests import independent

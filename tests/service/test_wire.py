@@ -19,7 +19,8 @@ from planner_core.solvers.registry import solver_class
 from service import client
 from service.access.callers import Scope
 from service.api import stapi
-from service.jobs.plan_job import PlanRequest, run_plan_job
+from service.jobs.plan_job import run_plan_job
+from service.jobs.plan_request import PlanRequest
 from service.jobs.solver_params import params_of, parse_params
 from service.main import ROUTERS, create_app
 from service.scenarios.translate import canonical, sha256_of

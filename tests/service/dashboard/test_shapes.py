@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 
 from planner_core.budget import Budget
-from service.jobs.plan_job import PlanRequest, run_plan_job
+from service.jobs.plan_job import run_plan_job
+from service.jobs.plan_request import PlanRequest
 from service.main import create_app
 from service.scenarios.translate import canonical
 from service.settings import Settings

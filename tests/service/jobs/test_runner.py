@@ -13,7 +13,7 @@ import pytest
 from planner_core.budget import Progress
 from service.jobs import runner as runner_module
 from service.jobs.child import Answered, Ending, Refused, Stopped
-from service.jobs.plan_job import Parcel, PlanRequest
+from service.jobs.plan_request import Parcel, PlanRequest
 from service.jobs.runner import Abandoned, Limits, Lost, Order, Runner
 from tests.service.jobs.work import WORK
 
