@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from planner_core.access import opportunities as tasks
 from planner_core.access.eligibility import Eligibility
+from planner_core.access.given import table_of, with_given
 from planner_core.access.limits import Limits, TargetLimits
 from planner_core.access.passes import contacts_of, downlinks_of
 from planner_core.access.windows import Accesses, find_accesses
@@ -25,7 +26,8 @@ from planner_core.domain import (
     Sensor,
 )
 from planner_core.errors import Cancelled, InvalidScenario
-from planner_core.idling import images_on_board, started, sunlit_from
+from planner_core.flown import Past, carried, flown_as, given_of, pasts_of
+from planner_core.idling import started, sunlit_from
 from planner_core.orbits import ephemeris as orbits
 from planner_core.orbits.earth_orientation import shipped
 from planner_core.orbits.eclipse import always_sunlit, sunlight
@@ -43,6 +45,8 @@ from planner_core.problem import (
     OUTSIDE_LIMITS,
     OUTSIDE_TIMES,
     WRONG_SENSOR_TYPE,
+    ImageOnBoard,
+    Ints,
     Opportunities,
     Problem,
     Sunlight,
@@ -291,9 +295,12 @@ def build_problem(scenario: Scenario, computed: ScenarioOpportunities, budget: B
         A pin is impossible.
     """
     satellites = []
+    table, origin = _with_frozen(scenario, computed.opportunities)
+    pasts = pasts_of(scenario)
+    images: list[ImageOnBoard] = []
     states = {state.satellite_id: state for state in scenario.states}
     sun = sun_path(scenario.horizon)
-    downlinks = downlinks_of(scenario, computed.opportunities)
+    downlinks = downlinks_of(scenario, table)
     for index, satellite in enumerate(scenario.satellites):
         _go_on(budget, index / len(scenario.satellites), "compile")
         sees_shadow = scenario.use_resources and satellite.resources.eclipse_aware
@@ -301,10 +308,13 @@ def build_problem(scenario: Scenario, computed: ScenarioOpportunities, budget: B
         if not sees_shadow:
             lit = always_sunlit(scenario.horizon.duration_s)
         start = started(scenario, index, states.get(satellite.id), computed.opportunities)
+        if index in pasts:
+            start = carried(pasts[index], _flown_problem(pasts[index], budget), start)
+        images += start.images
         satellites.append(
             build_satellite_problem(
                 index,
-                computed.opportunities,
+                table,
                 id=satellite.id,
                 name=satellite.name,
                 agility=satellite.agility,
@@ -324,16 +334,69 @@ def build_problem(scenario: Scenario, computed: ScenarioOpportunities, budget: B
         continuous_starts=has_continuous_starts(scenario),
         pointing=_pointing(scenario) if has_continuous_starts(scenario) else None,
         target_ids=tuple(target.id for target in scenario.targets),
-        worth=worth_of_opportunities(scenario, computed.opportunities),
+        worth=worth_of_opportunities(scenario, table),
         target_access=computed.target_access,
         station_ids=tuple(station.id for station in stations),
         station_antennas=np.array([s.antennas for s in stations], dtype=np.int32),
         downlinks=downlinks,
-        opportunities=computed.opportunities,
+        opportunities=table,
         satellites=tuple(satellites),
+        origin=origin,
     )
     problem = with_objective(problem, scenario.objective)
-    return pinned_problem(scenario, with_on_board(problem, images_on_board(scenario)))
+    return pinned_problem(scenario, with_on_board(problem, tuple(images)))
+
+
+def _flown_problem(past: Past, budget: Budget) -> Problem:
+    """Return the problem of what a satellite did before the horizon, and of nothing else."""
+    part = past.part()
+    (satellite,) = part.satellites
+    return build_problem(
+        part,
+        ScenarioOpportunities(
+            opportunities=table_of(part, past.given(part)),
+            target_access=np.full(len(part.targets), ACCESS_FOUND, dtype=np.int8),
+            sunlight=(sunlight(propagate(satellite, part.horizon)),),
+            warnings=(),
+        ),
+        budget,
+    )
+
+
+def _with_frozen(scenario: Scenario, table: Opportunities) -> tuple[Opportunities, Ints | None]:
+    """Return the table with each frozen action at its own instants, and the rows that these are of.
+
+    Raises
+    ------
+    InvalidScenario
+        ``frozen_not_kept``: by newer elements its satellite does not see its place then.
+    """
+    replan, horizon = scenario.replan, scenario.horizon
+    if replan is None:
+        return table, None
+    frozen = {
+        i: flown_as(action)
+        for i, action in enumerate(replan.base)
+        if action.start is not None
+        and action.end is not None
+        and horizon.start <= action.start < replan.freeze_until
+    }
+    satellites = {satellite.id: i for i, satellite in enumerate(scenario.satellites)}
+    given = [given_of(scenario, satellites[one.satellite_id], one) for one in frozen.values()]
+    made = with_given(scenario, table, given)
+    if made.missing and replan.elements == "newest":
+        number = list(frozen)[made.missing[0]]
+        action = frozen[number]
+        place = f"target {action.target_id!r}" if action.target_id else "the station"
+        raise InvalidScenario(
+            "frozen_not_kept",
+            f"By its newest elements satellite {action.satellite_id!r} does not see {place} at "
+            f"{action.start:%Y-%m-%dT%H:%M:%SZ}: end the freeze before, or skip the action.",
+            pointer=f"/replan/base/{number}",
+        )
+    if len(made.table) == len(table):
+        return table, None
+    return made.table, made.origin
 
 
 def has_continuous_starts(scenario: Scenario) -> bool:

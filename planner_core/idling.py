@@ -47,11 +47,14 @@ class Start:
         Where it looks; None where that is not known.
     sun_from_s
         When it can have its panels at the sun first.
+    images
+        What its recorder holds, the first to come down first.
     """
 
     resources: Resources
     heading: Heading | None = None
     sun_from_s: float = 0.0
+    images: tuple[ImageOnBoard, ...] = ()
 
 
 def started(scenario: Scenario, index: int, state: State | None, table: Opportunities) -> Start:
@@ -71,9 +74,10 @@ def started(scenario: Scenario, index: int, state: State | None, table: Opportun
     satellite = scenario.satellites[index]
     if state is None:
         return Start(resources=satellite.resources)
-    seen = None if state.attitude is None else _heading(scenario, index, state, table)
+    seen = None if state.attitude is None else heading_of(scenario, index, state, table)
+    images = _images(scenario, index, state)
     if not scenario.use_resources:
-        return Start(resources=satellite.resources, heading=seen)
+        return Start(resources=satellite.resources, heading=seen, images=images)
     waited_s = (scenario.horizon.start - state.at).total_seconds()
     turn_s = _turn_to_sun_s(satellite, state, seen)
     resources = _carried(satellite, state, scenario.horizon, turn_s)
@@ -81,7 +85,9 @@ def started(scenario: Scenario, index: int, state: State | None, table: Opportun
     if seen is not None and not is_free and turn_s <= waited_s:
         # By then it is at the sun, as whoever idles is.
         seen = Heading(free_from_s=0.0)
-    return Start(resources=resources, heading=seen, sun_from_s=max(0.0, turn_s - waited_s))
+    return Start(
+        resources=resources, heading=seen, sun_from_s=max(0.0, turn_s - waited_s), images=images
+    )
 
 
 def _carried(satellite: Satellite, state: State, horizon: Horizon, turn_s: float) -> Resources:
@@ -118,7 +124,8 @@ def _turn_to_sun_s(satellite: Satellite, state: State, seen: Heading | None) -> 
     )  # fmt: skip
 
 
-def _heading(scenario: Scenario, index: int, state: State, table: Opportunities) -> Heading:
+def heading_of(scenario: Scenario, index: int, state: State, table: Opportunities) -> Heading:
+    """Return where a satellite looks by the attitude of its state."""
     attitude = state.attitude
     assert attitude is not None
     free_from_s = scenario.horizon.offset_s(state.at)
@@ -171,27 +178,22 @@ def _tracked(
     return next(place for place in named if place.id == own_id)
 
 
-def images_on_board(scenario: Scenario) -> tuple[ImageOnBoard, ...]:
-    """Return the images that recorders hold when the horizon begins, each satellite's in order."""
-    satellites = {satellite.id: i for i, satellite in enumerate(scenario.satellites)}
+def _images(scenario: Scenario, index: int, state: State) -> tuple[ImageOnBoard, ...]:
+    """Return the images that a state lists, in their order."""
     targets = {target.id: i for i, target in enumerate(scenario.targets)}
-    found = []
-    for state in scenario.states:
-        index = satellites[state.satellite_id]
-        capacity_mbit = scenario.satellites[index].resources.recorder_capacity_mbit
-        for image in state.on_board:
-            target = targets[image.target_id]
-            reward = scenario.targets[target].reward
-            found.append(
-                ImageOnBoard(
-                    satellite=index,
-                    target=target,
-                    amount=image.amount(capacity_mbit),
-                    collected_s=scenario.horizon.offset_s(image.collected_at),
-                    worth=reward if image.worth is None else image.worth,
-                )
-            )
-    return tuple(found)
+    capacity_mbit = scenario.satellites[index].resources.recorder_capacity_mbit
+    return tuple(
+        ImageOnBoard(
+            satellite=index,
+            target=targets[image.target_id],
+            amount=image.amount(capacity_mbit),
+            collected_s=scenario.horizon.offset_s(image.collected_at),
+            worth=scenario.targets[targets[image.target_id]].reward
+            if image.worth is None
+            else image.worth,
+        )
+        for image in state.on_board
+    )
 
 
 def sunlit_from(lit: Sunlight, from_s: float) -> Sunlight:

@@ -46,7 +46,7 @@ from planner_core.domain.orbit_ephemeris import (
 from planner_core.domain.outages import Outage
 from planner_core.domain.places import GroundStation, Target
 from planner_core.domain.quality import Curve, Quality
-from planner_core.domain.replan import Promise, Replan, Stability
+from planner_core.domain.replan import Flown, Promise, Replan, Stability
 from planner_core.domain.scenario import CollectAlignment, Dynamics, Scenario
 from planner_core.domain.spacecraft import (
     Agility,
@@ -71,6 +71,7 @@ __all__ = [
     "Curve",
     "Dynamics",
     "EphemerisSegment",
+    "Flown",
     "Forecast",
     "Frame",
     "GroundStation",

@@ -5,10 +5,17 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass, field
 from datetime import datetime
+from typing import Final, Literal
 
 from planner_core.domain.checks import require
 from planner_core.errors import InvalidScenario
 from planner_core.pins import PinnedAction
+
+Elements = Literal["same", "newest"]
+Outcome = Literal["executed", "failed", "skipped", "partial"]
+
+_NEARLY_S: Final = 1.0  # bookings are made in whole seconds
+_SAME_PASS_S: Final = 1200.0  # the next access of a place is an orbit away
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -17,12 +24,13 @@ class Promise:
 
     Attributes
     ----------
-    image_by
-        When the image must have ended, where that matters.
+    image_by, deliver_by
+        When the image must have ended, and when it must be on the ground, where that matters.
     """
 
     target_id: str
     image_by: datetime | None = None
+    deliver_by: datetime | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,6 +57,32 @@ class Stability:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Flown:
+    """An action that began before the horizon, and what became of it.
+
+    Attributes
+    ----------
+    outcome
+        ``failed`` draws its energy, and holds no data but ``mbit``; ``skipped`` does nothing.
+    mbit
+        What was taken or brought down. None for what was planned, of what failed nothing.
+    """
+
+    satellite_id: str
+    target_id: str | None = None
+    station_id: str | None = None
+    start: datetime
+    end: datetime
+    outcome: Outcome = "executed"
+    mbit: float | None = None
+
+    @property
+    def is_imaged(self) -> bool:
+        """Whether its target has an image by it."""
+        return self.target_id is not None and self.outcome in ("executed", "partial")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Replan:
     """A plan to go on from.
 
@@ -60,12 +94,25 @@ class Replan:
         What starts before it is flown, or as good as: it stays, and nothing is added to it.
     promises
         Targets that must be imaged.
+    elements
+        Of which elements the plan before was: of ``newest`` ones what is frozen stays at its
+        instants, and what comes later is the opportunity that starts nearest to it.
+    flown
+        What began before the horizon. States are carried to its start by these actions. The last
+        one of a satellite before its state says where that looked, if nothing else does.
     """
 
     base: tuple[PinnedAction, ...]
     freeze_until: datetime
     promises: tuple[Promise, ...] = ()
     stability: Stability = field(default_factory=Stability)
+    elements: Elements = "same"
+    flown: tuple[Flown, ...] = ()
+
+    @property
+    def near_s(self) -> float:
+        """How far from an action of the base the same opportunity may start now."""
+        return _SAME_PASS_S if self.elements == "newest" else _NEARLY_S
 
     def check(
         self,
@@ -92,6 +139,17 @@ class Replan:
             _known(action.satellite_id, satellite_ids, "satellite", f"{at}/satellite_id")
             _known(action.target_id, target_ids, "target", f"{at}/target_id")
             _known(action.station_id, station_ids, "ground_station", f"{at}/station_id")
+        for i, flown in enumerate(self.flown):
+            at = f"/replan/flown/{i}"
+            if (flown.target_id is None) == (flown.station_id is None) or flown.end <= flown.start:
+                raise InvalidScenario(
+                    "value_out_of_range",
+                    "Name either the target or the station, and an end later than the start.",
+                    pointer=at,
+                )
+            _known(flown.satellite_id, satellite_ids, "satellite", f"{at}/satellite_id")
+            _known(flown.target_id, target_ids, "target", f"{at}/target_id")
+            _known(flown.station_id, station_ids, "ground_station", f"{at}/station_id")
         for i, promise in enumerate(self.promises):
             _known(promise.target_id, target_ids, "target", f"/replan/promises/{i}/target_id")
 

@@ -13,6 +13,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from datetime import datetime
 from itertools import groupby
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,6 +34,7 @@ from planner_core.problem import (
     RULED_OUT,
     Blocked,
     Bools,
+    Ints,
     Kept,
     Longs,
     Opportunities,
@@ -64,10 +66,9 @@ def pinned_problem(scenario: Scenario, problem: Problem) -> Problem:
         return problem
     pins, table = scenario.pins, problem.opportunities
     whole = table if problem.pointing is None else whole_accesses(problem)
-    kept = [row_of(scenario, whole, pin, f"/pins/keep/{i}") for i, pin in enumerate(pins.keep)]
-    skipped = [
-        rows_skipped(scenario, whole, pin, f"/pins/skip/{i}") for i, pin in enumerate(pins.skip)
-    ]
+    named = Named(scenario, whole, problem.origin)
+    kept = [row_of(named, pin, f"/pins/keep/{i}") for i, pin in enumerate(pins.keep)]
+    skipped = [rows_skipped(named, pin, f"/pins/skip/{i}") for i, pin in enumerate(pins.skip)]
     if problem.pointing is not None:
         accesses = [table.access[rows] for rows in skipped]
         problem, kept = with_pinned_starts(scenario, problem, kept)
@@ -106,7 +107,7 @@ def with_frozen(scenario: Scenario, problem: Problem, pinned: Pinned, replan: Re
             *(
                 Kept(row=row, pointer=f"/replan/base/{i}")
                 for i, row in rows.items()
-                if pinned.is_frozen(table.start_s[row]) and not in_outage[row]
+                if pinned.is_frozen(_start_s(scenario, replan, i)) and not in_outage[row]
             ),
         ),
     )
@@ -129,6 +130,8 @@ def rows_of_base(scenario: Scenario, table: Opportunities, replan: Replan) -> di
     for i, action in enumerate(replan.base):
         assert action.satellite_id is not None
         assert action.start is not None
+        if action.start < scenario.horizon.start:
+            continue
         kind, place = (
             (COLLECT, targets[action.target_id])
             if action.target_id is not None
@@ -137,9 +140,15 @@ def rows_of_base(scenario: Scenario, table: Opportunities, replan: Replan) -> di
         start_s = scenario.horizon.offset_s(action.start)
         rows = there.get((satellites[action.satellite_id], kind, place), [])
         nearest = min(rows, key=lambda row: abs(table.start_s[row] - start_s), default=None)
-        if nearest is not None and abs(table.start_s[nearest] - start_s) <= _NEARLY_S:
+        if nearest is not None and abs(table.start_s[nearest] - start_s) <= replan.near_s:
             found[i] = nearest
     return found
+
+
+def _start_s(scenario: Scenario, replan: Replan, number: int) -> float:
+    start = replan.base[number].start
+    assert start is not None
+    return scenario.horizon.offset_s(start)
 
 
 def resolve(scenario: Scenario, kept: Sequence[int], skipped: Sequence[Sequence[int]]) -> Pinned:
@@ -183,15 +192,28 @@ def _outages(scenario: Scenario) -> Iterator[Blocked]:
         )
 
 
-def rows_skipped(
-    scenario: Scenario, table: Opportunities, pin: PinnedAction, pointer: str
-) -> list[int]:
+class Named(NamedTuple):
+    """Opportunities by the names that operators give them.
+
+    Attributes
+    ----------
+    origin
+        The number of each, where that is not its row.
+    """
+
+    scenario: Scenario
+    table: Opportunities
+    origin: Ints | None = None
+
+
+def rows_skipped(named: Named, pin: PinnedAction, pointer: str) -> list[int]:
     """Return the opportunities that a skip means: of a span all that overlap it.
 
     A span that is some opportunity's own, give or take a second, means that one alone; of a pass
     it means every part.
     """
-    nearest = row_of(scenario, table, pin, pointer)
+    scenario, table = named.scenario, named.table
+    nearest = row_of(named, pin, pointer)
     if pin.start is None or pin.end is None:
         return _meant_by(table, nearest, pin)
     start_s, end_s = (scenario.horizon.offset_s(instant) for instant in (pin.start, pin.end))
@@ -204,12 +226,13 @@ def rows_skipped(
     overlaps = (table.start_s < end_s - TIME_TOLERANCE_S) & (
         table.end_s > start_s + TIME_TOLERANCE_S
     )
-    rows: list[int] = np.flatnonzero(_named_by(scenario, table, pin) & overlaps).tolist()
+    rows: list[int] = np.flatnonzero(_named_by(named, pin) & overlaps).tolist()
     return rows or _meant_by(table, nearest, pin)
 
 
-def _named_by(scenario: Scenario, table: Opportunities, pin: PinnedAction) -> Bools:
+def _named_by(named: Named, pin: PinnedAction) -> Bools:
     """Return the opportunities that are of the satellite, target or station that a pin names."""
+    scenario, table = named.scenario, named.table
     fits = np.ones(len(table), dtype=np.bool_)
     if pin.satellite_id is not None:
         ids = [satellite.id for satellite in scenario.satellites]
@@ -221,14 +244,16 @@ def _named_by(scenario: Scenario, table: Opportunities, pin: PinnedAction) -> Bo
         ids = [station.id for station in scenario.ground_stations]
         fits &= (table.kind == CONTACT) & (table.place == ids.index(pin.station_id))
     if pin.opportunity_id is not None:
-        fits &= np.arange(len(table)) == _number_of(pin.opportunity_id)
+        numbers = np.arange(len(table)) if named.origin is None else named.origin
+        fits &= numbers == _number_of(pin.opportunity_id)
     return fits
 
 
-def row_of(scenario: Scenario, table: Opportunities, pin: PinnedAction, pointer: str) -> int:
+def row_of(named: Named, pin: PinnedAction, pointer: str) -> int:
     """Return the opportunity that an operator's words mean."""
-    fits = _named_by(scenario, table, pin)
-    named = np.flatnonzero(fits)
+    scenario, table = named.scenario, named.table
+    fits = _named_by(named, pin)
+    like_it = np.flatnonzero(fits)
     start_s = 0.0
     if pin.start is not None:
         start_s = scenario.horizon.offset_s(pin.start)
@@ -237,7 +262,7 @@ def row_of(scenario: Scenario, table: Opportunities, pin: PinnedAction, pointer:
     rows = np.flatnonzero(fits)
     if len(rows) == 0:
         raise InvalidScenario(
-            "pin_without_opportunity", _why_none(scenario, table, named, pin), pointer=pointer
+            "pin_without_opportunity", _why_none(scenario, table, like_it, pin), pointer=pointer
         )
     if pin.start is None and len(rows) > 1 and _are_parts(table, rows):
         return int(rows[np.argmax(table.end_s[rows] - table.start_s[rows])])

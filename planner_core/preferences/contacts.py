@@ -84,7 +84,7 @@ def _by_gap(view: View, satellite: SatelliteProblem, taken: Ints) -> Iterator[li
     on_board_s = [
         min(0.0, one.collected_s)
         for one in problem.on_board
-        if one.satellite == index and one.amount > 0.0
+        if one.satellite == index and one.is_waiting
     ]
     ends_s = np.sort(np.append(table.end_s[images], on_board_s))
     gap = np.searchsorted(taken_s, free_s, side="right")

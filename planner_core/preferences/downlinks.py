@@ -13,7 +13,7 @@ def with_more_downlinks(problem: Problem, plan: Plan, budget: Budget) -> Plan:
     """Return the plan with contacts that fit beside its images and let them earn more."""
     view = View.of(problem, plan)
     images = view.timeline.collected.values()
-    old = [one for one in view.timeline.brought_down if problem.on_board[one.image].amount > 0.0]
+    old = [one for one in view.timeline.brought_down if problem.on_board[one.image].is_waiting]
     are_down = all(i.is_downlinked for i in images) and all(i.delivered_s is not None for i in old)
     is_settled = problem.objective.half_life_s is None and are_down
     if not problem.counts_delivery or not view.timeline.is_valid or is_settled:

@@ -58,7 +58,7 @@ def most_on_board(problem: Problem) -> float:
     best: dict[int, float] = {}
     for index, satellite in enumerate(problem.satellites):
         own = [image for image in problem.on_board if image.satellite == index]
-        if not own or not problem.counts_delivery:
+        if all(image.worth == 0.0 for image in own) or not problem.counts_delivery:
             continue
         amounts = np.array([image.amount for image in own])
         down_s = _earliest_down_s(problem, satellite, np.cumsum(amounts))

@@ -143,6 +143,8 @@ class ImageOnBoard:
 
     Attributes
     ----------
+    target
+        -1 for data of no image, which stands in the queue as well.
     amount
         What is left of it, in recorder capacities; 0 where it is on the ground already.
     collected_s
@@ -156,6 +158,11 @@ class ImageOnBoard:
     amount: float
     collected_s: float
     worth: float
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether it is an image, and not on the ground yet."""
+        return self.target >= 0 and self.amount > 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -116,7 +116,7 @@ def explain(
 def _imaged_before(problem: Problem, timeline: Timeline, target: int) -> TargetOutcome:
     """Return the outcome of a target with an image from before the horizon."""
     images = [image for image in timeline.brought_down if image.target == target]
-    is_down = any(
+    is_down = problem.use_resources and any(
         image.delivered_s is not None or problem.on_board[image.image].amount == 0.0
         for image in images
     )

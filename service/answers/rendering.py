@@ -226,7 +226,7 @@ class Documents(Wording):
         capacity_mbit = self.scenario.satellites[index].resources.recorder_capacity_mbit
         for one in self._timeline.brought_down:
             image, down_s = self.problem.on_board[one.image], one.delivered_s
-            if image.satellite == index:
+            if image.satellite == index and image.target >= 0:
                 yield OnBoardOut(
                     target_id=self.problem.target_ids[image.target],
                     collected_at=self.instant(image.collected_s),
