@@ -1,89 +1,94 @@
-"""The constants of ``certified``, found by their form, halved and doubled.
+"""The constants of ``certified``: the fields of its tuning, each halved and doubled.
 
-A constant is a number, or a few, under a name in capitals in a module of the engine. One that a
-compiled kernel reads is frozen into it and is left out, as are limits of memory and tolerances of
-rounding, which are for safety, sizes of arrays, and signs that stand for something.
+A field that compiled kernels read is frozen into them and is left out.
 """
 
 from __future__ import annotations
 
 import importlib
 import pkgutil
-import re
 from collections.abc import Iterator, Mapping
+from dataclasses import fields
 from types import ModuleType
 from typing import Any, Final
 
-from numba.core.dispatcher import Dispatcher
+from benchmarks.ablation.strategies import Change
+from planner_core import certified
+from planner_core.certified.tuning import TUNING, Tuning
 
-from benchmarks.ablation.strategies import Change, Patch
-
-_ENGINE: Final = "planner_core.certified"
-_CAPITALS: Final = re.compile(r"_?[A-Z][A-Z_]*")
 FACTORS: Final = {"half": 0.5, "double": 2.0}
-_LEFT_OUT: Final = frozenset({
-    "TOLERANCE", "_TOLERANCE", "CHAIN_TOLERANCE", "_ROUNDING", "_CLEAR", "_INTEGER", "_SLACK",
-    "_MAX_CELLS", "_MAX_LOG", "_MOST_KEPT", "_NUM_BITS", "_LONGEST_S", "_REPORT_EVERY_S", "_POLL_S",
-    "FREE", "ELSEWHERE", "FIXED", "INFINITE", "_STARTS", "_TOLD", "VERSION", "LABELS", "MAX_NODES",
-    "_SLOTS", "_SHARES",
-})  # fmt: skip
-_FAMILIES: Final[Mapping[str, Mapping[str, float]]] = {
-    "drivers.agility_only": {"agility-500": 10.0, "spaced-1000": 12.0},
-    "drivers.resources": {"paper-200": 10.0, "weights-1000": 15.0},
-    "drivers.resource_steps": {"paper-200": 10.0, "weights-1000": 15.0},
-    "drivers.resource_fleet": {"fleet-stations-4x2000": 40.0},
-    "drivers.fleet": {"fleet-2x500": 10.0, "fleet-4x2000": 6.0},
-    "drivers.continuous": {"continuous-1000": 12.0},
-    "lns.continuous": {"continuous-1000": 12.0},
-    "lns.insertion": {"continuous-1000": 12.0},
-    "lns.alternating": {"fleet-stations-4x2000": 30.0},
-    "lns.choices": {"paper-200": 10.0, "weights-1000": 15.0},
-    "lns.fleet_start": {"fleet-4x2000": 6.0},
-    "lns.resource": {"fleet-stations-4x2000": 30.0},
-    "lns.stream": {"fleet-2x500": 10.0},
-    "lns": {"agility-500": 10.0, "fleet-4x2000": 6.0},
-    "mip.contact_sets": {"paper-200": 10.0, "weights-1000": 15.0},
-    "mip.program_search": {"fleet-stations-4x2000": 40.0},
-    "mip.solution_pool": {"fleet-2x500": 10.0},
-    "mip": {"agility-500": 10.0, "agility-1000": 16.0},
-    "multipliers.resources": {"paper-200": 10.0, "weights-1000": 15.0},
-    "multipliers.energy": {"fleet-stations-4x2000": 30.0},
-    "multipliers.elementary": {"spaced-1000": 12.0},
-    "multipliers.chains": {"continuous-1000": 12.0},
-    "multipliers.ascent": {"agility-500": 10.0, "fleet-4x2000": 6.0, "spaced-1000": 12.0},
-    "multipliers.paths": {"agility-500": 10.0, "fleet-4x2000": 6.0},
-    "multipliers": {"agility-500": 10.0, "agility-1000": 16.0},
-    "proofs.continuous": {"continuous-1000": 12.0},
-    "proofs": {"paper-200": 10.0, "weights-1000": 15.0},
-    "dp": {"paper-200": 10.0, "weights-1000": 15.0},
+_ONE: Final = {"paper-500": 12.0, "weights-1000": 15.0}
+_AGILITY: Final = {"agility-1000": 12.0}
+_PASSES: Final = {"spaced-1000": 12.0}
+_FREE: Final = {"continuous-1000": 12.0}
+_FLEET: Final = {"fleet-4x2000": 8.0}
+_STATIONS: Final = {"fleet-stations-4x2000": 30.0}
+_ROOMS: Final[Mapping[str, Mapping[str, float]]] = {
+    "drivers.agility_only": {**_AGILITY, **_PASSES},
+    "drivers.resources": _ONE,
+    "drivers.resource_steps": _ONE,
+    "drivers.resource_fleet": _STATIONS,
+    "drivers.fleet": _FLEET,
+    "drivers.continuous": _FREE,
+    "drivers.commitments": _STATIONS,
+    "lns.alternating": {**_ONE, **_STATIONS},
+    "lns.choices": _ONE,
+    "lns.continuous_search": _FREE,
+    "lns.fleet_start": _FLEET,
+    "lns.insertion_with_resources": _FREE,
+    "lns.resource_search": {**_ONE, **_STATIONS},
+    "lns.search": {**_AGILITY, **_FLEET},
+    "mip.contact_sets": _ONE,
+    "mip.program_search": _STATIONS,
+    "mip.restricted_master": _AGILITY,
+    "mip.solution_pool": {**_FLEET, **_STATIONS},
+    "multipliers.ascent": {**_FLEET, **_PASSES},
+    "multipliers.chains": _FREE,
+    "multipliers.elementary": _PASSES,
+    "multipliers.energy": _STATIONS,
+    "multipliers.paths": {**_AGILITY, **_FLEET},
+    "multipliers.resources": _ONE,
+    "proofs.continuous": _FREE,
+    "proofs.lagrangian": _AGILITY,
+    "proofs.resource_bound": _ONE,
+    "proofs.shares": _ONE,
 }
-"""Where the constants of a module act; the longest beginning of its name counts."""
+"""Where what a module reads acts: families and CPU seconds."""
 
 
 def constants() -> dict[str, Change]:
-    """Return half and double of each constant, by module, name and factor."""
-    changes: dict[str, Change] = {}
+    """Return half and double of each constant, by name and factor."""
+    readers: dict[str, set[str]] = {}
     for module in modules():
-        short = module.__name__.removeprefix(f"{_ENGINE}.")
-        families = _families_of(short)
-        frozen = _read_by_kernels(module)
-        for name, value in vars(module).items():
-            is_constant = _CAPITALS.fullmatch(name) and _is_number(value) and name not in _LEFT_OUT
-            if not is_constant or name in frozen or not _is_own(module, name) or not families:
-                continue
-            for label, factor in FACTORS.items():
-                changed = scaled(value, factor)
-                if changed != value:
-                    patch = Patch(module=module.__name__, name=name, value=changed)
-                    changes[f"{short} {name} {label}"] = Change(patches=(patch,), families=families)
+        for name in fields_read_by(module):
+            readers.setdefault(name, set()).add(module.__name__.split(".", 2)[2])
+    changes = {}
+    for each in fields(Tuning):
+        rooms = sorted(readers.get(each.name, set()) & set(_ROOMS))
+        families = {family: s for room in rooms for family, s in _ROOMS[room].items()}
+        for label, factor in FACTORS.items():
+            value = getattr(TUNING, each.name)
+            if families and (changed := scaled(value, factor)) != value:
+                changes[f"{each.name} {label}"] = Change(
+                    tuning={each.name: changed}, families=families, num_draws=1
+                )
     return changes
 
 
 def modules() -> Iterator[ModuleType]:
     """Yield the engine's modules."""
-    engine = importlib.import_module(_ENGINE)
-    for found in pkgutil.walk_packages(engine.__path__, f"{_ENGINE}."):
+    for found in pkgutil.walk_packages(certified.__path__, f"{certified.__name__}."):
         yield importlib.import_module(found.name)
+
+
+def fields_read_by(module: ModuleType) -> set[str]:
+    """Return which fields of the tuning a module reads whenever it runs.
+
+    What it reads once, for its kernels, it keeps under a name in capitals.
+    """
+    source: str = module.__loader__.get_source(module.__name__)  # type: ignore[union-attr]  # has one
+    running = "\n".join(line for line in source.splitlines() if line[:1].isspace())
+    return {each.name for each in fields(Tuning) if f"TUNING.{each.name}" in running}
 
 
 def scaled(value: Any, factor: float) -> Any:
@@ -94,29 +99,7 @@ def scaled(value: Any, factor: float) -> Any:
     if isinstance(value, tuple):
         return tuple(scaled(each, factor) for each in value)
     if isinstance(value, int):
-        return max(1, round(value * factor))
+        return max(1, round(value * factor)) if value else 0
     if 0.5 < value < 1.0:
         return 1.0 - (1.0 - value) / factor
     return value * factor
-
-
-def _is_number(value: Any) -> bool:
-    if isinstance(value, tuple):
-        return len(value) > 0 and all(map(_is_number, value))
-    return isinstance(value, int | float) and not isinstance(value, bool)
-
-
-def _is_own(module: ModuleType, name: str) -> bool:
-    """Return whether a module makes a constant itself, and did not import it."""
-    source = module.__loader__.get_source(module.__name__)  # type: ignore[union-attr]  # ours have one
-    return re.search(rf"^{name}\b[^=\n]*=", source, re.MULTILINE) is not None
-
-
-def _read_by_kernels(module: ModuleType) -> set[str]:
-    kernels = (value for value in vars(module).values() if isinstance(value, Dispatcher))
-    return {name for kernel in kernels for name in kernel.py_func.__code__.co_names}
-
-
-def _families_of(module: str) -> Mapping[str, float]:
-    fitting = [start for start in _FAMILIES if module.startswith(start)]
-    return _FAMILIES[max(fitting, key=len)] if fitting else {}

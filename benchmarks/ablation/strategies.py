@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import reduce
 from typing import Any, Final
+
+from planner_core.certified.tuning import tune
 
 DRIVERS: Final = "planner_core.certified.drivers"
 NOTHING: Final = ""
@@ -48,19 +50,28 @@ class Patch:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Change:
-    """What is patched, and on which families of the suite that may show.
+    """What is changed, and on which families of the suite that may show.
 
     Attributes
     ----------
     families
         Names of families and the CPU seconds of a run.
+    patches, tuning
+        Names in modules that stand for something else, and other values of the tuning.
     num_draws
         How many missions of each family are planned, each with a seed of its own.
     """
 
-    patches: tuple[Patch, ...]
     families: Mapping[str, float]
+    patches: tuple[Patch, ...] = ()
+    tuning: Mapping[str, Any] = field(default_factory=dict)
     num_draws: int = 2
+
+    def apply(self) -> None:
+        """Put all of it in force, for the rest of this process."""
+        for patch in self.patches:
+            patch.apply()
+        tune(**self.tuning)
 
 
 def _nothing(*_: object, **__: object) -> None:
@@ -83,10 +94,6 @@ def _off(module: str, name: str, value: Callable[..., Any] = _nothing) -> tuple[
     return (Patch(module=module, name=name, value=value),)
 
 
-def _set(module: str, name: str, value: object) -> tuple[Patch, ...]:
-    return (Patch(module=module, name=name, value=value),)
-
-
 _RESOURCES: Final = {
     "paper-200": 10.0, "paper-500": 15.0, "weights-1000": 15.0, "paper-1000": 12.0,
 }  # fmt: skip
@@ -101,9 +108,7 @@ STRATEGIES: Final[Mapping[str, Change]] = {
     "turns of windows and choices": Change(
         patches=_off(f"{DRIVERS}.resource_steps", "ResourceSearch.search"), families=_RESOURCES
     ),
-    "relaxations of a fleet's contacts": Change(
-        patches=_set(f"{DRIVERS}.resource_fleet", "_MOST_RELAXED", 0), families=_STATIONS
-    ),
+    "relaxations of a fleet's contacts": Change(tuning={"most_relaxed": 0}, families=_STATIONS),
     "program search": Change(
         patches=_off(f"{DRIVERS}.resource_fleet", "ProgramSearch", _Idle), families=_STATIONS
     ),

@@ -76,8 +76,8 @@ def forked(problem: Problem, case: Case, change: Change | None) -> Result | str:
 
 def _answer(connection: Connection, problem: Problem, case: Case, change: Change | None) -> None:
     try:
-        for patch in change.patches if change else ():
-            patch.apply()
+        if change:
+            change.apply()
         connection.send(solve(problem, case.seed, case.budget_s))
     except Exception as error:  # noqa: BLE001 - a strategy may be needed: that is a result
         connection.send(f"{type(error).__name__}: {error}")

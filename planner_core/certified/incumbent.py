@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Final
 
 import numpy as np
 
@@ -14,15 +13,11 @@ from planner_core.certified.proofs.bound import (
     reward_unit,
     rounded_bound,
 )
+from planner_core.certified.tolerances import LEAST_BOUND, SAME
 from planner_core.problem import CONTACT, Problem
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import Timeline, replay
 from planner_core.solvers.base import Solution
-
-TOLERANCE: Final = 1e-6
-"""Share of the reward to which a plan is optimal where rewards are not whole."""
-
-_LEAST: Final = 4e-9  # rounding of a bound, where nearly nothing can be earned
 
 
 def is_optimal(reward: float, bound: float, unit: float) -> bool:
@@ -35,7 +30,7 @@ def is_optimal(reward: float, bound: float, unit: float) -> bool:
     unit
         An amount of which what any plan earns is a multiple; 0 where there is none.
     """
-    return bound < reward + max(unit, TOLERANCE * reward, _LEAST)
+    return bound < reward + max(unit, SAME * reward, LEAST_BOUND)
 
 
 def _in_its_best_form(problem: Problem, plan: Plan) -> tuple[Plan, Timeline]:
@@ -119,7 +114,7 @@ class Incumbent:
 
         Refuting it must suffice for "optimal", so it stays well within the tolerance.
         """
-        return self.reward + max(self.unit, 0.5 * TOLERANCE * self.reward, 1e-9)
+        return self.reward + max(self.unit, 0.5 * SAME * self.reward, 1e-9)
 
     def is_within(self, gap: float, reward: float = 0.0) -> bool:
         """Return whether the plan, or one worth ``reward``, is as close to the bound."""

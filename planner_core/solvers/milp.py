@@ -13,7 +13,7 @@ from typing import ClassVar, Final
 import numpy as np
 
 from planner_core.budget import Budget, Progress
-from planner_core.certified.drivers.agility_only import MOST_PAIRS, Effort
+from planner_core.certified.drivers.agility_only import Effort
 from planner_core.certified.drivers.fleet import solve_without_resources
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.search import improved
@@ -22,6 +22,7 @@ from planner_core.certified.mip.highs import Engine, Outcome, Watch
 from planner_core.certified.mip.model import Formulation, PlanProgram, plan_program
 from planner_core.certified.mip.program import Rows
 from planner_core.certified.proofs.bound import Bound
+from planner_core.certified.sizes import MAX_PAIRS
 from planner_core.precedence.relation import is_transitive, num_near_pairs
 from planner_core.problem import COLLECT, Floats, Problem
 from planner_core.problem.plan import Plan
@@ -108,7 +109,7 @@ class Milp:
             best.offer(improved(problem, best.plan, self.moves_per_task, budget, seed))
         if len(problem.opportunities) == 0 or budget.is_spent():
             return best.solution()
-        if num_near_pairs(problem) > MOST_PAIRS:
+        if num_near_pairs(problem) > MAX_PAIRS:
             budget.report(
                 Progress(
                     phase="solve",

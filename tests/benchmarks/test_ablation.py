@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from benchmarks.ablation.trials import Trial
 from benchmarks.suite import rows
 from benchmarks.suite.engine import Case, Result
 from benchmarks.suite.families import FAMILIES, Family
+from planner_core.certified.tuning import TUNING, Tuning, tuned
 
 PLAIN = Trial(
     family="paper-200",
@@ -46,7 +47,8 @@ def few() -> Iterator[str]:
 @pytest.mark.parametrize("name", STRATEGIES)
 def test_every_strategy_is_where_it_is_switched_off(name: str) -> None:
     change = STRATEGIES[name]
-    assert change.patches
+    assert change.patches or change.tuning
+    assert all(getattr(TUNING, name) != value for name, value in change.tuning.items())
     for patch in change.patches:
         owner, last = patch.place
         assert getattr(owner, last) != patch.value
@@ -58,17 +60,27 @@ def test_a_name_that_is_gone_is_an_error() -> None:
         Patch(module="planner_core.run", name="no_such", value=0).apply()
 
 
-def test_constants_are_found_and_kernels_are_left_alone() -> None:
+def test_all_constants_are_tried_but_those_that_only_kernels_read() -> None:
     found = constants()
-    assert len(found) > 40
     for change in found.values():
-        (patch,) = change.patches
-        owner, last = patch.place
-        assert getattr(owner, last) != patch.value
-        assert not last.endswith(("TOLERANCE", "_ROUNDING"))
+        ((name, value),) = change.tuning.items()
+        assert getattr(TUNING, name) != value
+        assert change.families
         assert set(change.families) <= set(FAMILIES)
-    # Frozen into the kernel that makes moves: a patch would change nothing.
-    assert not any("_FOR_FREE_TARGET" in name for name in found)
+    tried = {name.rpartition(" ")[0] for name in found}
+    # Frozen into the kernels that make moves: another value would change nothing.
+    assert {each.name for each in fields(Tuning)} - tried == {"aimed", "tie"}
+    assert {name.rpartition(" ")[2] for name in found} == {"half", "double"}
+
+
+def test_a_change_of_the_tuning_is_in_force_where_it_is_applied(few: str) -> None:
+    change = Change(tuning={"tries": 7}, families={few: 9.0})
+    with tuned(tries=TUNING.tries):
+        change.apply()
+        assert TUNING.tries == 7
+    assert TUNING.tries == Tuning().tries
+    with pytest.raises(AttributeError, match="no_such"):
+        Change(tuning={"no_such": 1}, families={}).apply()
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,6 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget, Progress, Termination
-from planner_core.certified.incumbent import TOLERANCE
 from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.proofs.certificate import (
     Certificate,
@@ -21,6 +20,7 @@ from planner_core.certified.proofs.certificate import (
     is_refuted,
 )
 from planner_core.certified.proofs.documents import from_json, is_proven, to_json
+from planner_core.certified.tolerances import SAME
 from planner_core.domain import Agility
 from planner_core.problem import COLLECT, Problem
 from planner_core.referee.replay import replay
@@ -68,7 +68,7 @@ def assert_proven(problem: Problem, solution: Solution, best: float) -> None:
     assert timeline.reward <= best + slack
     assert solution.bound >= best - slack
     if solution.termination is Termination.OPTIMAL:
-        assert timeline.reward >= best * (1.0 - TOLERANCE) - slack
+        assert timeline.reward >= best * (1.0 - SAME) - slack
     if solution.proven.is_elementary:
         assert is_proven(problem, solution.proven)
     elif solution.proven.proof == "lagrangian":
@@ -183,7 +183,7 @@ def test_crowded_problems_are_proven_and_the_proof_checks_out(
     solution = Certified(gap=gap).solve(problem, Budget(), seed)
     reward = replay(problem, solution.plan).reward
     assert solution.bound is not None
-    assert solution.bound - reward <= max(gap, TOLERANCE) * solution.bound + 1e-9
+    assert solution.bound - reward <= max(gap, SAME) * solution.bound + 1e-9
     assert solution.termination in {Termination.OPTIMAL, Termination.GAP_REACHED}
     assert_proven(problem, solution, reward)
 

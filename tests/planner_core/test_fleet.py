@@ -15,6 +15,7 @@ from planner_core.certified.lns.fleet_start import priced_start
 from planner_core.certified.mip.solution_pool import PlanPool
 from planner_core.certified.multipliers.paths import ascent_on_paths
 from planner_core.certified.proofs.documents import from_json, is_proven, to_json
+from planner_core.certified.tuning import tuned
 from planner_core.domain import Agility
 from planner_core.precedence.network import heaviest_paths, network_of
 from planner_core.precedence.relation import direct_precedence
@@ -104,10 +105,10 @@ def test_what_streams_are_worth_together_is_taken(monkeypatch: pytest.MonkeyPatc
     assert search.best.reward >= replay(problem, best).reward
 
 
-def test_a_large_fleet_is_planned_in_one_stream(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_large_fleet_is_planned_in_one_stream() -> None:
     problem = fleet(4)
-    monkeypatch.setattr("planner_core.certified.drivers.fleet._SMALL", 10)
-    solution = Certified().solve(problem, Budget(), 0)
+    with tuned(small_fleet=10):
+        solution = Certified().solve(problem, Budget(), 0)
     timeline = replay(problem, solution.plan)
     assert timeline.is_valid
     assert solution.proven is not None
@@ -179,12 +180,12 @@ def test_paths_of_a_fleet_need_no_table_of_pairs(monkeypatch: pytest.MonkeyPatch
         raise AssertionError
 
     monkeypatch.setattr("planner_core.precedence.relation._fill_bits", refuse)
-    monkeypatch.setattr("planner_core.certified.drivers.fleet._SMALL", 0)
     problem = random_problem(
         5, use_resources=False, num_collects=240, num_targets=90, num_satellites=8
     )
     effort = Effort(moves_per_task=5.0, max_rounds=0)
-    solution = solve_without_resources(problem, Budget(), 0, 0.0, effort)
+    with tuned(small_fleet=0):
+        solution = solve_without_resources(problem, Budget(), 0, 0.0, effort)
     assert solution.proven is not None
     assert 0.0 < replay(problem, solution.plan).reward <= solution.proven.value
     with pytest.raises(AssertionError):

@@ -10,9 +10,10 @@ import pytest
 from planner_core.budget import Budget, Progress, Termination
 from planner_core.certified.drivers.agility_only import FreeSearch
 from planner_core.certified.drivers.fleet import FleetSearch
-from planner_core.certified.incumbent import TOLERANCE, Incumbent, is_optimal
+from planner_core.certified.incumbent import Incumbent, is_optimal
 from planner_core.certified.mip.highs import Engine, Outcome
 from planner_core.certified.proofs.bound import Bound
+from planner_core.certified.tolerances import SAME
 from planner_core.problem import COLLECT, Kept, Pinned, Problem
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
@@ -20,7 +21,7 @@ from planner_core.solvers.base import Solver
 from planner_core.solvers.registry import Certified, Milp
 from tests.planner_core.problems import Task, make_problem, random_problem
 
-BEYOND = 5.0 * TOLERANCE  # what is missing, as a share: less than once counted as nothing
+BEYOND = 5.0 * SAME  # what is missing, as a share: less than once counted as nothing
 
 
 def problem_with_rewards(*, use_resources: bool) -> Problem:
@@ -34,7 +35,7 @@ def problem_with_rewards(*, use_resources: bool) -> Problem:
     return replace(problem, pinned=Pinned(kept=(Kept(row=0, pointer="/pins/keep/0"),)))
 
 
-@pytest.mark.parametrize("share", [0.5 * TOLERANCE, BEYOND])
+@pytest.mark.parametrize("share", [0.5 * SAME, BEYOND])
 @pytest.mark.parametrize("solver", [Milp(formulation="pairwise"), Certified()])
 def test_what_highs_leaves_open_is_not_called_optimal(
     solver: Solver, share: float, monkeypatch: pytest.MonkeyPatch
@@ -54,19 +55,19 @@ def test_what_highs_leaves_open_is_not_called_optimal(
     reward = replay(problem, solution.plan).reward
     assert solution.bound == pytest.approx(reward * (1.0 + share), abs=1e-8)
     is_proven = solution.termination is Termination.OPTIMAL
-    assert is_proven == is_optimal(reward, solution.bound, 0.0) == (share < TOLERANCE)
+    assert is_proven == is_optimal(reward, solution.bound, 0.0) == (share < SAME)
 
 
 def test_searches_agree_on_what_is_optimal() -> None:
     problem = replace(problem_with_rewards(use_resources=False), pinned=Pinned())
     reward = replay(problem, Plan.of(problem, range(3))).reward
-    for share in (0.5 * TOLERANCE, BEYOND):
+    for share in (0.5 * SAME, BEYOND):
         best = Incumbent(problem, Budget(), 0.0, Plan.of(problem, range(3)))
         best.bound = Bound(value=reward * (1.0 + share), proof="milp")
         searches = (FreeSearch(best, 0), FleetSearch(best, 0))
-        assert {search.best.is_optimal for search in searches} == {share < TOLERANCE}
+        assert {search.best.is_optimal for search in searches} == {share < SAME}
         ended = {search.best.solution().termination for search in searches}
-        assert (Termination.OPTIMAL in ended) == (share < TOLERANCE)
+        assert (Termination.OPTIMAL in ended) == (share < SAME)
 
 
 def test_a_valid_plan_is_better_than_any_other_and_what_is_kept_is_in_it() -> None:

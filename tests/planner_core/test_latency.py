@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from planner_core.budget import Budget
 from planner_core.certified.dp import contact_layers
-from planner_core.certified.dp.contact_layers import PASSED, Layers, layers_of, most_by_contacts
+from planner_core.certified.dp.contact_layers import Layers, layers_of, most_by_contacts
 from planner_core.certified.dp.energy_labels import EnergyLevels, energy_levels
 from planner_core.certified.dp.resource_network import Network, network_of
 from planner_core.certified.drivers.latency import worth_with
@@ -22,6 +22,7 @@ from planner_core.certified.proofs.bound import rounded_bound
 from planner_core.certified.proofs.documents import from_json, is_proven, to_json
 from planner_core.certified.proofs.latency import latency_value
 from planner_core.certified.proofs.resource_bound import quick_bound
+from planner_core.certified.signs import NEVER
 from planner_core.certified.solver import Certified
 from planner_core.domain import Objective
 from planner_core.problem import COLLECT, CONTACT, Floats, Problem
@@ -62,7 +63,7 @@ def best_by_enumeration(
                     continue
                 onward = max(from_here(k, left, up) for up in range(layer, len(layers.first)))
                 best = max(best, float(weight[layer, k]) + onward)
-            elif weight[layer, k] != PASSED:
+            elif weight[layer, k] != NEVER:
                 best = max(best, float(weight[layer, k]) + from_here(k, left, layer))
         return best
 
@@ -79,13 +80,13 @@ def test_the_programme_finds_the_best_path(
     network = network_of(problem, problem.satellites[0])
     levels = energy_levels(network, per_collect)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(contact_layers, "_MOST_LAYERS", num_groups)
+        patch.setattr(contact_layers, "MAX_LAYERS", num_groups)
         layers = layers_of(network)
     rng = np.random.default_rng(seed)
     m = len(problem.opportunities)
     weight = rng.uniform(-0.3, 1.0, (len(layers.first), m))
     is_image = layers.number < 0
-    weight[:, is_image] = np.where(weight[:, is_image] < 0.0, PASSED, weight[:, is_image])
+    weight[:, is_image] = np.where(weight[:, is_image] < 0.0, NEVER, weight[:, is_image])
     own, num_own = np.empty((m, levels.width)), np.zeros(m, dtype=np.int64)
     value, path, layer = most_by_contacts(network, levels, layers, weight, own, num_own)
     assert value == pytest.approx(max(0.0, best_by_enumeration(network, levels, layers, weight)))
@@ -135,7 +136,7 @@ def test_no_plan_beats_any_prices(
 
 
 def test_groups_of_contacts_bound_all_plans_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(contact_layers, "_MOST_LAYERS", 2)
+    monkeypatch.setattr(contact_layers, "MAX_LAYERS", 2)
     rng = np.random.default_rng(0)
     for seed in range(60):
         problem = _problem(seed, "physical" if seed % 2 else "paper", num_contacts=4)

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from planner_core.budget import Budget
 from planner_core.certified.lns.resource_search import ResourceWindows
-from planner_core.certified.mip import solution_pool as plan_pool
 from planner_core.certified.mip.solution_pool import PlanPool, rows_of
+from planner_core.certified.tuning import tuned
 from planner_core.domain import Dynamics
 from planner_core.problem import COLLECT, Problem
 from planner_core.problem.plan import Plan
@@ -104,16 +104,14 @@ def test_what_another_search_is_at_is_merged_only_if_it_is_the_best() -> None:
     assert set(rows_of(pool.plan)) <= {*rows_of(second), *rows_of(third)}
 
 
-def test_of_a_large_fleet_as_many_plans_are_merged_as_a_program_bears(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_of_a_large_fleet_as_many_plans_are_merged_as_a_program_bears() -> None:
     problem = large_problem(1)
     plans = plans_of(problem, 4, 300)
     best = sorted(plans, key=lambda plan: -replay(problem, plan).reward)[:2]
     offered = {row for plan in best for row in rows_of(plan)}
-    monkeypatch.setattr(plan_pool, "_MOST_OFFERED", len(offered))
     pool = PlanPool(problem, Budget(), 0)
     for plan in plans:
         pool.add(plan)
-    pool.merge()
+    with tuned(most_columns=len(offered)):
+        pool.merge()
     assert set(rows_of(pool.plan)) <= offered

@@ -11,13 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget
-from planner_core.certified.mip import program_search
 from planner_core.certified.mip.contact_sets import FixedContacts
 from planner_core.certified.mip.program_search import ProgramSearch
 from planner_core.certified.mip.solution_pool import PlanPool, rows_of
 from planner_core.certified.multipliers.energy import EnergyPaths, ascent_on_energy
 from planner_core.certified.multipliers.resources import PriceSearch
 from planner_core.certified.proofs.resource_bound import relaxations, whole_worth
+from planner_core.certified.tuning import tuned
 from planner_core.domain import Dynamics
 from planner_core.problem import CONTACT, Problem
 from planner_core.problem.plan import Plan
@@ -85,7 +85,6 @@ def test_small_problems_end_at_the_optimum() -> None:
 def test_a_program_of_some_satellites_leaves_the_others_alone(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(program_search, "_MOST_OFFERED", 1)
     monkeypatch.setattr(PlanPool, "merge", lambda _: None)
     gained = 0
     for seed in range(6):
@@ -97,7 +96,8 @@ def test_a_program_of_some_satellites_leaves_the_others_alone(
         search, pool = search_of(problem, Rule().solve(problem, Budget(), 0).plan, seed)
         for _ in range(20):
             before = pool.plan
-            search.turn()
+            with tuned(most_columns=1):
+                search.turn()
             changed = {*rows_of(before)} ^ {*rows_of(pool.plan)}
             assert len(set(problem.opportunities.satellite[list(changed)])) <= 1
             gained += pool.plan != before

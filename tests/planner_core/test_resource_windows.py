@@ -15,6 +15,7 @@ from planner_core.budget import Budget, Progress
 from planner_core.certified.lns.alternating import TurnSearch
 from planner_core.certified.lns.resource_search import ResourceWindows
 from planner_core.certified.proofs.documents import from_json, is_proven, to_json
+from planner_core.certified.tuning import tuned
 from planner_core.domain import Agility
 from planner_core.problem import Kept, Pinned
 from planner_core.problem.plan import Plan
@@ -127,10 +128,7 @@ def test_a_satellite_without_tasks_has_no_moves() -> None:
 def test_fleets_end_with_a_plan_and_a_bound_around_the_optimum(
     dynamics: Dynamics, seed: int, num_satellites: int
 ) -> None:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("planner_core.certified.drivers.resource_steps._LARGE", 3)
-        patch.setattr("planner_core.certified.drivers.resource_fleet._FLEET_PATIENCE", 5)
-        patch.setattr("planner_core.certified.drivers.resource_fleet._FLEET_ROUNDS", 40)
+    with tuned(large=3, fleet_patience=5, epochs=40):
         problem = _problem(seed, dynamics, num_satellites)
         best = best_reward(problem)
         reported: list[Progress] = []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import replace
 from typing import Final
 
@@ -12,6 +13,7 @@ import pytest
 
 from planner_core.budget import Budget, Progress, Termination
 from planner_core.certified.solver import Certified
+from planner_core.certified.tuning import tuned
 from planner_core.domain import Agility
 from planner_core.precedence.relation import is_transitive
 from planner_core.problem import Problem
@@ -96,14 +98,14 @@ FAMILIES: Final[dict[str, Callable[[], Problem]]] = {
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_a_budget_that_ends_at_any_stage_leaves_a_plan(
-    family: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    if family.startswith("large"):
-        monkeypatch.setattr("planner_core.certified.drivers.resource_steps._LARGE", 3)
-        monkeypatch.setattr("planner_core.certified.drivers.resource_fleet._FLEET_PATIENCE", 3)
-        monkeypatch.setattr("planner_core.certified.drivers.resource_fleet._FLEET_ROUNDS", 40)
+def test_a_budget_that_ends_at_any_stage_leaves_a_plan(family: str) -> None:
     problem = FAMILIES[family]()
+    is_large = family.startswith("large")
+    with tuned(large=3, fleet_patience=3, epochs=40) if is_large else nullcontext():
+        _stop_at_each_stage(problem)
+
+
+def _stop_at_each_stage(problem: Problem) -> None:
     whole = CountingBudget(None)
     Certified().solve(problem, whole, 0)
     assert len(whole.stops()) > _FIRST

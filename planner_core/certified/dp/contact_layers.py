@@ -12,7 +12,7 @@ recorders are left out.
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,13 +24,10 @@ from planner_core.certified.dp.energy_labels import (
     sink,
 )
 from planner_core.certified.dp.resource_network import Network
+from planner_core.certified.signs import NEVER
+from planner_core.certified.sizes import MAX_LAYERS
 from planner_core.jit import kernel
 from planner_core.problem import Floats, Ints, Longs
-
-_MOST_LAYERS: Final = 48
-
-PASSED: Final = -np.inf
-"""Weight of a task that no path needs to take."""
 
 
 @bundle
@@ -59,7 +56,7 @@ class Layers(NamedTuple):
 def layers_of(network: Network) -> Layers:
     """Return as many layers as there are contacts, up to a limit, and one more."""
     contact = np.flatnonzero(network.is_contact).astype(np.int32)
-    num_groups = min(len(contact), _MOST_LAYERS)
+    num_groups = min(len(contact), MAX_LAYERS)
     first = (np.arange(num_groups + 1) * len(contact)) // max(1, num_groups)
     group = np.full(len(network.place), -1, dtype=np.int32)
     number = group.copy()
@@ -100,7 +97,7 @@ def most_by_contacts(
     Parameters
     ----------
     weight
-        Worth of each task in each layer, of contacts in that of their own; ``PASSED`` for tasks
+        Worth of each task in each layer, of contacts in that of their own; ``NEVER`` for tasks
         that no path needs to take. Shape ``(num_layers, m)``.
     own, num_own
         Room to work in, of shapes ``(m, width)`` and ``(m,)`` at least.
@@ -173,7 +170,7 @@ def _take(
     """Extend all paths by a task; return how many entries its table has."""
     low = max(0, levels.floor[k] - base)
     high = levels.cap[k] - levels.cost[k] - base + 1
-    if weight == PASSED or high <= low:
+    if weight == NEVER or high <= low:
         return 0
     values = own[k, :high]
     values[:] = -np.inf

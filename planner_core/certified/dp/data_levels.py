@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from planner_core.bundles import bundle
 from planner_core.certified.dp.resource_network import Network
+from planner_core.certified.sizes import MAX_DATA_LEVELS
+from planner_core.certified.tolerances import LEVEL
 from planner_core.jit import kernel
 from planner_core.problem import Floats, Ints
-
-_MAX_LEVELS: Final = 1200
-_ROUNDING: Final = 1e-6  # of a level: tasks of "the same" length differ by as much
 
 
 @bundle
@@ -48,13 +47,13 @@ def data_levels(network: Network, per_collect: int, *, is_optimistic: bool) -> D
     highest = max(
         float(network.data_before.max(initial=0.0)), float(network.data_after.max(initial=0.0))
     )
-    unit = (highest - lowest) / (_MAX_LEVELS - 4) or 1.0
+    unit = (highest - lowest) / (MAX_DATA_LEVELS - 4) or 1.0
     if is_filling.any():
         # Halves of halves: what coarse levels prove, finer ones prove as well.
         finest = float(network.data_gain[is_filling].min()) / per_collect
         unit = finest * 2.0 ** np.ceil(np.log2(max(1.0, unit / finest)))
     sign = 1.0 if is_optimistic else -1.0
-    room = sign * (m + 1) * _ROUNDING
+    room = sign * (m + 1) * LEVEL
     base = int(np.floor(lowest / unit - abs(room)))
 
     def rounded(data: Floats | float, allowance: float) -> Ints:
@@ -71,7 +70,7 @@ def data_levels(network: Network, per_collect: int, *, is_optimistic: bool) -> D
         delivered = np.maximum(delivered, np.maximum.accumulate(emptied[::-1])[::-1])
     return DataLevels(
         num_levels=int(limit(highest)) + 1,
-        gain=rounded(network.data_gain, _ROUNDING),
+        gain=rounded(network.data_gain, LEVEL),
         floor=floor,
         before=limit(network.data_before),
         after=limit(network.data_after),
@@ -79,7 +78,7 @@ def data_levels(network: Network, per_collect: int, *, is_optimistic: bool) -> D
         least=np.asarray(
             unit * (np.arange(int(limit(highest)) + 1) + base - abs(room)), np.float64
         ),
-        start=int(rounded(network.data_start, _ROUNDING)) - base,
+        start=int(rounded(network.data_start, LEVEL)) - base,
         end=int(limit(network.data_end)),
     )
 

@@ -15,12 +15,14 @@ values only ever rise: the bound holds for any weights, and never exceeds that o
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from planner_core.bundles import bundle
+from planner_core.certified.signs import NOWHERE
+from planner_core.certified.sizes import MEMORY_BITS
 from planner_core.jit import borrowing, kernel
 from planner_core.precedence.arcs import ArcNetwork, arc_network_of
 from planner_core.problem import (
@@ -33,9 +35,6 @@ from planner_core.problem import (
 from planner_core.worth import surplus, weights
 
 Words = npt.NDArray[np.uint64]
-
-_NUM_BITS: Final = 128
-_NONE: Final = -2
 
 
 class Memory(NamedTuple):
@@ -87,7 +86,7 @@ def memory_of(problem: Problem, network: ArcNetwork) -> Memory:
 def _memory(group: Ints, first: Ints, last: Ints, is_twice: Bools) -> Memory:
     n = len(group)
     bit_of = np.full(len(first), -1, dtype=np.int32)
-    is_used = np.zeros(_NUM_BITS, dtype=np.bool_)
+    is_used = np.zeros(MEMORY_BITS, dtype=np.bool_)
     bit = np.full(n, -1, dtype=np.int32)
     begins = np.empty(n, dtype=np.int32)
     low, high = np.zeros(n, dtype=np.uint64), np.zeros(n, dtype=np.uint64)
@@ -98,7 +97,7 @@ def _memory(group: Ints, first: Ints, last: Ints, is_twice: Bools) -> Memory:
     for b in range(n):
         a = group[b]
         if first[a] == b and is_twice[a]:
-            for k in range(_NUM_BITS):
+            for k in range(MEMORY_BITS):
                 if not is_used[k]:
                     is_used[k] = True
                     bit_of[a] = k
@@ -166,7 +165,7 @@ def labels_for(network: ArcNetwork, memory: Memory) -> Labels:
         far_high=np.zeros(n + 1, dtype=np.uint64),
         far_node=np.full(n + 1, -1, dtype=np.int32),
         ceiling=np.zeros(int(memory.group.max(initial=-1)) + 1),
-        bit_weight=np.zeros(_NUM_BITS),
+        bit_weight=np.zeros(MEMORY_BITS),
     )
 
 
@@ -190,7 +189,7 @@ def label_part(
     begin, end = network.first[part], network.first[part + 1]
     for b in range(begin, end):
         ceiling[group[b]] = 0.0
-        far_node[b] = _NONE
+        far_node[b] = NOWHERE
     for b in range(begin, end):
         ceiling[group[b]] = max(ceiling[group[b]], weight[b])
     # The label of all that is far behind, the start of the part among it.
@@ -207,7 +206,7 @@ def label_part(
             f_high &= ~own_high
         f_low &= open_low[b]
         f_high &= open_high[b]
-        if far_node[b] != _NONE:
+        if far_node[b] != NOWHERE:
             v_low, v_high = far_low[b] & open_low[b], far_high[b] & open_high[b]
             if far_value[b] > far:
                 far, far_at, f_low, f_high = _merged(
@@ -299,7 +298,7 @@ def label_part(
                 m_low &= ~(one << np.uint64(started))
             else:
                 m_high &= ~(one << np.uint64(started - 64))
-        if far_node[to] == _NONE:
+        if far_node[to] == NOWHERE:
             far_value[to], far_node[to], far_low[to], far_high[to] = best, b, m_low, m_high
         elif best > far_value[to]:
             far_value[to], far_node[to], far_low[to], far_high[to] = _merged(

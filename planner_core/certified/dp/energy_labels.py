@@ -7,17 +7,16 @@ tried by the hundred. Energy is rounded in favour of the satellite: no plan is l
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from planner_core.bundles import bundle
 from planner_core.certified.dp.resource_network import Network
+from planner_core.certified.sizes import MAX_ENERGY_LEVELS
+from planner_core.certified.tolerances import LEVEL
 from planner_core.jit import inlined, kernel
 from planner_core.problem import Floats, Ints, Longs
-
-_ROUNDING: Final = 1e-6  # of a level: costs "of the same" length differ by as much
-_MAX_LEVELS: Final = 1500  # at a time
 
 
 @bundle
@@ -51,7 +50,7 @@ def energy_levels(network: Network, per_collect: int) -> EnergyLevels:
     step = float(positive.min()) / per_collect if len(positive) else 1.0
     left = np.minimum(network.energy_floor, network.energy_cap - network.energy_cost)
     span = float((network.energy_cap - np.minimum.accumulate(left)).max(initial=0.0))
-    step = max(step, span / _MAX_LEVELS)
+    step = max(step, span / MAX_ENERGY_LEVELS)
     if network.straight_give.any():
         cap, cost, floor, give = _rounded_potentials(network, step)
     else:
@@ -64,18 +63,18 @@ def energy_levels(network: Network, per_collect: int) -> EnergyLevels:
         cost=cost,
         floor=floor,
         lowest=lowest,
-        start=int(np.ceil(network.energy_start / step - _ROUNDING)),
+        start=int(np.ceil(network.energy_start / step - LEVEL)),
         width=int((cap - np.minimum(cost, 0) - lowest).max(initial=0)) + 1,
         give=give,
     )
 
 
 def _up(energy: Floats, step: float) -> Ints:
-    return np.ceil(energy / step - _ROUNDING).astype(np.int32)
+    return np.ceil(energy / step - LEVEL).astype(np.int32)
 
 
 def _down(energy: Floats, step: float) -> Ints:
-    return np.floor(energy / step + _ROUNDING).astype(np.int32)
+    return np.floor(energy / step + LEVEL).astype(np.int32)
 
 
 def _rounded_potentials(network: Network, step: float) -> tuple[Ints, Ints, Ints, Ints]:

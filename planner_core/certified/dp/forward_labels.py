@@ -12,6 +12,8 @@ import numpy as np
 
 from planner_core.certified.dp.data_levels import DataLevels
 from planner_core.certified.dp.resource_network import Network, give_between, may_be_next
+from planner_core.certified.signs import STOPPED, UNREACHED
+from planner_core.certified.tuning import TUNING
 from planner_core.jit import inlined, kernel
 from planner_core.problem import (
     Bytes,
@@ -21,9 +23,7 @@ from planner_core.problem import (
     Singles,
 )
 
-_TIDY_EVERY: Final = 8  # rows between two passes over the idle labels
-UNREACHED: Final = -1
-STOPPED: Final = -2
+_TIDY_EVERY: Final = TUNING.patience
 
 
 class Labels(NamedTuple):

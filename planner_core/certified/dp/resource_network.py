@@ -26,6 +26,8 @@ from typing import NamedTuple
 import numpy as np
 
 from planner_core.bundles import bundle
+from planner_core.certified.signs import ANY_LEVEL
+from planner_core.certified.tolerances import ROUNDING
 from planner_core.jit import inlined, kernel
 from planner_core.mdp.track import STRICT, compile_track
 from planner_core.precedence.arcs import Arcs, reversed_arcs
@@ -44,9 +46,6 @@ from planner_core.problem import (
     SatelliteProblem,
 )
 from planner_core.problem.slew import TIME_TOLERANCE_S
-
-_SLACK = 1e-9  # of capacity; above the referee's rounding, far below any task
-_ANY_LEVEL = 2.0  # of capacity: no limit
 
 
 @bundle
@@ -94,7 +93,7 @@ class Network(NamedTuple):
 
 def network_of(problem: Problem, satellite: SatelliteProblem) -> Network:
     """Return the network whose paths include every plan that the referee accepts."""
-    return _network(problem, satellite, _SLACK)
+    return _network(problem, satellite, ROUNDING)
 
 
 def strict_network_of(problem: Problem, satellite: SatelliteProblem) -> Network:
@@ -175,7 +174,7 @@ def _delivered(
         kept = kept[problem.worth[satellite.rows[kept]] == 0.0]
         emptied = emptied + (problem.left_on_board or 0.0)
     delivered = emptied + float(fill[kept].sum()) + 3.0 * slack
-    delivered[kept] = _ANY_LEVEL
+    delivered[kept] = ANY_LEVEL
     return delivered
 
 

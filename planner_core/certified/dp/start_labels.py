@@ -26,6 +26,9 @@ import numpy as np
 import numpy.typing as npt
 
 from planner_core.bundles import bundle
+from planner_core.certified.sizes import OPENING_LEVELS
+from planner_core.certified.tolerances import EARLIER_S
+from planner_core.certified.tuning import TUNING
 from planner_core.jit import borrowing, kernel
 from planner_core.precedence.earliest_starts import (
     EARLY_S,
@@ -50,14 +53,12 @@ Masks = npt.NDArray[np.uint64]
 _NONE: Final = np.uint64(0)
 _ALL: Final = np.uint64(0xFFFF_FFFF_FFFF_FFFF)
 _ONE: Final = np.uint64(1)
-_LEVELS: Final = 9  # of the table of what opens: ranges of up to 2**8 s
 _DE_BRUIJN: Final = np.uint64(0x03F7_9D71_B4CB_0A89)
 _SHIFT: Final = np.uint64(58)
 _PLACE_OF_BIT: Final[Ints] = np.zeros(64, dtype=np.int32)
 for _bit in range(64):
     _PLACE_OF_BIT[(((1 << _bit) * int(_DE_BRUIJN)) & int(_ALL)) >> 58] = _bit
-_SOONER_S: Final = 0.02
-_PER_TASK_S: Final = 60.0  # what a second is worth where labels are merged
+_PER_TASK_S: Final = TUNING.tidy_s
 
 
 @bundle
@@ -203,10 +204,10 @@ def _opened(spans: Spans, bit: Masks) -> Masks:
     for i in range(len(spans.open_s)):
         last_s = max(last_s, spans.close_s[i] + spans.length_s[i])
     size = int(last_s) + 2
-    opened = np.zeros((_LEVELS, size), dtype=np.uint64)
+    opened = np.zeros((OPENING_LEVELS, size), dtype=np.uint64)
     for i in range(len(spans.open_s)):
         opened[0, int(spans.open_s[i])] |= bit[i]
-    for level in range(1, _LEVELS):
+    for level in range(1, OPENING_LEVELS):
         half = 1 << (level - 1)
         for t in range(size):
             opened[level, t] = opened[level - 1, t] | opened[level - 1, min(t + half, size - 1)]
@@ -332,7 +333,7 @@ def _not_after_s(cells: Cells, end_s: float, looked: Vector, task: int, guess_s:
     """
     spans, eye = cells.spans, cells.eye
     first_s = max(end_s + eye.agile.settle_s, spans.open_s[task])
-    guess_s -= _SOONER_S
+    guess_s -= EARLIER_S
     if guess_s <= first_s:
         return float(first_s)
     looks = sight(eye.path, eye.places_m, spans.place[task], guess_s)
@@ -361,7 +362,7 @@ def _left_open(cells: Cells, mask: np.uint64, from_s: float, into: int, other: i
     level, span = 0, 1
     while 2 * span <= size:
         level, span = level + 1, 2 * span
-    if level >= _LEVELS:
+    if level >= OPENING_LEVELS:
         return _NONE
     new = cells.opened[level, first] | cells.opened[level, last - span + 1]
     left: np.uint64 = mask & (new ^ _ALL)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 
@@ -32,6 +31,9 @@ from planner_core.certified.proofs.certificate import (
     values_through,
 )
 from planner_core.certified.proofs.lagrangian import default_epochs
+from planner_core.certified.sizes import MAX_PAIRS, PAUSE_S
+from planner_core.certified.tolerances import TAKEN
+from planner_core.certified.tuning import TUNING
 from planner_core.precedence.network import network_of
 from planner_core.precedence.relation import is_transitive, num_near_pairs
 from planner_core.problem import (
@@ -44,21 +46,6 @@ from planner_core.problem.plan import Plan
 from planner_core.problem.restrict import restricted
 from planner_core.solvers.base import Solution
 from planner_core.solvers.rule import Rule
-
-MOST_PAIRS: Final = 8_000_000
-"""Of tasks near each other, in a program; HiGHS takes about 100 bytes for each."""
-
-_STALLED: Final = 0.02  # of the gap, in _PATIENCE rounds of cuts
-_PATIENCE: Final = 12
-_WANTED: Final = 1e-3
-_MAX_NODES: Final = 50  # of HiGHS, among the tasks that a relaxation takes
-_ROUNDED_OFF: Final = 8  # this round, and when cutting planes lead no further
-_REPORT_EVERY_S: Final = 0.25
-_SHARE: Final = 0.1  # moves for each task, where prices of passes take turns with them
-_PATIENT: Final = 20.0  # moves for each task without a better plan, in such problems
-_ROUNDS: Final = 4  # of such prices
-_EPOCHS_A_ROUND: Final = 5
-_MOST_TASKS: Final = 12_000  # that cutting planes and HiGHS are tried on, in such accesses
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -141,23 +128,22 @@ class FreeSearch:
         ascent.run(self.best.reward, self.budget.stop)
         self.step(Multipliers(prices=ascent.multipliers))
 
-    def price_passes(self, num_rounds: int) -> None:
+    def price_passes(self) -> None:
         """Search for prices by which no target is paid twice in one pass over it."""
         if self._prices is None:
             self._prices = ascent_on_passes(self.problem, self.seed)
-        for _ in range(num_rounds):
-            if not self.best.is_done:
-                self._prices.improve(_EPOCHS_A_ROUND, self.budget.stop)
-                value, prices = self._prices.value, self._prices.multipliers
-                self.best.lower(
-                    Bound(value=value, proof="lagrangian", prices=prices, is_elementary=True)
-                )
+        self._prices.improve(TUNING.epochs_at_a_time, self.budget.stop)
+        value, prices = self._prices.value, self._prices.multipliers
+        self.best.lower(Bound(value=value, proof="lagrangian", prices=prices, is_elementary=True))
+        self.best.report("prices")
 
     @property
     def is_small(self) -> bool:
         """Whether what is open is little enough for cutting planes."""
-        is_dense = num_near_pairs(self._rest) > MOST_PAIRS
-        return not is_dense and (not self.problem.offers_choice or len(self._rows) <= _MOST_TASKS)
+        is_dense = num_near_pairs(self._rest) > MAX_PAIRS
+        return not is_dense and (
+            not self.problem.offers_choice or len(self._rows) <= TUNING.most_relaxed
+        )
 
     @property
     def is_priced_out(self) -> bool:
@@ -203,7 +189,7 @@ class FreeSearch:
             self.step(master.multipliers())
             self.best.report("cutting planes")
             bounds.append(master.value)
-            if number == _ROUNDED_OFF and not self.best.is_done:
+            if number == TUNING.patience and not self.best.is_done:
                 self.round_off(master, taken)
             if self.best.is_done:
                 break
@@ -212,7 +198,8 @@ class FreeSearch:
             # Until paths are priced nearly as well as by the subgradient, odd sets lead astray.
             num_added = master.cut(taken, with_odd_sets=bounds[-1] <= priced + 0.2 * gap)
             is_stalled = (
-                len(bounds) > _PATIENCE and bounds[-1 - _PATIENCE] - bounds[-1] < _STALLED * gap
+                len(bounds) > TUNING.patience
+                and bounds[-1 - TUNING.patience] - bounds[-1] < TUNING.little * gap
             )
             if num_added == 0 or is_stalled:
                 if not self.round_off(master, taken) or self.best.is_done:
@@ -225,9 +212,9 @@ class FreeSearch:
         if not self.is_transitive:
             return False
         is_own = np.isin(self._rows, [a.opportunity for a in self.best.plan.actions])
-        is_offered = is_own | (taken > _WANTED)
+        is_offered = is_own | (taken > TAKEN)
         plan, _ = self._prover(master.program(is_offered), is_offered, self.best.better).prove(
-            0.0, self._watch, _MAX_NODES
+            0.0, self._watch, TUNING.highs_nodes
         )
         return plan is not None and self.best.offer(self._whole(plan, is_offered))
 
@@ -262,7 +249,7 @@ class FreeSearch:
 
     def _watch(self, _reward: float, _bound: float) -> None:
         now_s = time.monotonic()
-        if now_s - self._reported_s > _REPORT_EVERY_S:
+        if now_s - self._reported_s > PAUSE_S:
             self._reported_s = now_s
             self.best.report("HiGHS searches")
 
@@ -301,16 +288,15 @@ def solve_free(problem: Problem, budget: Budget, seed: int, gap: float, effort: 
 def _approach(search: FreeSearch, effort: Effort) -> None:
     """Better the plan by windows, and the bound by prices, until both lead no further."""
     is_spaced = search.problem.offers_choice
-    share, patience = (_SHARE, _PATIENT) if is_spaced else (5.0, 10.0)
+    moves = TUNING.moves_beside_passes if is_spaced else TUNING.moves_per_task
     left, num_idle = effort.moves_per_task, 0.0
-    while left > 0 and num_idle < patience and not search.best.is_done:
+    while left > 0 and num_idle < TUNING.tries * TUNING.moves_per_task and not search.best.is_done:
         if is_spaced and not search.is_priced_out:
-            search.price_passes(_ROUNDS)
-            search.best.report("prices")
+            search.price_passes()
         if not search.best.is_close:
-            left -= share
-            is_better = search.search(share, search.open_rows(search.best.reward))
-            num_idle = 0.0 if is_better else num_idle + share
+            left -= moves
+            is_better = search.search(moves, search.open_rows(search.best.reward))
+            num_idle = 0.0 if is_better else num_idle + moves
             search.best.report("window search")
 
 

@@ -11,19 +11,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Final
 
 import numpy as np
 
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.choices import ChoiceSearch
+from planner_core.certified.tuning import TUNING
 from planner_core.problem import COLLECT, Bools, Problem, SatelliteProblem
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
-
-_IMAGES: Final = (40, 20, 10, 5, 2, 0)  # typical ones, of each satellite
-_IMAGES_OF_FLEETS: Final = (20, 5, 0)
-_PATIENCE: Final = 2  # commitments that lead to nothing better
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -49,7 +45,7 @@ def best_commitment(best: Incumbent, unit: float, first_goal: float, seed: int) 
         return None
     found, most, idle = None, -np.inf, 0
     for part in _commitments(problem):
-        if best.budget.is_spent() or idle == _PATIENCE:
+        if best.budget.is_spent() or idle == TUNING.tries:
             break
         choices = ChoiceSearch(part, unit, seed, best.budget.stop)
         choices.start(np.zeros(len(problem.opportunities), dtype=np.bool_), first_goal)
@@ -68,7 +64,7 @@ def _commitments(problem: Problem) -> Iterator[Problem]:
     yield problem
     fill = _typical_fill(problem)
     is_fleet = sum(len(satellite) > 0 for satellite in problem.satellites) > 1
-    for num_images in _IMAGES_OF_FLEETS if is_fleet else _IMAGES:
+    for num_images in TUNING.images_on_board[1::2] if is_fleet else TUNING.images_on_board:
         yield replace(problem, left_on_board=num_images * fill)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Final
 
 import numpy as np
 
@@ -14,14 +13,11 @@ from planner_core.certified.lns.insertion_with_resources import filled_with_reso
 from planner_core.certified.multipliers.chains import ascend_on_chains
 from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.proofs.continuous import quick_bound
+from planner_core.certified.tuning import TUNING
 from planner_core.problem import Problem
 from planner_core.problem.plan import Plan
 from planner_core.solvers.base import Solution
 from planner_core.solvers.rule import Rule
-
-_MOVES_A_ROUND: Final = 1000  # on each satellite
-_SHARE: Final = 0.6  # of the time for fixed starts first, where resources count
-_BEFORE: Final = 0.25  # of the moves come before the bound
 
 
 def solve_continuous(
@@ -40,8 +36,8 @@ def solve_continuous(
     best.offer(search.plan)
     best.report("insertion")
     num_tasks = max((len(s.spans.row) for s in search.satellites), default=0)
-    num_rounds = int(np.ceil(moves_per_task * num_tasks / _MOVES_A_ROUND))
-    first = int(np.ceil(_BEFORE * num_rounds))
+    num_rounds = int(np.ceil(moves_per_task * num_tasks / TUNING.moves_at_a_time))
+    first = int(np.ceil(TUNING.beginning * num_rounds))
     _move(best, search, first)
     _price(best)
     _move(best, search, num_rounds - first)
@@ -53,7 +49,7 @@ def _move(best: Incumbent, search: ContinuousSearch, num_rounds: int) -> None:
     for _ in range(num_rounds):
         if best.is_done:
             return
-        search.move(_MOVES_A_ROUND)
+        search.move(TUNING.moves_at_a_time)
         best.offer(search.plan)
         best.report("window search")
 
@@ -74,7 +70,9 @@ def among_opportunities(budget: Budget) -> Budget:
 
     What bounds that search bounds no plan with free starts: it is not reported.
     """
-    return budget.part(_SHARE, lambda progress: budget.report(replace(progress, bound=None)))
+    return budget.part(
+        TUNING.first_share, lambda progress: budget.report(replace(progress, bound=None))
+    )
 
 
 def bounded(problem: Problem, solution: Solution, budget: Budget, gap: float) -> Solution:

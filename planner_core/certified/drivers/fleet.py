@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Final
 
 import numpy as np
 
@@ -30,23 +29,13 @@ from planner_core.certified.mip.solution_pool import PlanPool
 from planner_core.certified.multipliers.paths import ascent_on_paths
 from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.proofs.certificate import Multipliers
-from planner_core.certified.proofs.lagrangian import default_epochs
+from planner_core.certified.tuning import TUNING
 from planner_core.precedence.network import heaviest_through, network_of
 from planner_core.problem import COLLECT, Bools, Floats, Problem
 from planner_core.problem.plan import Plan
 from planner_core.solvers.base import Solution
 from planner_core.solvers.rule import Rule
 from planner_core.worth import weights
-
-_PREFERENCE: Final = 0.1  # of a large fleet, for targets that are hard to have
-_NEAR: Final = 0.2  # of a reward, that a task of a large fleet's search may cost the bound
-_EPOCHS_AT_A_TIME: Final = 10
-_EPOCHS_TO_START: Final = 80  # until a first plan is worth making
-_SMALL: Final = 60_000  # opportunities for which cutting planes are tried
-_LEAST_EPOCHS: Final = 250
-_STREAMS: Final = 2  # of a small fleet, that a plan does not hang on one start
-_MOVES_AT_A_TIME: Final = 500
-_MERGED_EVERY: Final = 4  # times of these
 
 
 class FleetSearch:
@@ -57,12 +46,11 @@ class FleetSearch:
         self._seed = seed
         self._network = network_of(self.problem)
         self._worth = self.problem.worth[self._network.row]
-        num_epochs = max(_LEAST_EPOCHS, default_epochs(len(self._network.row)))
-        self._dual = ascent_on_paths(self.problem, self._network, num_epochs, seed)
+        self._dual = ascent_on_paths(self.problem, self._network, TUNING.epochs, seed)
 
     @property
     def _is_small(self) -> bool:
-        return len(self.problem.opportunities) <= _SMALL
+        return len(self.problem.opportunities) <= TUNING.small_fleet
 
     @property
     def prices(self) -> Floats:
@@ -72,11 +60,11 @@ class FleetSearch:
     def price(self, num_epochs: float = math.inf) -> None:
         """Search for prices, so long or until more steps are of little use."""
         while num_epochs > 0 and not (self._dual.is_settled or self.best.is_done):
-            self._dual.improve(_EPOCHS_AT_A_TIME, self.budget.stop)
+            self._dual.improve(TUNING.epochs_at_a_time, self.budget.stop)
             bound = Bound(value=self._dual.value, proof="lagrangian", prices=self.prices)
             self.best.lower(bound)
             self.best.report("prices")
-            num_epochs -= _EPOCHS_AT_A_TIME
+            num_epochs -= TUNING.epochs_at_a_time
 
     def start(self) -> None:
         """Plan one stretch after another at the prices."""
@@ -95,21 +83,21 @@ class FleetSearch:
     def search(self, moves_per_task: float) -> None:
         """Search windows, in several streams where the fleet is small, as far as that leads."""
         num_accesses = num_choices(self.problem)
-        num_streams = _STREAMS if self._is_small else 1
+        num_streams = TUNING.tries if self._is_small else 1
         offered = None if self._is_small else self.near_best()
         streams = [self.windows(number) for number in range(num_streams)]
         left = int(moves_per_task * num_accesses)
         pool = PlanPool(self.problem, self.budget, self._seed)
         with ThreadPoolExecutor(self.budget.num_threads) as threads:
             while left > 0 and not self.budget.is_spent():
-                num_moves = min(left, _MOVES_AT_A_TIME)
+                num_moves = min(left, TUNING.moves_at_a_time)
                 going = [
                     threads.submit(s.make_moves, num_moves, self.budget, offered) for s in streams
                 ]
                 for one in going:
                     one.result()
                 left -= num_moves
-                if num_streams > 1 and left // _MOVES_AT_A_TIME % _MERGED_EVERY == 0:
+                if num_streams > 1 and left // TUNING.moves_at_a_time % TUNING.several == 0:
                     self._merge(pool, streams)
                 reward = max(pool.reward, *(stream.reward for stream in streams))
                 self.best.report("window search", reward)
@@ -133,7 +121,7 @@ class FleetSearch:
         total, through = heaviest_through(self._network, weights(self._worth, price))
         cost = total - through + np.maximum(price - self._worth, 0.0)
         is_near = np.zeros(len(self.problem.opportunities), dtype=np.bool_)
-        is_near[self._network.row] = cost <= _NEAR * self._worth
+        is_near[self._network.row] = cost <= TUNING.near * self._worth
         return is_near
 
     def windows(self, number: int) -> WindowSearch:
@@ -141,7 +129,7 @@ class FleetSearch:
         preference = urgency = None
         if not self._is_small:
             urgency = np.minimum(self.prices / np.maximum(self.problem.best_worth, 1e-300), 1.0)
-            preference = 1.0 + _PREFERENCE * (0.5 - urgency)
+            preference = 1.0 + TUNING.preference * (0.5 - urgency)
         seed = self._seed + number
         windows = WindowSearch(self.problem, seed, self._network, preference, urgency)
         windows.adopt(self.best.plan if number == 0 else self._priced_plan(seed))
@@ -158,13 +146,13 @@ def solve_without_resources(
     best.offer(Rule().solve(problem, Budget(), seed).plan)
     best.report("first plan")
     fleet = FleetSearch(best, seed)
-    fleet.price(_EPOCHS_TO_START)
+    fleet.price(TUNING.many_epochs)
     fleet.start()
     fleet.price()
     fleet.start()
     if not budget.is_spent():
         fleet.search(effort.moves_per_task)
-    is_small = effort.max_rounds > 0 and len(problem.opportunities) <= _SMALL
+    is_small = effort.max_rounds > 0 and len(problem.opportunities) <= TUNING.small_fleet
     if not is_small or budget.is_spent():
         return best.solution()
     search = FreeSearch(best, seed)

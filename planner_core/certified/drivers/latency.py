@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Final
 
 import numpy as np
 
@@ -20,16 +19,11 @@ from planner_core.certified.lns.alternating import TurnSearch
 from planner_core.certified.lns.choices import ChoiceSearch
 from planner_core.certified.multipliers.latency import LatencyAscent
 from planner_core.certified.proofs.bound import rounded_bound
+from planner_core.certified.tuning import TUNING
 from planner_core.problem import COLLECT, CONTACT, Floats, Ints, Kept, Problem
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
 from planner_core.worth import share_earned
-
-_FIRST_GOAL: Final = 0.95
-_ROUNDS: Final = 20  # of the ascent at a time
-_QUEUES: Final = 2  # that follow each other with the same contacts
-_STEPS: Final = 2  # of the search for plans with each
-_PATIENCE: Final = 8  # sets of contacts that lead to nothing better
 
 
 def close_in_on_the_ground(search: ResourceSearch, unit: float) -> None:
@@ -41,7 +35,7 @@ def close_in_on_the_ground(search: ResourceSearch, unit: float) -> None:
     num_idle = number = 0
     _lower(best, ascent)
     search.choose(unit)
-    while num_idle < _PATIENCE and not best.is_done:
+    while num_idle < TUNING.patience and not best.is_done:
         before = best.reward
         own = _contacts_of(best.problem, best.plan)
         offered = (*reversed(ascent.contact_sets), own, *_near(best.problem, own, rng))
@@ -55,7 +49,7 @@ def close_in_on_the_ground(search: ResourceSearch, unit: float) -> None:
 
 def _lower(best: Incumbent, ascent: LatencyAscent) -> None:
     """Go on with the ascent for a while."""
-    ascent.improve(_ROUNDS, best.reward, best.budget.stop)
+    ascent.improve(TUNING.rounds, best.reward, best.budget.stop)
     value = rounded_bound(best.problem, ascent.bound.value, best.reward)
     best.lower(replace(ascent.bound, value=value))
     best.report("prices")
@@ -81,14 +75,14 @@ def _plan_with(best: Incumbent, contacts: tuple[int, ...], unit: float, seed: in
     served = _served(problem, contacts)
     part = with_contacts(problem, served, None)
     choices = ChoiceSearch(part, unit, seed, best.budget.stop)
-    choices.start(np.zeros(len(problem.opportunities), dtype=np.bool_), _FIRST_GOAL)
+    choices.start(np.zeros(len(problem.opportunities), dtype=np.bool_), TUNING.first_goal)
     plan, reached = choices.plan, 0.0
     best.offer(plan)
-    for _ in range(_QUEUES):
+    for _ in range(TUNING.tries):
         if best.is_done:
             return
         turns = TurnSearch(part, plan, unit, best.budget, seed)
-        turns.turn(_STEPS)
+        turns.turn(TUNING.tries)
         best.offer(turns.plan)
         best.report("plans")
         plan = turns.plan

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from typing import Final
 
 import numpy as np
 
@@ -15,19 +14,8 @@ from planner_core.certified.mip.solution_pool import PlanPool
 from planner_core.certified.multipliers.ascent import Ascent, Steps
 from planner_core.certified.multipliers.energy import EnergyPaths, ascent_on_energy
 from planner_core.certified.multipliers.resources import PriceSearch
+from planner_core.certified.tuning import TUNING
 from planner_core.problem import Floats
-
-_FLEET_PATIENCE: Final = 60  # turns of a fleet without a better plan
-_TURN: Final = 6  # steps of the search for a fleet's plans
-_BESIDE_PRICES: Final = (2, 6)  # such steps, for few opportunities and for many
-_SHORT_PATIENCE: Final = 2  # of a small one
-_FLEET_ROUNDS: Final = 300  # of the search for a fleet's prices
-_SHARES: Final = (0.3, 0.6)  # of those prices that recorders leave, where they are short as well
-_NEAR_ROUNDS, _NEAR_STEP = 40, 3e-3  # of asking near prices
-_LEAST_SHARE: Final = 0.005  # that recorders take from the bound, where relaxations are asked
-_MOST_RELAXED: Final = 12_000  # tasks, in the relaxation of a fleet
-_BESIDE_RELAXATION: Final = 3  # steps of the search for plans
-_CUT_ROUNDS: Final = (0, 1)  # of each such relaxation; the first finds tasks
 
 
 def close_in_fleet(search: ResourceSearch, unit: float) -> None:
@@ -52,7 +40,7 @@ def close_in_fleet(search: ResourceSearch, unit: float) -> None:
                 search.seed,
             )
         idle_turns = 0
-        while idle_turns < (_FLEET_PATIENCE if programs else _SHORT_PATIENCE):
+        while idle_turns < (TUNING.fleet_patience if programs else TUNING.tries):
             if search.best.is_done:
                 return
             is_better = _take_turns(search, turns, pool, threads, programs)
@@ -70,7 +58,7 @@ def _take_turns(
 
     That search learns from no other: it would lead nowhere new from their plans.
     """
-    num_steps = _TURN if other is None else other.steps_beside
+    num_steps = TUNING.steps_beside if other is None else other.steps_beside
     work = [threads.submit(turns.turn, num_steps)]
     if other is not None:
         work.append(threads.submit(_go_on, other, pool))
@@ -129,39 +117,42 @@ class _FleetPricing:
     def _steps(self) -> Iterator[int]:
         """Yield how long each turn takes, before it."""
         search, usage = self._search, self._paths.usage
+        beside_prices = TUNING.steps_beside if search.is_fleet else TUNING.tries
         energy = ascent_on_energy(
-            search.problem, self._paths, search.prices(), _FLEET_ROUNDS, search.seed
+            search.problem, self._paths, search.prices(), TUNING.epochs, search.seed
         )
         while not energy.is_settled:
-            yield _BESIDE_PRICES[search.is_fleet]
+            yield beside_prices
             # What takes opportunities counts from here on: answers come near the best plans.
             usage[:] = 0.0
             search.ask_energy(energy)
-        yield _BESIDE_PRICES[search.is_fleet]
+        yield beside_prices
         value = min(search.best.bound.value, energy.value)
         prices = PriceSearch(search.problem, value, energy.multipliers, search.budget.stop)
         prices.learn(search.best.plan)
         search.price(prices, 1)
         self.prices = prices
-        has_full_recorders = prices.value < (1.0 - _LEAST_SHARE) * energy.value
-        is_small = np.count_nonzero(usage) <= _MOST_RELAXED
+        has_full_recorders = prices.value < (1.0 - TUNING.little) * energy.value
+        is_small = np.count_nonzero(usage) <= TUNING.most_relaxed
         if search.is_fleet and is_small and has_full_recorders:
-            for share in _SHARES:
+            for share in TUNING.price_shares[1:-1]:
                 self._ask_near(share * energy.multipliers)
-            for num_rounds in _CUT_ROUNDS:
-                yield _BESIDE_RELAXATION
+            # Without cutting planes at first: that finds tasks.
+            for num_rounds in range(TUNING.tries):
+                yield TUNING.steps_beside
                 offered = (usage > 0.0) | (prices.usage > 0.0)
                 relaxation = search.relax_plan(offered, num_rounds)
                 if relaxation is None:
                     break
                 self._ask_near(relaxation.prices)
                 prices.restart(relaxation.prices)
-        yield _BESIDE_PRICES[search.is_fleet]
+        yield beside_prices
         search.price(prices, 1)
 
     def _ask_near(self, prices: Floats) -> None:
         """Let satellites answer prices near these, by energy alone: more tasks get to be known."""
-        steps = Steps(first=_NEAR_STEP, last=_NEAR_STEP, num_epochs=_NEAR_ROUNDS)
+        num_epochs = TUNING.many_epochs // TUNING.tries
+        steps = Steps(first=TUNING.little * TUNING.first_step, last=1.0, num_epochs=num_epochs)
         search = self._search
         ascent = Ascent(self._paths, search.problem.best_worth, prices, steps, search.seed)
-        ascent.improve(_NEAR_ROUNDS, search.budget.stop)
+        ascent.improve(num_epochs, search.budget.stop)

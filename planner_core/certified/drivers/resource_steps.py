@@ -7,12 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import Final
 
 import numpy as np
 
 from planner_core.budget import ignored
-from planner_core.certified.drivers.agility_only import MOST_PAIRS, Effort
+from planner_core.certified.drivers.agility_only import Effort
 from planner_core.certified.drivers.commitments import best_commitment
 from planner_core.certified.drivers.fleet import solve_without_resources
 from planner_core.certified.incumbent import Incumbent
@@ -24,29 +23,11 @@ from planner_core.certified.multipliers.energy import EnergyPaths, ascent_on_ene
 from planner_core.certified.multipliers.resources import PriceSearch
 from planner_core.certified.proofs.bound import Bound, rounded_bound
 from planner_core.certified.proofs.lagrangian import lagrangian_bound
+from planner_core.certified.sizes import MAX_PAIRS
+from planner_core.certified.tuning import TUNING
 from planner_core.precedence.relation import num_near_pairs
 from planner_core.problem import CONTACT, Bools, Floats
 from planner_core.solvers.milp import Milp, relaxation_bound
-
-_FIRST_GOAL: Final = 0.95
-_IDLE_STEPS: Final = 5  # of the search for plans, before others have their turn
-_SETS_AT_A_TIME: Final = 2
-_AS_GOOD: Final = 0.75  # of a target: sets whose prices count
-_OFFERED: Final = (700, 1000)  # tasks in a search with fixed contacts
-_LESS_LIKELY: Final = 0.15  # of a target: what a set is worth less at each further attempt
-_ROOM: Final = 0.5  # of a target: with less the search for a better plan takes long
-_TIGHT: Final = 0.05  # of a target: prices that near to a relaxation are the best
-_MOST_ROWS: Final = 3000  # of a relaxation
-_LARGE: Final = 3000  # opportunities
-_MOST_WHOLE: Final = 6000  # of a relaxed program: 4,200 take a second, 13,000 more than a minute
-# Of the best bound, how far above it that of agility alone may be: 0 to 3 % where agility decides
-# (the demonstration's mission), 76 % and more where energy does (the paper's draws).
-_HARDLY: Final = 0.2
-# Of the time left, for the plan and the bound of agility alone. With starts 15 s apart these take
-# all there is: 253 of 290 after 20 s with all of the time, 280 with a quarter (docs/bounds.md).
-_ALONE: Final = 0.25
-_ROUNDS_AT_A_TIME: Final = 100  # of the search for prices by energy alone
-_WORTH_A_STEP: Final = 0.005  # of a bound by the battery alone
 
 
 class ResourceSearch:
@@ -74,12 +55,12 @@ class ResourceSearch:
     @property
     def is_large(self) -> bool:
         """Whether steps towards prices take long, and the whole program is out of reach."""
-        return len(self.problem.opportunities) > _LARGE
+        return len(self.problem.opportunities) > TUNING.large
 
     def choose(self, unit: float) -> None:
         """Look for first plans among choices of tasks, and near those of agility alone."""
         choices = ChoiceSearch(self.problem, unit, self.seed, self.budget.stop)
-        choices.start(self.mask([]), _FIRST_GOAL)
+        choices.start(self.mask([]), TUNING.first_goal)
         self.best.offer(choices.plan)
         self.best.report("plans")
         if self._is_bound_by_agility() and not self.best.is_done:
@@ -95,11 +76,13 @@ class ResourceSearch:
             return False
         # What stays on board lowers the other bound by a little, and says nothing of the images.
         alone = lagrangian_bound(self.problem, self.best.reward)
-        return alone.value <= (1.0 + _HARDLY) * self.best.bound.value
+        # 0 to 3 % above where agility decides (the demonstration's mission), 76 % and more where
+        # energy does (the paper's draws).
+        return alone.value <= (1.0 + TUNING.far_above) * self.best.bound.value
 
     def turns(self, unit: float) -> TurnSearch:
         """Return a search for plans that begins at the best, or where a commitment leads."""
-        committed = best_commitment(self.best, unit, _FIRST_GOAL, self.seed)
+        committed = best_commitment(self.best, unit, TUNING.first_goal, self.seed)
         problem, plan = (
             (committed.problem, committed.plan) if committed else (self.problem, self.best.plan)
         )
@@ -109,7 +92,7 @@ class ResourceSearch:
         """Search for plans from the best, while that leads on; return whether one is better."""
         before, idle_steps = self.best.reward, 0
         for _ in range(num_steps):
-            if self.best.is_done or idle_steps == _IDLE_STEPS:
+            if self.best.is_done or idle_steps == TUNING.several:
                 break
             turns.turn(1)
             is_better = turns.reward > self.best.reward and self.best.offer(turns.plan)
@@ -120,8 +103,10 @@ class ResourceSearch:
     def without_resources(self) -> Bools:
         """Let agility alone bound the plans; return the tasks of the best plan then."""
         free = replace(self.problem, use_resources=False)
-        # Its plans are not for this problem: they are not reported.
-        quiet = self.budget.part(_ALONE, ignored)
+        # With starts 15 s apart this takes all the time there is: 253 of 290 after 20 s with all of
+        # it, 280 with a quarter (docs/bounds.md). Its plans are not for this problem: they are not
+        # reported.
+        quiet = self.budget.part(TUNING.beginning, ignored)
         solution = solve_without_resources(free, quiet, self.seed, self.best.gap, Effort())
         if solution.proven is not None:
             self.best.lower(solution.proven)
@@ -134,10 +119,10 @@ class ResourceSearch:
         There the exact programmes pay for rounding to whole units with every image, and it is
         nearly tight. Where all images of a target earn the same they say as much or more.
         """
-        is_large = len(self.problem.opportunities) > _MOST_WHOLE
+        is_large = len(self.problem.opportunities) > TUNING.most_columns
         if is_large or not self.problem.has_better_images:
             return
-        if num_near_pairs(self.problem) > MOST_PAIRS:
+        if num_near_pairs(self.problem) > MAX_PAIRS:
             return
         self.best.lower(relaxation_bound(self.problem, self.budget, self.seed))
         self.best.report("relaxation")
@@ -184,20 +169,20 @@ class ResourceSearch:
         """
         best, known = self.best, self.prices()
         paths = EnergyPaths(self.problem)
-        energy = ascent_on_energy(self.problem, paths, known, _ROUNDS_AT_A_TIME, self.seed)
+        energy = ascent_on_energy(self.problem, paths, known, TUNING.many_epochs, self.seed)
         energy.ask()
         before = energy.value
         self.ask_energy(energy)
         value = min(best.bound.value, energy.value)
         prices = PriceSearch(self.problem, value, energy.multipliers, self.budget.stop)
         prices.learn(best.plan)
-        if energy.value < before - _WORTH_A_STEP * before:
+        if energy.value < before - TUNING.little * before:
             self.price(prices, 1)
         return prices
 
     def ask_energy(self, energy: Ascent) -> None:
         """Look for better prices by energy alone, for a while."""
-        energy.improve(_ROUNDS_AT_A_TIME, self.budget.stop)
+        energy.improve(TUNING.many_epochs, self.budget.stop)
 
     def relax_sets(self, prices: PriceSearch, turns: TurnSearch) -> bool:
         """Learn prices from the relaxations of sets of contacts; return whether any is new."""
@@ -207,9 +192,9 @@ class ResourceSearch:
             *(tuple(np.flatnonzero(p & (table.kind == CONTACT)).tolist()) for p in plans),
             *(key for key, _ in prices.contact_sets.most_common()),
         ]
-        new = [key for key in dict.fromkeys(sets) if key not in self._relaxed][:_SETS_AT_A_TIME]
+        new = [key for key in dict.fromkeys(sets) if key not in self._relaxed][: TUNING.tries]
         offered = np.ones(len(table), dtype=np.bool_)
-        if len(table) > _MOST_ROWS:
+        if len(table) > TUNING.large:
             offered = (prices.usage > 0.0) | (turns.usage > 0.0)
         offered |= self.mask(action.opportunity for action in self.best.plan.actions)
         for contacts in new:
@@ -219,7 +204,7 @@ class ResourceSearch:
             self._relaxed[contacts] = program.relaxation()
         if not new or not np.isfinite(self.relaxed):
             return False
-        least = self.relaxed - _AS_GOOD * self._one
+        least = self.relaxed - TUNING.room * self._one
         near = [r.prices for r in self._relaxed.values() if r.value >= least]
         prices.restart(np.mean(near, axis=0))
         self.best.report("contacts fixed")
@@ -256,12 +241,13 @@ class ResourceSearch:
         Where a relaxation leaves little room above a better plan that takes long. Unless this
         is the last resort it waits for prices, which may show that there is none.
         """
-        can_sink = self._priced - self.relaxed > _TIGHT * self._one
-        room = _ROOM if can_sink and not is_last else 0.0
+        can_sink = self._priced - self.relaxed > TUNING.tight * self._one
+        room = TUNING.room if can_sink and not is_last else 0.0
+        sizes = TUNING.open_tasks, int(TUNING.more * TUNING.open_tasks)
         hopeful = [
-            (relaxation.value - _LESS_LIKELY * attempt * self._one, contacts, size)
+            (relaxation.value - TUNING.tight * attempt * self._one, contacts, size)
             for contacts, relaxation in self._relaxed.items()
-            for attempt, size in enumerate(_OFFERED)
+            for attempt, size in enumerate(sizes)
             if relaxation.value >= self.best.better + room * self._one - 1e-6
             and self.best.better < self._missed.get((contacts, size), np.inf)
         ]

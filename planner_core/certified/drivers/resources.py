@@ -9,10 +9,6 @@ without resources.
 
 from __future__ import annotations
 
-from typing import Final
-
-import numpy as np
-
 from planner_core.budget import Budget
 from planner_core.certified.drivers.latency import close_in_on_the_ground
 from planner_core.certified.drivers.resource_fleet import close_in_fleet
@@ -21,17 +17,10 @@ from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.alternating import TurnSearch
 from planner_core.certified.proofs.lagrangian import lagrangian_bound
 from planner_core.certified.proofs.resource_bound import quick_bound
+from planner_core.certified.tuning import TUNING
 from planner_core.problem import Problem
 from planner_core.solvers.base import Solution
 from planner_core.solvers.rule import Rule
-
-_MAX_UNITS: Final = 2000
-_FIRST_MOVES: Final = (10, 40)  # of the search for plans, at least and at most, before contacts
-_TASKS_A_MOVE: Final = 80  # are fixed: the more tasks, the more it finds by itself
-_FURTHER_MOVES: Final = 20  # after each round of that
-_FIRST_STEPS: Final = 2  # of the search for prices, where sets of contacts gave new ones
-_STEPS: Final = 8
-_PATIENCE: Final = 3  # rounds without a new set of contacts or a better plan
 
 
 def solve_with_resources(problem: Problem, budget: Budget, seed: int, gap: float) -> Solution:
@@ -45,8 +34,8 @@ def solve_with_resources(problem: Problem, budget: Budget, seed: int, gap: float
     first_bound = lagrangian_bound if has_half_life else quick_bound
     search.best.lower(first_bound(problem, search.best.reward))
     unit = search.best.unit
-    if unit == 0.0 or search.best.bound.value / unit > _MAX_UNITS:
-        unit = max(search.best.bound.value / _MAX_UNITS, 1e-12)
+    if unit == 0.0 or search.best.bound.value / unit > TUNING.max_units:
+        unit = max(search.best.bound.value / TUNING.max_units, 1e-12)
     if has_half_life:
         close_in_on_the_ground(search, unit)
         if not (search.best.is_done or search.is_large):
@@ -58,7 +47,7 @@ def solve_with_resources(problem: Problem, budget: Budget, seed: int, gap: float
         return search.best.solution()
     search.choose(unit)
     turns = search.turns(unit)
-    search.search(turns, int(np.clip(len(problem.opportunities) // _TASKS_A_MOVE, *_FIRST_MOVES)))
+    search.search(turns, TUNING.rounds)
     if not search.best.is_done:
         search.relax_whole()
     _close_in(search, turns)
@@ -74,16 +63,16 @@ def _close_in(search: ResourceSearch, turns: TurnSearch) -> None:
         return
     prices = search.first_prices()
     idle_rounds = 0
-    while idle_rounds < _PATIENCE and not best.is_done:
+    while idle_rounds < TUNING.several and not best.is_done:
         is_new = search.relax_sets(prices, turns)
         # Where steps take long, a search for the last image is tried before them.
         is_better = search.is_large and not is_new and search.fix_contacts(is_last=True)
         if not is_better:
-            search.price(prices, _FIRST_STEPS if is_new else _STEPS)
+            search.price(prices, TUNING.tries if is_new else TUNING.patience)
             is_better = search.fix_contacts(is_last=False)
         if not is_new and not is_better:
             is_better = search.fix_contacts(is_last=True)
-            is_better |= search.search(turns, _FURTHER_MOVES)
+            is_better |= search.search(turns, TUNING.rounds)
         if is_better and turns.problem is search.problem:
             turns.adopt(best.plan)
         idle_rounds = 0 if is_new or is_better else idle_rounds + 1

@@ -7,25 +7,15 @@ contacts, and energy left elsewhere.
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 
 from planner_core.budget import Budget
 from planner_core.certified.lns.choices import ChoiceSearch
 from planner_core.certified.lns.resource_search import ResourceWindows
+from planner_core.certified.sizes import MAX_STARTS
+from planner_core.certified.tuning import TUNING
 from planner_core.problem import Problem
 from planner_core.problem.plan import Plan
-
-_MOVES: Final = 250  # of the window search in a step, for each satellite
-_FIRST_STEPS: Final = 12  # of the window search alone, at each start
-# Where one satellite turns to the sun to charge, tasks come in batches, and only whole days move
-# these: moves by choices in a step, and first steps of the window search. Of 2,000 targets 253
-# and 231 images instead of 251 and 229 after 20 s (docs/bounds.md); fleets lose by it.
-_CHOICES_OF_BATCHES: Final = 8
-_FIRST_STEPS_OF_BATCHES: Final = 1
-_STALLED: Final = 9  # steps that lead nowhere, before another start
-_STARTS: Final = 1000  # no search has more
 
 
 class TurnSearch:
@@ -56,17 +46,20 @@ class TurnSearch:
         self._num_satellites = sum(len(s) > 0 for s in problem.satellites)
         used = [s.resources for s in problem.satellites if len(s)]
         has_batches = len(used) == 1 and used[0].sun_pointing == "slew"
-        self._num_choices = _CHOICES_OF_BATCHES if has_batches else self._num_satellites
-        self._num_first_steps = _FIRST_STEPS_OF_BATCHES if has_batches else _FIRST_STEPS
+        # Where one satellite turns to the sun to charge, tasks come in batches, and only whole days
+        # move these. Of 2,000 targets 253 and 231 images instead of 251 and 229 after 20 s
+        # (docs/bounds.md); fleets lose by it.
+        self._num_choices = TUNING.patience if has_batches else self._num_satellites
+        self._num_first_steps = 1 if has_batches else TUNING.patience
         self._choices = ChoiceSearch(problem, unit, seed, budget.stop)
-        self._seed, self._num_starts, self._idle_steps = seed, 0, _STALLED
+        self._seed, self._num_starts, self._idle_steps = seed, 0, TUNING.patience
         self.ended: list[Plan] = []
         self.usage = np.zeros(len(problem.opportunities))
 
     def turn(self, num_steps: int) -> None:
         """Let each search go on from where the other got to, or begin afresh where both stall."""
         for _ in range(num_steps):
-            if self._idle_steps == _STALLED:
+            if self._idle_steps == TUNING.patience:
                 self._begin()
                 continue
             before = self._windows.reward
@@ -79,7 +72,7 @@ class TurnSearch:
         if self._num_starts:
             self.ended.append(self.plan)
         # A seed of its own for each start of each search.
-        self._windows = ResourceWindows(self.problem, self._seed + _STARTS * self._num_starts)
+        self._windows = ResourceWindows(self.problem, self._seed + MAX_STARTS * self._num_starts)
         self._windows.adopt(self._start)
         self._num_starts, self._idle_steps = self._num_starts + 1, 0
         # Whole days first: once most targets are taken, contacts hardly move.
@@ -89,7 +82,7 @@ class TurnSearch:
 
     def adopt(self, plan: Plan) -> None:
         """Begin with another plan from now on."""
-        self._start, self._idle_steps = plan, _STALLED
+        self._start, self._idle_steps = plan, TUNING.patience
 
     def _note(self) -> None:
         self.usage[[action.opportunity for action in self.plan.actions]] += 1.0
@@ -105,7 +98,9 @@ class TurnSearch:
             self._windows.adopt(self._choices.plan)
 
     def _replan_windows(self, num_steps: int) -> None:
-        self._windows.make_moves(num_steps * _MOVES * self._num_satellites, self._budget)
+        self._windows.make_moves(
+            num_steps * TUNING.moves_in_a_step * self._num_satellites, self._budget
+        )
 
     @property
     def plan(self) -> Plan:

@@ -9,7 +9,6 @@ programme plan, and settles every target collected twice on one of the two, unti
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from planner_core.certified.dp.completion_bounds import least_energy
 from planner_core.certified.dp.data_levels import DataLevels, data_levels, levels_of_part
 from planner_core.certified.dp.forward_labels import most_value, path_of
 from planner_core.certified.dp.resource_network import Network, part_of, strict_network_of
+from planner_core.certified.tuning import TUNING
 from planner_core.problem import (
     COLLECT,
     Bools,
@@ -26,14 +26,6 @@ from planner_core.problem import (
 )
 from planner_core.problem.plan import Plan
 from planner_core.solvers.sequential import blocked_rows
-
-_SETTLED: Final = 0.2  # share of the targets collected once that each round settles as well
-_OPENED: Final = 0.3  # the largest share of the collected targets that a move opens
-_MOST_UNITS: Final = 2500
-_MOST_ROWS: Final = 1200  # open ones, in a move
-_LARGER_STEP: Final = 0.03
-_CLOSINGS: Final = 4  # contacts that are tried as the last of a plan
-_OTHER_CLOSING: Final = 0.3  # of moves may end with a later one
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -71,7 +63,7 @@ class SatelliteChoices:
             target=target,
             may_stay=problem.left_on_board is not None and problem.left_on_board > 0.0,
             # Far above the bound, of which there are at most so many: such a task is in no plan.
-            weight=np.minimum(np.round(worth / unit), _MOST_UNITS).astype(np.int32),
+            weight=np.minimum(np.round(worth / unit), TUNING.max_units).astype(np.int32),
         )
 
     def best(self, allowed: Bools, goal: int, stop: Bytes) -> tuple[int, Ints]:
@@ -115,7 +107,7 @@ class SatelliteChoices:
     def closings(self) -> Ints:
         """Return contacts that may be the last of a plan, the latest first."""
         contacts = np.flatnonzero(self.target < 0).astype(np.int32)
-        return contacts[::-1][:_CLOSINGS]
+        return contacts[::-1][: TUNING.several]
 
 
 class ChoiceSearch:
@@ -193,7 +185,7 @@ class ChoiceSearch:
                 value, found = self._settled(satellite, part, max(wanted, best + 1))
                 if wanted <= max(best, 0):
                     break
-                wanted = int(wanted * (1.0 - _LARGER_STEP))
+                wanted = int(wanted * (1.0 - TUNING.goal_step))
             if value > best:
                 best, path = value, found
         return best, path
@@ -204,13 +196,13 @@ class ChoiceSearch:
         self._turn += 1
         own = self.taken[satellite.rows]
         kept = own & (satellite.target >= 0)
-        kept &= self._rng.random(len(kept)) >= self._rng.random() * _OPENED
+        kept &= self._rng.random(len(kept)) >= self._rng.random() * TUNING.disturbance
         others = self.taken.copy()
         others[satellite.rows] = False
         elsewhere = self._taken_targets(others)
         is_settled = self._mask(satellite.target[kept])
         is_open = ~(is_settled | elsewhere)[satellite.target] & (satellite.target >= 0)
-        share = _MOST_ROWS / max(1, int(is_open.sum()))
+        share = TUNING.open_tasks / max(1, int(is_open.sum()))
         is_open &= self._rng.random(len(is_open)) < share
         allowed = kept | is_open | (own & (satellite.target >= 0))
         self._let_contacts(allowed, index, satellite)
@@ -241,7 +233,7 @@ class ChoiceSearch:
             images = images[np.argsort(satellite.weight[images], kind="stable")]
             chosen = np.full(num_targets + 1, -1)
             chosen[satellite.target[images]] = images
-            once = (counts == 1) & (self._rng.random(num_targets + 1) < _SETTLED)
+            once = (counts == 1) & (self._rng.random(num_targets + 1) < TUNING.disturbance)
             settled = (counts > 1) | once
             allowed &= ~settled[satellite.target]
             allowed[chosen[settled]] = True
@@ -272,7 +264,7 @@ class ChoiceSearch:
         if not satellite.network.must_deliver or len(last) == 0:
             return
         closing = last[-1]
-        if self._rng.random() < _OTHER_CLOSING:
+        if self._rng.random() < TUNING.disturbance:
             closing = max(closing, self._rng.choice(satellite.closings()))
         allowed[closing + 1 :] &= satellite.target[closing + 1 :] >= 0
 

@@ -15,8 +15,6 @@ import numpy as np
 
 from planner_core.bundles import bundle
 from planner_core.certified.lns.route import (
-    FIXED,
-    FREE,
     Route,
     early_after,
     position_of,
@@ -24,6 +22,9 @@ from planner_core.certified.lns.route import (
     update_early,
     update_late,
 )
+from planner_core.certified.signs import FIXED, FREE, NOWHERE
+from planner_core.certified.sizes import ROUTE_BUCKETS, ROUTE_LABELS, ROUTE_TASKS
+from planner_core.certified.tuning import TUNING
 from planner_core.draws import Uint64s, next_draw
 from planner_core.jit import borrowing
 from planner_core.precedence.earliest_starts import Arrivals, cell_of, edge_s
@@ -31,13 +32,9 @@ from planner_core.precedence.time_windows import Spans, View
 from planner_core.problem import Bytes, Floats, Ints
 from planner_core.problem.pointing import needed_s, sight
 
-_MOST_LABELS: Final = 20_000
-_MOST_BUCKETS: Final = 4096
-_MOST_TASKS: Final = 64  # of a window
-_TIE: Final = 0.01  # of a task's worth: what a free swap is worth, and what breaks ties
-_AIMED: Final = 0.7  # of the moves begin at a target that nobody images
-_ATTEMPTS: Final = 30
-_DONE: Final = -2
+_TIE: Final = TUNING.tie
+_AIMED: Final = TUNING.aimed
+_ATTEMPTS: Final = TUNING.patience
 
 Within = tuple[float, float]
 """When a window begins, and by when the task after it must have its start."""
@@ -96,25 +93,25 @@ def scratch_of(num_tasks: int, num_cells: int, num_targets: int) -> Scratch:
     """Return room for the moves on a route."""
     return Scratch(
         mark=np.zeros(1, dtype=np.int32),
-        task=np.empty(_MOST_LABELS, dtype=np.int32),
-        start_s=np.empty(_MOST_LABELS),
-        value=np.empty(_MOST_LABELS),
-        gain=np.empty(_MOST_LABELS),
-        parent=np.empty(_MOST_LABELS, dtype=np.int32),
-        following=np.empty(_MOST_LABELS, dtype=np.int32),
-        bucket=np.full(_MOST_BUCKETS, -1, dtype=np.int32),
+        task=np.empty(ROUTE_LABELS, dtype=np.int32),
+        start_s=np.empty(ROUTE_LABELS),
+        value=np.empty(ROUTE_LABELS),
+        gain=np.empty(ROUTE_LABELS),
+        parent=np.empty(ROUTE_LABELS, dtype=np.int32),
+        following=np.empty(ROUTE_LABELS, dtype=np.int32),
+        bucket=np.full(ROUTE_BUCKETS, -1, dtype=np.int32),
         label=np.empty(num_cells, dtype=np.int32),
         label_mark=np.zeros(num_cells, dtype=np.int32),
         worth=np.empty(num_tasks),
         worth_mark=np.zeros(num_tasks, dtype=np.int32),
         inside_mark=np.zeros(num_targets, dtype=np.int32),
-        chosen=np.empty(_MOST_TASKS, dtype=np.int32),
-        chosen_s=np.empty(_MOST_TASKS),
+        chosen=np.empty(ROUTE_TASKS, dtype=np.int32),
+        chosen_s=np.empty(ROUTE_TASKS),
         old=Route(
             size=np.zeros(1, dtype=np.int32),
-            task=np.empty(num_tasks + _MOST_TASKS, dtype=np.int32),
-            early_s=np.empty(num_tasks + _MOST_TASKS),
-            late_s=np.empty(num_tasks + _MOST_TASKS),
+            task=np.empty(num_tasks + ROUTE_TASKS, dtype=np.int32),
+            early_s=np.empty(num_tasks + ROUTE_TASKS),
+            late_s=np.empty(num_tasks + ROUTE_TASKS),
         ),
     )
 
@@ -168,11 +165,11 @@ def _replan(
         old_gain += worth[route.task[p]]
         scratch.inside_mark[spans.place[route.task[p]]] = mark
     last = _best_chain(search, first, end, old_gain)
-    if last == _DONE:
+    if last == NOWHERE:
         return False
     size = 0
     while last >= 0:
-        if size == _MOST_TASKS:
+        if size == ROUTE_TASKS:
             return False
         scratch.chosen[size] = scratch.task[last]
         size += 1
@@ -247,7 +244,7 @@ def _best_chain(
     end: int,
     old_gain: float,
 ) -> int:
-    """Return the last label of the best chain, -1 for the empty one, ``_DONE`` for none as good."""
+    """Return the last label of the best chain: -1 for none at all, ``NOWHERE`` if all are worse."""
     spans, view, route, scratch = search.spans, search.looks, search.route, search.scratch
     after, late_s = -1, np.inf
     looks = (1.0, 0.0, 0.0)
@@ -262,15 +259,15 @@ def _best_chain(
         count = _extend(search, count, before, start_s, -1, (from_s, late_s))
     else:
         from_s = spans.open_s[0] if len(spans.open_s) else 0.0
-        until_s = min(late_s, from_s + _MOST_BUCKETS * 4.0)
+        until_s = min(late_s, from_s + ROUTE_BUCKETS * 4.0)
         for task in range(len(spans.open_s)):
             if spans.open_s[task] >= until_s:
                 break
             count = _offer(search, count, task, spans.open_s[task], -1, (from_s, late_s))
-    best, best_value = _DONE, -1.0
+    best, best_value = NOWHERE, -1.0
     if old_gain <= 1e-9 and end > first:
         best, best_value = -1, 0.0
-    for b in range(_MOST_BUCKETS):
+    for b in range(ROUTE_BUCKETS):
         at = scratch.bucket[b]
         while at >= 0:
             scratch.bucket[b] = scratch.following[at]
@@ -316,7 +313,7 @@ def _offer(
     spans, arrivals, scratch = search.spans, search.arrivals, search.scratch
     worth, holder = search.worth, search.holder
     from_s, late_s = within_s
-    if start_s + spans.length_s[task] > late_s or count == _MOST_LABELS:
+    if start_s + spans.length_s[task] > late_s or count == ROUTE_LABELS:
         return count
     mark, place = scratch.mark[0], spans.place[task]
     is_inside = scratch.inside_mark[place] == mark
@@ -346,7 +343,7 @@ def _offer(
             return count
         at = scratch.parent[at]
     bucket = int((start_s - from_s) * 0.25)
-    if bucket >= _MOST_BUCKETS:
+    if bucket >= ROUTE_BUCKETS:
         return count
     scratch.label[cell], scratch.label_mark[cell] = count, mark
     scratch.task[count], scratch.start_s[count] = task, start_s

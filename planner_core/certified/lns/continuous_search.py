@@ -3,24 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 
 from planner_core.budget import Budget
 from planner_core.certified.lns.continuous_moves import RouteSearch, make_moves, scratch_of
 from planner_core.certified.lns.insertion import insert_each
-from planner_core.certified.lns.route import (
-    ELSEWHERE,
-    FIXED,
-    FREE,
-    Route,
-    empty_route,
-    remove,
-    update_early,
-    update_late,
-)
-from planner_core.certified.proofs.continuous import width_for
+from planner_core.certified.lns.route import Route, empty_route, remove, update_early, update_late
+from planner_core.certified.proofs.continuous import rough_cell_s, width_for
+from planner_core.certified.signs import ELSEWHERE, FIXED, FREE
+from planner_core.certified.sizes import MAX_FOLLOWERS
+from planner_core.certified.tuning import TUNING
 from planner_core.draws import draws_of
 from planner_core.precedence.earliest_starts import Arrivals, arrivals_of
 from planner_core.precedence.time_windows import (
@@ -38,12 +31,6 @@ from planner_core.problem import (
 )
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
-
-_CELL_S: Final = 10.0
-_LONGEST: Final = 12  # tasks that a window takes up
-_MOVES_AT_A_TIME: Final = 500
-_AT_ONCE: Final = 20
-_MOST_KEPT: Final = 30_000_000  # followers, of 12 bytes each, kept from turn to turn
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -103,7 +90,7 @@ class ContinuousSearch:
         ]
         self._tables: dict[int, Arrivals] = {}
         self._num_kept = self._num_calls = 0
-        self._width_s = max(_CELL_S, width_for(problem))
+        self._width_s = max(rough_cell_s(), width_for(problem))
 
     def arrivals(self, index: int) -> Arrivals:
         """Return a satellite's table; kept from turn to turn where all of them are small."""
@@ -111,7 +98,7 @@ class ContinuousSearch:
         if table is None:
             satellite = self.satellites[index]
             table = arrivals_of(satellite.spans, satellite.view, self._width_s, self.budget.stop)
-            if self._num_kept + len(table.to) <= _MOST_KEPT:
+            if self._num_kept + len(table.to) <= MAX_FOLLOWERS:
                 self._tables[index] = table
                 self._num_kept += len(table.to)
         return table
@@ -136,15 +123,15 @@ class ContinuousSearch:
         for index in range(len(self.satellites)):
             left = num_moves
             if self._num_calls > 1 and index not in self._tables:
-                if self._num_calls % _AT_ONCE:
+                if self._num_calls % TUNING.rounds:
                     continue
-                left = num_moves * _AT_ONCE
+                left = num_moves * TUNING.rounds
             if self.budget.is_spent() or len(self.satellites[index].spans.row) == 0:
                 continue
             arrivals = self.arrivals(index)
             while left > 0 and not self.budget.is_spent():
-                self._turn(index, arrivals, min(left, _MOVES_AT_A_TIME))
-                left -= _MOVES_AT_A_TIME
+                self._turn(index, arrivals, min(left, TUNING.moves_at_a_time))
+                left -= TUNING.moves_at_a_time
         self._note()
         return self.reward > before
 
@@ -159,7 +146,7 @@ class ContinuousSearch:
         search = RouteSearch(
             spans, view, arrivals, satellite.worth, holder, satellite.route, scratch, self._draws
         )
-        make_moves(search, num_moves, _LONGEST, self.budget.stop)
+        make_moves(search, num_moves, TUNING.window_tasks[1], self.budget.stop)
         for place in np.flatnonzero((before == ELSEWHERE) & (holder >= 0)).tolist():
             self._give_up(index, place)
 

@@ -7,16 +7,12 @@ about what the best plans give them.
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 
+from planner_core.certified.tuning import TUNING
 from planner_core.jit import kernel
 from planner_core.precedence.network import Network, heaviest_path
 from planner_core.problem import Bools, Floats, Ints
-
-_ORDERS: Final = 4  # of the satellites that are tried
-_LEAST: Final = 1e-3  # of its reward that a target is worth, whatever its price
 
 
 def priced_start(
@@ -34,11 +30,11 @@ def priced_start(
         Places that are taken already. Shape of ``prices``.
     """
     rng = np.random.default_rng(seed)
-    priced = np.maximum(worth - prices[network.place], _LEAST * worth)
+    priced = np.maximum(worth - prices[network.place], TUNING.trifle * worth)
     weight, value = np.empty(len(network.row)), np.empty(len(network.row))
     previous = np.empty(len(network.row), dtype=np.int32)
     best, best_reward = [], -1.0
-    for _ in range(_ORDERS):
+    for _ in range(TUNING.several):
         is_left = ~taken
         nodes = np.concatenate(
             [

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from planner_core.certified.lns.route import (
-    FREE,
     Route,
     early_after,
     late_before,
     update_early,
     update_late,
 )
+from planner_core.certified.signs import FREE
 from planner_core.jit import borrowing, kernel
 from planner_core.precedence.time_windows import Spans, View
 from planner_core.problem import Bools, Bytes, Ints

@@ -7,8 +7,6 @@ remains valid.
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 
 from planner_core.budget import Budget
@@ -19,6 +17,7 @@ from planner_core.certified.lns.route import (
     update_early,
     update_late,
 )
+from planner_core.certified.tuning import TUNING
 from planner_core.precedence.time_windows import (
     Spans,
     View,
@@ -30,8 +29,6 @@ from planner_core.precedence.time_windows import (
 from planner_core.problem import COLLECT, Problem
 from planner_core.problem.plan import Action, Plan
 from planner_core.referee.replay import replay
-
-_PATIENCE: Final = 80  # trials in vain, after which there is hardly anything to be had
 
 
 def filled_with_resources(problem: Problem, plan: Plan, budget: Budget) -> Plan:
@@ -58,7 +55,7 @@ def _filled(problem: Problem, plan: Plan, index: int, budget: Budget) -> Plan:
         return plan
     tasks = [_task_of(problem, spans, action) for action in own]
     reward = replay(problem, plan).reward
-    left = _PATIENCE
+    left = TUNING.trials
     while left > 0 and not budget.is_spent():
         route = _route_of(spans, view, tasks)
         if route is None:
@@ -83,7 +80,7 @@ def _filled(problem: Problem, plan: Plan, index: int, budget: Budget) -> Plan:
             left -= 1
             if judged.is_valid and judged.reward > reward:
                 plan, reward, tasks, own = tried, judged.reward, trial, actions
-                left, is_better = _PATIENCE, True
+                left, is_better = TUNING.trials, True
                 break
         if not is_better:
             break

@@ -15,6 +15,10 @@ import numpy as np
 import numpy.typing as npt
 
 from planner_core.bundles import bundle
+from planner_core.certified.signs import FREE, NO_TASK, NOWHERE
+from planner_core.certified.sizes import WINDOW_NODES, WINDOW_WORDS
+from planner_core.certified.tolerances import SLIGHT
+from planner_core.certified.tuning import TUNING
 from planner_core.draws import Uint64s, next_draw
 from planner_core.jit import borrowing
 from planner_core.precedence.network import Network, slews_in
@@ -41,23 +45,9 @@ from planner_core.problem import (
 from planner_core.problem.slew import TIME_TOLERANCE_S
 from planner_core.problem.transitions import Slews, Vector, turns_within
 
-NO_TASK: Final = -1
-
-FREE: Final = -1
-"""Holder of a target that no task images."""
-
-MAX_NODES: Final = 8192
-"""How many nodes a window may span."""
-
-MAX_WORDS: Final = 16
-"""How many words the set of targets may take that are in a window more than once."""
-
-_FEWEST_TASKS: Final = 3
-_MORE_TASKS: Final = 12
-_FOR_FREE_TARGET: Final = 0.7  # of all moves
-_TIE: Final = 0.01  # of a target's worth; a window's together stay below one task
-_SMALL_TIE: Final = 1e-5
-_NOWHERE: Final = -2
+_FEWEST_TASKS, _MOST_TASKS = TUNING.window_tasks
+_FOR_FREE_TARGET: Final = TUNING.aimed
+_TIE: Final = TUNING.tie
 _EMPTY: Final = np.uint64(0)
 
 
@@ -109,7 +99,7 @@ class Taken(NamedTuple):
 
 @bundle
 class Room(NamedTuple):
-    """Working memory of a window; shape ``(MAX_NODES + 1,)`` for nodes, which count from its first.
+    """Working memory of a window; shape ``(WINDOW_NODES + 1,)`` for nodes, from its first on.
 
     Attributes
     ----------
@@ -120,7 +110,7 @@ class Room(NamedTuple):
     waiting
         Nodes whose labels have not been entered yet, in order of end.
     on_chain
-        Sets of targets, a label's after another's. Shape ``(MAX_NODES * MAX_WORDS,)``.
+        Sets of targets, a label's after another's. Shape ``(WINDOW_NODES * WINDOW_WORDS,)``.
     number, marked_at, tie
         A target's place in those sets (-1 for none) and by how much it is favoured, as of which
         move. Shape ``(num_targets + 1,)``.
@@ -149,13 +139,13 @@ class Room(NamedTuple):
 
 def room_for(num_targets: int) -> Room:
     """Return working memory for a problem of so many targets."""
-    nodes = MAX_NODES + 1
+    nodes = WINDOW_NODES + 1
     return Room(
         sky=skyline_for(nodes),
         value=np.zeros(nodes),
         source=np.zeros(nodes, dtype=np.int32),
         waiting=np.zeros(nodes, dtype=np.int32),
-        on_chain=np.zeros(nodes * MAX_WORDS, dtype=np.uint64),
+        on_chain=np.zeros(nodes * WINDOW_WORDS, dtype=np.uint64),
         number=np.zeros(num_targets + 1, dtype=np.int32),
         marked_at=np.zeros(num_targets + 1, dtype=np.int64),
         weight=np.zeros(nodes),
@@ -201,11 +191,11 @@ def make_moves(
         if low >= high:
             continue
         num_words = _weigh(ground, taken, offered, room, low, high, draws)
-        if num_words > MAX_WORDS:
+        if num_words > WINDOW_WORDS:
             continue
         ends = (left if left >= begin else NO_TASK, right if right < end else NO_TASK)
         last = _heaviest(ground, room, num_words, part, ends, low, high)
-        if last != _NOWHERE:
+        if last != NOWHERE:
             _replace(ground, taken, room, low, high, last)
 
 
@@ -256,9 +246,9 @@ def _part_of(ground: Ground, node: int) -> int:
 @borrowing
 def _window(taken: Taken, pivot: int, begin: int, end: int, draws: Uint64s) -> tuple[int, int]:
     """Return the nodes between two tasks of the plan, a few tasks apart, around the pivot."""
-    num_tasks = _FEWEST_TASKS + int(next_draw(draws) * _MORE_TASKS)
+    num_tasks = _FEWEST_TASKS + int(next_draw(draws) * (_MOST_TASKS - _FEWEST_TASKS + 1))
     num_before = int(next_draw(draws) * (num_tasks + 1))
-    lowest, highest = max(begin, pivot - MAX_NODES // 2), min(end, pivot + MAX_NODES // 2)
+    lowest, highest = max(begin, pivot - WINDOW_NODES // 2), min(end, pivot + WINDOW_NODES // 2)
     low, high = pivot, pivot
     count = 0
     while low > lowest:
@@ -289,7 +279,7 @@ def _weigh(
     """
     move = room.move[0] + 1
     room.move[0] = move
-    tie = _TIE if ground.is_alike or move & 1 else _SMALL_TIE
+    tie = _TIE if ground.is_alike or move & 1 else SLIGHT
     count = 0
     for node in range(low, high):
         room.weight[node - low] = 0.0
@@ -328,7 +318,7 @@ def _heaviest(
 ) -> int:  # fmt: skip
     """Find the heaviest chain between two tasks, or none; return its last label.
 
-    ``NO_LABEL`` where that is no task at all, ``_NOWHERE`` where the two tasks cannot do
+    ``NO_LABEL`` where that is no task at all, ``NOWHERE`` where the two tasks cannot do
     without any in between.
     """
     network, sky, (left, right) = ground.network, room.sky, ends
@@ -364,7 +354,7 @@ def _heaviest(
         return top_label(sky)
     at = best_ahead(sky, network.start_s[right], _looks(network, right), slews)
     if at == NO_LABEL and left != NO_TASK and not _follows(network, slews, left, right):
-        return _NOWHERE
+        return NOWHERE
     return at
 
 

@@ -7,12 +7,14 @@ how much data it bears.
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from planner_core.bundles import bundle
 from planner_core.certified.dp.resource_network import Network, give_between, may_be_next
+from planner_core.certified.signs import AT_START, NEVER, NOWHERE
+from planner_core.certified.sizes import LABELS_PER_TASK, RESOURCE_WINDOW_NODES
 from planner_core.jit import borrowing
 from planner_core.problem import (
     Bools,
@@ -20,21 +22,6 @@ from planner_core.problem import (
     Ints,
     Longs,
 )
-
-MAX_NODES: Final = 1024
-"""How many tasks a window may span."""
-
-LABELS: Final = 5
-"""How many labels a task keeps."""
-
-NEVER: Final = -np.inf
-"""Gain of a task that is not to be taken."""
-
-NOWHERE: Final = -2
-"""Answered where there is no path."""
-
-_SLOTS: Final = MAX_NODES * LABELS
-_AT_START: Final = -1
 
 
 @bundle
@@ -91,7 +78,7 @@ class Room(NamedTuple):
     Attributes
     ----------
     value, energy, data, source
-        Of each label; ``LABELS`` for each task. ``source`` is the label before.
+        Of each label; ``LABELS_PER_TASK`` for each task. ``source`` is the label before.
     num_labels
         Labels of each task.
     idle_value, idle_energy, idle_data, idle_label
@@ -139,23 +126,23 @@ def room_for(num_targets: int) -> Room:
         return np.zeros(length, dtype=np.int32)
 
     return Room(
-        value=floats(_SLOTS),
-        energy=floats(_SLOTS),
-        data=floats(_SLOTS),
-        source=ints(_SLOTS),
-        num_labels=ints(MAX_NODES),
-        idle_value=floats(LABELS),
-        idle_energy=floats(LABELS),
-        idle_data=floats(LABELS),
-        idle_label=ints(LABELS),
-        next_idle=ints(MAX_NODES),
-        first_idle=ints(MAX_NODES + 1),
-        gain=floats(MAX_NODES),
+        value=floats(RESOURCE_WINDOW_NODES * LABELS_PER_TASK),
+        energy=floats(RESOURCE_WINDOW_NODES * LABELS_PER_TASK),
+        data=floats(RESOURCE_WINDOW_NODES * LABELS_PER_TASK),
+        source=ints(RESOURCE_WINDOW_NODES * LABELS_PER_TASK),
+        num_labels=ints(RESOURCE_WINDOW_NODES),
+        idle_value=floats(LABELS_PER_TASK),
+        idle_energy=floats(LABELS_PER_TASK),
+        idle_data=floats(LABELS_PER_TASK),
+        idle_label=ints(LABELS_PER_TASK),
+        next_idle=ints(RESOURCE_WINDOW_NODES),
+        first_idle=ints(RESOURCE_WINDOW_NODES + 1),
+        gain=floats(RESOURCE_WINDOW_NODES),
         seen=ints(num_targets + 1),
         marked_at=np.zeros(num_targets + 1, dtype=np.int64),
-        path=ints(MAX_NODES),
-        old=ints(MAX_NODES),
-        dropped=ints(MAX_NODES),
+        path=ints(RESOURCE_WINDOW_NODES),
+        old=ints(RESOURCE_WINDOW_NODES),
+        dropped=ints(RESOURCE_WINDOW_NODES),
         move=np.zeros(1, dtype=np.int64),
     )
 
@@ -167,7 +154,7 @@ def best_label(
 ) -> int:  # fmt: skip
     """Find the path that gains most between two tasks; return its last label.
 
-    ``_AT_START`` where that is no task at all, ``NOWHERE`` where there is no path.
+    ``AT_START`` where that is no task at all, ``NOWHERE`` where there is no path.
     """
     network = ground.network
     m, size = len(ground.rows), high - low
@@ -183,19 +170,21 @@ def best_label(
         and data <= bears
         and (left < 0 or right >= m or may_be_next(network, left, right))
     ):
-        best, best_energy, best_label = 0.0, energy, _AT_START
+        best, best_energy, best_label = 0.0, energy, AT_START
     for k in range(low, high):
         at = k - low
         if not starts_open and (left < 0 or network.idle_from[left] <= k):
             starts_open = True
             num_idle = _keep(
                 room.idle_value, room.idle_energy, room.idle_data, room.idle_label, 0, num_idle,
-                0.0, energy, data, _AT_START,
+                0.0, energy, data, AT_START,
             )  # fmt: skip
         other = room.first_idle[at]
         while other >= 0:
             if other + low >= earliest:
-                for i in range(other * LABELS, other * LABELS + room.num_labels[other]):
+                for i in range(
+                    other * LABELS_PER_TASK, other * LABELS_PER_TASK + room.num_labels[other]
+                ):
                     num_idle = _keep(
                         room.idle_value, room.idle_energy, room.idle_data, room.idle_label, 0,
                         num_idle, room.value[i], room.energy[i], room.data[i], i,
@@ -204,7 +193,7 @@ def best_label(
         room.num_labels[at] = 0
         if room.gain[at] == NEVER:
             continue
-        begin = at * LABELS
+        begin = at * LABELS_PER_TASK
         count = 0
         for i in range(num_idle):
             count = _extend(
@@ -215,10 +204,10 @@ def best_label(
             i, give = network.straight_rows[arc], network.straight_give[arc]
             if i == left and not starts_open:
                 count = _extend(
-                    ground, room, low, k, begin, count, give, 0.0, energy, data, _AT_START
+                    ground, room, low, k, begin, count, give, 0.0, energy, data, AT_START
                 )
             elif i >= earliest:
-                first = (i - low) * LABELS
+                first = (i - low) * LABELS_PER_TASK
                 for label in range(first, first + room.num_labels[i - low]):
                     count = _extend(
                         ground, room, low, k, begin, count, give,
@@ -265,7 +254,7 @@ def _extend(
     if not network.is_contact[k] and room.seen[target] > 1:
         before = label
         while before >= 0:
-            if ground.target[low + before // LABELS] == target:
+            if ground.target[low + before // LABELS_PER_TASK] == target:
                 return count
             before = room.source[before]
     return _keep(
@@ -291,7 +280,7 @@ def _keep(
             datas[at], sources[at] = datas[end], sources[end]
         else:
             at += 1
-    if end - begin == LABELS:
+    if end - begin == LABELS_PER_TASK:
         poorest = begin
         for i in range(begin + 1, end):
             if values[i] < values[poorest]:

@@ -12,30 +12,21 @@ from typing import Final
 import numpy as np
 
 from planner_core.certified.dp.resource_network import give_between
-from planner_core.certified.lns.moves import FREE, Taken
-from planner_core.certified.lns.resource_labels import (
-    LABELS,
-    MAX_NODES,
-    NEVER,
-    NOWHERE,
-    Ground,
-    Room,
-    best_label,
-)
+from planner_core.certified.lns.moves import Taken
+from planner_core.certified.lns.resource_labels import Ground, Room, best_label
+from planner_core.certified.signs import FREE, NEVER, NOWHERE
+from planner_core.certified.sizes import LABELS_PER_TASK, RESOURCE_WINDOW_NODES
+from planner_core.certified.tolerances import ROUNDING, SLIGHT, STAYS
+from planner_core.certified.tuning import TUNING
 from planner_core.draws import Uint64s, next_draw
 from planner_core.jit import borrowing
 from planner_core.problem import Bytes
 
-_FEWEST_TASKS: Final = 2
-_MORE_TASKS: Final = 14
-_FOR_FREE_TARGET: Final = 0.7  # of all moves
-_TRIALS: Final = 200  # for such a target
-_WITH_OTHERS: Final = 0.5  # of all moves may take targets that are imaged elsewhere
-_TIE: Final = 0.01  # of a target's worth
-_CONTACT: Final = 0.05  # of a typical target: what one contact fewer is worth
-_STAYS: Final = 1e6  # typical targets: what a polish would lose with a contact
-_SLIGHT: Final = 1e-5  # of a typical target: what a polish counts liking, which is 1 at most
-_EQUAL: Final = 1e-9
+_FEWEST_TASKS, _MOST_TASKS = TUNING.window_tasks
+_FOR_FREE_TARGET: Final = TUNING.aimed
+_TRIALS: Final = TUNING.trials
+_TIE: Final = TUNING.tie
+_CONTACT: Final = TUNING.tight
 
 
 @borrowing
@@ -83,10 +74,10 @@ def _pivot(ground: Ground, taken: Taken, draws: Uint64s) -> int:
 @borrowing
 def _window(ground: Ground, taken: Taken, pivot: int, draws: Uint64s) -> tuple[int, int]:
     """Return the tasks between two of the plan, a few apart, around the pivot."""
-    num_tasks = _FEWEST_TASKS + int(next_draw(draws) * _MORE_TASKS)
+    num_tasks = _FEWEST_TASKS + int(next_draw(draws) * (_MOST_TASKS - _FEWEST_TASKS + 1))
     num_before = int(next_draw(draws) * (num_tasks + 1))
-    lowest = max(0, pivot - MAX_NODES // 2)
-    highest = min(len(ground.rows), pivot + MAX_NODES // 2)
+    lowest = max(0, pivot - RESOURCE_WINDOW_NODES // 2)
+    highest = min(len(ground.rows), pivot + RESOURCE_WINDOW_NODES // 2)
     low, high = pivot, pivot
     count = 0
     while low > lowest:
@@ -175,7 +166,7 @@ def _weigh(ground: Ground, taken: Taken, room: Room, low: int, high: int, draws:
     """
     move = room.move[0] + 1
     room.move[0] = move
-    with_others = next_draw(draws) < _WITH_OTHERS
+    with_others = next_draw(draws) < 0.5
     for k in range(low, high):
         at = k - low
         target = ground.target[k]
@@ -215,13 +206,13 @@ def _weigh_liking(
     """
     move = room.move[0] + 1
     room.move[0] = move
-    with_free = next_draw(draws) < _WITH_OTHERS
-    slight = _SLIGHT * ground.typical
+    with_free = next_draw(draws) < 0.5
+    slight = SLIGHT * ground.typical
     for k in range(low, high):
         at, row = k - low, ground.rows[k]
         target = ground.target[k]
         if ground.network.is_contact[k]:
-            room.gain[at] = _STAYS * ground.typical if taken.is_taken[row] else NEVER
+            room.gain[at] = STAYS * ground.typical if taken.is_taken[row] else NEVER
             continue
         if room.marked_at[target] != move:
             room.marked_at[target] = move
@@ -250,7 +241,7 @@ def _replace(ground: Ground, taken: Taken, room: Room, low: int, high: int, last
     liking, num_contacts = 0.0, 0
     label = last
     while label >= 0:
-        k = low + label // LABELS
+        k = low + label // LABELS_PER_TASK
         room.path[num_new] = k
         num_new += 1
         if not ground.network.is_contact[k]:
@@ -275,9 +266,9 @@ def _replace(ground: Ground, taken: Taken, room: Room, low: int, high: int, last
                 liking -= ground.liking[ground.rows[k]]
             else:
                 num_contacts -= 1
-    if worth < -_EQUAL:
+    if worth < -ROUNDING:
         return
-    if ground.is_polish and (worth > _EQUAL or liking <= _EQUAL or num_contacts != 0):
+    if ground.is_polish and (worth > ROUNDING or liking <= ROUNDING or num_contacts != 0):
         return
     for i in range(num_old):
         k = room.old[i]

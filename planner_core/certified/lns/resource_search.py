@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 
 from planner_core.budget import Budget
 from planner_core.certified.dp.resource_network import strict_network_of
-from planner_core.certified.lns.moves import FREE, Taken
+from planner_core.certified.lns.moves import Taken
 from planner_core.certified.lns.resource_labels import Ground, room_for
 from planner_core.certified.lns.resource_moves import make_moves
+from planner_core.certified.signs import FREE
+from planner_core.certified.tuning import TUNING
 from planner_core.draws import draws_of
 from planner_core.precedence.relation import is_transitive
 from planner_core.problem import (
@@ -22,8 +22,6 @@ from planner_core.problem import (
 )
 from planner_core.problem.plan import Plan
 from planner_core.solvers.sequential import blocked_rows
-
-_MOVES_AT_A_TIME: Final = 100
 
 
 class ResourceWindows:
@@ -95,9 +93,9 @@ class ResourceWindows:
             self._turn += 1
             make_moves(
                 ground._replace(is_shut=self._shut(ground.number)), self._taken, self._room,
-                self._draws, min(num_moves, _MOVES_AT_A_TIME), budget.stop,
+                self._draws, min(num_moves, TUNING.moves_in_a_step), budget.stop,
             )  # fmt: skip
-            num_moves -= _MOVES_AT_A_TIME
+            num_moves -= TUNING.moves_in_a_step
 
     def make_moves_on_each(self, num_moves: int, budget: Budget) -> None:
         """Make so many moves on each satellite, unless the budget is spent before."""

@@ -17,13 +17,6 @@ from planner_core.precedence.time_windows import Spans, View
 from planner_core.problem import Floats, Ints
 from planner_core.problem.pointing import earliest_start_s, latest_start_s, sight
 
-FREE = -1
-"""No task holds the target."""
-ELSEWHERE = -2
-"""Another satellite holds it."""
-FIXED = -3
-"""Another satellite must keep it."""
-
 
 @bundle
 class Route(NamedTuple):

@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Final
 
 import numpy as np
 
 from planner_core.budget import Budget
-from planner_core.certified.lns.moves import (
-    FREE,
-    Ground,
-    Taken,
-    make_moves,
-    room_for,
-)
+from planner_core.certified.lns.moves import Ground, Taken, make_moves, room_for
+from planner_core.certified.signs import FREE
+from planner_core.certified.tuning import TUNING
 from planner_core.draws import draws_of
 from planner_core.precedence.network import Network, network_of
 from planner_core.precedence.relation import is_transitive_on
@@ -27,10 +22,6 @@ from planner_core.problem import (
 )
 from planner_core.problem.plan import Plan
 from planner_core.solvers.base import Solution
-
-_MOVES_AT_A_TIME: Final = 500
-_TRIALS: Final = 8
-_TRIALS_FOR_URGENT: Final = 200
 
 
 class WindowSearch:
@@ -99,9 +90,9 @@ class WindowSearch:
         while num_moves > 0 and not budget.is_spent():
             make_moves(
                 self._ground, self._taken, nodes, self._room, self._draws,
-                min(num_moves, _MOVES_AT_A_TIME), budget.stop,
+                min(num_moves, TUNING.moves_at_a_time), budget.stop,
             )  # fmt: skip
-            num_moves -= _MOVES_AT_A_TIME
+            num_moves -= TUNING.moves_at_a_time
 
     @property
     def plan(self) -> Plan:
@@ -165,7 +156,7 @@ def _ground_of(
         worth=worth,
         preference=np.ones(num_targets + 1) if preference is None else np.append(preference, 1.0),
         urgency=np.ones(num_targets + 1) if urgency is None else np.append(urgency, 0.0),
-        num_trials=_TRIALS if urgency is None else _TRIALS_FOR_URGENT,
+        num_trials=TUNING.patience if urgency is None else TUNING.trials,
         is_kept=is_kept,
         is_locked=is_locked,
         kept_worth=1.0 + float(problem.best_worth.sum()),

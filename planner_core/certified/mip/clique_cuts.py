@@ -8,12 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from planner_core.certified.sizes import CLIQUE_STEPS
+from planner_core.certified.tolerances import CLIQUE_BROKEN
 from planner_core.jit import kernel
 from planner_core.precedence.relation import Precedence, are_comparable, comes_before
 from planner_core.problem import Floats, Ints, Longs
-
-_MIN_VIOLATION = 1e-4
-_MAX_STEPS = 2000  # of a search for one antichain
 
 
 @kernel
@@ -111,12 +110,12 @@ def violated_antichains(precedence: Precedence, taken: Floats) -> tuple[Longs, I
     members = [np.int32(0) for _ in range(0)]
     clique = np.empty(m, dtype=np.int32)
     for row in range(m):
-        if taken[row] <= _MIN_VIOLATION or taken[row] >= 1.0 - _MIN_VIOLATION:
+        if taken[row] <= CLIQUE_BROKEN or taken[row] >= 1.0 - CLIQUE_BROKEN:
             continue
         near = np.arange(row + 1, max(row + 1, precedence.far_from[row])).astype(np.int32)
-        wanted = near[taken[near] > _MIN_VIOLATION]
+        wanted = near[taken[near] > CLIQUE_BROKEN]
         size, total = _heaviest_antichain(precedence, taken, row, wanted, clique)
-        if total <= 1.0 + _MIN_VIOLATION:
+        if total <= 1.0 + CLIQUE_BROKEN:
             continue
         size = _extend(precedence, clique, size, first_near[row], precedence.far_from[row])
         for member in np.sort(clique[:size]):
@@ -163,7 +162,7 @@ def _heaviest_antichain(
         for j in range(i, k):
             if free[depth, j]:
                 remaining += taken[others[j]]
-        if i == k or steps > _MAX_STEPS or weight[depth] + remaining <= best + 1e-9:
+        if i == k or steps > CLIQUE_STEPS or weight[depth] + remaining <= best + 1e-9:
             depth -= 1
             continue
         at[depth] = i + 1

@@ -16,9 +16,11 @@ import numpy as np
 
 from planner_core.budget import Budget
 from planner_core.certified.mip.clique_cuts import violated_antichains
-from planner_core.certified.mip.highs import CHAIN_TOLERANCE, Engine
+from planner_core.certified.mip.highs import Engine
 from planner_core.certified.mip.model import plan_program
 from planner_core.certified.mip.program import Rows
+from planner_core.certified.tolerances import CHAINED, INSIDE
+from planner_core.certified.tuning import TUNING
 from planner_core.problem import (
     COLLECT,
     CONTACT,
@@ -29,12 +31,6 @@ from planner_core.problem import (
 )
 from planner_core.problem.plan import Plan
 
-_CLEAR: Final = 1e-7  # from the limits, so that the referee accepts the plan
-_CENTRAL_ROUNDS: Final = 2
-_CORNER_ROUNDS: Final = 5
-_EFFORT: Final = 0.2
-_MAX_NODES: Final = 200
-_ASIDE: Final = 1e-3  # of what tasks are worth
 _INTERIOR: Final[Mapping[str, str | float]] = {
     "solver": "ipm",
     "run_crossover": "off",
@@ -43,7 +39,7 @@ _INTERIOR: Final[Mapping[str, str | float]] = {
 _CORNER: Final[Mapping[str, str | float]] = {
     "solver": "choose",
     "run_crossover": "on",
-    "primal_feasibility_tolerance": CHAIN_TOLERANCE,
+    "primal_feasibility_tolerance": CHAINED,
 }
 
 
@@ -159,7 +155,7 @@ class FixedContacts:
         kept = offered & (problem.opportunities.kind == COLLECT)
         kept[[*fixed, *others, *problem.kept_rows.tolist()]] = True
         self._rows = np.flatnonzero(kept).astype(np.int32)
-        self._model = plan_program(problem, "antichain", _CLEAR, self._rows)
+        self._model = plan_program(problem, "antichain", INSIDE, self._rows)
         self._limit(self._is_fixed(fixed))
         self._budget, self._seed = budget, seed
         self._engine = self._new_engine()
@@ -167,7 +163,7 @@ class FixedContacts:
         self._fixed = fixed
         self._point: Floats | None = None  # of the last relaxation
 
-    def relaxation(self, num_rounds: int = _CENTRAL_ROUNDS) -> Relaxation:
+    def relaxation(self, num_rounds: int = TUNING.tries) -> Relaxation:
         """Return what the relaxation tells, with prices amid all that prove it.
 
         Parameters
@@ -186,14 +182,14 @@ class FixedContacts:
 
     def relaxed(self) -> float:
         """Return what the relaxation is worth: a corner, from which the search sets out."""
-        point = self._cut(_CORNER_ROUNDS, self._engine.corner)
+        point = self._cut(TUNING.several, self._engine.corner)
         self._point = None if point is None else point.columns
         return -np.inf if point is None else point.value
 
     def turn_aside(self, rng: np.random.Generator) -> None:
         """Move to another corner of the relaxation, worth about as much."""
         worth = np.concatenate(self._model.program.worth)
-        self._engine.weigh(worth * (1.0 + _ASIDE * rng.random(len(worth))))
+        self._engine.weigh(worth * (1.0 + TUNING.trifle * rng.random(len(worth))))
         point = self._engine.corner()
         self._point = None if point is None else point.columns
         self._engine.weigh(worth)
@@ -268,8 +264,8 @@ class FixedContacts:
         engine.require(at_least)
         if is_rounded:
             engine.look_no_further()
-        max_nodes = 0 if is_rounded else _MAX_NODES
-        outcome = engine.search(self._point, 0.0, _EFFORT, _unwatched, max_nodes)
+        max_nodes = 0 if is_rounded else TUNING.highs_nodes
+        outcome = engine.search(self._point, 0.0, TUNING.highs_effort, _unwatched, max_nodes)
         if outcome.columns is None:
             return None
         return Plan.of(self._problem, self._rows[outcome.columns[: len(self._rows)] > 0.5])

@@ -5,25 +5,19 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
 
 import highspy
 import numpy as np
 
 from planner_core.budget import Budget
 from planner_core.certified.mip.program import Program, Rows
+from planner_core.certified.sizes import LOG_CHARACTERS, PAUSE_S, POLL_S
+from planner_core.certified.tolerances import CHAINED, SAME
 from planner_core.problem import Floats
 
 # Sums of zeros and ones bear HiGHS's usual tolerance. In a long chain of levels each row may
 # be off by as much, so there it must be far below one task.
-_TOLERANCE: Final = 1e-6
-CHAIN_TOLERANCE: Final = 1e-9
 
-_POLL_S: Final = 0.02
-_PATIENCE_S: Final = 0.25
-"""How long HiGHS may take to stop by itself; between two of its interrupts lie seconds at times."""
-
-_MAX_LOG: Final = 6000  # characters
 
 Watch = Callable[[float, float], None]
 """Called now and then with the best objective so far and the bound."""
@@ -60,7 +54,7 @@ class Engine:
     """
 
     def __init__(self, program: Program, budget: Budget, seed: int, *, is_chained: bool) -> None:
-        tolerance = CHAIN_TOLERANCE if is_chained else _TOLERANCE
+        tolerance = CHAINED if is_chained else SAME
         self._budget = budget
         self._bound = float("inf")
         self._incumbent: Floats | None = None
@@ -104,7 +98,7 @@ class Engine:
             return None
         info = self._highs.getInfo()
         # The duals prove the value but for what HiGHS tolerates of them, on columns up to one.
-        doubt = float(info.sum_dual_infeasibilities) + _TOLERANCE
+        doubt = float(info.sum_dual_infeasibilities) + SAME
         self._bound = min(self._bound, float(info.objective_function_value) + doubt)
         return np.array(self._highs.getSolution().col_value)
 
@@ -116,7 +110,7 @@ class Engine:
     @property
     def log(self) -> str:
         """What HiGHS had to say: the end of it, which holds the result."""
-        return "".join(self._messages)[-_MAX_LOG:]
+        return "".join(self._messages)[-LOG_CHARACTERS:]
 
     def search(
         self,
@@ -197,8 +191,8 @@ class Engine:
         thread = threading.Thread(target=self._highs.run, name="highs")
         thread.start()
         while thread.is_alive() and not self._budget.is_spent():
-            thread.join(_POLL_S)
-        thread.join(_PATIENCE_S)
+            thread.join(POLL_S)
+        thread.join(PAUSE_S)
         self._is_abandoned = thread.is_alive()
         return not self._is_abandoned
 

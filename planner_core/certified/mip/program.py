@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from planner_core.problem import Bools, Floats, Ints
-
-INFINITE: Final = float("inf")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -41,8 +38,8 @@ class Rows:
         column: npt.NDArray[np.integer],
         value: Floats | float = 1.0,
         *,
-        lower: Floats | float = -INFINITE,
-        upper: Floats | float = INFINITE,
+        lower: Floats | float = -np.inf,
+        upper: Floats | float = np.inf,
     ) -> Rows:
         """Return rows from offsets of shape ``(num_rows + 1,)``; numbers stand for all alike."""
         num_rows = len(offsets) - 1
@@ -58,8 +55,8 @@ class Rows:
     def aligned(
         cls,
         *terms: tuple[npt.NDArray[np.integer], Floats | float],
-        lower: Floats | float = -INFINITE,
-        upper: Floats | float = INFINITE,
+        lower: Floats | float = -np.inf,
+        upper: Floats | float = np.inf,
     ) -> Rows:
         """Return as many rows as each term has columns: row i sums the i-th of every term."""
         num_rows = len(terms[0][0])

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import chain
-from typing import Final
 
 import numpy as np
 
@@ -21,6 +20,7 @@ from planner_core.certified.mip.contact_sets import FixedContacts
 from planner_core.certified.mip.solution_pool import PlanPool, Rows, rows_of
 from planner_core.certified.multipliers.resources import PriceSearch
 from planner_core.certified.proofs.resource_bound import leaving_whole_units, whole_worth
+from planner_core.certified.tuning import TUNING
 from planner_core.problem import (
     CONTACT,
     Bools,
@@ -29,18 +29,6 @@ from planner_core.problem import (
     Problem,
 )
 from planner_core.solvers.sequential import blocked_rows
-
-_BEST: Final = 2  # of those sets that are planned with
-_TRIES: Final = 2  # of a program without a better plan
-_DRAWS: Final = 3  # sets of contacts beside those of plans
-_OFF: Final = 0.2  # of a reward: what prices are off by at a draw
-_FEWEST_OFFERED, _MOST_PER_TASK = 1.2, 4.0  # tasks, of which programs choose one
-_MORE: Final = 1.5  # where no better plan is found among them
-_MOST_OFFERED: Final = 6000  # tasks of a program: of a larger fleet it takes some satellites
-# Steps of the other search that take about as long as
-_BESIDE_DRAWS: Final = 6
-_BESIDE_RELAXATIONS: Final = 6
-_BESIDE_PROGRAM: Final = 6
 
 
 class ProgramSearch:
@@ -76,7 +64,7 @@ class ProgramSearch:
         self._prices, self._unit = prices.prices, prices.unit
         self._satellites = prices.satellites
         self._losses = losses
-        self._offered_per_task = _FEWEST_OFFERED
+        self._offered_per_task = TUNING.tasks_per_task
         self._rng = np.random.default_rng(seed)
         self._work = self._steps()
         self.steps_beside = next(self._work, 1)
@@ -93,15 +81,15 @@ class ProgramSearch:
             beside = self._tasks_beside(group)
             program = self._program(group, beside)
             before = self._pool.reward
-            yield _BESIDE_RELAXATIONS
+            yield TUNING.steps_beside
             sets = [self._contacts(group, rows) for rows in self._known()]
             yield from self._improve_best(program, beside, sets)
             if self._pool.reward == before:
-                yield _BESIDE_DRAWS
-                sets = [self._draw(group, beside) for _ in range(_DRAWS)]
+                yield TUNING.steps_beside
+                sets = [self._draw(group, beside) for _ in range(TUNING.several)]
                 yield from self._improve_best(program, beside, sets)
             if self._pool.reward == before:
-                self._offered_per_task = min(_MORE * self._offered_per_task, _MOST_PER_TASK)
+                self._offered_per_task = min(TUNING.more * self._offered_per_task, TUNING.several)
 
     def _improve_best(
         self, program: FixedContacts, beside: Rows, sets: Sequence[Rows]
@@ -112,7 +100,7 @@ class ProgramSearch:
             fixed = (*beside, *contacts)
             program.fix(fixed)
             worth[fixed] = program.relaxed()
-        for fixed in sorted(worth, key=lambda fixed: -worth[fixed])[:_BEST]:
+        for fixed in sorted(worth, key=lambda fixed: -worth[fixed])[: TUNING.tries]:
             yield from self._improve(program, fixed)
 
     def _improve(self, program: FixedContacts, fixed: Rows) -> Iterator[int]:
@@ -120,8 +108,8 @@ class ProgramSearch:
         program.fix(fixed)
         value = program.relaxed()
         num_tries = 0
-        while value >= self._pool.better and num_tries < _TRIES:
-            yield _BESIDE_PROGRAM
+        while value >= self._pool.better and num_tries < TUNING.tries:
+            yield TUNING.steps_beside
             before = self._pool.reward
             self._pool.add(program.plan(self._pool.better, is_rounded=True))
             num_tries = 0 if self._pool.reward > before else num_tries + 1
@@ -134,7 +122,7 @@ class ProgramSearch:
         for relaxation in self._rng.permutation(np.array(self._satellites, dtype=object)):
             rows = relaxation.satellite.rows
             num_offered += int(is_promising[rows].sum())
-            if num_offered > _MOST_OFFERED and group.any():
+            if num_offered > TUNING.most_columns and group.any():
                 break
             group[self._problem.opportunities.satellite[rows[0]]] = True
         return group
@@ -176,7 +164,7 @@ class ProgramSearch:
     def _draw(self, group: Bools, beside: Rows) -> Rows:
         """Return contacts that satellites would have in turn, at prices that are a little off."""
         most = self._problem.best_worth
-        off = _OFF * most * self._rng.standard_normal(len(most)) * (self._prices > 0.0)
+        off = TUNING.near * most * self._rng.standard_normal(len(most)) * (self._prices > 0.0)
         prices = np.clip(self._prices + off, 0.0, most)
         prices = leaving_whole_units(self._problem, prices, self._unit)
         worth = whole_worth(self._problem, prices, self._unit)

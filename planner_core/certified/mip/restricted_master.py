@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 
 from planner_core.budget import Budget
@@ -12,6 +10,7 @@ from planner_core.certified.mip.highs import Engine
 from planner_core.certified.mip.program import Program, Rows
 from planner_core.certified.mip.zero_half_cuts import Sets, deepest, odd_sets
 from planner_core.certified.proofs.certificate import Cut, Multipliers
+from planner_core.certified.tuning import TUNING
 from planner_core.draws import draws_of
 from planner_core.jit import kernel
 from planner_core.precedence.relation import (
@@ -27,11 +26,6 @@ from planner_core.problem import (
     Ints,
     Problem,
 )
-
-_TRIALS: Final = 4  # orders of elimination that are tried for odd sets
-_MAX_CUTS: Final = 150  # in a round
-_MAX_SHARED: Final = 40  # new cuts that one fractional task may stand in
-_PATIENCE: Final = 2  # rounds that a cut may lie idle
 
 
 class Master(Engine):
@@ -164,13 +158,15 @@ class Master(Engine):
     def _odd_sets(self, taken: Floats) -> list[tuple[int, ...]]:
         """Return the deepest cuts, not too many of them about the same tasks."""
         depth_of: dict[tuple[int, ...], float] = {}
-        for _ in range(_TRIALS):
+        for _ in range(TUNING.several):
             chosen = odd_sets(self._sets, taken, self._draws)
-            cuts, depth = deepest(self._sets, chosen, taken, _MAX_CUTS, _MAX_SHARED)
+            cuts, depth = deepest(
+                self._sets, chosen, taken, TUNING.max_cuts, TUNING.max_cuts // TUNING.several
+            )
             for cut, beyond in zip(cuts, depth, strict=True):
                 group = chosen.members[chosen.offsets[cut] : chosen.offsets[cut + 1]]
                 depth_of[tuple(np.sort(group).tolist())] = float(beyond)
-        return sorted(depth_of, key=lambda group: (-depth_of[group], group))[:_MAX_CUTS]
+        return sorted(depth_of, key=lambda group: (-depth_of[group], group))[: TUNING.max_cuts]
 
     def _drop_idle(self) -> None:
         solution = self._highs.getSolution()
@@ -178,12 +174,12 @@ class Master(Engine):
         for row, picked in enumerate(self._row_sets):
             if len(picked) > 1:
                 self._idle[row] = self._idle[row] + 1 if dual[row] < 1e-9 else 0
-        drop = [row for row, idle in enumerate(self._idle) if idle >= _PATIENCE]
+        drop = [row for row, idle in enumerate(self._idle) if idle >= TUNING.tries]
         if drop:
             self._highs.deleteRows(len(drop), np.array(drop, dtype=np.int32))
             gone = set(drop)
             self._row_sets = [p for row, p in enumerate(self._row_sets) if row not in gone]
-            self._idle = [idle for idle in self._idle if idle < _PATIENCE]
+            self._idle = [idle for idle in self._idle if idle < TUNING.tries]
 
 
 def _exclusion(precedence: Precedence, place: Ints, kind: np.ndarray) -> Precedence:

@@ -8,23 +8,19 @@ what they are worth together: an image or two more than the best, again and agai
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Final
 
 import numpy as np
 
 from planner_core.budget import Budget
 from planner_core.certified.mip.contact_sets import FixedContacts
 from planner_core.certified.proofs.bound import reward_unit
+from planner_core.certified.tolerances import SAME
+from planner_core.certified.tuning import TUNING
 from planner_core.problem import CONTACT, Problem
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
 
 Rows = tuple[int, ...]
-
-_BEST: Final = 6  # plans that are merged
-_NEWEST: Final = 6  # and others
-_MOST_OFFERED: Final = 6000  # tasks
-_LEAST_GAIN: Final = 1e-6  # of the reward
 
 
 class PlanPool:
@@ -51,7 +47,7 @@ class PlanPool:
     @property
     def better(self) -> float:
         """What a better plan is worth at least."""
-        return self.reward + max(self._gain, _LEAST_GAIN * self.reward)
+        return self.reward + max(self._gain, SAME * self.reward)
 
     def learn(self, ended: Iterable[Plan], latest: Plan) -> None:
         """Note the plans that another search has ended with, and the one that it is at."""
@@ -74,12 +70,12 @@ class PlanPool:
         if len(self._worth) == self._num_merged:
             return
         self._num_merged = len(self._worth)
-        newest = [*reversed(self._worth)][:_NEWEST]
-        best = sorted(self._worth, key=lambda rows: -self._worth[rows])[:_BEST]
+        newest = [*reversed(self._worth)][: TUNING.patience]
+        best = sorted(self._worth, key=lambda rows: -self._worth[rows])[: TUNING.patience]
         merged: list[Rows] = []
         taken: set[int] = set()
         for rows in dict.fromkeys([rows_of(self.plan), *best, *newest]):
-            if len(taken.union(rows)) > _MOST_OFFERED:
+            if len(taken.union(rows)) > TUNING.most_columns:
                 break
             taken.update(rows)
             merged.append(rows)

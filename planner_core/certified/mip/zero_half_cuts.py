@@ -11,14 +11,13 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from planner_core.certified.tolerances import TAKEN, WHOLE, ZERO_HALF_BROKEN
+from planner_core.certified.tuning import TUNING
 from planner_core.draws import Uint64s, next_draw
 from planner_core.jit import kernel
 from planner_core.problem import Floats, Ints, Longs
 
-_INTEGER: Final = 1e-5  # nearer than this to 0 or 1 is no fraction
-_MIN_VIOLATION: Final = 0.02  # of the sum, before halving
-_NOISE: Final = 0.3
-_MIN_DEPTH: Final = 1e-3
+_NOISE: Final = TUNING.disturbance
 
 
 class Sets(NamedTuple):
@@ -39,7 +38,7 @@ def _tight_sets(sets: Sets, taken: Floats, column_of: Ints) -> tuple[Ints, Float
         for at in range(sets.offsets[i], sets.offsets[i + 1]):
             total += taken[sets.members[at]]
             has_fraction |= column_of[sets.members[at]] >= 0
-        if has_fraction and total > _MIN_VIOLATION:
+        if has_fraction and total > ZERO_HALF_BROKEN:
             own[m] = i
             slack[m] = max(0.0, 1.0 - total)
             m += 1
@@ -54,7 +53,7 @@ def odd_sets(sets: Sets, taken: Floats, draws: Uint64s) -> Sets:
     first, stands in an even number of them (Koster, Zymolka and Kutschka, 2009).
     """
     one = np.uint64(1)
-    fractional = np.flatnonzero((taken > _INTEGER) & (taken < 1.0 - _INTEGER))
+    fractional = np.flatnonzero((taken > WHOLE) & (taken < 1.0 - WHOLE))
     noise = np.array([_NOISE * next_draw(draws) for _ in range(len(fractional))])
     fractional = fractional[np.argsort(-taken[fractional] - noise)]
     column_of = np.full(len(taken), -1, dtype=np.int32)
@@ -90,16 +89,16 @@ def odd_sets(sets: Sets, taken: Floats, draws: Uint64s) -> Sets:
             odd[i] ^= odd[pivot]
             used[i] ^= used[pivot]
             is_odd_number[i] ^= is_odd_number[pivot]
-            is_live[i] = slack[i] < 1.0 - _MIN_VIOLATION
+            is_live[i] = slack[i] < 1.0 - ZERO_HALF_BROKEN
             if not is_live[i] or not is_odd_number[i]:
                 continue
             lost = slack[i]
             for c in range(n):
                 if odd[i, c >> 6] & (one << np.uint64(c & 63)):
                     lost += taken[fractional[c]]
-                    if lost >= 1.0 - _MIN_VIOLATION:
+                    if lost >= 1.0 - ZERO_HALF_BROKEN:
                         break
-            if lost < 1.0 - _MIN_VIOLATION:
+            if lost < 1.0 - ZERO_HALF_BROKEN:
                 for j in range(m):
                     if used[i, j >> 6] & (one << np.uint64(j & 63)):
                         found.append(own[j])
@@ -129,13 +128,13 @@ def deepest(
                 weight = count[member] // 2
                 count[member] = 0
                 total += weight * taken[member]
-                norm += weight * weight if taken[member] > _INTEGER else 0.0
+                norm += weight * weight if taken[member] > WHOLE else 0.0
         depth[cut] = total / np.sqrt(norm)
     shared = np.zeros(len(taken), dtype=np.int32)
     found = np.empty(max_cuts, dtype=np.int32)
     m = 0
     for cut in np.argsort(-depth, kind="mergesort"):
-        if m == max_cuts or depth[cut] < _MIN_DEPTH:
+        if m == max_cuts or depth[cut] < TAKEN:
             break
         picked = chosen.members[chosen.offsets[cut] : chosen.offsets[cut + 1]]
         is_free = True
@@ -146,7 +145,7 @@ def deepest(
             continue
         for i in picked:
             for member in sets.members[sets.offsets[i] : sets.offsets[i + 1]]:
-                if _INTEGER < taken[member] < 1.0 - _INTEGER:
+                if WHOLE < taken[member] < 1.0 - WHOLE:
                     # Whoever counts stands in two of the sets.
                     shared[member] += 1
         found[m] = cut

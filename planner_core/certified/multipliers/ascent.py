@@ -15,15 +15,13 @@ parts for turns: their steps are longer, and follow the value.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import Protocol
 
 import numpy as np
 
+from planner_core.certified.tuning import TUNING
 from planner_core.jit import kernel
 from planner_core.problem import Bytes, Floats, Ints
-
-_NEWEST: Final = 0.15  # share of an epoch's multipliers in the mean
-_MOVES: Final = 24  # of the multipliers in an epoch, at most
 
 
 class Oracle(Protocol):
@@ -56,9 +54,11 @@ class Steps:
 
     Attributes
     ----------
-    first, last
-        What a multiplier moves in the first epoch and in the last one, all parts together, for
-        each answer too many; a share of what the target is worth.
+    first
+        What a multiplier moves in the first epoch, all parts together, for each answer too many;
+        a share of what the target is worth.
+    last
+        How much of that in the last one.
     num_epochs
         After how many more are of little use.
     asked_every
@@ -120,7 +120,7 @@ class Ascent:
             if stop[0]:
                 return
             self._epoch += 1
-            self._mean += _NEWEST * (self._now - self._mean)
+            self._mean += TUNING.newest_share * (self._now - self._mean)
             if self._epoch % self._steps.asked_every == 0:
                 self.ask()
 
@@ -131,8 +131,8 @@ class Ascent:
 
     def _go_round(self, stop: Bytes) -> None:
         steps, parts = self._steps, self._rng.permutation(self._oracle.parts)
-        num_moves = min(_MOVES, len(parts))
-        shorter = (steps.last / steps.first) ** (self._epoch / max(1, steps.num_epochs))
+        num_moves = min(TUNING.moves_per_epoch, len(parts))
+        shorter = steps.last ** (self._epoch / max(1, steps.num_epochs))
         # Before all have answered nothing is known of what is taken twice.
         length = steps.first * shorter / max(1, num_moves) if self._epoch else 0.0
         for move in range(num_moves):

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Final
+from dataclasses import replace
 
 import numpy as np
 
 from planner_core.certified.multipliers.ascent import Ascent, Steps
-from planner_core.certified.proofs.continuous import ContinuousDual, num_followers, width_for
+from planner_core.certified.proofs.continuous import (
+    ContinuousDual,
+    num_followers,
+    rough_cell_s,
+    width_for,
+)
+from planner_core.certified.sizes import MAX_FOLLOWERS
+from planner_core.certified.tuning import TUNING
 from planner_core.problem import Bytes, Floats, Ints, Problem
-
-_ROUGH_S: Final = 10.0
-_ROUGH: Final = Steps(first=0.15, last=0.02, num_epochs=50, asked_every=51)
-_FINE: Final = Steps(first=0.08, last=0.0046, num_epochs=70, asked_every=14)
-_MOST_FOLLOWERS: Final = 30_000_000  # of 12 bytes each; with more there is no search
-_BEGIN: Final = 0.9  # of what targets are worth
 
 
 class Chains:
@@ -43,10 +44,18 @@ class Chains:
 def ascend_on_chains(problem: Problem, stop: Bytes) -> Iterator[tuple[float, Floats]]:
     """Yield after each epoch the best bound so far, and the multipliers that prove it."""
     width_s = width_for(problem)
-    if num_followers(problem, width_s) > _MOST_FOLLOWERS:
+    if num_followers(problem, width_s) > MAX_FOLLOWERS:
         return
-    begin = _BEGIN * problem.best_worth
-    for cell_s, steps in ((max(_ROUGH_S, width_s), _ROUGH), (width_s, _FINE)):
+    begin = TUNING.begin_of_chains * problem.best_worth
+    num_epochs = TUNING.epochs // TUNING.several
+    rough = Steps(
+        first=TUNING.first_step,
+        last=TUNING.last_step_of_few,
+        num_epochs=num_epochs,
+        asked_every=num_epochs + 1,  # its answers prove less than those of narrow cells
+    )
+    fine = replace(rough, first=TUNING.first_step / 2.0, asked_every=TUNING.epochs_at_a_time)
+    for cell_s, steps in ((max(rough_cell_s(), width_s), rough), (width_s, fine)):
         dual = None if stop[0] else ContinuousDual.of(problem, cell_s, stop)
         if dual is None:
             return

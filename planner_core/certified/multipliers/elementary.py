@@ -13,14 +13,11 @@ from planner_core.certified.dp.elementary import (
     memory_of,
 )
 from planner_core.certified.multipliers.ascent import Ascent, Steps
+from planner_core.certified.tuning import TUNING
 from planner_core.jit import borrowing
 from planner_core.precedence.arcs import ArcNetwork, arc_network_of
 from planner_core.problem import Bools, Floats, Ints, Problem
 from planner_core.worth import weights
-
-_STEPS = Steps(first=0.2, last=1e-3, num_epochs=530)
-_LAST_OF_FEW = 0.01  # the length of the last step, where there are few
-_BEGIN = 0.5  # of what targets are worth
 
 
 class ElementaryPaths:
@@ -61,10 +58,12 @@ def ascent_on_passes(problem: Problem, seed: int, num_epochs: int | None = None)
     """
     network = arc_network_of(problem)
     oracle = ElementaryPaths(problem, network, memory_of(problem, network))
-    steps = _STEPS
-    if num_epochs is not None:
-        steps = Steps(first=_STEPS.first, last=_LAST_OF_FEW, num_epochs=num_epochs)
-    return Ascent(oracle, problem.best_worth, _BEGIN * problem.best_worth, steps, seed)
+    steps = Steps(
+        first=TUNING.first_step,
+        last=TUNING.last_step if num_epochs is None else TUNING.last_step_of_few,
+        num_epochs=num_epochs or 2 * TUNING.epochs,
+    )
+    return Ascent(oracle, problem.best_worth, TUNING.begin * problem.best_worth, steps, seed)
 
 
 @borrowing

@@ -6,18 +6,16 @@ multipliers prove with recorders is for ``resource_bound`` to say.
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from planner_core.certified.dp.energy_labels import EnergyLevels, energy_levels, most_by_energy
 from planner_core.certified.dp.resource_network import Network, network_of
 from planner_core.certified.multipliers.ascent import Ascent, Steps
+from planner_core.certified.tuning import TUNING
 from planner_core.problem import COLLECT, Floats, Ints, Problem, SatelliteProblem
 from planner_core.worth import weights
-
-_PER_COLLECT: Final = 24  # levels of energy
-_FIRST_STEP, _LAST_STEP = 0.3, 3e-4
 
 
 class _Part(NamedTuple):
@@ -31,7 +29,7 @@ class _Part(NamedTuple):
     @classmethod
     def of(cls, problem: Problem, satellite: SatelliteProblem) -> _Part:
         network = network_of(problem, satellite)
-        levels = energy_levels(network, _PER_COLLECT)
+        levels = energy_levels(network, TUNING.levels_per_collect)
         num_targets = len(problem.target_ids)
         target = np.where(satellite.kind == COLLECT, satellite.place, num_targets)
         return cls(
@@ -88,5 +86,5 @@ def ascent_on_energy(
     problem: Problem, oracle: EnergyPaths, begin: Floats, num_epochs: int, seed: int
 ) -> Ascent:
     """Return the ascent on what batteries prove."""
-    steps = Steps(first=_FIRST_STEP, last=_LAST_STEP, num_epochs=max(1, num_epochs))
+    steps = Steps(first=TUNING.first_step, last=TUNING.last_step, num_epochs=max(1, num_epochs))
     return Ascent(oracle, problem.best_worth, begin, steps, seed)

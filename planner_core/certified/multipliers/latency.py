@@ -8,19 +8,13 @@ multipliers of targets and contacts move together, by what the bound is above th
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 
 from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.proofs.latency import latency_relaxations
+from planner_core.certified.tolerances import SAME
+from planner_core.certified.tuning import TUNING
 from planner_core.problem import CONTACT, Bytes, Floats, Problem
-
-_STALLED: Final = 6  # rounds without a lower bound, before steps get shorter
-_SHORTER: Final = 0.6
-_SETTLED: Final = 0.01  # of the first step
-_MOST_ABOVE: Final = 0.2  # of a bound: a plan that is poor says little of the best one
-_LOWER: Final = 1e-6  # of a bound: what counts as a lower one
 
 
 class LatencyAscent:
@@ -61,7 +55,7 @@ class LatencyAscent:
     @property
     def is_settled(self) -> bool:
         """Whether more rounds are of little use."""
-        return self._length < _SETTLED
+        return self._length < TUNING.little
 
     def improve(self, num_rounds: int, level: float, stop: Bytes) -> None:
         """Go some rounds on towards a bound at ``level``, which a known plan earns."""
@@ -101,7 +95,7 @@ class LatencyAscent:
 
     def _is_hopeful(self, value: float) -> bool:
         """Note what the prices of the moment prove; go back to better ones after a while."""
-        if value < self.bound.value * (1.0 - _LOWER):
+        if value < self.bound.value * (1.0 - SAME):
             self._best, self._num_idle = (self._prices, self._tolls), 0
             self.bound = Bound(
                 value=value,
@@ -111,9 +105,9 @@ class LatencyAscent:
             )
             return True
         self._num_idle += 1
-        if self._num_idle < _STALLED:
+        if self._num_idle < TUNING.patience:
             return True
-        self._length, self._num_idle = _SHORTER * self._length, 0
+        self._length, self._num_idle = TUNING.shorter * self._length, 0
         self._prices, self._tolls = self._best
         return False
 
@@ -129,7 +123,7 @@ class LatencyAscent:
         too_many = np.where((self._prices <= 0.0) & (too_many < 0.0), 0.0, too_many)
         too_much = np.where((self._tolls <= 0.0) & (too_much < 0.0), 0.0, too_much)
         squares = sum(float(np.square(each).sum()) for each in (too_many, too_much))
-        above = min(above, _MOST_ABOVE * self.bound.value)
+        above = min(above, TUNING.far_above * self.bound.value)
         step = self._length * above / squares if squares > 0.0 else 0.0
         self._prices = np.clip(self._prices + step * too_many, 0.0, self._most)
         self._tolls = np.maximum(self._tolls + step * too_much, 0.0)

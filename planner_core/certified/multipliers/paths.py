@@ -5,12 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from planner_core.certified.multipliers.ascent import Ascent, Steps
+from planner_core.certified.tuning import TUNING
 from planner_core.jit import kernel
 from planner_core.precedence.network import Network, heaviest_path, heaviest_paths
 from planner_core.problem import Bools, Floats, Ints, Problem
-
-_FIRST_STEP, _LAST_STEP = 0.5, 5e-4
-_BEGIN = 0.5  # of what targets are worth
 
 
 class Paths:
@@ -43,8 +41,8 @@ class Paths:
 
 def ascent_on_paths(problem: Problem, network: Network, num_epochs: int, seed: int) -> Ascent:
     """Return the ascent on what longest paths prove."""
-    steps = Steps(first=_FIRST_STEP, last=_LAST_STEP, num_epochs=num_epochs)
-    begin = _BEGIN * problem.best_worth
+    steps = Steps(first=TUNING.first_step_of_paths, last=TUNING.last_step, num_epochs=num_epochs)
+    begin = TUNING.begin * problem.best_worth
     return Ascent(Paths(problem, network), problem.best_worth, begin, steps, seed)
 
 

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections import Counter, deque
-from typing import Final
+from collections import Counter
 
 import numpy as np
 import numpy.typing as npt
 
 from planner_core.certified.proofs.resource_bound import (
-    COARSE,
     leaving_whole_units,
     relaxations,
     whole_worth,
 )
+from planner_core.certified.sizes import MAX_CELLS
+from planner_core.certified.tolerances import NOTHING
+from planner_core.certified.tuning import TUNING
 from planner_core.problem import (
     COLLECT,
     CONTACT,
@@ -23,16 +24,6 @@ from planner_core.problem import (
     Problem,
 )
 from planner_core.problem.plan import Plan
-
-_MAX_CELLS: Final = 36_000_000
-_UNITS_PER_REWARD: Final = 48
-_DEFLECTION: Final = 0.3
-_PATIENCE: Final = 7
-_SHORTER: Final = 0.6
-_NEAR: Final = 0.99
-_AFRESH: Final = 1.0  # length of the steps from given prices
-_KEPT_PATHS: Final = 30
-_NOTHING: Final = 1e-15  # of the most that a target is worth: all that a step could move
 
 
 class PriceSearch:
@@ -58,13 +49,13 @@ class PriceSearch:
         self._typical = problem.typical_worth
         # By target: what the image earns that plans take of it, as far as they are known.
         self._worth_taken = problem.best_worth.copy()
-        coarse = relaxations(problem, COARSE)
+        coarse = relaxations(problem, TUNING.coarse)
         num_images = int(value / self._typical / len(coarse))
         self.satellites = tuple(s.with_data_price(num_images) for s in coarse)
         self._now = np.where(self._is_reachable, prices, 0.0)
         self._direction = np.zeros(len(prices))
         # Rows of relaxed plans of each satellite: at any prices the best is no worse than they.
-        self._paths: list[deque[Ints]] = [deque(maxlen=_KEPT_PATHS) for _ in self.satellites]
+        self._paths: list[list[Ints]] = [[] for _ in self.satellites]
         self._stalled = 0
         self.unit = self._unit(value)
         self.value, self.prices = np.inf, self._now
@@ -74,8 +65,8 @@ class PriceSearch:
 
     def _unit(self, value: float) -> float:
         largest = max(len(s.satellite) for s in self.satellites)
-        unit = 2.0 ** np.floor(np.log2(self._typical)) / _UNITS_PER_REWARD
-        while value / len(self.satellites) / unit > _MAX_CELLS / largest:
+        unit = 2.0 ** np.floor(np.log2(self._typical)) / TUNING.levels_per_collect
+        while value / len(self.satellites) / unit > MAX_CELLS / largest:
             unit *= 2.0
         return float(unit)
 
@@ -96,8 +87,8 @@ class PriceSearch:
         self._stalled += 1
         if value < self.value - 1e-9:
             self.value, self.prices, self._stalled = value, prices, 0
-        if self._stalled >= _PATIENCE:
-            self.theta, self._stalled = self.theta * _SHORTER, 0
+        if self._stalled >= TUNING.patience:
+            self.theta, self._stalled = self.theta * TUNING.shorter, 0
             self._now, self._direction = self.prices, np.zeros_like(self._direction)
             return True
         gradient = np.where(self._is_reachable, counts - 1.0, 0.0)
@@ -105,11 +96,11 @@ class PriceSearch:
         gradient[(self._now >= most) & (gradient > 0.0)] = 0.0
         # A step moves prices in proportion to what the targets are worth.
         scale = np.where(most > 0.0, most, 1.0)
-        self._direction = (1.0 - _DEFLECTION) * gradient + _DEFLECTION * self._direction
+        self._direction = (1.0 - TUNING.deflection) * gradient + TUNING.deflection * self._direction
         norm = float(self._direction @ (scale * self._direction))
-        if norm <= _NOTHING * float(scale.max()):
+        if norm <= NOTHING * float(scale.max()):
             return False
-        length = self.theta * (value - max(level, _NEAR * self.value)) / norm
+        length = self.theta * (value - max(level, (1.0 - TUNING.little) * self.value)) / norm
         self._now = np.clip(self._now + length * scale * self._direction, 0.0, most)
         return True
 
@@ -126,7 +117,7 @@ class PriceSearch:
         self._now = np.where(self._is_reachable, prices, 0.0)
         self._direction = np.zeros_like(self._now)
         self.value, self.prices = np.inf, self._now
-        self.theta, self._stalled = _AFRESH, 0
+        self.theta, self._stalled = 1.0, 0
 
     def _whole(self, prices: Floats, unit: float) -> Floats:
         """Return prices at which the images that plans take are worth whole units."""

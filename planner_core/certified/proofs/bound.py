@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Final, Literal
+from typing import Literal
 
 import numpy as np
 
 from planner_core.certified.proofs.certificate import Certificate
+from planner_core.certified.tolerances import SAME
 from planner_core.problem import Floats, Problem
 
 Proof = Literal["lagrangian", "milp", "dp", "totals"]
-
-_ROUNDING: Final = 1e-6  # relative; far above the rounding of the sums, far below one reward
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -75,7 +74,7 @@ def rounded_bound(problem: Problem, value: float, reward: float) -> float:
     safe = value * (1.0 + 1e-12) + 1e-9
     unit = reward_unit(problem)
     if unit > 0.0:
-        safe = float(np.floor((safe + _ROUNDING) / unit) * unit)
+        safe = float(np.floor((safe + SAME) / unit) * unit)
     return max(safe, reward)
 
 

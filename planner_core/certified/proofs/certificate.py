@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planner_core.certified.tolerances import ROUNDING
 from planner_core.precedence.network import Network, heaviest_through, network_of
 from planner_core.precedence.relation import (
     Precedence,
@@ -30,8 +31,6 @@ from planner_core.problem import (
     Problem,
 )
 from planner_core.problem.restrict import restricted
-
-_ROUNDING = 1e-9  # relative; what sums of floats may be off by
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -187,7 +186,7 @@ def values_through(
 
 def is_below(value: Floats | float, amount: float) -> Bools:
     """Return whether a bound is below an amount, whatever the rounding of its sum."""
-    return np.asarray(value) < amount - _ROUNDING * max(1.0, abs(amount))
+    return np.asarray(value) < amount - ROUNDING * max(1.0, abs(amount))
 
 
 def _priced(problem: Problem, rows: Ints, step: Multipliers) -> tuple[float, Floats]:

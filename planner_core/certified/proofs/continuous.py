@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 
@@ -26,6 +25,8 @@ from planner_core.certified.dp.start_labels import (
 )
 from planner_core.certified.proofs.bound import Bound, accessible
 from planner_core.certified.proofs.totals import totals_bound
+from planner_core.certified.sizes import LABELS_PER_CELL, MAX_PAIRS
+from planner_core.certified.tuning import TUNING
 from planner_core.precedence.time_windows import (
     Spans,
     part_of,
@@ -40,12 +41,6 @@ from planner_core.problem import (
     Problem,
 )
 from planner_core.worth import surplus, weights
-
-LABELS: Final = 2
-_WIDTHS_S: Final = (2.5, 25.0)
-_FOLLOWERS: Final = 8_000_000  # in the tables of all satellites, more or less
-_CLEAR_S: Final = 60.0
-_LONGEST_S: Final = 15_000.0
 
 
 def quick_bound(problem: Problem) -> Bound:
@@ -67,8 +62,13 @@ def continuous_value(problem: Problem, prices: Floats) -> float:
 
 def width_for(problem: Problem) -> float:
     """Return how wide cells are, so that tables have a size that a machine can hold."""
-    width_s = _WIDTHS_S[0] * num_followers(problem, _WIDTHS_S[0]) / _FOLLOWERS
-    return float(np.clip(width_s, *_WIDTHS_S))
+    width_s = TUNING.widths_s[0] * num_followers(problem, TUNING.widths_s[0]) / MAX_PAIRS
+    return float(np.clip(width_s, *TUNING.widths_s))
+
+
+def rough_cell_s() -> float:
+    """Return how wide cells are where a search only needs to know about where it goes."""
+    return TUNING.several * TUNING.widths_s[0]
 
 
 def num_followers(problem: Problem, width_s: float) -> float:
@@ -119,7 +119,7 @@ class ContinuousDual:
                 cells = cells_of(piece, view_of(problem, index), width_s)
                 if cells is None:
                     return None
-                parts.append((cells, labels_of(cells, LABELS)))
+                parts.append((cells, labels_of(cells, LABELS_PER_CELL)))
         return cls(problem=problem, parts=tuple(parts), is_offered=is_offered)
 
     def clipped(self, prices: Floats) -> Floats:
@@ -145,10 +145,10 @@ class ContinuousDual:
         cells, labels = self.parts[number]
         worth = self.problem.worth[cells.spans.row]
         weight = weights(worth, price[cells.spans.place])
-        value, slot = heaviest(cells, weight, labels, LABELS, is_exact)
+        value, slot = heaviest(cells, weight, labels, LABELS_PER_CELL, is_exact)
         taken = []
         while slot >= 0:
-            task = cells.task[slot // LABELS]
+            task = cells.task[slot // LABELS_PER_CELL]
             if labels.is_paid[slot] and worth[task] >= price[cells.spans.place[task]]:
                 taken.append(cells.spans.place[task])
             slot = int(labels.parent[slot])
@@ -158,7 +158,7 @@ class ContinuousDual:
 def pieces_of(spans: Spans) -> list[Spans]:
     """Return tasks in pieces of a day: cut where nothing is open, or little in a long while."""
     ends_s = np.maximum.accumulate(spans.close_s + spans.length_s)
-    is_clear = spans.open_s[1:] >= ends_s[:-1] + _CLEAR_S
+    is_clear = spans.open_s[1:] >= ends_s[:-1] + TUNING.tidy_s
     pieces: list[Spans] = []
     left = [
         part_of(spans, slice(a, b))
@@ -166,12 +166,12 @@ def pieces_of(spans: Spans) -> list[Spans]:
     ]
     while left:
         piece = left.pop()
-        if len(piece.row) < 2 or piece.open_s[-1] - piece.open_s[0] < _LONGEST_S:
+        if len(piece.row) < 2 or piece.open_s[-1] - piece.open_s[0] < TUNING.longest_piece_s:
             pieces.append(piece)
             continue
         inner = np.flatnonzero(
-            (piece.open_s > piece.open_s[0] + _LONGEST_S / 3.0)
-            & (piece.open_s < piece.open_s[-1] - _LONGEST_S / 3.0)
+            (piece.open_s > piece.open_s[0] + TUNING.longest_piece_s / 3.0)
+            & (piece.open_s < piece.open_s[-1] - TUNING.longest_piece_s / 3.0)
         )
         if len(inner) == 0:
             inner = np.array([len(piece.row) // 2])

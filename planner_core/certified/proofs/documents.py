@@ -26,11 +26,11 @@ from planner_core.certified.proofs.lagrangian import lagrangian_value
 from planner_core.certified.proofs.latency import latency_value
 from planner_core.certified.proofs.resource_bound import resource_value
 from planner_core.certified.proofs.totals import totals_bound
+from planner_core.certified.tolerances import WRITTEN
 from planner_core.problem import Floats, Problem
 from planner_core.problem.on_board import most_on_board
 
 VERSION: Final = 1
-_ROUNDING: Final = 1e-8  # relative
 
 
 def to_json(bound: Bound) -> str:
@@ -86,7 +86,7 @@ def is_proven(problem: Problem, bound: Bound) -> bool | None:
     Nothing of the search that found them is used: they are put into the dual function of
     ``problem``, whose value is a bound whatever they are. What HiGHS has proven has its log.
     """
-    room = _ROUNDING * max(1.0, abs(bound.value))
+    room = WRITTEN * max(1.0, abs(bound.value))
     if bound.on_board < most_on_board(problem) - room:
         return False
     bound = bound.without_on_board()

@@ -15,12 +15,10 @@ import numpy as np
 from planner_core.certified.multipliers.elementary import ascent_on_passes
 from planner_core.certified.multipliers.paths import ascent_on_paths
 from planner_core.certified.proofs.bound import Bound, rounded_bound
+from planner_core.certified.tuning import TUNING
 from planner_core.precedence.network import heaviest_paths, network_of
 from planner_core.problem import Floats, Ints, Problem
 from planner_core.worth import surplus, weights
-
-_NODES_TO_SPEND = 6_000_000
-_EPOCHS = (100, 200)  # at least and at most: 500 lower a bound by another 0.01 %
 
 
 def lagrangian_value(problem: Problem, prices: Floats) -> tuple[float, Ints]:
@@ -76,4 +74,5 @@ def lagrangian_bound(problem: Problem, reward: float, num_epochs: int | None = N
 
 def default_epochs(num_nodes: int) -> int:
     """Return how many epochs of an ascent a network is worth."""
-    return int(np.clip(_NODES_TO_SPEND / max(1, num_nodes), *_EPOCHS))
+    least, most = TUNING.epochs // 2, TUNING.epochs
+    return int(np.clip(TUNING.quick_nodes / max(1, num_nodes), least, most))

@@ -19,19 +19,17 @@ the order in which bits come down, what telemetry takes of a contact, and statio
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from planner_core.bundles import bundle
-from planner_core.certified.dp.contact_layers import (
-    PASSED,
-    Layers,
-    layers_of,
-    most_by_contacts,
-)
+from planner_core.certified.dp.contact_layers import Layers, layers_of, most_by_contacts
 from planner_core.certified.dp.energy_labels import EnergyLevels, energy_levels
 from planner_core.certified.dp.resource_network import Network, network_of
+from planner_core.certified.signs import NEVER
+from planner_core.certified.tolerances import DOWN, DOWN_S
+from planner_core.certified.tuning import TUNING
 from planner_core.jit import kernel
 from planner_core.precedence.relation import is_transitive_on
 from planner_core.problem import (
@@ -43,10 +41,6 @@ from planner_core.problem import (
     SatelliteProblem,
 )
 from planner_core.worth import surplus
-
-_PER_COLLECT: Final = 24  # levels of energy
-_ROUNDING_S: Final = 1e-5  # the referee forgives a recorder 1e-9 of its capacity
-_ROUNDING: Final = 2e-9  # of a recorder, by which an image may fall short of being down
 
 
 @bundle
@@ -120,15 +114,15 @@ class LatencyRelaxation:
             typical=(float(np.median(size[is_image])) if is_image.any() else 0.0) or 1.0,
             may_need_all=not (is_dear and is_transitive_on(satellite)),
             network=network,
-            levels=energy_levels(network, _PER_COLLECT),
+            levels=energy_levels(network, TUNING.levels_per_collect),
             layers=layers,
             terms=_Terms(
                 end_s=satellite.end_s,
                 on_board=on_board,
                 decaying=problem.worth_on_ground[rows] - on_board,
                 most=problem.worth[rows],
-                size=np.maximum(size - _ROUNDING, 0.0),
-                ready_s=satellite.start_s[layers.contact] + setup_s - _ROUNDING_S,
+                size=np.maximum(size - DOWN, 0.0),
+                ready_s=satellite.start_s[layers.contact] + setup_s - DOWN_S,
                 volume=satellite.volume[layers.contact],
                 half_life_s=problem.objective.half_life_s or np.inf,
             ),
@@ -146,7 +140,7 @@ class LatencyRelaxation:
         """
         m, num_layers = len(self.rows), len(self.layers.first)
         weight = np.empty((num_layers, m))
-        passed = 0.0 if self.may_need_all else PASSED
+        passed = 0.0 if self.may_need_all else NEVER
         _weigh(self.terms, self.layers, prices[self.target], tolls, passed, weight)
         own, num_own = np.empty((m, self.levels.width)), np.zeros(m, dtype=np.int64)
         return most_by_contacts(self.network, self.levels, self.layers, weight, own, num_own)

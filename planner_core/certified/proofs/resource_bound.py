@@ -11,23 +11,22 @@ left out.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from planner_core.certified.dp.completion_bounds import least_energy
 from planner_core.certified.dp.data_levels import DataLevels, data_levels
-from planner_core.certified.dp.forward_labels import (
-    STOPPED,
-    UNREACHED,
-    most_value,
-    path_of,
-)
+from planner_core.certified.dp.forward_labels import most_value, path_of
 from planner_core.certified.dp.resource_network import Network, network_of
 from planner_core.certified.multipliers.latency import LatencyAscent
 from planner_core.certified.proofs.bound import Bound, rounded_bound
 from planner_core.certified.proofs.lagrangian import lagrangian_bound
-from planner_core.certified.proofs.shares import ROUNDING, Shares
+from planner_core.certified.proofs.shares import Shares
+from planner_core.certified.signs import STOPPED, UNREACHED
+from planner_core.certified.sizes import MAX_CELLS
+from planner_core.certified.tolerances import ROUNDING
+from planner_core.certified.tuning import TUNING
 from planner_core.problem import (
     COLLECT,
     Bools,
@@ -39,23 +38,6 @@ from planner_core.problem import (
     Singles,
 )
 from planner_core.worth import common_unit, surplus, weights
-
-_MAX_CELLS: Final = 30_000_000  # of one table of least energy
-_MAX_UNITS: Final = 2000
-_OPPORTUNITY_ROUNDS: Final = 100_000  # of an ascent with half-lives, about a second
-_ROUNDS: Final = (2, 20)
-_FIRST_STEP: Final = 0.01
-_SHARES: Final = (0.0, 0.25, 0.5, 0.75, 1.0)  # of prices that hold where agility alone counts
-_TRIED: Final = 2
-_PARTS: Final = 4  # of whole rewards, where images may earn parts of them
-_FEW: Final = 1000  # opportunities whose programme takes no time
-_TRIAL_UNITS: Final = 24  # of an image, in the search for a price of data
-_FIRST_GOAL: Final = 0.95  # of what the battery alone allows
-_SPAN: Final = 0.6  # of an image: telemetry in a span of the last image
-FINE: Final = 8
-"""Levels of the recorder that the smallest collect fills, where a proof counts."""
-COARSE: Final = 2
-"""The same where many prices are tried."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -101,8 +83,8 @@ class SatelliteRelaxation:
         num_images
             How many are expected, about.
         """
-        num_units = _TRIAL_UNITS
-        while num_units * num_images * len(self.satellite) > _MAX_CELLS:
+        num_units = TUNING.levels_per_collect
+        while num_units * num_images * len(self.satellite) > MAX_CELLS:
             num_units //= 2
         weight = np.where(self.satellite.kind == COLLECT, num_units, 0).astype(np.int32)
         best, least = self, np.inf
@@ -174,9 +156,11 @@ class SatelliteRelaxation:
         assert shares is not None
         goal = max(enough, near or 0)
         if goal == 0:
-            goal = int(_FIRST_GOAL * _Needs.of(self.network, self.levels, weight, 0.0, near).top)
+            goal = int(
+                TUNING.first_goal * _Needs.of(self.network, self.levels, weight, 0.0, near).top
+            )
         # By the battery alone smaller units take next to no time.
-        finer = max(1, min(shares.finer(unit), _MAX_CELLS // max(1, goal * len(weight))))
+        finer = max(1, min(shares.finer(unit), MAX_CELLS // max(1, goal * len(weight))))
 
         def before(since: int) -> int:
             own = shares.weights_before(weight, unit, since, finer)
@@ -244,7 +228,7 @@ class SatelliteRelaxation:
         """
         needs = _Needs.of(self.network, levels, weight, self._price_in(weight), near)
         top = needs.top
-        step = max(1, int(_FIRST_STEP * top))
+        step = max(1, int(TUNING.goal_step * top))
         goal = top
         if near is not None and near < top:
             goal = min(top, near + step)
@@ -286,7 +270,7 @@ def _classes(
     telemetry_per_s = satellite.resources.telemetry_per_s
     length_s = np.inf
     if telemetry_per_s > 0.0 and is_image.any():
-        length_s = _SPAN * float(network.data_gain[is_image].min()) / telemetry_per_s
+        length_s = TUNING.room * float(network.data_gain[is_image].min()) / telemetry_per_s
     is_shut = (network.is_contact == 0) & ~is_image & ~network.is_kept
     classes = []
     while is_free.any():
@@ -345,7 +329,7 @@ class _Needs(NamedTuple):
 
 
 def relaxations(
-    problem: Problem, levels_per_collect: int = FINE
+    problem: Problem, levels_per_collect: int = TUNING.fine
 ) -> tuple[SatelliteRelaxation, ...]:
     """Return the programmes of all satellites that have anything to do."""
     return tuple(
@@ -375,7 +359,7 @@ def resource_value(problem: Problem, prices: Floats, unit: float) -> float:
     stop = np.zeros(1, dtype=np.uint8)
     return min(
         _value(problem, relaxations(problem, levels), prices, unit, 0.0, stop)
-        for levels in (FINE, COARSE)
+        for levels in (TUNING.fine, TUNING.coarse)
     )
 
 
@@ -413,20 +397,20 @@ def quick_bound(problem: Problem, reward: float) -> Bound:
     is_plain = len(problem.satellites) == 1 and _is_alike(problem)
     satellites: tuple[SatelliteRelaxation, ...] = ()
     if problem.use_resources:
-        is_quick = is_plain or len(problem.opportunities) <= _FEW
-        satellites = relaxations(problem, FINE if is_quick else COARSE)
+        is_quick = is_plain or len(problem.opportunities) <= TUNING.large
+        satellites = relaxations(problem, TUNING.fine if is_quick else TUNING.coarse)
     if not satellites or best.value <= reward:
         return best
     stop = np.zeros(1, dtype=np.uint8)
     unit = _unit(problem, satellites, best.value)
     start = np.zeros(1) if best.prices is None else best.prices
-    offered = [leaving_whole_units(problem, share * start, unit) for share in _SHARES]
+    offered = [leaving_whole_units(problem, share * start, unit) for share in TUNING.price_shares]
     if is_plain:
         offered = offered[:1]
     else:
         # What the battery alone allows takes a fraction of the time, and tells which are best.
         offered.sort(key=lambda prices: _battery_value(problem, satellites, prices, unit))
-    for prices in offered[:_TRIED]:
+    for prices in offered[: TUNING.tries]:
         value = _value(problem, satellites, prices, unit, reward, stop)
         if value < best.value:
             rounded = rounded_bound(problem, value, reward)
@@ -437,7 +421,8 @@ def quick_bound(problem: Problem, reward: float) -> Bound:
 def _with_half_life(problem: Problem, best: Bound, reward: float) -> Bound:
     """Return a bound that knows what contacts take, which counts for more than recorders."""
     assert best.prices is not None
-    num_rounds = int(np.clip(_OPPORTUNITY_ROUNDS // max(1, len(problem.opportunities)), *_ROUNDS))
+    num_rounds = TUNING.latency_work // max(1, len(problem.opportunities))
+    num_rounds = int(np.clip(num_rounds, TUNING.tries, TUNING.rounds))
     ascent = LatencyAscent(problem, best.prices)
     ascent.improve(num_rounds, reward, np.zeros(1, dtype=np.uint8))
     value = rounded_bound(problem, ascent.bound.value, reward)
@@ -456,12 +441,12 @@ def _battery_value(
 def _unit(problem: Problem, satellites: tuple[SatelliteRelaxation, ...], value: float) -> float:
     """Return a unit: 1 where rewards are whole and few, or what can be counted in good time."""
     largest = max(len(s.satellite) for s in satellites)
-    most_units = min(_MAX_UNITS, _MAX_CELLS // largest)
+    most_units = min(TUNING.max_units, MAX_CELLS // largest)
     if problem.reward_unit > 0.0 and value <= most_units:
         return 1.0
     whole = common_unit(problem.worth_on_ground)
     if whole > 0.0 and value <= most_units * whole:
-        return whole / min(_PARTS, most_units * whole // value)
+        return whole / min(TUNING.several, most_units * whole // value)
     return max(value / most_units, 1e-12)
 
 

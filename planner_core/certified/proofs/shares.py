@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 
 from planner_core.certified.dp.data_levels import DataLevels
 from planner_core.certified.dp.resource_network import Network
+from planner_core.certified.signs import FROM_START
+from planner_core.certified.tolerances import ON_BOARD, ROUNDING
+from planner_core.certified.tuning import TUNING
 from planner_core.precedence.relation import is_transitive_on
 from planner_core.problem import (
     COLLECT,
@@ -20,16 +22,6 @@ from planner_core.problem import (
     SatelliteProblem,
 )
 from planner_core.problem.slew import TIME_TOLERANCE_S
-
-ROUNDING: Final = 1e-9
-"""Of a unit."""
-
-FROM_START: Final = -1
-"""In place of an instant: of all that is ever recorded."""
-
-_INSTANTS: Final = 33
-_FINE_PARTS: Final = 10  # of a typical image
-_LEFT_SLACK: Final = 3e-9  # of a recorder's capacity, that the referee forgives
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -96,7 +88,11 @@ class Shares:
         if not counts.any():
             return None
         starts = np.unique(satellite.start_s)
-        since_s = starts[np.unique(np.linspace(0, len(starts) - 1, _INSTANTS).astype(np.int64))]
+        since_s = starts[
+            np.unique(
+                np.linspace(0, len(starts) - 1, TUNING.several * TUNING.fine + 1).astype(np.int64)
+            )
+        ]
         is_booked = problem.dynamics == "paper"
         # Events book the telemetry since the one before them.
         events_s = np.concatenate([[0.0], satellite.event_s])
@@ -135,7 +131,7 @@ class Shares:
 
     def finer(self, unit: float) -> int:
         """Return into how many parts a unit is to be cut where that takes little time."""
-        return int(np.ceil(_FINE_PARTS * unit / self.typical))
+        return int(np.ceil(TUNING.fine * unit / self.typical))
 
     def weights_before(self, weight: Ints, unit: float, since: int, finer: int) -> Ints:
         """Return what images count in the first case, in so much finer units."""
@@ -162,5 +158,5 @@ class Shares:
         without = -self.held
         if since != FROM_START:
             without = self.telemetry_per_s * (self.telemetry_since_s[since] - TIME_TOLERANCE_S)
-        left = np.maximum(levels.least + without - _LEFT_SLACK, 0.0)
+        left = np.maximum(levels.least + without - ON_BOARD, 0.0)
         return np.floor(self.per_data * left / unit).astype(np.int32)

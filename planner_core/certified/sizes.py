@@ -1,0 +1,59 @@
+"""How large tables and arrays may be, so that a machine can hold them, and pauses in seconds.
+
+What is larger is counted more coarsely or not tried; no plan or bound becomes wrong by it.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+MAX_CELLS: Final = 30_000_000
+"""Of one satellite's table over tasks and units of worth."""
+
+MAX_PAIRS: Final = 8_000_000
+"""Of tasks near each other in a program, of about 100 bytes each; followers in tables of starts."""
+
+MAX_FOLLOWERS: Final = 30_000_000
+"""Kept by a search with free starts, of 12 bytes each."""
+
+MAX_DATA_LEVELS: Final = 1200
+MAX_ENERGY_LEVELS: Final = 1500
+"""Of a recorder and, at a time, of a battery."""
+
+MAX_LAYERS: Final = 48
+"""Groups of contacts between which images come down."""
+
+MEMORY_BITS: Final = 128
+"""Targets that a label may remember."""
+
+OPENING_LEVELS: Final = 9
+"""Of the table of what opens: ranges of up to 2**8 s."""
+
+WINDOW_NODES: Final = 8192
+"""That a window may span; ``WINDOW_WORDS`` hold the targets in it more than once."""
+WINDOW_WORDS: Final = 16
+
+RESOURCE_WINDOW_NODES: Final = 1024
+"""The same under battery and recorder, with so many labels for each."""
+LABELS_PER_TASK: Final = 5
+
+LABELS_PER_CELL: Final = 2
+"""Of start times."""
+
+ROUTE_LABELS: Final = 20_000
+ROUTE_BUCKETS: Final = 4096
+ROUTE_TASKS: Final = 64
+"""Of a window with free starts."""
+
+CLIQUE_STEPS: Final = 2000
+"""Of the search for one clique cut, which any good one ends."""
+
+LOG_CHARACTERS: Final = 6000
+"""Of HiGHS, kept as the end of a proof."""
+
+POLL_S: Final = 0.02
+PAUSE_S: Final = 0.25
+"""Between two looks at HiGHS; between two reports, and until one that does not stop is left."""
+
+MAX_STARTS: Final = 1000
+"""Of one search: how far apart the seeds of two searches lie."""

@@ -1,0 +1,224 @@
+"""What steers the search of ``certified``: every constant that is neither a size nor a rounding.
+
+Whatever these values are, plans are judged by the referee and bounds are proven: they decide how
+soon both are good. ``python -m benchmarks.ablation --constants`` measures half and double of each
+under its name here, which is that of its row in docs/ablation.md. Sizes of tables are in ``sizes``,
+what counts as equal in ``tolerances``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, Final
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tuning:
+    """The constants of the search. Shares are of what their names say, or of the word after them.
+
+    Attributes
+    ----------
+    tries
+        How often or on how many something is tried of which more hardly pays: sets of contacts
+        at a time, streams of a small fleet, programs without a better plan.
+    several
+        The same where each takes next to no time: orders of elimination, contacts as the last.
+    patience
+        How often in a row a search may lead to nothing better before it is done in another way.
+    rounds
+        Steps of a search that is asked for more than a moment's work.
+    fleet_patience
+        Turns of a fleet's searches without a better plan, before the solver ends.
+
+    first_step_of_paths, first_step
+        How far multipliers move in the first epoch of an ascent on longest paths and of any other,
+        in shares of what targets are worth.
+    last_step, last_step_of_few
+        How far in the last one, as a share of that; and where epochs are few.
+    begin, begin_of_chains
+        The multipliers at first, as a share of what targets are worth; with free starts.
+    newest_share
+        Of an epoch's multipliers in the mean.
+    moves_per_epoch
+        How often multipliers move in an epoch, at most.
+    epochs
+        After how many an ascent is settled; twice as many where each target is paid once in a pass.
+    quick_nodes
+        Nodes of a network that the quick bound may visit; a million take about 0.1 s.
+    epochs_at_a_time, many_epochs
+        Between two looks at the budget and the other searches; where an epoch takes no time.
+
+    deflection
+        Share of the last direction in the next, in the ascent on exact programmes.
+    shorter
+        What the length of steps is multiplied by where they no longer help.
+    far_above
+        Share of a bound: a plan or another bound that far away says little of the best plan.
+    little
+        Share of a bound or of a gap: what a step gains at least, for another one to be made.
+    goal_step
+        Share of a goal by which it is given up where nothing comes near it.
+    levels_per_collect
+        Parts of a typical collect, in energy or worth, where tables are small.
+    fine, coarse
+        Levels of the recorder that the smallest collect fills, where a proof counts and where many
+        prices are tried.
+    max_units
+        Units of worth that a bound by exact programmes may count.
+    price_shares
+        Of the prices by agility alone, at which resources are asked.
+    latency_work
+        Opportunities times rounds of a quick bound where images lose worth as they age; a second.
+    first_goal
+        Share of what the battery alone allows that an exact programme is asked for first.
+
+    widths_s
+        The narrowest and the widest cells of start times.
+    longest_piece_s
+        Of a day, that is bounded as a whole with free starts.
+    tidy_s
+        What a label's second is worth less than a target for; and what separates two pieces.
+    first_share, beginning
+        Of the time of a job for fixed starts before free ones, and of time or moves for what other
+        searches only begin with.
+
+    window_tasks
+        Tasks between which a window lies, at least and at most.
+    aimed
+        Share of moves that begin at a target that nobody images.
+    trials
+        Draws to find such a target where they matter, or a task that fits.
+    tie
+        Of a target's worth, by which equal targets are told apart at random.
+    trifle
+        Of a target's worth, that is as good as nothing.
+    moves_at_a_time, moves_in_a_step
+        Of the window search between two looks at the budget; and under resources.
+    moves_per_task, moves_beside_passes
+        Of the window search in a turn, for each task; and where an ascent on passes has its turns.
+    disturbance
+        Largest share of a plan, or of prices, that a random move changes.
+
+    near
+        Share of a reward that a task may cost and yet be in the best plans.
+    room, tight
+        Of a typical target: with less room above the plan the next image is hard to find; two
+        values so near are the same.
+    open_tasks
+        Of a program with fixed contacts, and of one replanned day, at first.
+    more
+        By what factor more are offered where that finds nothing.
+    tasks_per_task
+        Offered to a fleet's program, for each that the plan takes, at first.
+    large, small_fleet
+        Opportunities above which steps with resources take long; up to which a fleet without them
+        is planned in streams and ends with cutting planes.
+    most_columns, most_relaxed
+        Tasks of a mixed-integer program, and of a relaxation without energy levels.
+    steps_beside
+        Steps of the search for plans while another one has its turn.
+    preference
+        For targets of a large fleet that are hard to have, as a share of their worth.
+    highs_nodes, highs_effort
+        Nodes of a HiGHS search that only seeks plans, and its share of work on heuristics.
+    max_cuts
+        Zero-half cuts of a round.
+    images_on_board
+        Typical images that may stay in a recorder at the end, tried in turn.
+    """
+
+    tries: int = 2
+    several: int = 4
+    patience: int = 8
+    rounds: int = 20
+    fleet_patience: int = 60
+
+    first_step_of_paths: float = 0.5
+    first_step: float = 0.2
+    last_step: float = 1e-3
+    last_step_of_few: float = 0.05
+    begin: float = 0.5
+    begin_of_chains: float = 0.9
+    newest_share: float = 0.15
+    moves_per_epoch: int = 24
+    epochs: int = 250
+    quick_nodes: int = 6_000_000
+    epochs_at_a_time: int = 10
+    many_epochs: int = 100
+
+    deflection: float = 0.3
+    shorter: float = 0.6
+    far_above: float = 0.2
+    little: float = 0.01
+    goal_step: float = 0.02
+    levels_per_collect: int = 24
+    fine: int = 8
+    coarse: int = 2
+    max_units: int = 2000
+    price_shares: tuple[float, ...] = (0.0, 0.25, 0.5, 0.75, 1.0)
+    latency_work: int = 100_000
+    first_goal: float = 0.95
+
+    widths_s: tuple[float, float] = (2.5, 25.0)
+    longest_piece_s: float = 15_000.0
+    tidy_s: float = 60.0
+    first_share: float = 0.6
+    beginning: float = 0.25
+
+    window_tasks: tuple[int, int] = (3, 14)
+    aimed: float = 0.7
+    trials: int = 100
+    tie: float = 0.01
+    trifle: float = 1e-3
+    moves_at_a_time: int = 500
+    moves_in_a_step: int = 250
+    moves_per_task: float = 5.0
+    moves_beside_passes: float = 0.05
+    disturbance: float = 0.3
+
+    near: float = 0.2
+    room: float = 0.5
+    tight: float = 0.05
+    open_tasks: int = 1000
+    more: float = 1.5
+    tasks_per_task: float = 1.2
+    large: int = 3000
+    small_fleet: int = 60_000
+    most_columns: int = 6000
+    most_relaxed: int = 12_000
+    steps_beside: int = 6
+    preference: float = 0.1
+    highs_nodes: int = 100
+    highs_effort: float = 0.2
+    max_cuts: int = 150
+    images_on_board: tuple[int, ...] = (40, 20, 10, 5, 2, 0)
+
+
+TUNING: Final = Tuning()
+"""The values in force. Kernels freeze what they read when they are compiled."""
+
+
+def tune(**changes: Any) -> None:
+    """Steer by other values from now on, in all threads.
+
+    Raises
+    ------
+    AttributeError
+        Where there is no such value.
+    """
+    for name, value in changes.items():
+        getattr(TUNING, name)
+        object.__setattr__(TUNING, name, value)
+
+
+@contextmanager
+def tuned(**changes: Any) -> Iterator[None]:
+    """Steer by other values within: for measurements and tests."""
+    before = {name: getattr(TUNING, name) for name in changes}
+    try:
+        tune(**changes)
+        yield
+    finally:
+        tune(**before)
