@@ -21,7 +21,7 @@ from service.db.ids import new_id
 from service.db.rows import GroundStationRow, SatelliteRow, ScenarioRow, TargetCatalogRow, TargetRow
 from service.db.session import Database
 from service.problems.faults import faults_of_validation
-from service.scenarios.forecast_inputs import find_forecast, frozen_forecast
+from service.scenarios.frozen_forecasts import find_forecast, frozen_forecast
 from service.scenarios.pin_inputs import with_settled_pins
 from service.scenarios.scenario_limits import ScenarioLimits
 from service.scenarios.translate import (

@@ -1,0 +1,60 @@
+"""Stored forecasts, frozen into a scenario file.
+
+What is frozen are the series of the targets, not the grid that they come from: a forecast is
+linear in time, so a target's values at the forecast's instants say all of it. That is less than
+the target itself takes, whatever the size of the grid, and the hash is of the very numbers that
+are planned with: two forecasts that say the same of a question make the same question.
+"""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime, timedelta
+
+import numpy as np
+from sqlalchemy.orm import Session
+
+from planner_core.errors import InvalidScenario
+from service.db.rows import ForecastRow
+from service.forecasts.fields import from_bytes, time_ms_of
+from service.stores import forecast_store
+from service.wire.scenarios import FileForecast, ScenarioFile, SkySeriesIn
+
+_DIGITS = 4
+_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+
+
+def find_forecast(session: Session, forecast_id: str, owner: str | None) -> ForecastRow:
+    """Return a forecast of an owner's, its block too; ``unknown_forecast`` where there is none."""
+    row = forecast_store.find(session, forecast_id, owner)
+    if row is None:
+        raise InvalidScenario(
+            "unknown_forecast", f"There is no forecast {forecast_id!r}.", pointer="/forecast_id"
+        )
+    return row
+
+
+def frozen_forecast(row: ForecastRow, file: ScenarioFile) -> FileForecast:
+    """Return what a stored forecast says of a file's targets, over its horizon."""
+    targets = file.targets
+    skies = from_bytes(row.block).over(
+        [target.id for target in targets],
+        np.array([target.lat_deg for target in targets]),
+        np.array([target.lon_deg for target in targets]),
+        time_ms_of(file.horizon.start),
+        time_ms_of(file.horizon.end),
+    )
+    series = [
+        SkySeriesIn(
+            times=[_EPOCH + timedelta(milliseconds=time) for time in one.time_ms.tolist()],
+            clear_probability={
+                targets[position].id: values
+                for position, values in zip(
+                    one.target.tolist(),
+                    np.round(one.clear_probability, _DIGITS).tolist(),
+                    strict=True,
+                )
+            },
+        )
+        for one in skies
+    ]
+    return FileForecast(default_clear_probability=row.default_clear_probability, series=series)
