@@ -98,7 +98,7 @@ def _at_sea(scenario: Scenario) -> str | None:
             "land with latitude and longitude swapped: look at the columns of the catalogue."
         )
     if share > _MOST_AT_SEA:
-        first = targets[int(np.flatnonzero(at_sea)[0])].id
+        first = targets[int(np.flatnonzero(at_sea)[0])].title
         return (
             f"{at_sea.sum()} of {len(targets)} targets are at sea, {first!r} first: look at signs "
             "and columns if that is not what is meant."
@@ -144,8 +144,8 @@ def _too_large(scenario: Scenario) -> str | None:
     if not large:
         return None
     return (
-        f"An image of target {large[0].id!r}{_others(len(large))} is larger than the recorder of "
-        "every satellite: shorten collect_s or enlarge recorder_capacity_mbit."
+        f"An image of target {large[0].title!r}{_others(len(large))} is larger than the "
+        "recorder of every satellite: shorten collect_s or enlarge recorder_capacity_mbit."
     )
 
 
@@ -161,7 +161,7 @@ def _too_hungry(scenario: Scenario) -> str | None:
     if not hungry:
         return None
     return (
-        f"An image of target {hungry[0].id!r}{_others(len(hungry))} takes more energy than the "
+        f"An image of target {hungry[0].title!r}{_others(len(hungry))} takes more energy than the "
         "battery of any satellite may give: shorten collect_s or enlarge battery_capacity_wh."
     )
 
@@ -177,7 +177,7 @@ def _too_long(scenario: Scenario) -> str | None:
     if not long:
         return None
     return (
-        f"An image of target {long[0].id!r}{_others(len(long))} takes longer than any satellite "
+        f"An image of target {long[0].title!r}{_others(len(long))} takes longer than any satellite "
         f"sees a place, {longest_s:.0f} s at most: shorten collect_s."
     )
 

@@ -19,6 +19,8 @@ class Target:
 
     Attributes
     ----------
+    name
+        For people. None where only the id tells targets apart.
     release, due
         Aware instants between which a collect lies as a whole. None for no limit.
     sensor_type
@@ -31,6 +33,7 @@ class Target:
     id: str
     lat_deg: float
     lon_deg: float
+    name: str | None = None
     alt_m: float = 0.0
     reward: float = 1.0
     collect_s: float = 30.0
@@ -74,6 +77,15 @@ class Target:
             "reward_half_life_s",
             "must be greater than 0",
         )
+
+    @property
+    def title(self) -> str:
+        """What people call it: its name where it has one, and its id.
+
+        >>> Target(id="7", name="Bern", lat_deg=46.9, lon_deg=7.4).title
+        'Bern (7)'
+        """
+        return self.id if self.name is None else f"{self.name} ({self.id})"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -112,6 +112,7 @@ class Wording:
         worth = None if collected is None else collected.worth
         return TargetItem(
             target_id=target.id,
+            target_name=target.name,
             target_catalog_id=target.catalog_id,
             outcome=found.outcome,
             action_id=None if found.position is None else self.action_ids[found.position],
@@ -284,13 +285,13 @@ class Documents(Wording):
 
     def _action(self, action_id: str, action: JudgedAction) -> ActionOut:
         table, row, down_s = self.problem.opportunities, action.opportunity, action.delivered_s
-        target_id = station = off_nadir_deg = azimuth_deg = quality = clear = None
+        target = station = off_nadir_deg = azimuth_deg = quality = clear = None
         if row is not None:
             own = table.off_nadir_deg[row], table.azimuth_deg[row]
             off_nadir_deg, azimuth_deg = self._seen.get(action.position, own)
             place = int(table.place[row])
             if action.mode == "collect":
-                target_id = self.scenario.targets[place].id
+                target = self.scenario.targets[place]
                 quality = self._images.quality[row]
                 clear = None if self._images.clear is None else self._images.clear[row]
             else:
@@ -300,7 +301,8 @@ class Documents(Wording):
             mode=action.mode,
             start=self.instant(action.start_s),
             end=self.instant(action.end_s),
-            target_id=target_id,
+            target_id=None if target is None else target.id,
+            target_name=None if target is None else target.name,
             station_id=None if station is None else station.id,
             station_name=None if station is None else station.name,
             opportunity_id=self.opportunity_id(row),

@@ -134,7 +134,8 @@ def _geometry(scenario: Scenario) -> Scenario:
             for satellite in scenario.satellites
         ),
         targets=tuple(
-            replace(target, reward=1.0, reward_half_life_s=None) for target in scenario.targets
+            replace(target, name=None, reward=1.0, reward_half_life_s=None)
+            for target in scenario.targets
         ),
     )
 

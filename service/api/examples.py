@@ -57,6 +57,7 @@ BODIES: Final[dict[str, Any]] = {
         "freeze_until": "2026-03-01T09:30:00Z",
         "promises": [{"target_id": "bern"}],
     },
+    "TargetCatalogPatch": {"rewards": {"bern": 5}},
     "WebhookIn": {"url": "https://ops.example/slewline", "events": ["job.succeeded"]},
 }
 """By the name of the schema."""

@@ -78,16 +78,13 @@ def _differences(first: TimelineOut, second: TimelineOut) -> Iterator[Difference
 
 
 class _Names:
-    """What the timelines call satellites and stations."""
+    """What the timelines call satellites, targets and stations."""
 
     def __init__(self, *timelines: TimelineOut):
         self._satellites = {s.id: s.name for t in timelines for s in t.satellites}
-        self._stations = {
-            action.station_id: action.station_name
-            for timeline in timelines
-            for satellite in timeline.satellites
-            for action in satellite.actions
-        }
+        actions = [a for t in timelines for s in t.satellites for a in s.actions]
+        self._targets = {action.target_id: action.target_name for action in actions}
+        self._stations = {action.station_id: action.station_name for action in actions}
 
     def shown(self, action: PlannedAction) -> PlannedOut:
         """Return an action as clients see it."""
@@ -97,6 +94,7 @@ class _Names:
             satellite_name=self._satellites[action.satellite_id],
             mode="collect" if is_collect else "contact",
             target_id=action.place_id if is_collect else None,
+            target_name=self._targets[action.place_id] if is_collect else None,
             station_id=None if is_collect else action.place_id,
             station_name=None if is_collect else self._stations[action.place_id],
             start=action.start,

@@ -190,6 +190,7 @@ def _opportunity(described: Described, row: int, **edges: ViewOut) -> Opportunit
     is_collect = int(table.kind[row]) == COLLECT
     place = int(table.place[row])
     satellite = scenario.satellites[int(table.satellite[row])]
+    target = scenario.targets[place] if is_collect else None
     station = None if is_collect else scenario.ground_stations[place]
     at = scenario.horizon.instant
     return OpportunityOut(
@@ -197,7 +198,8 @@ def _opportunity(described: Described, row: int, **edges: ViewOut) -> Opportunit
         satellite_id=satellite.id,
         satellite_name=satellite.name,
         kind="collect" if is_collect else "contact",
-        target_id=scenario.targets[place].id if is_collect else None,
+        target_id=None if target is None else target.id,
+        target_name=None if target is None else target.name,
         station_id=None if station is None else station.id,
         station_name=None if station is None else station.name,
         start=at(float(table.start_s[row])),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Annotated, Any
 
@@ -27,7 +27,13 @@ from service.problems.faults import faults_of_validation, refuse
 from service.problems.kinds import ServiceError
 from service.scenarios.translate import target_from
 from service.wire.base import Body, Listed, Name
-from service.wire.places import MAX_TARGETS, CreatedCatalog, TargetCatalogOut, TargetIn
+from service.wire.places import (
+    MAX_TARGETS,
+    CreatedCatalog,
+    TargetCatalogOut,
+    TargetCatalogPatch,
+    TargetIn,
+)
 from service.wire.stored import from_store
 
 router = APIRouter(prefix="/v1/target-catalogs", tags=["target catalogs"])
@@ -37,6 +43,7 @@ _REQUIRED = ("id", "lat_deg", "lon_deg")
 _COLUMNS = tuple(TargetIn.model_fields)
 _OPTIONAL = tuple(column for column in _COLUMNS if column not in _REQUIRED)
 _UNNAMED = "Targets"
+_AT_ONCE = 500  # parameters of one statement
 
 
 class _Listed(Body):
@@ -64,7 +71,7 @@ _REQUEST_BODY: dict[str, Any] = {
                     "type": "string",
                     "description": f"A header with id, lat_deg, lon_deg and any of "
                     f"{', '.join(_OPTIONAL)}; lat, latitude, lon, lng and longitude are "
-                    "taken as well. An empty cell means the default.",
+                    "taken as well, and city for name. An empty cell means the default.",
                 }
             },
         },
@@ -204,6 +211,48 @@ def list_targets(catalog_id: str, database: DatabaseDep, paging: PagingDep) -> L
     return Listed(items=[from_store(TargetIn, row.body) for row in page.rows], next=page.next)
 
 
+@router.patch("/{catalog_id}", responses=problem_responses(404, 412))
+def change_target_catalog(
+    catalog_id: str, body: TargetCatalogPatch, call: CallDep
+) -> TargetCatalogOut:
+    """Change the name of a catalogue, or what images of its targets earn.
+
+    Scenarios that use it keep their copy. `If-Match` takes the ETag of the catalogue.
+    """
+    with call.database.transaction() as session:
+        row = _find(session, catalog_id, to_change=True)
+        require_match(call.request, lambda: _shown(row))
+        row.name = body.name or row.name
+        _set_rewards(session, catalog_id, body.rewards or {})
+        row.changed_at = datetime.now(UTC)
+        call.audit.record(session, "update", "target_catalog", catalog_id)
+        shown = _shown(row)
+    return created(call.response, shown, f"/v1/target-catalogs/{catalog_id}")
+
+
+def _set_rewards(session: Session, catalog_id: str, rewards: Mapping[str, float]) -> None:
+    """Give targets other rewards; all of them or none."""
+    of_catalog = sa.select(TargetRow).where(TargetRow.catalog_id == catalog_id)
+    ids, found = list(rewards), dict[str, TargetRow]()
+    for first in range(0, len(ids), _AT_ONCE):
+        wanted = TargetRow.target_id.in_(ids[first : first + _AT_ONCE])
+        found |= {row.target_id: row for row in session.scalars(of_catalog.where(wanted))}
+    unknown = [own_id for own_id in rewards if own_id not in found]
+    if unknown:
+        raise refuse(
+            [
+                Fault(
+                    code="unknown_target",
+                    detail=f"The catalogue has no target {own_id!r}.",
+                    pointer="/rewards/" + own_id.replace("~", "~0").replace("/", "~1"),
+                )
+                for own_id in unknown
+            ]
+        )
+    for own_id, reward in rewards.items():
+        found[own_id].body = found[own_id].body | {"reward": reward}
+
+
 @router.delete("/{catalog_id}", status_code=204, responses=problem_responses(404, 412))
 def delete_target_catalog(catalog_id: str, call: CallDep) -> None:
     """Delete a catalogue. Scenarios that use it keep their copy."""
@@ -227,5 +276,6 @@ def _shown(row: TargetCatalogRow) -> TargetCatalogOut:
         name=row.name,
         num_targets=row.num_targets,
         created_at=row.created_at,
+        changed_at=row.changed_at,
         links={"targets": f"/v1/target-catalogs/{row.id}/targets"},
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from service.client.transport import Transport, path_of
+from service.client.transport import Transport, held, path_of
 from service.client.uploads import Source, upload
 from service.wire.places import CreatedCatalog
 from service.wire.places import TargetCatalogOut as TargetCatalog
@@ -64,6 +64,15 @@ class TargetCatalogs:
         """Yield the targets of a catalogue, in the order of its file."""
         path = path_of("target-catalogs", catalog_id, "targets")
         return self._transport.pages(path, Target, {"limit": 500})
+
+    def change(
+        self, catalog_id: str, *, if_match: str | None = None, **changes: Any
+    ) -> TargetCatalog:
+        """Change its ``name``, or by target the ``rewards`` that images earn from now on."""
+        headers = {} if if_match is None else {"If-Match": if_match}
+        path = path_of("target-catalogs", catalog_id)
+        answer = self._transport.request("PATCH", path, json=changes, headers=headers)
+        return held(TargetCatalog, answer)
 
     def delete(self, catalog_id: str, *, if_match: str | None = None) -> None:
         """Delete a catalogue; scenarios keep their copy."""

@@ -70,7 +70,7 @@ def changes_text(changes: PlanChanges) -> str:
 
 
 def _of(action: PlanAction) -> str:
-    return action.target_id or action.station_name or action.station_id or ""
+    return action.target_name or action.target_id or action.station_name or action.station_id or ""
 
 
 def _start(action: PlanAction | None) -> str:

@@ -57,6 +57,7 @@ _PAGES: Final = {
     "plans": _Page(title="Plans", script="plans_page.js"),
     "plan": _Page(title="Plan", script="plan_page.js"),
     "fleet": _Page(title="Fleet", script="fleet_page.js"),
+    "targets": _Page(title="Targets", script="targets_page.js"),
     "wall": _Page(title="Wall", script="wall_page.js"),
     "comparison": _Page(title="Comparison", script="comparison_page.js"),
 }

@@ -28,6 +28,7 @@ _ADDRESSES: Final = {
     "/plans": "plans",
     "/plans/{plan_id}": "plan",
     "/fleet": "fleet",
+    "/targets": "targets",
     "/wall": "wall",
 }
 """Each page, by the name that `assets.py` knows it by."""

@@ -120,6 +120,7 @@ class TargetCatalogRow(Row):
     name: Mapped[str]
     num_targets: Mapped[int]
     created_at: Mapped[datetime]
+    changed_at: Mapped[datetime | None]
     deleted_at: Mapped[datetime | None]
 
 
@@ -137,7 +138,7 @@ class TargetRow(Row):
 class OrderRow(Row):
     """An order that came over STAPI; its id is that of its target.
 
-    ``target`` is that target as its catalogue holds it, ``sent`` what the order said.
+    ``target`` is that target as it was ordered, ``sent`` what the order said.
     """
 
     __tablename__ = "stapi_order"
@@ -501,6 +502,7 @@ class PlanActionRow(Row):
     delivered_at: Mapped[datetime | None]
     satellite_name: Mapped[str | None]
     station_name: Mapped[str | None]
+    target_name: Mapped[str | None]
 
 
 class PlanEventRow(Row):

@@ -133,7 +133,7 @@ def _target(target: Target, told: Document, names: dict[str, str]) -> Document:
     }
     return {
         "id": f"target/{target.id}",
-        "name": target.id,
+        "name": target.name or target.id,
         "position": _at(target.lon_deg, target.lat_deg, target.alt_m),
         "point": {"color": {"rgba": list(_OUTCOMES[told["outcome"]])}, "pixelSize": 5},
         "properties": {name: value for name, value in properties.items() if value is not None},

@@ -83,6 +83,7 @@ def _targets(answered: Answered) -> Iterator[Document]:
             _point(target.lon_deg, target.lat_deg),
             {
                 "target_id": target.id,
+                "target_name": target.name,
                 "target_catalog_id": target.catalog_id,
                 "outcome": told["outcome"],
                 "reason": reason and reason["code"],

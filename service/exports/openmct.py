@@ -65,7 +65,7 @@ def _parts(answered: Answered) -> Iterator[str]:
 def _name(action: Document, stations: dict[str, str]) -> str:
     if action["mode"] in _IDLE_NAMES:
         return _IDLE_NAMES[action["mode"]]
-    return str(action["target_id"] or stations[action["station_id"]])
+    return str(action.get("target_name") or action["target_id"] or stations[action["station_id"]])
 
 
 def _milliseconds(instant: str) -> int:

@@ -21,7 +21,7 @@ COLUMNS = (
     "target_id", "station_id", "opportunity_id", "off_nadir_deg", "azimuth_deg",
     "slew_angle_deg", "slew_needed_s", "slew_available_s", "reward",
     "battery_fraction_end", "recorder_fraction_end", "worth", "quality", "station_name",
-    "delivered_at", "age_s", "clear_probability",
+    "delivered_at", "age_s", "clear_probability", "target_name",
 )  # fmt: skip
 
 
@@ -36,7 +36,8 @@ def _lines(answered: Answered) -> Iterator[str]:
         station_name = guarded(_station_name(answered, action))
         # Answers of earlier releases do not have them.
         behind = (action.get(name) for name in ("delivered_at", "age_s", "clear_probability"))
-        yield _line((*_cells(satellite, action), station_name, *behind))
+        target_name = guarded(action.get("target_name"))
+        yield _line((*_cells(satellite, action), station_name, *behind, target_name))
 
 
 def _station_name(answered: Answered, action: Document) -> str | None:

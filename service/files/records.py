@@ -151,9 +151,10 @@ def read_csv(
     """Return the records of a CSV file with a header, which may have ``most`` of them.
 
     Columns may stand in any order; ``lat``, ``latitude``, ``lon``, ``lng``, ``long`` and
-    ``longitude`` are taken too. Other columns are ignored, unless they look like a misspelt
-    one. An empty cell means the default. Cells are parted by commas, or by semicolons or tabs where
-    the header shows it; there a comma may be the decimal sign.
+    ``longitude`` are taken too, and ``city`` where there is no ``name``. Other columns are
+    ignored, unless they look like a misspelt one. An empty cell means the default. Cells are parted
+    by commas, or by semicolons or tabs where the header shows it; there a comma may be the decimal
+    sign.
     """
     text = decoded(data)
     if isinstance(text, Fault):
@@ -197,8 +198,10 @@ def read_csv(
 
 def column_names(header: Sequence[str]) -> list[str]:
     """Return our names of a file's columns."""
-    names = (cell.strip().lower() for cell in header)
-    return [_ALIASES.get(name, name) for name in names]
+    names = [cell.strip().lower() for cell in header]
+    # Lists of cities call the name so.
+    aliases = _ALIASES if "name" in names else _ALIASES | {"city": "name"}
+    return [aliases.get(name, name) for name in names]
 
 
 def _too_many_rows(most: int) -> Records:
@@ -289,8 +292,9 @@ def _feature(feature: object, pointer: str, known: Collection[str]) -> Record | 
     fields |= dict(zip(("lon_deg", "lat_deg", "alt_m"), map(_as_float, position), strict=False))
     if "id" in feature:
         fields["id"] = feature["id"]
-    if isinstance(fields.get("id"), int):
-        fields["id"] = str(fields["id"])
+    for name in ("id", "name"):
+        if isinstance(fields.get(name), int):
+            fields[name] = str(fields[name])
     pointers = {"lon_deg": f"{at}/0", "lat_deg": f"{at}/1"}
     if len(position) == 3:
         pointers["alt_m"] = f"{at}/2"

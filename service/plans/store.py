@@ -61,7 +61,7 @@ def add(
             "satellite_id": satellite.id, "mode": action.mode, "start": action.start,
             "end": action.end, "target_id": action.target_id, "station_id": action.station_id,
             "delivered_at": action.delivered_at, "satellite_name": satellite.name,
-            "station_name": action.station_name,
+            "station_name": action.station_name, "target_name": action.target_name,
         }
         for position, (satellite, action) in enumerate(actions)
     ]  # fmt: skip

@@ -13,7 +13,7 @@ from service.wire.instants import instant_text
 from service.wire.places import TargetIn
 from service.wire.scenarios import ScenarioFile
 
-_OF_TARGETS = TargetIn.model_fields.keys() - {"id", "lat_deg", "lon_deg", "alt_m"}
+_OF_TARGETS = TargetIn.model_fields.keys() - {"id", "name", "lat_deg", "lon_deg", "alt_m"}
 
 
 def relaxed_file(file: ScenarioFile, relax: RelaxIn) -> ScenarioFile:

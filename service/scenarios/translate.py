@@ -146,7 +146,7 @@ def canonical_of_file(file: ScenarioFile) -> str:
     for station in document["ground_stations"]:
         _without(station, setup_s=0.0, downlink_gain=1.0)
     for target in document["targets"]:
-        _without_unset(target, "catalog_id", "release", "due", "sensor_type", "reward_half_life_s")
+        _without_unset(target, *_UNSET_OF_TARGETS)
     _without_unset(document, "forecast")
     if document["collect_alignment"] == "access":
         del document["collect_alignment"]
@@ -195,6 +195,10 @@ def _without_unset(part: dict[str, Any], *names: str) -> None:
         if part[name] is None:
             del part[name]
 
+
+_UNSET_OF_TARGETS: Final = (
+    "catalog_id", "name", "release", "due", "sensor_type", "reward_half_life_s",
+)  # fmt: skip
 
 _YOUNGER: Final[Mapping[str, object]] = {
     "sun_pointing": "free",

@@ -13,10 +13,10 @@ PinnedMode = Literal["collect", "contact"]
 
 OF_ACTIONS: Final = frozenset(
     (
-        "id", "mode", "start", "end", "satellite_id", "satellite_name", "target_id", "station_id",
-        "station_name", "opportunity_id", "off_nadir_deg", "azimuth_deg", "slew", "turn_to_s",
-        "turn_back_s", "reward", "worth", "quality", "clear_probability", "delivered_at", "age_s",
-        "battery_fraction_end", "recorder_fraction_end", "outcome",
+        "id", "mode", "start", "end", "satellite_id", "satellite_name", "target_id", "target_name",
+        "station_id", "station_name", "opportunity_id", "off_nadir_deg", "azimuth_deg", "slew",
+        "turn_to_s", "turn_back_s", "reward", "worth", "quality", "clear_probability",
+        "delivered_at", "age_s", "battery_fraction_end", "recorder_fraction_end", "outcome",
     )
 )  # fmt: skip
 """What actions of timelines and plans tell."""

@@ -100,6 +100,7 @@ class TargetIn(LightIn):
     """
 
     id: Id = Field(description="Your own; unique in the catalogue.")
+    name: Name | None = None
     lat_deg: Latitude
     lon_deg: Longitude
     alt_m: Altitude = 0.0
@@ -134,6 +135,17 @@ class TargetCatalogIn(Body):
     targets: list[TargetIn] = Field(min_length=1, max_length=MAX_TARGETS)
 
 
+class TargetCatalogPatch(Patch):
+    """What is to be different about a catalogue; what is left out or null stays."""
+
+    name: Name | None = None
+    rewards: dict[Id, NonNegative] | None = Field(
+        None,
+        max_length=MAX_TARGETS,
+        description="By target, its priority: what its image earns from now on.",
+    )
+
+
 class TargetCatalogOut(Stored):
     """A catalogue; its targets have their own address."""
 
@@ -141,6 +153,7 @@ class TargetCatalogOut(Stored):
     name: str
     num_targets: int
     created_at: Instant
+    changed_at: Instant | None = Field(None, description="When name or rewards were changed last.")
     links: dict[str, str]
 
 

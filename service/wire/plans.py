@@ -102,6 +102,7 @@ class PlanActionOut(Wire):
     start: Instant
     end: Instant
     target_id: str | None
+    target_name: str | None
     station_id: str | None
     station_name: str | None
     outcome: Open[Outcome] | None = Field(description="The last that was reported.")

@@ -344,6 +344,7 @@ class OpportunityOut(Wire):
     satellite_name: str | None = None
     kind: Open[Kind]
     target_id: str | None = Field(description="Of a collect.")
+    target_name: str | None = Field(None, description="Of a collect whose target has one.")
     station_id: str | None = Field(description="Of a contact.")
     station_name: str | None = Field(None, description="Of a contact.")
     start: Instant

@@ -154,6 +154,7 @@ class ActionOut(Wire):
     start: Instant
     end: Instant
     target_id: str | None
+    target_name: str | None = Field(None, description="Of a collect whose target has one.")
     station_id: str | None
     station_name: str | None = Field(None, description="Of a contact.")
     opportunity_id: str | None
@@ -298,6 +299,7 @@ class TargetItem(Wire):
     """What became of one target."""
 
     target_id: str
+    target_name: str | None = None
     target_catalog_id: str | None = None
     outcome: Open[Outcome]
     action_id: str | None = None
@@ -349,6 +351,7 @@ class PlannedOut(Wire):
     satellite_name: str | None = None
     mode: Open[Literal["collect", "contact"]]
     target_id: str | None
+    target_name: str | None = Field(None, description="Of a collect whose target has one.")
     station_id: str | None
     station_name: str | None = Field(None, description="Of a contact.")
     start: Instant

@@ -6,7 +6,7 @@ import httpx
 
 from service.wire.places import GroundStationIn, GroundStationPatch
 from tests.service.conftest import Service
-from tests.service.factories import ground_station, post, satellite, send
+from tests.service.factories import ground_station, post, satellite, send, target
 from tests.service.problems import assert_problem
 
 STATIONS = "name,lat_deg,lon_deg,antennas\n"
@@ -96,3 +96,35 @@ def test_two_stations_of_one_name_stay_two(service: Service) -> None:
 def test_a_change_of_nothing_is_refused(service: Service) -> None:
     where = "/v1/satellites/" + post(service.client, "/v1/satellites", satellite())["id"]
     assert_problem(service.client.patch(where, json={}), 422, "invalid_value")
+
+
+def test_priorities_and_the_name_of_a_catalogue_change(service: Service) -> None:
+    client = service.client
+    sent = {"name": "Points", "targets": [target(id="a"), target(id="b/~c"), target(id="d")]}
+    where = f"/v1/target-catalogs/{post(client, '/v1/target-catalogs', sent)['id']}"
+    before = client.get(where)
+    changes = {"name": "Places", "rewards": {"b/~c": 7.5, "a": 0}}
+    seen = {"If-Match": before.headers["etag"]}
+    answer = client.patch(where, json=changes, headers=seen)
+    assert answer.status_code == 200, answer.text
+    assert answer.json()["name"] == "Places"
+    targets = client.get(f"{where}/targets").json()["items"]
+    assert {one["id"]: one["reward"] for one in targets} == {"a": 0.0, "b/~c": 7.5, "d": 1.0}
+    # Who has read it before the change is told so.
+    late = client.patch(where, json={"rewards": {"d": 2}}, headers=seen)
+    assert_problem(late, 412, "precondition_failed")
+    assert client.get(where).headers["etag"] == answer.headers["etag"]
+
+
+def test_a_priority_of_no_target_changes_none(service: Service) -> None:
+    client = service.client
+    sent = {"name": "Points", "targets": [target(id="a")]}
+    where = f"/v1/target-catalogs/{post(client, '/v1/target-catalogs', sent)['id']}"
+    refused = client.patch(where, json={"name": "New", "rewards": {"a": 5, "b/": 5}})
+    assert_problem(refused, 422, "unknown_target", "/rewards/b~1")
+    assert client.get(where).json()["name"] == "Points"
+    (same,) = client.get(f"{where}/targets").json()["items"]
+    assert same["reward"] == 1.0
+    assert_problem(client.patch(where, json={}), 422, "invalid_value")
+    negative = client.patch(where, json={"rewards": {"a": -1}})
+    assert_problem(negative, 422, "value_out_of_range", "/rewards/a")

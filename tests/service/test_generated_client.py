@@ -26,7 +26,7 @@ HALF_A_DAY = {"start": "2019-01-01T00:00:00Z", "end": "2019-01-01T12:00:00Z"}
 @pytest.fixture(scope="module")
 def service_url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     folder = tmp_path_factory.mktemp("service")
-    keys = f"robot:submit:{SECRET}"
+    keys = f"robot:approve:{SECRET}"
     with serving(folder, "serve", "--workers", "1", require_keys="true", api_keys=keys) as (
         _,
         line,
@@ -39,7 +39,7 @@ def generated(service_url: str, tmp_path_factory: pytest.TempPathFactory) -> Ite
     """Return the name of a package made of the document that the service shows."""
     folder = tmp_path_factory.mktemp("generated")
     document = folder / "openapi.json"
-    document.write_text(httpx.get(f"{service_url}/openapi.json", trust_env=False).text)
+    document.write_text(httpx.get(f"{service_url}/openapi.json", trust_env=False, timeout=120).text)
     # It would format the files by a linter of its own choice.
     (folder / "config.yml").write_text(json.dumps({"post_hooks": []}))
     made = subprocess.run(
@@ -117,6 +117,27 @@ def plan_a_mission(client: Any, generated: str) -> None:
     assert table.startswith("action_id,satellite_id,")
     outcomes = call("timelines.list_outcomes", job_id=job.id, limit=100)
     assert len(outcomes.items) == len(mission["targets"])
+    approve_and_read_passes(client, generated, job.id, timeline.totals.contacts)
+
+
+def approve_and_read_passes(client: Any, generated: str, job_id: str, num_contacts: int) -> None:
+    models = part(generated, "models")
+
+    def call(operation: str, **fields: Any) -> Any:
+        return part(generated, f"api.plans.{operation}").sync(client=client, **fields)
+
+    body = models.PlanIn.from_dict({"job_id": job_id, "name": "Half a day"})
+    made = call("create_plan", body=body)
+    assert made.state == "draft"
+    for step in ({"to": "approved"}, {"to": "published", "effective_from": HALF_A_DAY["start"]}):
+        body = models.TransitionIn.from_dict(step)
+        moved = call("move_plan", plan_id=made.id, body=body)
+        assert moved.to_dict()["state"] == step["to"], moved
+    passes = call("list_passes", plan_id=made.id, limit=500).items
+    planned = [one for one in passes if one.planned]
+    assert sum(len(one.action_ids) for one in planned) == num_contacts > 0
+    assert all(one.aos <= one.tca <= one.los for one in passes)
+    assert all(one.station_name and one.satellite_name for one in passes)
 
 
 def sent(client: Any, generated: str, operation: str, **fields: Any) -> Any:

@@ -51,6 +51,7 @@ def test_a_json_catalogue_fills_in_defaults(client: httpx.Client) -> None:
         "id": "t2",
         "lat_deg": 47.0,
         "lon_deg": 8.0,
+        "name": None,
         "alt_m": 0.0,
         "reward": 3.0,
         "collect_s": 30.0,
@@ -361,3 +362,20 @@ def test_a_deleted_catalogue_is_gone(client: httpx.Client) -> None:
 def test_a_cursor_of_another_list_is_refused(client: httpx.Client) -> None:
     where = client.post(PATH, json=catalog(target())).headers["location"]
     assert_problem(client.get(f"{where}/targets?cursor=YWJj"), 422, "invalid_cursor")
+
+
+@pytest.mark.parametrize("column", ["name", "city", "City"])
+def test_targets_have_names_beside_their_ids(service: Service, column: str) -> None:
+    text = f"id,{column},lat,lon\n007,Bern,46.9,7.4\n008,,-0.2,-78.5\n"
+    answer = send(service.client, "/v1/target-catalogs", text, "text/csv").json()
+    assert answer["ignored_columns"] == []
+    targets = service.client.get(answer["links"]["targets"]).json()["items"]
+    assert [(one["id"], one["name"]) for one in targets] == [("007", "Bern"), ("008", None)]
+
+
+def test_a_column_of_cities_is_no_name_where_there_is_one(service: Service) -> None:
+    text = "id,name,city,lat,lon\nt,Zytglogge,Bern,46.9,7.4\n"
+    answer = send(service.client, "/v1/target-catalogs", text, "text/csv").json()
+    assert answer["ignored_columns"] == ["city"]
+    (target,) = service.client.get(answer["links"]["targets"]).json()["items"]
+    assert target["name"] == "Zytglogge"

@@ -57,7 +57,8 @@ MODULES = (
 NOW = "2026-03-01T00:00:00.000Z"
 ACTION = {
     "id": "a1", "mode": "collect", "start": NOW, "end": NOW, "target_id": "t1", "station_id": None,
-    "station_name": None, "turn_to_s": None, "turn_back_s": None, "opportunity_id": "o1",
+    "station_name": None, "target_name": None,
+    "turn_to_s": None, "turn_back_s": None, "opportunity_id": "o1",
     "off_nadir_deg": 10.0, "azimuth_deg": 90.0,
     "slew": {"angle_deg": 1.0, "needed_s": 1.0, "available_s": 2.0}, "reward": 0.8,
     "worth": 0.8, "quality": 0.8, "clear_probability": None, "delivered_at": NOW, "age_s": 60.0,

@@ -3,11 +3,8 @@
 
 import { list, post } from "./api.js";
 import { byId, fill, h } from "./dom.js";
-import { utc } from "./format.js";
-import { openMenu } from "./menu.js";
-import { offersOfContact, offersOfImage, offersOfTarget, weighed } from "./offers.js";
 import { describe } from "./page.js";
-import { askForPriority, installPriorityDialog } from "./priority_dialog.js";
+import { WishDesk } from "./wish_desk.js";
 
 /** @typedef {import("./types.js").PlanOut} PlanOut */
 /** @typedef {import("./types.js").PlanActionOut} PlanActionOut */
@@ -24,7 +21,8 @@ export class ActionDesk {
     this.path = `/v1/plans/${encodeURIComponent(plan.id)}`;
     this.drawn = drawn;
     this.selection = selection;
-    this.wishes = wishes;
+    // Nobody goes on from a plan that is withdrawn or superseded.
+    this.desk = new WishDesk(drawn, selection, wishes, () => !byId("replan-card").hidden);
     /** @type {Map<string, PlanActionOut>} */
     this.actions = new Map();
     this.choice = /** @type {HTMLSelectElement} */ (byId("action-choice"));
@@ -36,8 +34,7 @@ export class ActionDesk {
       this.choice.value = actionId !== null && this.actions.has(actionId) ? actionId : "";
       this.show();
     });
-    selection.onOpen((anchor) => this.openMenu(anchor));
-    installPriorityDialog();
+    selection.onOpen((anchor) => this.desk.openMenu(anchor));
   }
 
   async load() {
@@ -53,84 +50,57 @@ export class ActionDesk {
 
   /** @param {PlanActionOut} one */
   words(one) {
-    const what = one.mode === "collect" ? `image of ${one.target_id}` : `contact with ${this.station(one)}`;
+    const action = this.drawn.actions.get(one.id);
     const outcome = one.outcome ? `, ${one.outcome}` : "";
-    return `${utc(one.start)} ${this.drawn.satelliteName(one.satellite_id)}: ${what}${outcome}`;
-  }
-
-  /** @param {PlanActionOut} one */
-  station(one) {
-    return this.drawn.actions.get(one.id)?.station_name ?? one.station_id ?? "";
+    return `${action ? this.desk.words(action) : one.id}${outcome}`;
   }
 
   show() {
     const place = byId("chosen-action");
-    const { actionId, targetId } = this.selection.now;
-    const action = this.actions.get(actionId ?? "");
-    const target = this.drawn.target.get(targetId ?? "");
-    const reports = action ? this.reports(action) : [];
-    const wishes = this.offers().map((offer) =>
-      h("button", { type: "button", class: "quiet", id: `wish-${offer.id}`, onclick: () => this.take(offer) }, offer.text),
+    const action = this.actions.get(this.selection.now.actionId ?? "");
+    const title = action ? this.words(action) : this.desk.title();
+    const wishes = this.desk.buttons(this.desk.offers());
+    fill(
+      place,
+      title && h("p", {}, title),
+      wishes.length > 0 && h("p", { class: "buttons needs-submit" }, ...wishes),
+      action && this.isReported() && this.reports(action),
     );
-    if (!action && !target) fill(place);
-    else fill(place, h("p", {}, this.title()), h("p", { class: "buttons needs-submit" }, ...reports, ...wishes));
   }
 
-  /** What is selected, in words. */
-  title() {
-    const { actionId, targetId } = this.selection.now;
-    const action = this.actions.get(actionId ?? "");
-    if (action) return this.words(action);
-    const target = this.drawn.target.get(targetId ?? "");
-    return target ? `${target.id}: ${target.outcome}${target.why ? `, ${target.why}` : ""}` : "";
-  }
-
-  /** What can be wished of what is selected. @returns {import("./offers.js").Offer[]} */
-  offers() {
-    // Nobody goes on from a plan that is withdrawn or superseded.
-    if (byId("replan-card").hidden) return [];
-    const { actionId, targetId } = this.selection.now;
-    const action = this.actions.get(actionId ?? "");
-    const target = this.drawn.target.get(targetId ?? "") ?? null;
-    const names = {
-      satelliteOf: (/** @type {string} */ id) => this.drawn.satelliteName(id),
-      stationOf: (/** @type {PlanActionOut} */ one) => this.station(one),
-    };
-    if (action?.mode === "collect") return offersOfImage(action, target, names);
-    if (action) return offersOfContact(action, names);
-    return target && target.actionId === null ? offersOfTarget(target) : [];
-  }
-
-  /** @param {import("./selection.js").Anchor} anchor */
-  openMenu(anchor) {
-    if (document.body.dataset.scope === "read") return;
-    const lines = this.offers().map((offer) => ({ id: offer.id, text: offer.text, choose: () => this.take(offer) }));
-    if (lines.length > 0) openMenu(this.title(), lines, anchor);
-  }
-
-  /** @param {import("./offers.js").Offer} offer */
-  async take({ wish, weigh }) {
-    if (wish) this.wishes.add(wish);
-    if (!weigh) return;
-    const reward = await askForPriority(weigh.id, weigh.reward);
-    if (reward !== null) this.wishes.add(weighed(weigh.id, reward));
+  /** Whether there is anything to report of: the plan is flown, or was. */
+  isReported() {
+    return this.plan.state !== "draft" && this.plan.state !== "approved";
   }
 
   /** @param {PlanActionOut} action */
   reports(action) {
-    if (this.plan.state === "draft" || this.plan.state === "approved") return [];
-    return ["executed", "failed", "skipped"].map((outcome) =>
-      h("button", { type: "button", id: `report-${outcome}`, onclick: () => this.report(action, outcome) }, `Report ${outcome}`),
+    const mbit = h("input", { type: "number", id: "report-mbit", min: 0, step: "any" });
+    const detail = h("input", { id: "report-detail", autocomplete: "off", maxlength: 1000 });
+    const told = () => ({
+      ...(mbit.value === "" ? {} : { mbit: mbit.valueAsNumber }),
+      ...(detail.value.trim() === "" ? {} : { detail: detail.value.trim() }),
+    });
+    const buttons = ["executed", "partial", "failed", "skipped"].map((outcome) => {
+      const onclick = () => this.report(action, { outcome, ...told() });
+      return h("button", { type: "button", id: `report-${outcome}`, onclick }, `Report ${outcome}`);
+    });
+    return h(
+      "div",
+      { class: "row needs-submit", role: "group", "aria-label": "Report" },
+      h("label", {}, "Data volume, Mbit ", mbit),
+      h("label", {}, "Remark ", detail),
+      ...buttons,
     );
   }
 
   /**
    * @param {PlanActionOut} action
-   * @param {string} outcome
+   * @param {{outcome: string, mbit?: number, detail?: string}} told
    */
-  async report(action, outcome) {
+  async report(action, told) {
     try {
-      await post(`${this.path}/executions`, [{ action_id: action.id, outcome }]);
+      await post(`${this.path}/executions`, [{ action_id: action.id, ...told }]);
       await this.load();
     } catch (error) {
       byId("chosen-action").append(h("div", { class: "notice bad", role: "alert" }, h("div", {}, ...describe(error))));

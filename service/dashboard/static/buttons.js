@@ -8,9 +8,10 @@ import { h } from "./dom.js";
  * @param {import("./plan.js").Plan} plan
  * @param {import("./selection.js").Selection} selection
  * @param {string} id
+ * @param {string} [text] its id where nothing else is said
  */
-export function actionButton(plan, selection, id) {
-  return selecting(id, selection, () => plan.about(id));
+export function actionButton(plan, selection, id, text = id) {
+  return selecting(text, selection, () => plan.about(id));
 }
 
 /**
@@ -20,7 +21,7 @@ export function actionButton(plan, selection, id) {
  * @param {string | null} id
  */
 export function targetButton(plan, selection, id) {
-  return id === null ? "" : selecting(id, selection, () => plan.aboutTarget(id));
+  return id === null ? "" : selecting(plan.targetTitle(id), selection, () => plan.aboutTarget(id));
 }
 
 /**

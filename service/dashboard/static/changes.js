@@ -2,7 +2,7 @@
 /** What a replan changes, and why. */
 
 import { h } from "./dom.js";
-import { percent, utc } from "./format.js";
+import { percent, targetTitle, utc } from "./format.js";
 
 /** @typedef {import("./types.js").PlanChangesOut} PlanChangesOut */
 /** @typedef {import("./types.js").PlanActionOut} PlanActionOut */
@@ -18,10 +18,8 @@ const CAUSES = {
 /**
  * Return the changes as elements: the shares, then a row for each.
  * @param {PlanChangesOut} changes
- * @param {(satelliteId: string) => string} nameOf
- * @param {(stationId: string) => string} stationOf
  */
-export function changesTable(changes, nameOf, stationOf) {
+export function changesTable(changes) {
   const { items } = changes;
   const shares =
     `${percent(changes.changed_share)} of the plan after ${utc(changes.freeze_until)} UTC moved or removed, ` +
@@ -34,8 +32,8 @@ export function changesTable(changes, nameOf, stationOf) {
       {},
       h("th", { scope: "row" }, item.change),
       h("td", {}, about.mode),
-      h("td", {}, about.target_id ?? stationOf(about.station_id ?? "")),
-      h("td", {}, nameOf(about.satellite_id)),
+      h("td", {}, about.target_id === null ? (about.station_name ?? about.station_id) : targetTitle(about.target_id, about.target_name)),
+      h("td", {}, about.satellite_name ?? about.satellite_id),
       h("td", {}, utc(item.parent_action?.start)),
       h("td", {}, utc(item.action?.start)),
       h("td", {}, CAUSES[item.cause] ?? item.cause),

@@ -60,6 +60,15 @@ export function gapOf(reward, bound) {
   return bound > 0 ? Math.max(0, (bound - reward) / bound) : 0;
 }
 
+/**
+ * A target in texts: its name where it has one, and its id.
+ * @param {string} id
+ * @param {string | null | undefined} name
+ */
+export function targetTitle(id, name) {
+  return name && name !== id ? `${name} (${id})` : id;
+}
+
 /** A name for an id that has none: its last, random part. @param {string} id */
 export function short(id) {
   return id.slice(-8);
@@ -68,7 +77,8 @@ export function short(id) {
 /**
  * @param {number} count
  * @param {string} noun in the singular
+ * @param {string} [nouns] in the plural
  */
-export function counted(count, noun) {
-  return `${count} ${noun}${count === 1 ? "" : "s"}`;
+export function counted(count, noun, nouns = `${noun}s`) {
+  return `${count} ${count === 1 ? noun : nouns}`;
 }

@@ -351,13 +351,13 @@ export function drawNow(pen, view, width, bottom, colors) {
 
 /** @param {Action} action */
 export function tellAction(action) {
-  const what = action.target_id ?? action.station_name ?? action.station_id ?? "";
+  const what = action.target_name ?? action.target_id ?? action.station_name ?? action.station_id ?? "";
   const angle = action.off_nadir_deg === null ? "" : `, ${number(action.off_nadir_deg)}° off nadir`;
   return `${action.mode} ${what}: ${utc(action.start)} to ${utc(action.end).slice(11)} UTC${angle}`;
 }
 
 /** @param {OpportunityOut} one */
 function tellOpportunity(one) {
-  const what = one.target_id ?? one.station_name ?? one.station_id ?? "";
+  const what = one.target_name ?? one.target_id ?? one.station_name ?? one.station_id ?? "";
   return `opportunity, ${one.kind} ${what}: ${utc(one.start)} to ${utc(one.end).slice(11)} UTC, ${number(one.off_nadir_deg)}° off nadir`;
 }

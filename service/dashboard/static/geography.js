@@ -2,6 +2,7 @@
 /** What the map shows: land, and the timeline as GeoJSON, made ready for drawing. */
 
 import { call } from "./api.js";
+import { targetTitle } from "./format.js";
 import { firstAbove } from "./plan.js";
 
 /**
@@ -15,7 +16,8 @@ import { firstAbove } from "./plan.js";
 /**
  * @typedef {object} TargetPlace
  * @property {string} id
- * @property {string} name
+ * @property {string} name for pictures; the id where it has none
+ * @property {string} title for texts: its name, and its id
  * @property {number} lon
  * @property {number} lat
  * @property {string} outcome
@@ -59,7 +61,8 @@ export async function loadGeography(path) {
     const { kind } = properties;
     if (kind === "target") {
       found.targets.push({
-        ...place(geometry, properties.target_id, properties.target_id),
+        ...place(geometry, properties.target_id, properties.target_name ?? properties.target_id),
+        title: targetTitle(properties.target_id, properties.target_name),
         outcome: properties.outcome,
         reason: properties.reason,
         why: properties.reason_detail,

@@ -20,6 +20,9 @@ import { watchSelection } from "./selected.js";
 import { stateBadge } from "./state.js";
 import { showSummary } from "./summary.js";
 import { TimeView } from "./time_view.js";
+import { installWhatIf } from "./what_if.js";
+import { WishDesk } from "./wish_desk.js";
+import { Wishes } from "./wishes.js";
 
 /** @typedef {import("./types.js").JobOut} JobOut */
 
@@ -91,6 +94,9 @@ function showState(job) {
   );
   byId("cancel").hidden = isFinal || job.state === "cancelling";
   byId("rerun").hidden = !isFinal;
+  // Solver, parameters and time limit of its scenario: what a search that ran out of time needs.
+  byId("other-settings").hidden = !isFinal;
+  byId("other-settings").setAttribute("href", `/new#scenario=${encodeURIComponent(job.scenario.id)}`);
   byId("take").hidden = job.state !== "succeeded";
   byId("compare").hidden = !isFinal;
 }
@@ -109,7 +115,10 @@ async function showAnswer(job) {
   installTools(view, plan);
   installUnused(plan, job, gantt);
   showSummary(plan, selection);
-  watchSelection(plan, selection, job, gantt);
+  const wishes = new Wishes();
+  const desk = new WishDesk(plan, selection, wishes, (offer) => isTried(offer, selection));
+  watchSelection(plan, selection, job, gantt, desk);
+  installWhatIf(job, wishes);
   const [geography, land] = await asked;
   plan.setTargets(geography.targets);
   await frame();
@@ -119,6 +128,15 @@ async function showAnswer(job) {
   showLeftOut(plan, selection, jobPath);
   showTables(plan, selection);
   installDownload();
+}
+
+/**
+ * Return whether a what-if can have it: outages are a replan's, and what is taken is promised by its pin.
+ * @param {import("./offers.js").Offer} offer
+ * @param {Selection} selection
+ */
+function isTried({ wish }, selection) {
+  return wish?.kind !== "outage" && !(wish?.kind === "promise" && selection.now.actionId !== null);
 }
 
 /** Let the browser draw and listen between two pieces of work. */

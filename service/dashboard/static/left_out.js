@@ -97,5 +97,5 @@ function whyOf(reason) {
  */
 export function blockersOf(plan, selection, reason) {
   const ids = reason?.blocking_actions ?? [];
-  return h("span", {}, ...ids.flatMap((id) => [actionButton(plan, selection, id), " "]));
+  return h("span", {}, ...ids.flatMap((id, i) => [i > 0 && ", ", actionButton(plan, selection, id, plan.actionTitle(id))]));
 }

@@ -348,7 +348,7 @@ export class WorldMap {
   hover(x, y) {
     const target = this.targetAt(x, y);
     this.tip.hidden = target === null;
-    this.tip.textContent = target && `${target.id}: ${target.outcome}`;
+    this.tip.textContent = target && `${target.title}: ${target.outcome}`;
     this.tip.style.left = `${Math.min(x + 12, this.canvas.element.clientWidth - 200)}px`;
     this.tip.style.top = `${y + 14}px`;
   }

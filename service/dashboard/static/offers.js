@@ -2,9 +2,10 @@
 /** What can be wished of an action or a target of a plan: the lines of its menu, and its buttons. */
 
 import { utc } from "./format.js";
+import { changeOf } from "./settings.js";
 
-/** @typedef {import("./types.js").PlanActionOut} PlanActionOut */
-/** @typedef {import("./geography.js").TargetPlace} TargetPlace */
+/** @typedef {import("./types.js").Action} Action */
+/** @typedef {import("./plan.js").Plan} Plan */
 /** @typedef {import("./wishes.js").Wish} Wish */
 
 /**
@@ -12,62 +13,66 @@ import { utc } from "./format.js";
  * @property {string} id
  * @property {string} text
  * @property {Wish} [wish]
- * @property {{id: string, reward: number | null}} [weigh] the target whose priority is asked for first
+ * @property {string} [weigh] the target whose priority is asked for first
  */
-
-/** @typedef {{satelliteOf: (id: string) => string, stationOf: (action: PlanActionOut) => string}} Names */
 
 /**
- * @param {PlanActionOut} action
- * @param {TargetPlace | null} target
- * @param {Names} names
+ * Return what can be wished of a collect.
+ * @param {Plan} plan
+ * @param {Action} action
  * @returns {Offer[]}
  */
-export function offersOfImage(action, target, names) {
+export function offersOfImage(plan, action) {
   const id = action.target_id ?? "";
-  const what = `image of ${id} by ${names.satelliteOf(action.satellite_id)} at ${utc(action.start)} UTC`;
+  const what = `image of ${plan.targetTitle(id)} by ${satelliteOf(plan, action)} at ${utc(action.start)} UTC`;
   return [
-    pin("keep", "Keep (pin)", `Kept: ${what}.`, action, { [`action ${action.id}`]: "keep", [`target ${id}`]: "wanted" }),
-    pin("skip", "Skip this image", `Skipped: ${what}.`, action, { [`action ${action.id}`]: "skip" }),
-    promise(id),
+    pin(plan, "keep", "Keep (pin)", `Kept: ${what}.`, action, { [`action ${action.id}`]: "keep", [`target ${id}`]: "wanted" }),
+    pin(plan, "skip", "Skip this image", `Skipped: ${what}.`, action, { [`action ${action.id}`]: "skip" }),
+    promise(plan, id),
     {
       id: "drop",
       text: "Forbid its target",
-      wish: { text: `Forbidden: ${id} is no longer wanted.`, field: "drop_targets", value: id, stances: { [`target ${id}`]: "dropped" } },
+      wish: {
+        text: `Forbidden: ${plan.targetTitle(id)} is no longer wanted.`,
+        kind: "drop",
+        value: id,
+        stances: { [`target ${id}`]: "dropped" },
+      },
     },
-    priority(id, target),
+    priority(id),
   ];
 }
 
 /**
- * @param {PlanActionOut} action
- * @param {Names} names
+ * Return what can be wished of a contact.
+ * @param {Plan} plan
+ * @param {Action} action
  * @returns {Offer[]}
  */
-export function offersOfContact(action, names) {
-  const { satellite_id, station_id, start, end } = action;
-  const station = names.stationOf(action);
-  const over = `${names.satelliteOf(satellite_id)} over ${station} at ${utc(start)} UTC`;
+export function offersOfContact(plan, action) {
+  const { station_id, start, end } = action;
+  const station = action.station_name ?? station_id ?? "";
+  const over = `${satelliteOf(plan, action)} over ${station} at ${utc(start)} UTC`;
   const stance = (/** @type {string} */ said) => ({ [`action ${action.id}`]: said });
   return [
-    pin("keep", "Keep (pin)", `Kept: ${over}.`, action, stance("keep")),
+    pin(plan, "keep", "Keep (pin)", `Kept: ${over}.`, action, stance("keep")),
     {
       id: "lose",
       text: "The pass is lost",
       wish: {
         text: `Lost: ${over}.`,
-        field: "outages",
-        value: { satellite_id, start, end, modes: ["contact"], reason: "Lost pass." },
+        kind: "outage",
+        value: { satellite_id: plan.satelliteOf.get(action.id), start, end, modes: ["contact"], reason: "Lost pass." },
         stances: stance("lost"),
       },
     },
-    pin("skip", "Skip this pass", `Skipped: ${over}.`, action, stance("skip")),
+    pin(plan, "skip", "Skip this pass", `Skipped: ${over}.`, action, stance("skip")),
     {
       id: "station-out",
       text: "The station is out",
       wish: {
         text: `${station} is out from ${utc(start)} to ${utc(end)} UTC.`,
-        field: "outages",
+        kind: "outage",
         value: { station_id, start, end },
         stances: stance("out"),
       },
@@ -76,55 +81,81 @@ export function offersOfContact(action, names) {
 }
 
 /**
- * @param {TargetPlace} target that has no image
+ * Return what can be wished of a target that has no image.
+ * @param {Plan} plan
+ * @param {string} id
  * @returns {Offer[]}
  */
-export function offersOfTarget(target) {
-  return [promise(target.id), priority(target.id, target)];
+export function offersOfTarget(plan, id) {
+  return [promise(plan, id), priority(id)];
+}
+
+/**
+ * Return what a proposal of the service wishes: other settings that would let a target in.
+ * @param {Plan} plan
+ * @param {Record<string, unknown>} change
+ * @param {string} id of the offer
+ * @returns {Offer}
+ */
+export function offerOfChange(plan, change, id) {
+  const text = changeOf(plan, change);
+  const { opportunity_id, ...value } = change;
+  return { id, text: `Try ${text}`, wish: { text: `Settings: ${text}.`, kind: "setting", value } };
 }
 
 /**
  * Return the wish that an image earns so much from now on.
+ * @param {Plan} plan
  * @param {string} id
  * @param {number} reward
  * @returns {Wish}
  */
-export function weighed(id, reward) {
+export function weighed(plan, id, reward) {
   return {
-    text: `Priority of ${id}: ${reward}.`,
-    field: "rewards",
+    text: `Priority of ${plan.targetTitle(id)}: ${reward}.`,
+    kind: "reward",
     value: [id, reward],
     stances: { [`reward ${id}`]: String(reward), [`target ${id}`]: "wanted" },
   };
 }
 
 /**
- * @param {"keep" | "skip"} field
+ * @param {Plan} plan
+ * @param {Action} action
+ */
+function satelliteOf(plan, action) {
+  return plan.satelliteName(plan.satelliteOf.get(action.id) ?? "");
+}
+
+/**
+ * @param {Plan} plan
+ * @param {"keep" | "skip"} kind
  * @param {string} text
  * @param {string} told
- * @param {PlanActionOut} action
+ * @param {Action} action
  * @param {Record<string, string>} stances
  * @returns {Offer}
  */
-function pin(field, text, told, { satellite_id, target_id, station_id, start, end }, stances) {
-  const value = { satellite_id, ...(target_id === null ? { station_id } : { target_id }), start, end };
-  return { id: field, text, wish: { text: told, field, value, stances } };
+function pin(plan, kind, text, told, { id, target_id, station_id, start, end }, stances) {
+  const place = target_id === null ? { station_id } : { target_id };
+  const value = { satellite_id: plan.satelliteOf.get(id), ...place, start, end };
+  return { id: kind, text, wish: { text: told, kind, value, stances } };
+}
+
+/**
+ * @param {Plan} plan
+ * @param {string} id
+ * @returns {Offer}
+ */
+function promise(plan, id) {
+  const text = `Promised: ${plan.targetTitle(id)} is imaged.`;
+  return { id: "promise", text: "Promise its image", wish: { text, kind: "promise", value: id, stances: { [`target ${id}`]: "wanted" } } };
 }
 
 /**
  * @param {string} id
  * @returns {Offer}
  */
-function promise(id) {
-  const wish = { text: `Promised: ${id} is imaged.`, field: /** @type {const} */ ("promises"), value: { target_id: id } };
-  return { id: "promise", text: "Promise its image", wish: { ...wish, stances: { [`target ${id}`]: "wanted" } } };
-}
-
-/**
- * @param {string} id
- * @param {TargetPlace | null} target
- * @returns {Offer}
- */
-function priority(id, target) {
-  return { id: "priority", text: "Priority …", weigh: { id, reward: target?.reward ?? null } };
+function priority(id) {
+  return { id: "priority", text: "Priority …", weigh: id };
 }

@@ -134,7 +134,7 @@ function targetFilter(plan, table) {
     const text = find.value.trim().toLowerCase();
     const found = plan.targets.filter(
       (one) =>
-        (!text || one.id.toLowerCase().includes(text)) &&
+        (!text || one.title.toLowerCase().includes(text)) &&
         (!outcome.value || one.outcome === outcome.value) &&
         (!reason.value || one.reason === reason.value),
     );
@@ -145,7 +145,7 @@ function targetFilter(plan, table) {
   return h(
     "div",
     { class: "row tools" },
-    h("label", {}, "Target id with ", find),
+    h("label", {}, "Target with ", find),
     h("label", {}, "Outcome ", outcome),
     h("label", {}, "Reason ", reason),
     count,

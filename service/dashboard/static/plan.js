@@ -1,6 +1,8 @@
 // @ts-check
 /** A timeline made ready for drawing: times as numbers, actions by lane and in order. */
 
+import { targetTitle } from "./format.js";
+
 /** @typedef {import("./types.js").Timeline} Timeline */
 /** @typedef {import("./types.js").Action} Action */
 /** @typedef {import("./geography.js").TargetPlace} TargetPlace */
@@ -107,6 +109,8 @@ export class Plan {
     this.targets = [];
     /** @type {Map<string, TargetPlace>} */
     this.target = new Map();
+    /** @type {Map<string, string>} what targets are called in texts */
+    this.titles = new Map();
     this.names = new Map(timeline.satellites.map(({ id, name }) => [id, name]));
     this.rows = timeline.satellites.map((satellite) => this.row(satellite));
   }
@@ -115,6 +119,7 @@ export class Plan {
   setTargets(targets) {
     this.targets = targets;
     this.target = new Map(targets.map((one) => [one.id, one]));
+    for (const { id, title } of targets) this.titles.set(id, title);
   }
 
   /**
@@ -126,6 +131,7 @@ export class Plan {
       this.actions.set(action.id, action);
       this.satelliteOf.set(action.id, satellite.id);
       if (action.target_id !== null) {
+        this.titles.set(action.target_id, targetTitle(action.target_id, action.target_name));
         const known = this.actionsOf.get(action.target_id) ?? [];
         this.actionsOf.set(action.target_id, [...known, action.id]);
       }
@@ -167,6 +173,22 @@ export class Plan {
     const known = this.target.get(targetId);
     const actionId = known?.actionId ?? this.actionsOf.get(targetId)?.[0] ?? null;
     return { actionId, targetId, satelliteId: known?.satelliteId ?? null };
+  }
+
+  /**
+   * Return what an action is about, and its id.
+   * @param {string} id
+   */
+  actionTitle(id) {
+    const action = this.actions.get(id);
+    if (action?.mode === "collect") return `image of ${this.targetTitle(action.target_id ?? "")} (${id})`;
+    if (action?.mode === "contact") return `contact with ${action.station_name ?? action.station_id} (${id})`;
+    return id;
+  }
+
+  /** @param {string} id */
+  targetTitle(id) {
+    return this.titles.get(id) ?? id;
   }
 
   /** @param {string} id */

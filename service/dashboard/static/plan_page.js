@@ -17,6 +17,7 @@ import { Plan } from "./plan.js";
 import { move, nextInstant } from "./plan_steps.js";
 import { installReplan } from "./replan.js";
 import { Selection } from "./selection.js";
+import { stateBadge } from "./state.js";
 import { TimeView } from "./time_view.js";
 import { Wishes } from "./wishes.js";
 
@@ -35,20 +36,17 @@ startPage(async () => {
   const changes = plan.parent_id === null ? null : await get(`${planPath}/changes`);
   showLife(plan, changes?.freeze_until ?? null);
   const drawn = new Plan(/** @type {any} */ (await get(`${planPath}/timeline.json`)));
-  const stations = stationsOf(drawn);
-  const nameOf = (/** @type {string} */ id) => drawn.satelliteName(id);
-  const stationOf = (/** @type {string} */ id) => stations.find((one) => one.id === id)?.name ?? id;
   if (changes) {
     byId("changes-card").hidden = false;
-    fill(byId("changes"), ...changesTable(changes, nameOf, stationOf));
+    fill(byId("changes"), ...changesTable(changes));
   }
   const selection = new Selection();
   const wishes = new Wishes();
   const view = new TimeView(drawn.start, drawn.end);
   new Gantt(byId("gantt"), drawn, view, selection);
   await new ActionDesk(plan, drawn, selection, wishes).load();
-  await showPlaces(asked, drawn, view, selection);
-  installReplan(plan, stations, wishes, { nameOf, stationOf });
+  const stations = await showPlaces(asked, drawn, view, selection);
+  installReplan(plan, stations, wishes);
   await showHistory();
   await showPasses(plan, stations, nextInstant(plan));
 });
@@ -59,6 +57,7 @@ startPage(async () => {
  * @param {Plan} drawn
  * @param {TimeView} view
  * @param {Selection} selection
+ * @returns {Promise<{id: string, name: string}[]>} all stations, by name
  */
 async function showPlaces(asked, drawn, view, selection) {
   const [geography, land] = await asked;
@@ -66,6 +65,7 @@ async function showPlaces(asked, drawn, view, selection) {
   byId("map-credit").textContent = land.credit;
   new WorldMap(byId("map"), geography, land.rings, drawn, view, selection);
   showTables(drawn, selection);
+  return [...geography.stations].sort((a, b) => a.name.localeCompare(b.name));
 }
 
 /**
@@ -75,7 +75,7 @@ async function showPlaces(asked, drawn, view, selection) {
 function showLife(plan, freezeUntil) {
   document.title = `${plan.name ?? short(plan.id)} - Slewline`;
   byId("plan-title").textContent = plan.name ?? `Plan ${short(plan.id)}`;
-  fill(byId("plan-state"), h("span", { class: `state ${plan.state}` }, plan.state));
+  fill(byId("plan-state"), stateBadge(plan));
   fill(
     byId("plan-about"),
     `${utc(plan.horizon.start)} to ${utcLabelled(plan.horizon.end)}, `,
@@ -104,16 +104,6 @@ function showLife(plan, freezeUntil) {
       return button;
     }),
   );
-}
-
-/** @param {Plan} drawn */
-function stationsOf(drawn) {
-  /** @type {Map<string, string>} */
-  const found = new Map();
-  for (const action of drawn.actions.values()) {
-    if (action.station_id !== null) found.set(action.station_id, action.station_name ?? action.station_id);
-  }
-  return [...found].map(([id, name]) => ({ id, name })).sort((a, b) => a.name.localeCompare(b.name));
 }
 
 async function showHistory() {

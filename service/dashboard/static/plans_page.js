@@ -5,6 +5,7 @@ import { list, pause } from "./api.js";
 import { byId, fill, h } from "./dom.js";
 import { short, utc } from "./format.js";
 import { startPage } from "./page.js";
+import { stateBadge } from "./state.js";
 
 /** @typedef {import("./types.js").PlanOut} PlanOut */
 
@@ -42,7 +43,7 @@ function rowOf(plan) {
   return h(
     "tr",
     { "data-plan": plan.id },
-    h("td", {}, h("span", { class: `state ${plan.state}` }, plan.state)),
+    h("td", {}, stateBadge(plan)),
     h("th", { scope: "row" }, h("a", { href: `/plans/${plan.id}` }, plan.name ?? short(plan.id))),
     h("td", {}, names.length > 4 ? `${names.slice(0, 4).join(", ")} and ${names.length - 4} more` : names.join(", ")),
     h("td", {}, utc(plan.horizon.start)),

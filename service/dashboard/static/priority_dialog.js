@@ -1,37 +1,44 @@
 // @ts-check
 /** Asks for a target's priority: what its image earns from now on. */
 
-import { byId } from "./dom.js";
+import { byId, h } from "./dom.js";
 
-/** Let the dialog's buttons close it. */
+/** Put the dialog on the page. */
 export function installPriorityDialog() {
-  const dialog = dialogOf();
+  const close = h("button", { type: "button", id: "priority-close", class: "quiet" }, "Close");
+  const form = h(
+    "form",
+    { id: "priority-form", method: "dialog" },
+    h("h2", { id: "priority-title" }, "Priority"),
+    h("p", {},
+      h("label", { for: "priority-input" }, "What its image earns from now on "),
+      h("input", { id: "priority-input", type: "number", min: 0, step: "any", required: true })),
+    h("p", { class: "buttons" }, h("button", { type: "submit" }, "Use it"), " ", close),
+  );
+  const dialog = h("dialog", { id: "priority-dialog", "aria-labelledby": "priority-title" }, form);
   // The policy lets no form send itself; a dialog's form need not.
-  byId("priority-form").addEventListener("submit", (event) => {
+  form.addEventListener("submit", (event) => {
     event.preventDefault();
     dialog.close("use");
   });
-  byId("priority-close").addEventListener("click", () => dialog.close("close"));
+  close.addEventListener("click", () => dialog.close("close"));
+  document.body.append(dialog);
 }
 
 /**
  * Ask for the priority; null where nobody gives one.
- * @param {string} targetId
+ * @param {string} title of the target
  * @param {number | null} reward what it is
  * @returns {Promise<number | null>}
  */
-export async function askForPriority(targetId, reward) {
-  const dialog = dialogOf();
+export async function askForPriority(title, reward) {
+  const dialog = /** @type {HTMLDialogElement} */ (byId("priority-dialog"));
   const input = /** @type {HTMLInputElement} */ (byId("priority-input"));
-  byId("priority-title").textContent = `Priority of ${targetId}`;
+  byId("priority-title").textContent = `Priority of ${title}`;
   input.value = reward === null ? "" : String(reward);
   dialog.returnValue = "";
   dialog.showModal();
   input.select();
   await new Promise((resolve) => dialog.addEventListener("close", resolve, { once: true }));
   return dialog.returnValue === "use" && input.value !== "" ? input.valueAsNumber : null;
-}
-
-function dialogOf() {
-  return /** @type {HTMLDialogElement} */ (byId("priority-dialog"));
 }

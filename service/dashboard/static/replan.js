@@ -9,11 +9,11 @@ import { instantOf } from "./instants.js";
 import { whileBusy } from "./page.js";
 import { move, nextInstant } from "./plan_steps.js";
 import { ProgressText } from "./progress_text.js";
+import { replanOf } from "./wishes.js";
 
 /** @typedef {import("./types.js").PlanOut} PlanOut */
 /** @typedef {import("./types.js").JobOut} JobOut */
 /** @typedef {import("./wishes.js").Wishes} Wishes */
-/** @typedef {{nameOf: (id: string) => string, stationOf: (id: string) => string}} Names */
 
 const HOUR_MS = 3_600_000;
 
@@ -21,9 +21,8 @@ const HOUR_MS = 3_600_000;
  * @param {PlanOut} plan
  * @param {{id: string, name: string}[]} stations
  * @param {Wishes} wishes
- * @param {Names} names
  */
-export function installReplan(plan, stations, wishes, names) {
+export function installReplan(plan, stations, wishes) {
   field("freeze-until").value = utc(nextInstant(plan));
   installOutages(plan, stations, wishes);
   const button = /** @type {HTMLButtonElement} */ (byId("replan"));
@@ -35,7 +34,7 @@ export function installReplan(plan, stations, wishes, names) {
       byId("proposal").hidden = true;
       proposal = await propose(plan, wishes);
       const changes = await get(`/v1/plans/${proposal.id}/changes`);
-      fill(byId("proposal-changes"), ...changesTable(changes, names.nameOf, names.stationOf));
+      fill(byId("proposal-changes"), ...changesTable(changes));
       byId("proposal").hidden = false;
       byId("take-proposal").focus();
     });
@@ -82,7 +81,7 @@ function installOutages(plan, stations, wishes) {
       const name = /** @type {HTMLSelectElement} */ (/** @type {unknown} */ (choice)).selectedOptions[0]?.text;
       wishes.add({
         text: `Out: ${name}, ${utc(start)} to ${utc(end)} UTC.`,
-        field: "outages",
+        kind: "outage",
         value: { [choice.value.slice(0, at)]: choice.value.slice(at + 1), start, end },
       });
     });
@@ -102,7 +101,7 @@ async function propose(plan, wishes) {
     freeze_until: freeze,
     // A plan of another day is tried out as of its own time.
     ...(isUnderWay ? {} : { now: freeze }),
-    ...wishes.fields(),
+    ...replanOf(wishes.all),
     limits: { time_s: Number(field("replan-time").value) },
   };
   /** @type {JobOut & {links: Record<string, string>}} */

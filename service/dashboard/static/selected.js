@@ -8,8 +8,8 @@ import { blockersOf } from "./left_out.js";
 import { lanesOf, opportunitiesOf } from "./opportunities.js";
 import { outcomeOf, reasonName } from "./outcomes.js";
 import { showError } from "./page.js";
+import { offerOfChange } from "./offers.js";
 import { changeOf } from "./settings.js";
-import { whatIfButton } from "./what_if.js";
 
 /** @typedef {import("./types.js").OpportunityOut} OpportunityOut */
 /** @typedef {import("./types.js").ExplanationOut} ExplanationOut */
@@ -19,8 +19,9 @@ import { whatIfButton } from "./what_if.js";
  * @param {import("./selection.js").Selection} selection
  * @param {import("./types.js").JobOut} job
  * @param {import("./gantt.js").Gantt} gantt
+ * @param {import("./wish_desk.js").WishDesk} desk
  */
-export function watchSelection(plan, selection, job, gantt) {
+export function watchSelection(plan, selection, job, gantt, desk) {
   let asked = 0;
   selection.onChange(({ actionId, targetId, satelliteId }) => {
     asked += 1;
@@ -34,7 +35,7 @@ export function watchSelection(plan, selection, job, gantt) {
     }
     const list = factsOf([...(known ? targetFacts(known) : []), ...(action ? actionFacts(plan, action, satelliteId) : [])]);
     const more = h("div", {});
-    const tries = h("div", {});
+    const tries = h("div", { class: "needs-submit" }, h("p", { class: "buttons" }, ...desk.buttons(desk.offers())));
     const place = h("div", {});
     fill(byId("selected"), list, more, tries, place);
     const mine = asked;
@@ -45,11 +46,13 @@ export function watchSelection(plan, selection, job, gantt) {
           gantt.blocking = new Set(item.reason.blocking_actions);
           gantt.canvas.redraw();
           fill(more, factsOf(reasonFacts(plan, selection, item.reason)));
+          const { change } = item.reason;
+          if (change !== null) tries.append(h("p", { class: "buttons" }, ...desk.buttons([offerOfChange(plan, change, "change")])));
         })
         .catch(showError);
     }
     if (known) {
-      offer(plan, job, known, tries, () => mine === asked).catch(showError);
+      if (known.reason === "no_access") offerAccess(plan, job, known.id, desk, tries, () => mine === asked).catch(showError);
       opportunitiesOf(job.scenario.id, { target_id: known.id })
         .then(({ items }) => {
           if (mine !== asked) return;
@@ -64,25 +67,27 @@ export function watchSelection(plan, selection, job, gantt) {
 }
 
 /**
- * Offer what could be different of a target, to be tried.
+ * Offer the settings that would give a target an access.
  * @param {import("./plan.js").Plan} plan
  * @param {import("./types.js").JobOut} job
- * @param {import("./geography.js").TargetPlace} known
+ * @param {string} targetId
+ * @param {import("./wish_desk.js").WishDesk} desk
  * @param {HTMLElement} place
  * @param {() => boolean} isWanted
  */
-async function offer(plan, job, known, place, isWanted) {
-  const outcome = h("div", { class: "what-if-outcomes", "aria-live": "polite" });
-  const isTaken = known.reason === null;
-  if (isTaken) {
-    fill(place, whatIfButton(job, `Plan without ${known.id}`, { forbid: [known.id] }, outcome), outcome);
-  } else if (known.reason !== "no_access") {
-    fill(place, whatIfButton(job, `Plan with ${known.id}`, { force: [known.id] }, outcome), outcome);
-  } else {
-    fill(place, h("p", { class: "hint" }, "Looking for what would give it an access …"));
-    const told = await explanationOf(job.id, known.id, isWanted);
-    if (told && isWanted()) fill(place, ...accessChanges(plan, job, told, outcome), outcome);
+async function offerAccess(plan, job, targetId, desk, place, isWanted) {
+  const hint = h("p", { class: "hint" }, "Looking for what would give it an access …");
+  place.append(hint);
+  const told = await explanationOf(job.id, targetId, isWanted);
+  hint.remove();
+  if (!told || !isWanted()) return;
+  if (told.access_changes.length === 0) {
+    place.append(h("p", {}, "No single limit, if lifted, would give it an access."));
+    return;
   }
+  const offers = told.access_changes.map((change, i) => offerOfChange(plan, change, `access-${i}`));
+  const lines = desk.buttons(offers).map((button) => h("li", {}, button));
+  place.append(h("p", {}, "Each of these would give it an access:"), h("ul", { class: "access-changes" }, ...lines));
 }
 
 /**
@@ -106,20 +111,6 @@ async function explanationOf(jobId, targetId, isWanted) {
   return null;
 }
 
-/**
- * @param {import("./plan.js").Plan} plan
- * @param {import("./types.js").JobOut} job
- * @param {ExplanationOut} told
- * @param {HTMLElement} outcome
- */
-function accessChanges(plan, job, told, outcome) {
-  if (told.access_changes.length === 0) return [h("p", {}, "No single limit, if lifted, would give it an access.")];
-  const lines = told.access_changes.map((change) =>
-    h("li", {}, whatIfButton(job, `Try ${changeOf(plan, change)}`, { relax: change }, outcome)),
-  );
-  return [h("p", {}, "Each of these would give it an access:"), h("ul", { class: "access-changes" }, ...lines)];
-}
-
 /** @param {[string, import("./dom.js").Child][]} facts */
 function factsOf(facts) {
   return h("dl", { class: "facts" }, ...facts.flatMap(([name, value]) => [h("dt", {}, name), h("dd", {}, value)]));
@@ -129,9 +120,9 @@ function factsOf(facts) {
  * @param {import("./geography.js").TargetPlace} known
  * @returns {[string, import("./dom.js").Child][]}
  */
-function targetFacts({ id, outcome, reason, why }) {
+function targetFacts({ title, outcome, reason, why }) {
   /** @type {[string, import("./dom.js").Child][]} */
-  const facts = [["Target", h("strong", { id: "selected-target" }, id)], ["Outcome", outcome]];
+  const facts = [["Target", h("strong", { id: "selected-target" }, title)], ["Outcome", outcome]];
   if (reason !== null) facts.push(["Reason", reasonName(reason)], ["Why", why]);
   return facts;
 }
@@ -195,7 +186,7 @@ function tellOpportunities(plan, targetId, items, place) {
     ),
   );
   const heads = ["", "Satellite", "Start (UTC)", "End (UTC)", "Off nadir, °", "Sun, °", "Light"];
-  const caption = `Opportunities of ${targetId}: ${items.length}${items.length > 100 ? ", the first 100" : ""}`;
+  const caption = `Opportunities of ${plan.targetTitle(targetId)}: ${items.length}${items.length > 100 ? ", the first 100" : ""}`;
   fill(
     place,
     h(

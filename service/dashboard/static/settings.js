@@ -18,7 +18,6 @@ const SAID = {
   due: (value) => `wanted until ${utc(value)} UTC`,
   sensor_type: (value) => (value === null ? "any type of sensor" : `sensor type ${value}`),
   horizon_end: (value) => `planning until ${utc(value)} UTC`,
-  drop_actions: (value) => `without ${value.join(", ")}`,
 };
 
 /**
@@ -40,12 +39,21 @@ function* partsOf(plan, change) {
   /** @type {Set<string>} */
   const said = new Set();
   for (const [name, value] of settingsOf(change)) {
-    const words = SAID[name]?.(value) ?? `${name.replaceAll("_", " ")} ${typeof value === "object" ? JSON.stringify(value) : value}`;
+    const told = name === "drop_actions" ? withoutActions(plan, /** @type {string[]} */ (value)) : SAID[name]?.(value);
+    const words = told ?? `${name.replaceAll("_", " ")} ${typeof value === "object" ? JSON.stringify(value) : value}`;
     // The target and the sensor may have the same limit: it is said once.
     if (!said.has(words)) yield words;
     said.add(words);
   }
   if (change.satellite_id) yield `on ${plan.satelliteName(String(change.satellite_id))}`;
+}
+
+/**
+ * @param {import("./plan.js").Plan} plan
+ * @param {string[]} ids
+ */
+function withoutActions(plan, ids) {
+  return `without ${ids.map((id) => plan.actionTitle(id)).join(", ")}`;
 }
 
 /**

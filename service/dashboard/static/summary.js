@@ -74,8 +74,9 @@ function showViolations(plan, selection) {
   );
   const heads = ["Violation", "Satellite", "At (UTC)", "Needed", "Available", "What"];
   const { validity } = plan.timeline;
+  /** @type {Record<string, string>} */
   const titles = { valid: "Remarks", inherited: "Limits were broken before this plan began" };
-  const title = titles[/** @type {keyof titles} */ (validity)] ?? "This plan breaks limits";
+  const title = titles[validity] ?? "This plan breaks limits";
   fill(
     byId("violations"),
     h(

@@ -147,6 +147,7 @@
  * @property {string} satellite_id
  * @property {string} kind
  * @property {string | null} target_id
+ * @property {string | null} target_name
  * @property {string | null} station_id
  * @property {string | null} station_name
  * @property {string} start
@@ -189,6 +190,7 @@
  * @property {string} satellite_id
  * @property {string | null} satellite_name
  * @property {string | null} target_id
+ * @property {string | null} target_name
  * @property {string | null} station_id
  * @property {string | null} station_name
  * @property {string} start
@@ -216,6 +218,7 @@
  * @property {string} start
  * @property {string} end
  * @property {string | null} target_id
+ * @property {string | null} [target_name] not in answers of earlier releases
  * @property {string | null} station_id
  * @property {string | null} station_name
  * @property {string | null} opportunity_id
@@ -225,6 +228,7 @@
  * @property {number | null} [turn_to_s]
  * @property {number | null} [turn_back_s]
  * @property {number} reward
+ * @property {string | null} [delivered_at] not in answers of earlier releases
  * @property {number | null} battery_fraction_end
  * @property {number | null} recorder_fraction_end
  */
@@ -317,6 +321,7 @@
  * @property {string} job_id
  * @property {string | null} parent_id
  * @property {{start: string, end: string}} horizon
+ * @property {string} validity
  * @property {Violation[]} violations
  * @property {PlanSatelliteOut[]} satellites
  * @property {string[]} allowed
@@ -324,14 +329,25 @@
  */
 
 /**
+ * A target over all plans.
+ * @typedef {object} TargetLifeOut
+ * @property {{id: string, name: string | null, reward: number, due: string | null}} target
+ * @property {string} state
+ * @property {{plan_id: string, satellite_name: string, start: string} | null} collect
+ */
+
+/**
  * @typedef {object} PlanActionOut
  * @property {string} id
  * @property {string} satellite_id
+ * @property {string | null} satellite_name
  * @property {string} mode
  * @property {string} start
  * @property {string} end
  * @property {string | null} target_id
+ * @property {string | null} target_name
  * @property {string | null} station_id
+ * @property {string | null} station_name
  * @property {string | null} outcome
  */
 

@@ -68,7 +68,7 @@ export function telling(plan, changes) {
 export function changeLine(item, plan, stationOf) {
   const about = item.action ?? item.parent_action;
   if (about === null) return item.change;
-  const where = about.target_id ?? stationOf(about.station_id ?? "");
+  const where = about.target_name ?? about.target_id ?? stationOf(about.station_id ?? "");
   const name = plan?.satelliteName(about.satellite_id) ?? about.satellite_id;
   return `${item.change}: ${name}, ${about.mode} ${where}, ${utc(about.start).slice(11)}`;
 }

@@ -55,9 +55,16 @@ let silentSince = "";
 function tell(trouble) {
   silentSince = trouble === "" ? "" : silentSince || trouble;
   const at = shift === 0 ? "" : `As of ${utc(now())} UTC. `;
-  const nothing = shown.size === 0 && !trouble ? "No plan is in force." : "";
-  byId("wall-status").textContent = at + (silentSince || nothing);
-  byId("wall-status").classList.toggle("bad", silentSince !== "");
+  const lack = lackOfPlans();
+  byId("wall-status").textContent = at + (silentSince || lack);
+  byId("wall-status").classList.toggle("bad", silentSince !== "" || lack !== "");
+}
+
+/** Say it where nothing that is in force reaches to this time. */
+function lackOfPlans() {
+  if (shown.size === 0) return "No plan is in force.";
+  const end = Math.max(...[...shown.values()].map(({ drawn }) => drawn.end));
+  return end > now() ? "" : `All plans in force have ended, the last at ${utc(end)} UTC.`;
 }
 
 /**

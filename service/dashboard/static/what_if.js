@@ -1,42 +1,57 @@
 // @ts-check
-/** What if: the job's question with one change, and what would come of it. */
+/** What if: the job's question with some changes, and what would come of it. */
 
 import { follow, get, post } from "./api.js";
-import { fill, h } from "./dom.js";
-import { number, utc } from "./format.js";
+import { byId, fill, h } from "./dom.js";
+import { number, targetTitle, utc } from "./format.js";
 import { whileBusy } from "./page.js";
+import { ProgressText } from "./progress_text.js";
+import { whatIfOf } from "./wishes.js";
 
 /** @typedef {import("./types.js").JobOut} JobOut */
 /** @typedef {import("./types.js").DiffOut} DiffOut */
 /** @typedef {import("./types.js").PlannedOut} PlannedOut */
 
 const MOST_ROWS = 100;
+/** Of a job's label. */
+const MOST_LETTERS = 200;
 
 /**
- * Return a button that tries a change, and shows below it what that comes to.
+ * Let the changes that are gathered be tried as a whole.
  * @param {JobOut} job
- * @param {string} text
- * @param {Record<string, unknown>} change the body of a what-if
- * @param {HTMLElement} place
+ * @param {import("./wishes.js").Wishes} wishes
  */
-export function whatIfButton(job, text, change, place) {
-  const button = h("button", { type: "button", class: "what-if" }, text);
-  button.addEventListener("click", () =>
+export function installWhatIf(job, wishes) {
+  const button = /** @type {HTMLButtonElement} */ (byId("try"));
+  const place = byId("what-if-outcomes");
+  byId("what-if-form").addEventListener("submit", (event) => {
+    event.preventDefault();
     whileBusy(button, place, async () => {
-      const path = `/v1/jobs/${encodeURIComponent(job.id)}`;
-      /** @type {JobOut} */
-      let last = await post(`${path}/what-if`, { ...change, label: text.slice(0, 64) });
-      await follow(last.id, (told) => {
-        last = told;
-        fill(place, h("p", { class: "hint" }, `${text}: ${told.state}${told.progress ? `, ${told.progress.phase}` : ""}`));
-      });
-      if (last.state !== "succeeded") throw new Error(last.error?.detail ?? `The search ended as ${last.state}.`);
-      /** @type {DiffOut} */
-      const diff = await get(`${path}/diff/${encodeURIComponent(last.id)}`);
-      fill(place, ...told(text, last, diff));
-    }),
-  );
-  return button;
+      if (wishes.all.length === 0) throw new Error("There are no changes yet: choose an action or a target first.");
+      const text = wishes.all.map((wish) => wish.text).join(" ");
+      const { varied, diff } = await tried(job, { ...whatIfOf(wishes.all), label: `What if: ${text}`.slice(0, MOST_LETTERS) }, place);
+      fill(place, ...told(text, varied, diff));
+    });
+  });
+}
+
+/**
+ * @param {JobOut} job
+ * @param {Record<string, unknown>} change the body of a what-if
+ * @param {HTMLElement} place where its progress is told
+ * @returns {Promise<{varied: JobOut, diff: DiffOut}>}
+ */
+async function tried(job, change, place) {
+  const path = `/v1/jobs/${encodeURIComponent(job.id)}`;
+  /** @type {JobOut} */
+  let varied = await post(`${path}/what-if`, change);
+  const progress = new ProgressText(place);
+  await follow(varied.id, (now) => {
+    varied = now;
+    progress.show(now, `What if: ${now.state}${now.progress ? `, ${now.progress.phase}` : ""}`);
+  });
+  if (varied.state !== "succeeded") throw new Error(varied.error?.detail ?? `The search ended as ${varied.state}.`);
+  return { varied, diff: await get(`${path}/diff/${encodeURIComponent(varied.id)}`) };
 }
 
 /**
@@ -53,13 +68,14 @@ function told(text, job, diff) {
   const heads = ["Change", "Target or station", "Satellite", "Is (UTC)", "Would be (UTC)"];
   const head = h("tr", {}, ...heads.map((title) => h("th", { scope: "col" }, title)));
   const more = rows.length > MOST_ROWS ? `, the first ${MOST_ROWS}` : "";
-  const caption = h("caption", {}, `${text}: ${rows.length} changes${more}`);
+  const caption = h("caption", {}, `${rows.length} changes${more}`);
   const reward = diff.totals.reward;
   return [
+    h("p", { class: "hint" }, text),
     h("p", { class: "what-if-outcome" }, reward ? `Reward ${number(reward.before)} → ${number(reward.after)}. ` : "The reward stays as it is. ",
       h("a", { href: `/jobs/${encodeURIComponent(job.id)}` }, "Open that plan")),
     rows.length > 0 &&
-      h("div", { class: "scroll changes", tabindex: 0, role: "region", "aria-label": `${text}: changes` },
+      h("div", { class: "scroll changes", tabindex: 0, role: "region", "aria-label": "What would change" },
         h("table", {}, caption, h("thead", {}, head), h("tbody", {}, ...rows.slice(0, MOST_ROWS)))),
   ];
 }
@@ -75,7 +91,7 @@ function row(change, one, was, is) {
     "tr",
     {},
     h("th", { scope: "row" }, change),
-    h("td", {}, one.target_id ?? one.station_name ?? one.station_id),
+    h("td", {}, one.target_id === null ? (one.station_name ?? one.station_id) : targetTitle(one.target_id, one.target_name)),
     h("td", {}, one.satellite_name ?? one.satellite_id),
     h("td", {}, was && utc(was)),
     h("td", {}, is && utc(is), was && is && shift(was, is)),

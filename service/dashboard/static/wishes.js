@@ -1,16 +1,17 @@
 // @ts-check
-/** What has happened to a plan and what is wanted of the next one, until a replan is asked for. */
+/** What is to be different of a plan: gathered one by one, then asked for as a whole. */
 
 import { byId, fill, h } from "./dom.js";
 
 /**
  * @typedef {object} Wish
  * @property {string} text for people
- * @property {"outages" | "promises" | "drop_targets" | "keep" | "skip" | "rewards"} field of the replan's body
- * @property {unknown} value of `rewards` target and reward
+ * @property {"keep" | "skip" | "promise" | "drop" | "reward" | "outage" | "setting"} kind
+ * @property {any} value an action, a target's id, target and reward, an outage, or settings as `relax` has them
  * @property {Record<string, string>} [stances] what it says of what: a later wish that says otherwise takes its place
  */
 
+/** Shown as lines that can be removed. */
 export class Wishes {
   constructor() {
     /** @type {Wish[]} */
@@ -42,16 +43,73 @@ export class Wishes {
     };
     return h("button", { type: "button", class: "link", "aria-label": `Remove: ${wish.text}`, onclick }, "remove");
   }
+}
 
-  /** Return the fields of a replan's body. @returns {Record<string, unknown>} */
-  fields() {
-    /** @type {Record<string, unknown[]>} */
-    const found = {};
-    for (const { field, value } of this.all) (found[field] ??= []).push(value);
-    const { rewards, ...lists } = found;
-    if (rewards === undefined) return lists;
-    return { ...lists, rewards: Object.fromEntries(/** @type {[string, number][]} */ (rewards)) };
-  }
+/**
+ * Return the fields of a replan's body.
+ * @param {Wish[]} wishes
+ * @returns {Record<string, unknown>}
+ */
+export function replanOf(wishes) {
+  const rewards = Object.fromEntries(valuesOf(wishes, "reward"));
+  return {
+    keep: valuesOf(wishes, "keep"),
+    skip: valuesOf(wishes, "skip"),
+    promises: valuesOf(wishes, "promise").map((target_id) => ({ target_id })),
+    drop_targets: valuesOf(wishes, "drop"),
+    outages: valuesOf(wishes, "outage"),
+    ...(Object.keys(rewards).length > 0 ? { rewards } : {}),
+  };
+}
+
+/**
+ * Return the fields of a what-if's body.
+ * @param {Wish[]} wishes
+ * @returns {Record<string, unknown>}
+ */
+export function whatIfOf(wishes) {
+  const rewards = valuesOf(wishes, "reward").map(([id, reward]) => ({ targets: { [id]: { reward } } }));
+  return {
+    force: [...valuesOf(wishes, "keep"), ...valuesOf(wishes, "promise")],
+    forbid: [...valuesOf(wishes, "skip"), ...valuesOf(wishes, "drop")],
+    relax: [...valuesOf(wishes, "setting"), ...rewards].reduce(joined, {}),
+  };
+}
+
+/**
+ * @param {Wish[]} wishes
+ * @param {Wish["kind"]} kind
+ * @returns {any[]}
+ */
+function valuesOf(wishes, kind) {
+  return wishes.filter((one) => one.kind === kind).map((one) => one.value);
+}
+
+/**
+ * Return both settings in one: those of a satellite under its id, those of targets under theirs.
+ * @param {Record<string, any>} relax
+ * @param {Record<string, any>} more
+ * @returns {Record<string, any>}
+ */
+function joined(relax, more) {
+  const { satellite_id, targets, drop_actions, horizon_end, opportunity_id, ...settings } = more;
+  const found = { ...relax };
+  if (horizon_end) found.horizon_end = horizon_end;
+  if (drop_actions) found.drop_actions = [...new Set([...(relax.drop_actions ?? []), ...drop_actions])];
+  if (targets) found.targets = merged(relax.targets, targets);
+  if (satellite_id === undefined || satellite_id === null) return { ...found, ...settings };
+  if (Object.keys(settings).length > 0) found.satellites = merged(relax.satellites, { [satellite_id]: settings });
+  return found;
+}
+
+/**
+ * @param {Record<string, object> | undefined} known
+ * @param {Record<string, object>} more
+ */
+function merged(known, more) {
+  const found = { ...known };
+  for (const [id, own] of Object.entries(more)) found[id] = { ...found[id], ...own };
+  return found;
 }
 
 /**

@@ -16,6 +16,7 @@ from service.dashboard.routes import PAGE_POLICY
 PAGES = {
     "/": "jobs", "/new": "new", "/jobs/x": "job", "/comparisons/x": "comparison",
     "/plans": "plans", "/plans/x": "plan", "/fleet": "fleet", "/wall": "wall",
+    "/targets": "targets",
 }  # fmt: skip
 STATIC = Path(__file__).resolve().parents[3] / "service" / "dashboard" / "static"
 VOID = {"input", "link", "meta"}

@@ -92,7 +92,7 @@ def mission_file(**flags: object) -> Document:
         {"name": "Suva", "lat_deg": -18.1, "lon_deg": 178.4, "elevation_mask": [[0, 5], [180, 20]]},
     ]
     mission["targets"] += [
-        {"id": "-1+1", "lat_deg": 60.0, "lon_deg": 190.0},
+        {"id": "-1+1", "name": "=North, 'of it'", "lat_deg": 60.0, "lon_deg": 190.0},
         {"id": '\'=late, "pole"', "lat_deg": -89.5, "lon_deg": 0.0, "reward": 2.5},
         {"id": "@out of reach", "lat_deg": 10.0, "lon_deg": 20.0, "off_nadir_max_deg": 1.0},
     ]

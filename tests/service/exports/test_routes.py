@@ -117,3 +117,23 @@ def test_every_form_names_stations_and_satellites(
     seen = [one["properties"] for one in packets if "satellite_id" in one.get("properties", {})]
     assert seen
     assert all(one["satellite_name"] for one in seen)
+
+
+def test_every_form_names_targets(client: httpx.Client, job_path: str) -> None:
+    named, name = "-1+1", "=North, 'of it'"
+    satellites = client.get(f"{job_path}/timeline.json").json()["satellites"]
+    taken = [one for own in satellites for one in own["actions"] if one["mode"] == "collect"]
+    assert {one["target_name"] for one in taken if one["target_id"] == named} == {name}
+    assert {one["target_name"] for one in taken if one["target_id"] != named} == {None}
+    rows = list(csv.DictReader(io.StringIO(client.get(f"{job_path}/timeline.csv").text)))
+    # A cell is no formula.
+    assert {r["target_name"] for r in rows if r["target_id"] == f"'{named}"} == {f"'{name}"}
+    told = client.get(f"{job_path}/targets", params={"target_id": named}).json()["items"]
+    assert [one["target_name"] for one in told] == [name]
+    features = client.get(f"{job_path}/timeline.geojson").json()["features"]
+    places = [one["properties"] for one in features if one["properties"]["kind"] == "target"]
+    assert [one["target_name"] for one in places if one["target_id"] == named] == [name]
+    packets = client.get(f"{job_path}/timeline.czml").json()
+    assert [one["name"] for one in packets if one["id"] == f"target/{named}"] == [name]
+    groups = client.get(f"{job_path}/timeline.openmct.json").json()
+    assert name in {one["name"] for group in groups.values() for one in group}

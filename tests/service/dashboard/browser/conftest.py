@@ -17,9 +17,9 @@ from selenium import webdriver
 from selenium.webdriver.chrome.service import Service as DriverService
 from selenium.webdriver.remote.webelement import WebElement
 
+from tests.patience import PATIENCE_S
 from tests.service.serving import serving
 
-PATIENCE_S: Final = 120.0
 LAPTOP: Final = (1366, 900)
 _CHROMIUM: Final = shutil.which("chromium") or ""
 _DRIVER: Final = shutil.which("chromedriver") or ""

@@ -24,6 +24,31 @@ def small_mission(api: httpx.Client) -> str:
     return str(stored[-1]["id"])
 
 
+def light_mission(api: httpx.Client) -> str:
+    """Store that mission's day over fewer targets, planned and replanned to a proof in no time."""
+    small_mission(api)
+    names = [demo_mission.SATELLITE["name"], *(s["name"] for s in demo_mission.GROUND_STATIONS)]
+    (satellite_id, *station_ids) = (
+        api.get(f"/v1/{kind}", params={"name": name}).json()["items"][0]["id"]
+        for kind, name in zip(
+            ("satellites", "ground-stations", "ground-stations"), names, strict=True
+        )
+    )
+    catalog = api.post(
+        "/v1/target-catalogs?name=A+hundred",
+        content=demo_mission.targets_csv(100),
+        headers={"Content-Type": "text/csv"},
+    ).json()
+    scenario = {
+        "name": "Light day",
+        "horizon": demo_mission.HORIZON,
+        "satellite_ids": [satellite_id],
+        "target_catalog_ids": [catalog["id"]],
+        "ground_station_ids": station_ids,
+    }
+    return str(post(api, "/v1/scenarios", scenario)["id"])
+
+
 def large_mission(api: httpx.Client, num_satellites: int = 12, num_days: int = 7) -> str:
     """Store a fleet, 2,000 targets and some days; return the id of the scenario."""
     satellites = [
@@ -50,9 +75,11 @@ def large_mission(api: httpx.Client, num_satellites: int = 12, num_days: int = 7
     return str(post(api, "/v1/scenarios", scenario)["id"])
 
 
-def planned(api: httpx.Client, scenario_id: str, solver: str = "rule") -> Json:
+def planned(
+    api: httpx.Client, scenario_id: str, solver: str = "rule", *, time_s: float = WITHIN_S
+) -> Json:
     """Plan a scenario; return the job when it has ended."""
-    body = {"scenario_id": scenario_id, "solver": solver, "limits": {"time_s": 60}}
+    body = {"scenario_id": scenario_id, "solver": solver, "limits": {"time_s": time_s}}
     job = post(api, "/v1/jobs", body)
     deadline_s = time.monotonic() + WITHIN_S
     while job["state"] in ("queued", "running"):

@@ -9,8 +9,11 @@ from pathlib import Path
 from typing import Final
 
 import httpx
+from PIL import Image
 
-from tests.service.dashboard.browser.conftest import PATIENCE_S, Browser, start_chromium
+from tests.patience import PATIENCE_S
+from tests.service.dashboard.browser.conftest import Browser, start_chromium
+from tests.service.dashboard.browser.crowd import show_at
 from tests.service.dashboard.browser.missions import Json, planned, small_mission
 from tests.service.factories import post
 from tests.service.serving import serving
@@ -18,6 +21,8 @@ from tests.service.serving import serving
 FOLDER: Final = Path(__file__).resolve().parents[4] / "docs" / "images"
 LARGEST_BYTES: Final = 300_000
 WIDTH: Final = 1400
+NUM_COLORS: Final = 128
+SCREENS: Final = ((1280, 900), (1920, 1080))
 
 
 @contextmanager
@@ -36,9 +41,11 @@ def colors(browser: Browser, scheme: str) -> None:
     browser.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": media})
 
 
-def take(browser: Browser, name: str, height: int, top: str = "header") -> None:
+def take(
+    browser: Browser, name: str, height: int, top: str = "header", *, width: int = WIDTH
+) -> None:
     """Write a picture of the page from an element on."""
-    browser.driver.set_window_size(WIDTH, height)
+    show_at(browser, width, height)
     browser.run(
         "document.activeElement.blur(); document.querySelector(arguments[0])"
         ".scrollIntoView({block: 'start'})",
@@ -48,6 +55,8 @@ def take(browser: Browser, name: str, height: int, top: str = "header") -> None:
     browser.driver.execute_async_script("const [done] = arguments; setTimeout(done, 500);")
     path = FOLDER / f"{name}.png"
     browser.driver.save_screenshot(str(path))
+    with Image.open(path) as picture:
+        picture.quantize(NUM_COLORS).save(path, optimize=True)
     size = path.stat().st_size
     assert size < LARGEST_BYTES, f"{path.name} has {size} bytes"
     print(f"{path.relative_to(FOLDER.parents[1])}: {size // 1000} kB")
@@ -78,9 +87,9 @@ def select_blocked(browser: Browser) -> None:
     browser.wait(lambda: browser.text("#selected table"))
 
 
-def shift(api: httpx.Client, browser: Browser, scenario_id: str) -> None:
-    """Publish a plan and its change, and picture the plan and the wall."""
-    job = planned(api, scenario_id, "certified")
+def shift(api: httpx.Client, browser: Browser, scenario_id: str) -> dict[str, tuple[str, str]]:
+    """Publish a plan and its change, and picture the plan and the wall; return where they are."""
+    job = planned(api, scenario_id, "certified", time_s=60)
     plan = post(api, "/v1/plans", {"job_id": job["id"], "name": "Monday"})
     start = plan["horizon"]["start"]
     publish(api, plan, start)
@@ -109,6 +118,30 @@ def shift(api: httpx.Client, browser: Browser, scenario_id: str) -> None:
     colors(browser, "dark")
     take(browser, "wall", 900)
     colors(browser, "light")
+    return {
+        "plan": (f"/plans/{replan['id']}", "#passes tbody"),
+        "wall": (f"/wall#at={lost['start']}", "#wall-passes tbody"),
+    }
+
+
+def screens(browser: Browser, addresses: dict[str, tuple[str, str]]) -> None:
+    """Picture the pages on a laptop and on a large screen, by day and by night, and on paper."""
+    for page, (address, is_ready) in addresses.items():
+        browser.open(address)
+        browser.wait(lambda text=is_ready: browser.text(text), f"{page} is not ready")  # type: ignore[misc]
+        for width, height in SCREENS:
+            for scheme in ("light", "dark"):
+                colors(browser, scheme)
+                take(browser, f"screens/{page}-{width}-{scheme}", height, width=width)
+    colors(browser, "light")
+    browser.open(addresses["plan"][0])
+    browser.wait(lambda: browser.text("#passes tbody"), "no passes")
+    browser.run("window.print = () => {}")
+    browser.click("#print-passes")
+    browser.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
+    # A sheet of A4 at 96 dots an inch, between its margins.
+    take(browser, "screens/passes-print", 1030, width=703)
+    browser.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
 
 
 def publish(api: httpx.Client, plan: Json, effective_from: str) -> None:
@@ -121,7 +154,7 @@ def publish(api: httpx.Client, plan: Json, effective_from: str) -> None:
 
 def main() -> None:
     """Plan the demonstration's mission and write the pictures."""
-    FOLDER.mkdir(exist_ok=True)
+    (FOLDER / "screens").mkdir(exist_ok=True, parents=True)
     with (
         tempfile.TemporaryDirectory() as folder,
         serving(Path(folder), "serve", "--workers", "2") as (_, line),
@@ -150,7 +183,13 @@ def main() -> None:
         browser.open("/new")
         browser.wait(lambda: browser.text("#satellites .choices label"))
         take(browser, "new", 1360)
-        shift(api, browser, scenario_id)
+        pages = shift(api, browser, scenario_id)
+        pages |= {
+            "job": (f"/jobs/{job['id']}", "#left-out details"),
+            "targets": ("/targets", "#targets tbody"),
+            "fleet": ("/fleet", "#thing"),
+        }
+        screens(browser, pages)
 
 
 if __name__ == "__main__":

@@ -11,7 +11,8 @@ from typing import Any
 import httpx
 import pytest
 
-from tests.service.dashboard.browser.conftest import PATIENCE_S, Browser
+from tests.patience import PATIENCE_S
+from tests.service.dashboard.browser.conftest import Browser
 from tests.service.dashboard.browser.crowd import (
     CUT_OFF,
     NOON_OF_SHIFT,

@@ -116,7 +116,7 @@ def test_no_link_and_no_button_is_clipped(browser: Browser, job: Json, width: in
     try:
         open_job(browser, job)
         assert browser.run(CLIPPED) == []
-        for path in ("/", "/new", "/plans", "/fleet"):
+        for path in ("/", "/new", "/plans", "/targets", "/fleet"):
             browser.open(path)
             browser.wait(lambda: "ready," in browser.text("#service-status"))
             assert browser.run(CLIPPED) == []

@@ -11,7 +11,7 @@ from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.keys import Keys
 
 from tests.service.dashboard.browser.conftest import Browser
-from tests.service.dashboard.browser.missions import Json, planned, small_mission
+from tests.service.dashboard.browser.missions import Json, light_mission, planned
 from tests.service.dashboard.browser.test_job_page import click_canvas, point_of
 from tests.service.factories import post
 
@@ -21,7 +21,7 @@ MOST_TABS: Final = 2000
 
 @pytest.fixture(scope="module")
 def job(api: httpx.Client) -> Json:
-    return planned(api, small_mission(api), "certified")
+    return planned(api, light_mission(api), "certified")
 
 
 @pytest.fixture
@@ -31,7 +31,7 @@ def plan(api: httpx.Client, job: Json, browser: Browser) -> Json:
     browser.open(f"/plans/{made['id']}")
     browser.wait(lambda: browser.text("#tables summary"), "no tables")
     browser.wait(lambda: browser.drawn("gantt") and browser.drawn("map"), "no pictures")
-    browser.run("document.querySelector('#replan-time').value = 20")
+    browser.run("document.querySelector('#replan-time').value = 200")
     return made
 
 

@@ -9,15 +9,16 @@ from typing import Any
 
 import httpx
 import pytest
+from selenium.webdriver.common.keys import Keys
 
 from service.wire.instants import instant_text
 from tests.service.dashboard.browser.conftest import Browser
-from tests.service.dashboard.browser.missions import Json, planned, small_mission
+from tests.service.dashboard.browser.missions import Json, light_mission, planned
 
 
 @pytest.fixture(scope="module")
 def job(api: httpx.Client) -> Json:
-    return planned(api, small_mission(api), "certified")
+    return planned(api, light_mission(api), "certified")
 
 
 def listed(api: httpx.Client, address: str, **query: str) -> list[Json]:
@@ -50,15 +51,25 @@ def take_over(browser: Browser, job: Json) -> str:
 
 
 def test_a_shift(browser: Browser, api: httpx.Client, job: Json) -> None:
+    browser.open("/wall")
+    browser.wait(lambda: browser.text("#wall-status") or browser.text("#wall-passes"), "no wall")
     plan_id = take_over(browser, job)
+    watch_the_wall(browser, api, plan_id)
+    browser.open(f"/plans/{plan_id}")
     actions = listed(api, f"/v1/plans/{plan_id}/actions")
     contacts = sorted((a for a in actions if a["mode"] == "contact"), key=lambda a: a["start"])
     lost = contacts[len(contacts) // 2]
     browser.wait(lambda: browser.drawn("gantt"), "no timeline")
     choose(browser, lost)
+    browser.find("#report-detail").send_keys("No lock on the carrier")
+    browser.click("#report-failed")
+    browser.wait(lambda: browser.text("#chosen-action p").endswith(", failed"), "not reported")
+    (report,) = listed(api, f"/v1/plans/{plan_id}/executions")
+    told = (report["action_id"], report["outcome"], report["detail"])
+    assert told == (lost["id"], "failed", "No lock on the carrier")
     browser.click("#wish-lose")
     assert "Lost:" in browser.text("#wishes")
-    browser.run("document.querySelector('#replan-time').value = 20")
+    browser.run("document.querySelector('#replan-time').value = 200")
     browser.click("#replan")
     browser.wait(lambda: browser.text("#proposal-changes"), "no proposal")
     assert re.search(r"removed\s+contact", browser.text("#proposal-changes"))
@@ -76,7 +87,10 @@ def test_a_shift(browser: Browser, api: httpx.Client, job: Json) -> None:
         plan_id_of(browser)
     ]
     print_the_passes(browser, api)
-    watch_the_wall(browser, api)
+    next_plan = plan_id_of(browser)
+    watch_the_wall(browser, api, next_plan)
+    browser.wait(lambda: "changed after" in browser.text("#wall-changes"), "no changes")
+    browser.wait(lambda: browser.drawn("wall-map"), "no map")
 
 
 def choose(browser: Browser, action: Json) -> None:
@@ -113,16 +127,14 @@ def print_the_passes(browser: Browser, api: httpx.Client) -> None:
     assert 1 <= pages <= 2
 
 
-def watch_the_wall(browser: Browser, api: httpx.Client) -> None:
-    plan = api.get(f"/v1/plans/{plan_id_of(browser)}").json()
+def watch_the_wall(browser: Browser, api: httpx.Client, plan_id: str) -> None:
+    plan = api.get(f"/v1/plans/{plan_id}").json()
     start = datetime.fromisoformat(plan["horizon"]["start"])
     browser.open(f"/wall#at={instant_text(start.replace(hour=start.hour + 6))}")
     browser.wait(lambda: "AOS" in browser.text("#wall-passes"), "no countdown")
     satellites = browser.text("#wall-satellites")
     assert all(one["satellite_name"] in satellites for one in plan["satellites"])
     assert satellites.count("%") == 2 * len(plan["satellites"])
-    browser.wait(lambda: "changed after" in browser.text("#wall-changes"), "no changes")
-    browser.wait(lambda: browser.drawn("wall-map"), "no map")
     before = browser.text("#wall-passes")
     browser.wait(lambda: browser.text("#wall-passes") != before, "the countdown stands still")
 
@@ -179,3 +191,32 @@ def test_a_station_is_changed_and_reported_as_out(
     browser.wait(lambda: "Antenna in service" not in browser.text("#outages"), "it is still there")
     assert listed(api, "/v1/outages", station_id=station["id"]) == []
     api.patch(address, json={"min_elevation_deg": station["min_elevation_deg"]}).raise_for_status()
+
+
+def test_priorities_of_targets_are_changed(browser: Browser, api: httpx.Client) -> None:
+    rows = "".join(f"p{i},Place {i},{i // 2},{i}\n" for i in range(150))
+    catalog = api.post(
+        "/v1/target-catalogs?name=Places",
+        content=f"id,name,lat_deg,lon_deg\n{rows}",
+        headers={"Content-Type": "text/csv"},
+    ).json()
+    browser.open("/targets")
+    option = f"#catalog option[value='{catalog['id']}']"
+    browser.wait(lambda: browser.driver.find_elements("css selector", option), "no catalogue")
+    browser.find(option).click()
+    browser.wait(lambda: browser.text("#count") == "150 of 150 targets", "not its targets")
+    # Only a page of them is in the document: what was typed outlasts the table's turns.
+    for name, priority in (("Place 7 (", "12.5"), ("Place 149", "3")):
+        browser.find("#find").clear()
+        browser.find("#find").send_keys(name)
+        browser.wait(lambda: browser.text("#count") == "1 of 150 targets", "not narrowed")
+        field = browser.find("#targets input.priority")
+        field.clear()
+        field.send_keys(priority)
+    assert browser.text("#priorities-status") == "2 changes not saved yet."
+    field.send_keys(Keys.ENTER)
+    browser.wait(lambda: browser.text("#priorities-status") == "2 priorities saved.", "not saved")
+    targets = listed(api, catalog["links"]["targets"])
+    changed = {one["id"]: one["reward"] for one in targets if one["reward"] != 1}
+    assert changed == {"p7": 12.5, "p149": 3}
+    assert "Place 149 (p149)" in browser.text("#targets")

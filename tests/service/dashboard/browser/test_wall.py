@@ -9,7 +9,8 @@ import httpx
 from selenium import webdriver
 
 from service.commands import demo_mission
-from tests.service.dashboard.browser.conftest import PATIENCE_S, Browser
+from tests.patience import PATIENCE_S
+from tests.service.dashboard.browser.conftest import Browser
 from tests.service.dashboard.browser.crowd import CUT_OFF, SCREENS, show_at
 from tests.service.dashboard.browser.missions import Json, planned, small_mission
 from tests.service.factories import post

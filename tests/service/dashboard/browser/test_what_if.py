@@ -45,8 +45,9 @@ def targets(api: httpx.Client, job: Json) -> list[Json]:
 
 
 def tried(browser: Browser, button: str) -> str:
-    """Press a button of the selection's; return what its plan is called, as a job."""
+    """Press a button of the selection's, and try it; return what its plan is called, as a job."""
     browser.click(button)
+    browser.click("#try")
     browser.wait(lambda: browser.text(".what-if-outcome"), "no outcome")
     link = browser.find(".what-if-outcome a").get_attribute("href")
     assert link is not None
@@ -80,7 +81,7 @@ def test_the_angle_that_would_do_is_said_and_tried(
     now = {item["target_id"]: item["outcome"] for item in targets(api, {"id": varied})}
     before = {item["target_id"]: item["outcome"] for item in targets(api, job)}
     assert now != before
-    assert "added" in browser.text(".what-if-outcomes table")
+    assert "added" in browser.text("#what-if-outcomes table")
 
 
 def test_an_image_is_left_out_to_see_what_the_plan_would_be(
@@ -91,8 +92,53 @@ def test_an_image_is_left_out_to_see_what_the_plan_would_be(
     browser.wait_for_answer()
     browser.wait(lambda: browser.run(_SELECT, taken["target_id"]), "no button of the target")
     browser.wait(lambda: browser.text("#selected-target") == taken["target_id"], "not selected")
-    varied = tried(browser, "#selected button.what-if")
+    varied = tried(browser, "#wish-drop")
     now = {item["target_id"]: item["action_id"] for item in targets(api, {"id": varied})}
     assert now[taken["target_id"]] is None
-    assert taken["target_id"] in browser.text(".what-if-outcomes table")
-    assert "removed" in browser.text(".what-if-outcomes table")
+    assert taken["target_id"] in browser.text("#what-if-outcomes table")
+    assert "removed" in browser.text("#what-if-outcomes table")
+
+
+def test_several_changes_are_tried_as_one(browser: Browser, api: httpx.Client, job: Json) -> None:
+    outcomes = targets(api, job)
+    dropped, skipped = [one["target_id"] for one in outcomes if one["action_id"]][:2]
+    unseen = next(
+        one["target_id"]
+        for one in outcomes
+        if one["reason"] and one["reason"]["code"] == "no_access"
+    )
+    browser.open(f"/jobs/{job['id']}")
+    browser.wait_for_answer()
+    browser.click("#try")
+    browser.wait(lambda: "no changes yet" in browser.text("#what-if-outcomes"), "it asks anyway")
+    for target, offer in ((dropped, "drop"), (skipped, "skip"), (unseen, "access-0")):
+        select(browser, target)
+        browser.click(f"#wish-{offer}")
+    select(browser, unseen)
+    browser.click("#wish-promise")
+    browser.click("#wish-priority")
+    browser.wait(lambda: browser.text("#priority-title") == f"Priority of {unseen}", "no dialog")
+    browser.find("#priority-input").clear()
+    browser.find("#priority-input").send_keys("5")
+    browser.click("#priority-form button[type=submit]")
+    lines = "return document.querySelectorAll('#wishes li').length"
+    browser.wait(lambda: browser.run(lines) == 5, browser.text("#wishes"))
+
+    browser.click("#try")
+    browser.wait(lambda: browser.text(".what-if-outcome"), "no outcome")
+    link = str(browser.find(".what-if-outcome a").get_attribute("href"))
+    varied = api.get(f"/v1/jobs/{link.rpartition('/')[2]}").json()
+    assert varied["links"]["what_if_of"].endswith(job["id"])
+    assert varied["change"]["force"] == [unseen]
+    assert dropped in varied["change"]["forbid"]
+    assert [p["target_id"] for p in varied["change"]["forbid"] if p != dropped] == [skipped]
+    assert varied["change"]["relax"]["targets"][unseen]["reward"] == 5
+    now = {one["target_id"]: one for one in targets(api, varied)}
+    assert now[dropped]["action_id"] is None
+    assert now[unseen]["action_id"] is not None
+    assert now[unseen]["worth"] == 5
+
+
+def select(browser: Browser, target_id: str) -> None:
+    browser.wait(lambda: browser.run(_SELECT, target_id), f"no button of {target_id}")
+    browser.wait(lambda: browser.text("#selected-target") == target_id, "not selected")
