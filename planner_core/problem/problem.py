@@ -462,6 +462,13 @@ class Problem:
         """Whether some satellite turns between moving lines of sight."""
         return any(satellite.agility.tracks for satellite in self.satellites)
 
+    @property
+    def turns_to_the_sun(self) -> bool:
+        """Whether some satellite charges only between turns to the sun and back."""
+        return self.use_resources and any(
+            satellite.resources.sun_pointing == "slew" for satellite in self.satellites
+        )
+
     @cached_property
     def offers_choice(self) -> bool:
         """Return whether some access offers several collects."""

@@ -103,10 +103,13 @@ class _FleetPricing:
 
     @property
     def losses(self) -> Floats:
-        relaxation = self._search.best_relaxation
-        if relaxation is None:
-            return np.where(self._paths.usage > 0.0, 0.0, np.inf)
-        return relaxation.losses
+        relaxation, usage = self._search.best_relaxation, self._paths.usage
+        if relaxation is not None:
+            return relaxation.losses
+        if self._search.problem.turns_to_the_sun:
+            # Pairs of tasks make programs large: those come first that most answers take.
+            return np.where(usage > 0.0, 1.0 - usage / max(1.0, usage.max()), np.inf)
+        return np.where(usage > 0.0, 0.0, np.inf)
 
     def turn(self) -> None:
         """Ask by energy alone some more, or relax, or prove something."""
@@ -133,7 +136,10 @@ class _FleetPricing:
         search.price(prices, 1)
         self.prices = prices
         has_full_recorders = prices.value < (1.0 - TUNING.little) * energy.value
+        # With turns to the sun each pair of near tasks has a column, and a relaxation takes as long
+        # as ten programs over the few tasks that most answers take.
         is_small = np.count_nonzero(usage) <= TUNING.most_relaxed
+        is_small = is_small and not search.problem.turns_to_the_sun
         if search.is_fleet and is_small and has_full_recorders:
             for share in TUNING.price_shares[1:-1]:
                 self._ask_near(share * energy.multipliers)
