@@ -4,8 +4,9 @@
 and without resources, and with several starts in each access, by every solver named, flies all in
 Basilisk (``benchmarks.flight``, in the interpreter that ``--python`` names), and prints a table
 of Markdown. Scenario files, timelines and what each flight said are left in the folder. With
-``--first-release`` missions without resources are planned with turns from rest to rest, and flown
-by the spacecraft as it is, those with continuous starts as well.
+``--first-release`` missions are planned as the first release would have had them, with turns from
+rest to rest and charge in all idle time, and flown by the spacecraft as it is, those with
+continuous starts as well.
 """
 
 from __future__ import annotations
@@ -53,12 +54,33 @@ _FIGURES: Final = {
 
 
 def known_before(scenario: Document) -> Document:
-    """Return a scenario with turns from rest to rest, as the first release counted them."""
+    """Return a scenario in the terms of the first release.
+
+    Turns lead from rest to rest, all idle time charges, and what is drawn at all times counts
+    with each mode.
+    """
     satellites = [
-        {**satellite, "agility": {**satellite["agility"], "slew_model": "rest"}}
+        {
+            **satellite,
+            "agility": {**satellite["agility"], "slew_model": "rest"},
+            "resources": _net_of_idle(satellite["resources"]),
+        }
         for satellite in scenario["satellites"]
     ]
     return {**scenario, "satellites": satellites}
+
+
+def _net_of_idle(resources: Document) -> Document:
+    idle_w = resources["idle_power_w"]
+    return {
+        **resources,
+        "sun_pointing": "free",
+        "eclipse_aware": False,
+        "idle_power_w": 0.0,
+        "sunpoint_power_w": resources["sunpoint_power_w"] - idle_w,
+        "collect_power_w": resources["collect_power_w"] + idle_w,
+        "contact_power_w": resources["contact_power_w"] + idle_w,
+    }
 
 
 def row_of(scenario: Path, solver: str, options: argparse.Namespace) -> str:
@@ -90,7 +112,7 @@ def main() -> None:
     parser.add_argument("--variants", nargs="*", choices=VARIANTS, default=list(VARIANTS))
     parser.add_argument("--solvers", nargs="*", default=list(SOLVERS))
     parser.add_argument("--first-release", action="store_true",
-                        help="plan with turns from rest to rest")  # fmt: skip
+                        help="plan with its turns and its charge")  # fmt: skip
     parser.add_argument("--time-s", type=float, default=20.0, help="of the clock, for each plan")
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
@@ -100,8 +122,6 @@ def main() -> None:
     with ThreadPoolExecutor(max_workers=2) as pool:
         for name in options.variants:
             # Free starts are refused where turns begin and end in motion.
-            if options.first_release and not name.endswith("no resources"):
-                continue
             if name.startswith("continuous") and not options.first_release:
                 continue
             path = options.folder / f"{name.replace(', ', '-').replace(' ', '-')}.json"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any
 
@@ -187,3 +188,18 @@ def test_the_battery_is_what_the_sun_gives_and_the_recorder_what_was_written() -
     assert verdict.charged["once at the sun"] <= verdict.charged["in all idle time"]
     # The timeline's curve, which is made up, holds nothing; the recorder an image and telemetry.
     assert verdict.recorder_error == pytest.approx(0.01 + 1800.0 * 1e-6, abs=1e-6)
+
+
+def test_a_flight_that_comes_too_near_to_the_sun_is_not_flyable() -> None:
+    mission = _mission((300.0, *_below(_mission(), 315.0)))
+    flown = judge(mission, reference := _reference(mission), _as_told(reference))
+    flown = replace(flown, recorder_error=0.0, below_curve=0.0)
+
+    def is_kept(sun_exclusion_deg: float) -> bool:
+        agility = replace(mission.agility, sun_exclusion_deg=sun_exclusion_deg)
+        kept = replace(flown, mission=replace(mission, agility=agility))
+        return is_flyable(kept, 0.995)
+
+    assert is_kept(0.0)
+    assert is_kept(flown.nearest_sun_deg - 0.1)
+    assert not is_kept(flown.nearest_sun_deg + 0.1)

@@ -300,7 +300,7 @@ def sunny_problem(
     resources = replace(
         TIGHT,
         sun_pointing="slew",
-        panel_angle_deg=float(rng.choice([180.0, 180.0, 90.0])),
+        panel_angle_deg=float(rng.choice([180.0, 135.0, 90.0, 45.0])),
         idle_drain_per_s=float(rng.choice([0.0, 1e-4, 4e-4])),
         initial_battery_fraction=float(rng.choice([0.5, 0.7, 1.0])),
         sunpoint_charge_per_s=float(rng.choice([1 / 2500, 1 / 1000, 1 / 300])),

@@ -13,6 +13,8 @@ from hypothesis import strategies as st
 from planner_core.budget import Budget
 from planner_core.certified.dp.energy_labels import energy_levels, most_by_energy
 from planner_core.certified.dp.resource_network import network_of
+from planner_core.certified.multipliers.energy import EnergyPaths
+from planner_core.certified.proofs.lagrangian import lagrangian_bound
 from planner_core.certified.proofs.resource_bound import quick_bound, resource_value
 from planner_core.domain import Agility, Horizon, Resources, Scenario
 from planner_core.errors import InvalidScenario
@@ -23,6 +25,7 @@ from planner_core.problem.plan import Plan
 from planner_core.problem.slew import slew_s
 from planner_core.problem.sun_turns import SunPath, sun_turn_s
 from planner_core.referee.replay import Timeline, replay
+from planner_core.solvers.milp import relaxation_bound
 from planner_core.solvers.priced import better_of, energy_of, is_priced, with_choices
 from planner_core.solvers.registry import SOLVERS, Certified, Milp
 from planner_core.solvers.sequential import Turn
@@ -169,15 +172,21 @@ def test_a_load_at_all_times_empties_the_battery_in_shadow() -> None:
 
 
 @examples(300)
-@given(seed=SEEDS)
-def test_no_plan_beats_the_bounds(seed: int) -> None:
-    problem = sunny_problem(seed, is_plain=bool(seed % 2))
+@given(seed=SEEDS, num_satellites=st.integers(1, 3))
+def test_no_plan_beats_the_bounds(seed: int, num_satellites: int) -> None:
+    problem = sunny_problem(seed, num_satellites=num_satellites, is_plain=bool(seed % 2))
     best = best_reward(problem)
     rng = np.random.default_rng(seed)
     prices = rng.uniform(0.0, 1.0, len(problem.target_ids)) * problem.best_worth
     assert quick_bound(problem, 0.0).value >= best - 1e-6
+    assert lagrangian_bound(problem, 0.0).value >= best - 1e-6
     assert resource_value(problem, prices, 0.05) >= best - 1e-6
     assert resource_value(problem, np.zeros(len(prices)), 1.0) >= best - 1e-6
+    by_energy = prices.sum() + EnergyPaths(problem).gain(np.append(prices, 0.0))
+    assert by_energy >= best - 1e-6
+    if replay(problem, Plan(())).is_valid:
+        # Where idle load alone empties the battery HiGHS has no plan to bound.
+        assert relaxation_bound(problem, Budget(), 0).value >= best - 1e-6
 
 
 @examples(300)
@@ -213,9 +222,11 @@ def test_every_solver_plans_what_the_referee_accepts(
 
 @pytest.mark.parametrize("solver", [Milp(), Milp(formulation="pairwise"), Certified()])
 @examples(60)
-@given(seed=SEEDS)
-def test_exact_solvers_find_the_best_plan(solver: Milp | Certified, seed: int) -> None:
-    problem = sunny_problem(seed)
+@given(seed=SEEDS, num_satellites=st.integers(1, 3))
+def test_exact_solvers_find_the_best_plan(
+    solver: Milp | Certified, seed: int, num_satellites: int
+) -> None:
+    problem = sunny_problem(seed, num_satellites=num_satellites)
     best = best_reward(problem)
     solution = solver.solve(problem, Budget(), seed)
     is_possible = replay(problem, Plan(())).is_valid
