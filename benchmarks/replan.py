@@ -1,9 +1,10 @@
 """What a day's events do to a plan, replanned and planned anew (``python -m benchmarks.replan``).
 
 Prints for each mission and event what a replan of ``LIMIT_S`` CPU seconds came to: reward and bound
-after the freeze, the share of the plan's later actions that it moved or removed, and what of that
-was forced. Beside it what solver ``certified`` makes of the same problem from scratch. Access and
-compilation are not counted. One run each, on one core, after a warm-up on a small mission.
+after the freeze, the share of the plan's later actions that it moved or removed, what of that was
+lost whatever is planned, and the least that any valid plan changes, where that is proven. Beside
+it what solver ``certified`` makes of the same problem from scratch. Access and compilation are not
+counted. One run each, on one core, after a warm-up on a small mission.
 
 ``python -m benchmarks.replan one`` or ``four`` picks the mission.
 """
@@ -26,6 +27,9 @@ from planner_core.pins import PinnedAction
 from planner_core.problem import COLLECT, Problem
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
+from planner_core.replanning.known import KnownPrices, prices_of
+from planner_core.replanning.programs import fewest_changes
+from planner_core.replanning.question import Question
 from planner_core.replanning.replan import question_of, solve_replan
 from planner_core.solvers.registry import Certified
 
@@ -48,6 +52,7 @@ class Day:
     problem: Problem
     plan: Plan
     later_targets: tuple[Target, ...]
+    known: KnownPrices | None
 
     @property
     def base(self) -> tuple[PinnedAction, ...]:
@@ -92,6 +97,7 @@ def day_of(num_satellites: int, num_targets: int) -> Day:
     return Day(
         scenario=scenario, problem=problem, plan=solution.plan,
         later_targets=whole.targets[num_targets:],
+        known=prices_of(solution.proven, problem.target_ids),
     )  # fmt: skip
 
 
@@ -121,13 +127,13 @@ def events_of(day: Day) -> Iterator[tuple[str, Scenario]]:
     yield "5 % new targets", replace(asked, targets=(*asked.targets, *day.later_targets))
 
 
-def measure(name: str, scenario: Scenario) -> str:
+def measure(name: str, scenario: Scenario, known: KnownPrices | None) -> str:
     """Return a line of the table."""
     problem = problem_of(scenario)
     question = question_of(scenario, problem)
     began = time.process_time()
     budget = CpuBudget(LIMIT_S, time.time() + 60.0)
-    solution = solve_replan(question, Certified(), budget, 0)
+    solution = solve_replan(question, Certified(), budget, 0, known)
     cpu_s = time.process_time() - began
     timeline = replay(problem, solution.plan)
     assert timeline.is_valid, timeline.violations
@@ -141,9 +147,26 @@ def measure(name: str, scenario: Scenario) -> str:
     anew = question.changed(scratch.plan) / question.num_base
     return (
         f"| {name} | {timeline.reward:g} / {solution.bound:g} | {changed:.1%} | {forced:.1%} "
+        f"| {_least(question)} "
         f"| {cpu_s:.2f} | {replay(problem, scratch.plan).reward:g} / {scratch.bound:g} "
         f"| {anew:.0%} | {scratch_s:.1f} |"
     )
+
+
+def _least(question: Question) -> str:
+    """Return the least share that any valid plan changes, contacts that are kept left out."""
+    problem = question.problem
+    found = None
+    if problem.use_resources:
+        budget = CpuBudget(SCRATCH_S, time.time() + 300.0)
+        found = fewest_changes(question, range(len(problem.satellites)), budget)
+    if found is None or not found.is_proven:
+        return "-"
+    is_image = problem.opportunities.kind[question.base] == COLLECT
+    start_s = problem.opportunities.start_s
+    still = sum(not problem.pinned.is_frozen(start_s[row]) for row in question.base)
+    least = question.num_base - still + int(is_image.sum()) - found.num_kept
+    return f"{least / question.num_base:.1%}"
 
 
 def main() -> None:
@@ -160,10 +183,10 @@ def main() -> None:
     for name in chosen:
         day = day_of(*MISSIONS[name])
         print(f"\n{name}: {replay(day.problem, day.plan).reward:g} before\n")
-        print("| event | reward / bound | changed | forced | CPU s | anew | changed | CPU s |")
-        print("|---|---|---|---|---|---|---|---|")
+        head = "event | reward / bound | changed | lost | least | CPU s | anew | changed | CPU s"
+        print(f"| {head} |\n|{'---|' * 9}")
         for event, scenario in events_of(day):
-            print(measure(event, scenario), flush=True)
+            print(measure(event, scenario, day.known), flush=True)
 
 
 if __name__ == "__main__":

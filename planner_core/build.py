@@ -99,8 +99,8 @@ class ScenarioOpportunities:
     sunlight: tuple[Sunlight, ...]
     warnings: tuple[str, ...]
 
-    def to_bytes(self) -> bytes:
-        """Return a compressed form that ``from_bytes`` reads back bit for bit."""
+    def to_bytes(self, *, compress: bool = True) -> bytes:
+        """Return a form that ``from_bytes`` reads back bit for bit."""
         lit = self.sunlight
         columns = {
             field.name: getattr(self.opportunities, field.name) for field in fields(Opportunities)
@@ -114,7 +114,8 @@ class ScenarioOpportunities:
         }
         buffer = io.BytesIO()
         # As np.savez_compressed, in half the time: more effort hardly shrinks such numbers.
-        with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        method = zipfile.ZIP_DEFLATED if compress else zipfile.ZIP_STORED
+        with zipfile.ZipFile(buffer, "w", method, compresslevel=1) as archive:
             for name, values in columns.items():
                 with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
                     np.lib.format.write_array(member, values, allow_pickle=False)

@@ -10,6 +10,7 @@ from typing import Final
 
 from planner_core.budget import Budget, Progress, Termination
 from planner_core.build import ScenarioOpportunities, build_problem, compute_opportunities
+from planner_core.build_after import PlanBefore, opportunities_after
 from planner_core.certified.drivers.continuous import with_own_starts
 from planner_core.certified.proofs import continuous
 from planner_core.certified.proofs.bound import Bound
@@ -75,6 +76,7 @@ def plan_scenario(
     budget: Budget,
     computed: ScenarioOpportunities | None = None,
     known_bound: Bound | None = None,
+    before: PlanBefore | None = None,
 ) -> Judged:
     """Return the judged plan of ``solver``.
 
@@ -83,6 +85,9 @@ def plan_scenario(
     computed, known_bound
         What earlier plans of the same scenario have found out already. The plan itself does
         not depend on it.
+    before
+        Of a replan: what the search for the plan before has worked out. It spares access, and
+        where its multipliers still prove enough the search for a proof.
 
     Raises
     ------
@@ -92,7 +97,10 @@ def plan_scenario(
         Where the budget ended before there was a problem to plan.
     """
     clock = [time.perf_counter()]
-    opportunities = computed or compute_opportunities(scenario, budget)
+    opportunities = computed
+    if opportunities is None and before is not None:
+        opportunities = opportunities_after(scenario, before, budget)
+    opportunities = opportunities or compute_opportunities(scenario, budget)
     clock.append(time.perf_counter())
     problem = build_problem(scenario, opportunities, budget)
     clock.append(time.perf_counter())
@@ -104,7 +112,9 @@ def plan_scenario(
         search = budget.part(_SEARCH) if aims else budget
         solution = solver.solve(relieved, search, seed)
     else:
-        solution = solve_replan(question_of(scenario, relieved), solver, budget, seed)
+        question = question_of(scenario, relieved)
+        prices = None if before is None else before.prices
+        solution = solve_replan(question, solver, budget, seed, prices)
     solution = flyable(without_on_board(problem), relieved, solution)
     if problem.continuous_starts:
         solution = with_own_starts(problem, solution, budget)

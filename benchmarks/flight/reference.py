@@ -31,7 +31,6 @@ from benchmarks.flight.world import line_of_sight, orbit, sun_km
 STEP_S: Final = 0.1
 _LATEST_S: Final = 600.0  # after which a turn that is possible at all has ended
 _STRONG_WHEELS_DEG_S2: Final = 0.5  # where the plan knows no limit
-_NO_CONE: Final = 1e-3  # across the sun; panels opposite to the boresight leave it nowhere else
 
 # Where a line of sight is, and the rate at which it turns, at an instant in seconds.
 Goal = Callable[[float], tuple[Floats, Floats]]
@@ -130,22 +129,11 @@ class Pilot:
     # From one task to the next ----------------------------------------------------------------
 
     def _between(self, until_s: float, task: Task | None) -> None:
-        """Go on until a task begins, by way of the sun where the plan has it so.
-
-        Panels beside the boresight face the sun from anywhere on a cone. A visit too short to get
-        from where it arrives to where it leaves is left out: the satellite is in time for its task,
-        and the battery tells what that costs.
-        """
+        """Go on until a task begins, by way of the sun where the plan has it so."""
         for from_s, to_s in self._sun_spans(until_s, task):
-            about = 0.0
-            if task is not None:
-                about = self._about_sun(self._sunward(from_s, self._boresight), task, to_s)
-                if self._rest_to_rest_s(abs(about)) > to_s - from_s:
-                    continue
             self._to_sun(from_s)
             leaves_s = max(self._now_s, to_s)
             self._visits.append((self._now_s, leaves_s))
-            self._turn_about_sun(about, leaves_s)
             self._rest(leaves_s)
         if task is not None:
             self._to_task(task)
@@ -176,35 +164,6 @@ class Pilot:
     def _to_sun(self, wanted_s: float) -> None:
         """Turn to the sun, to be there at an instant, or as soon after it as can be."""
         self._turn(self._sun_goal, wanted_s)
-
-    def _about_sun(self, boresight: Floats, task: Task, leaves_s: float) -> float:
-        """Return the turn about the sun to where the way to a task is shortest, in rad.
-
-        Panels opposite to the boresight need none.
-        """
-        sun = self._sun(leaves_s)
-        wanted = self._sunward(leaves_s, self._goal(task)(task.start_s)[0])
-        here, there = (v - sun * float(sun @ v) for v in (boresight, wanted))
-        if norm(here) < _NO_CONE or norm(there) < _NO_CONE:
-            return 0.0
-        return math.atan2(float(sun @ np.cross(here, there)), float(here @ there))
-
-    def _rest_to_rest_s(self, angle: float) -> float:
-        """Return how long a turn from rest to rest takes."""
-        rate, acceleration = self._limits.rate, self._limits.acceleration
-        if angle < rate**2 / acceleration:
-            return 2.0 * math.sqrt(angle / acceleration)
-        return angle / rate + rate / acceleration
-
-    def _turn_about_sun(self, angle: float, until_s: float) -> None:
-        """Turn about the sun, which the panels face meanwhile, and be at rest at an instant."""
-        takes_s, acceleration = until_s - self._now_s, self._limits.acceleration
-        if angle == 0.0 or takes_s <= 0.0:
-            return
-        room = max(0.0, takes_s**2 - 4.0 * abs(angle) / acceleration)
-        rate = min(acceleration * (takes_s - math.sqrt(room)) / 2.0, self._limits.rate)
-        cruise = math.copysign(rate, angle) * self._sun(until_s)
-        self._draw(cruise, np.zeros(3), until_s, until_s)
 
     def _to_task(self, task: Task) -> None:
         """Turn to where the task's line of sight will be, in time for it or as soon as can be."""
@@ -343,7 +302,8 @@ class Pilot:
 
         The panels stand at a fixed angle to the boresight, and turn freely about it.
         """
-        sun = self._sun(time_s)
+        sun = sun_km(self._mission, time_s)
+        sun /= norm(sun)
         panel = 180.0 if self._mission.power is None else self._mission.power.panel_angle_deg
         across = boresight - sun * float(sun @ boresight)
         if norm(across) < 1e-9:
@@ -351,8 +311,3 @@ class Pilot:
         across /= norm(across)
         angle = math.radians(panel)
         return math.cos(angle) * sun + math.sin(angle) * across
-
-    def _sun(self, time_s: float) -> Floats:
-        sun = sun_km(self._mission, time_s)
-        direction: Floats = sun / norm(sun)
-        return direction

@@ -190,7 +190,9 @@ def in_order(
 ) -> Columns:
     """Return all rows by (start, end, satellite, kind, place's id as text).
 
-    Empties ``parts`` on the way: a week of a constellation is large.
+    Accesses are numbered anew as they come up in the table: a number does not depend on accesses
+    that offer nothing, or on what was found together. Empties ``parts`` on the way: a week of a
+    constellation is large.
     """
     whole = {name: np.concatenate([part.pop(name) for part in parts]) for name in list(parts[0])}
     is_collect = whole["kind"] == COLLECT
@@ -200,7 +202,19 @@ def in_order(
         _rank_of(station_ids, whole["place"], ~is_collect),
     )
     order = np.lexsort((rank, whole["kind"], whole["satellite"], whole["end_s"], whole["start_s"]))
-    return {name: whole.pop(name)[order] for name in list(whole)}
+    whole["access"] = _numbered(whole["access"][order])
+    return {
+        name: whole.pop(name) if name == "access" else whole.pop(name)[order]
+        for name in list(whole)
+    }
+
+
+def _numbered(access: Ints) -> Ints:
+    """Return the numbers 0, 1, … in the order in which these come up for the first time."""
+    _, first, own = np.unique(access, return_index=True, return_inverse=True)
+    number = np.empty(len(first), dtype=np.int32)
+    number[np.argsort(first)] = np.arange(len(first))
+    return number[own].astype(np.int32)
 
 
 def _rank_of(ids: Sequence[str], place: Ints, wanted: npt.NDArray[np.bool_]) -> Longs:

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Final
 
 import numpy as np
 
 from planner_core.domain import Stability
 from planner_core.problem import COLLECT, CONTACT, Bools, Floats, Ints, Problem
 from planner_core.problem.plan import Plan
+from planner_core.referee.replay import Timeline, replay
+
+_KEPT_VERDICTS: Final = 16  # plans of a fleet take megabytes each
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -63,6 +67,19 @@ class Question:
             worth=self.problem.worth + more,
             full_worth=None if full is None else full + more,
         )
+
+    @cached_property
+    def _verdicts(self) -> dict[Plan, Timeline]:
+        return {}
+
+    def judged(self, plan: Plan) -> Timeline:
+        """Return the referee's verdict; of the last plans asked about it is kept."""
+        verdicts = self._verdicts
+        found = verdicts.pop(plan, None) or replay(self.problem, plan)
+        verdicts[plan] = found
+        if len(verdicts) > _KEPT_VERDICTS:
+            del verdicts[next(iter(verdicts))]
+        return found
 
     def stable_worth(self, plan: Plan) -> float:
         """Return what the kept actions of a plan count."""

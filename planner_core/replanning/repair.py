@@ -11,7 +11,7 @@ from planner_core.problem.plan import Plan
 from planner_core.problem.slew import TIME_TOLERANCE_S
 from planner_core.referee.replay import Violation, replay
 
-_LIMITS: Final = ("battery", "recorder")
+LIMITS: Final = ("battery", "recorder")
 _MOST_TRIED: Final = 30  # contacts in place of a lost one
 
 
@@ -55,7 +55,7 @@ def _with_contact(problem: Problem, plan: Plan, broken: Violation) -> Plan | Non
         trial = Plan.of(problem, [*taken, row])
         after = replay(problem, trial)
         own_broken = [v for v in after.violations if v.satellite == broken.satellite]
-        if all(v.at_s > broken.at_s for v in own_broken if v.code in _LIMITS) and len(
+        if all(v.at_s > broken.at_s for v in own_broken if v.code in LIMITS) and len(
             after.violations
         ) <= len(before.violations):
             return trial
@@ -75,7 +75,7 @@ def _shed(
         and action.start_s <= broken.at_s + TIME_TOLERANCE_S
         and (table.kind[action.opportunity] == COLLECT or broken.code == "battery")
     ]
-    candidates = ahead if broken.code in _LIMITS else [*blamed, *ahead]
+    candidates = ahead if broken.code in LIMITS else [*blamed, *ahead]
     loose = [row for row in candidates if row not in kept]
     if not loose:
         return None

@@ -22,11 +22,12 @@ from planner_core.certified.proofs.resource_bound import quick_bound
 from planner_core.domain import Scenario
 from planner_core.errors import InvalidScenario
 from planner_core.pinning.pinned_problem import rows_of_base
-from planner_core.problem import CONTACT, Problem
+from planner_core.problem import Problem
 from planner_core.problem.plan import Plan
-from planner_core.referee.replay import replay
+from planner_core.replanning.known import KnownPrices, bound_at
+from planner_core.replanning.programs import fewest_changes, mixed
 from planner_core.replanning.question import Question
-from planner_core.replanning.repair import conflicts, repaired
+from planner_core.replanning.repair import LIMITS, conflicts, repaired
 from planner_core.replanning.undo import parts_of, undone, value, within_share
 from planner_core.solvers.base import Solution, Solver
 
@@ -58,8 +59,19 @@ def question_of(scenario: Scenario, problem: Problem) -> Question:
     )
 
 
-def solve_replan(question: Question, solver: Solver, budget: Budget, seed: int) -> Solution:
+def solve_replan(
+    question: Question,
+    solver: Solver,
+    budget: Budget,
+    seed: int,
+    known: KnownPrices | None = None,
+) -> Solution:
     """Return the plan that follows the base.
+
+    Parameters
+    ----------
+    known
+        The multipliers of the plan before. They can spare the search for a proof.
 
     Raises
     ------
@@ -67,11 +79,10 @@ def solve_replan(question: Question, solver: Solver, budget: Budget, seed: int) 
         ``promise_not_kept``: no plan was found that images a promised target.
     """
     problem = question.problem
-    protected = set(np.flatnonzero(question.is_promised).tolist())
-    start = with_promised(question, repaired(problem, question.base.tolist(), protected))
-    plan = improved(question, start, budget.part(_SHARE), seed)
+    first = budget.part(_SHARE)
+    plan = improved(question, first_plan(question, first), first, seed)
     best = Incumbent(problem, budget, getattr(solver, "gap", 0.0), plan)
-    best.lower(_quick_bound(problem, best.reward))
+    best.lower(_first_bound(problem, known, best.reward))
     best.report("kept")
     if not best.is_done or not best.is_valid:
         # Where plan and bound are apart another search may earn more, and proves how much.
@@ -84,6 +95,19 @@ def solve_replan(question: Question, solver: Solver, budget: Budget, seed: int) 
     return _solution(question, plan, best, budget)
 
 
+def first_plan(question: Question, budget: Budget) -> Plan:
+    """Return the base with what is promised, changed as little as limits demand."""
+    problem = question.problem
+    protected = set(np.flatnonzero(question.is_promised).tolist())
+    base = Plan.of(problem, question.base.tolist()).with_kept(problem)
+    broken = {v.satellite for v in question.judged(base).violations if v.code in LIMITS}
+    if broken:
+        fewest = fewest_changes(question, sorted(broken), budget)
+        if fewest is not None and question.judged(fewest.plan).is_valid:
+            return with_promised(question, fewest.plan)
+    return with_promised(question, repaired(problem, question.base.tolist(), protected))
+
+
 def improved(question: Question, start: Plan, budget: Budget, seed: int) -> Plan:
     """Return a plan whose worth, kept actions counted, is no less than that of ``start``."""
     problem, searched = question.problem, question.searched
@@ -91,25 +115,22 @@ def improved(question: Question, start: Plan, budget: Budget, seed: int) -> Plan
     windows: ResourceWindows | WindowSearch
     if problem.use_resources or problem.turns_in_motion:
         windows = ResourceWindows(searched, seed)
-        windows.adopt(start)
-        windows.make_moves(num_moves, budget)
     else:
         windows = WindowSearch(searched, seed)
-        windows.adopt(start)
-        windows.make_moves(num_moves, budget)
+    windows.adopt(start)
+    windows.make_moves(num_moves, budget)
     found = windows.plan.with_kept(problem)
     return undone(question, _best(question, start, found), budget)
 
 
 def _better_of(question: Question, plan: Plan, other: Plan, budget: Budget, seed: int) -> Plan:
-    """Return the plan, or what its search makes of one that earns more, changes counted."""
-    problem = question.problem
-    before, after = replay(problem, plan), replay(problem, other)
+    """Return the plan, or the best mix of the base, it and one that earns more."""
+    before, after = question.judged(plan), question.judged(other)
     if (after.is_valid, after.reward) <= (before.is_valid, before.reward + _EQUAL):
         return plan
-    nearer = undone(
-        question, improved(question, with_promised(question, other), budget, seed), budget
-    )
+    mix = mixed(question, (plan, other), budget, seed) if question.problem.use_resources else None
+    start = other if mix is None or not question.judged(mix).is_valid else mix
+    nearer = improved(question, with_promised(question, start), budget, seed)
     return _best(question, plan, nearer)
 
 
@@ -117,7 +138,7 @@ def _best(question: Question, *plans: Plan) -> Plan:
     """Return the plan that is valid, misses no promise and is worth most; of equals the first."""
 
     def rank(plan: Plan) -> tuple[bool, int, float]:
-        is_valid = replay(question.problem, plan).is_valid
+        is_valid = question.judged(plan).is_valid
         return is_valid, -len(question.missing(plan)), value(question, plan)
 
     best = plans[0]
@@ -141,7 +162,7 @@ def with_promised(question: Question, plan: Plan) -> Plan:
             if gone & (kept | protected):
                 continue
             trial = repaired(problem, [*(set(taken) - gone), row], protected)
-            if target not in question.missing(trial) and replay(problem, trial).is_valid:
+            if target not in question.missing(trial) and question.judged(trial).is_valid:
                 trials.append(trial)
         fewer = [t for t in trials if len(question.missing(t)) < len(question.missing(plan))]
         plan = max(fewer, key=lambda trial: value(question, trial), default=plan)
@@ -166,7 +187,11 @@ def _require_promises(question: Question, plan: Plan) -> None:
         )
 
 
-def _quick_bound(problem: Problem, reward: float) -> Bound:
+def _first_bound(problem: Problem, known: KnownPrices | None, reward: float) -> Bound:
+    """Return what the multipliers of the plan before prove, or a bound made from nothing."""
+    prices = None if known is None else known.on(problem)
+    if prices is not None:
+        return bound_at(problem, prices, reward)
     if problem.use_resources:
         return quick_bound(problem, reward)
     return lagrangian_bound(problem, reward)
@@ -174,24 +199,17 @@ def _quick_bound(problem: Problem, reward: float) -> Bound:
 
 def _solution(question: Question, plan: Plan, best: Incumbent, budget: Budget) -> Solution:
     problem = question.problem
-    last = Incumbent(problem, budget, best.gap, plan, best.bound)
+    last = Incumbent(problem, budget, best.gap, plan, best.bound) if plan != best.plan else best
     solution = last.solution()
     kept = question.stable_worth(plan)
-    table = problem.opportunities
-    contacts = question.bonus[table.kind == CONTACT].sum()
-    # No plan counts more than the best and all that may be kept; with time left, the images with
-    # what they count are bounded themselves, and contacts count the same in every plan.
-    summed = last.bound.value + question.bonus.sum()
-    if not budget.is_spent():
-        images = replace(question, promised=()).searched
-        own = _quick_bound(images, replay(images, plan).reward)
-        summed = min(summed, own.value + contacts)
+    # No plan counts more than the best and all that may be kept.
+    summed = last.bound.value + float(question.bonus.sum())
     return replace(
         solution,
         statistics={
             **solution.statistics,
             "stability": kept,
-            "stability_bound": float(max(summed, last.reward + kept)),
+            "stability_bound": max(summed, last.reward + kept),
             "changed": float(question.changed(plan)),
             "base": float(question.num_base),
             "parts": float(len(parts_of(question, plan))),

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from planner_core.budget import Budget
 from planner_core.problem import COLLECT
 from planner_core.problem.plan import Plan
-from planner_core.referee.replay import replay
 from planner_core.replanning.question import Question
 from planner_core.replanning.repair import conflicts
 
@@ -102,9 +101,9 @@ def without(question: Question, plan: Plan, part: Part) -> Plan | None:
     trial = Plan.of(problem, (taken - part.added) | part.removed)
     if len(question.missing(trial)) > len(question.missing(plan)):
         return None
-    return trial if replay(problem, trial).is_valid else None
+    return trial if question.judged(trial).is_valid else None
 
 
 def value(question: Question, plan: Plan) -> float:
     """Return what a plan earns, and what its kept actions count."""
-    return replay(question.problem, plan).reward + question.stable_worth(plan)
+    return question.judged(plan).reward + question.stable_worth(plan)

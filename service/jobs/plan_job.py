@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import cast
 
 from planner_core import __version__
 from planner_core.budget import Budget
 from planner_core.build import ScenarioOpportunities
+from planner_core.build_after import PlanBefore
 from planner_core.certified.proofs import documents as proofs
 from planner_core.run import plan_scenario
 from planner_core.solvers.base import Solver
 from planner_core.solvers.registry import solver_class
 from service.answers.blocks import target_blocks, timeline_blocks
 from service.answers.rendering import Documents, figures_of
+from service.jobs.held import HeldBlocks
 from service.jobs.plan_request import PlanAnswer, PlanRequest
 from service.scenarios.translate import scenario_from_content
 from service.wire.base import Json, dumped
@@ -35,6 +38,7 @@ def run_plan_job(request: PlanRequest, budget: Budget) -> PlanAnswer:
     block = request.opportunity_block.take()
     known = None if block is None else ScenarioOpportunities.from_bytes(block)
     del block  # the solver needs the memory
+    held = None if request.held_in is None else HeldBlocks(Path(request.held_in))
     judged = plan_scenario(
         scenario_from_content(json.loads(request.content)),
         make_solver(**request.params),
@@ -42,7 +46,10 @@ def run_plan_job(request: PlanRequest, budget: Budget) -> PlanAnswer:
         budget,
         known,
         proofs.from_json(request.bound) if request.bound is not None else None,
+        _before(request, held),
     )
+    if held is not None and not held.holds(request.scenario_sha256):
+        held.save(request.scenario_sha256, judged.opportunities.to_bytes(compress=False))
     documents = Documents(judged)
     solver = SolverUsed(
         name=request.solver, version=__version__, params=request.params, seed=request.seed
@@ -61,6 +68,23 @@ def run_plan_job(request: PlanRequest, budget: Budget) -> PlanAnswer:
         opportunity_block=judged.opportunities.to_bytes() if known is None else None,
         figures=figures_of(dumped(head)),
         warnings=tuple(head.warnings),
+    )
+
+
+def _before(request: PlanRequest, held: HeldBlocks | None) -> PlanBefore | None:
+    """Return what is known of the plan that a replan goes on from: held here, or stored."""
+    parent = request.parent
+    if parent is None:
+        return None
+    stored = parent.opportunity_block.take()
+    block = held.load(parent.scenario_sha256) if held is not None else None
+    block = block or stored
+    if block is None:
+        return None
+    return PlanBefore(
+        scenario=scenario_from_content(json.loads(parent.content)),
+        opportunities=ScenarioOpportunities.from_bytes(block),
+        bound=None if parent.bound is None else proofs.from_json(parent.bound),
     )
 
 

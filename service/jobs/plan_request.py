@@ -25,6 +25,22 @@ class Parcel:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Parent:
+    """The plan that a replan goes on from, as its own job has stored it.
+
+    Attributes
+    ----------
+    content, bound, opportunity_block
+        As those of a request.
+    """
+
+    scenario_sha256: str
+    content: str
+    bound: str | None
+    opportunity_block: Parcel = field(default_factory=lambda: Parcel(None))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class PlanRequest:
     """The frozen question of one job, as it travels to the solver's process.
 
@@ -42,6 +58,10 @@ class PlanRequest:
         The scenario's stored opportunities; none where they are still to be computed.
     bound
         The best bound known of the scenario with its proof (JSON text), or None.
+    parent
+        Of a replan: the plan before.
+    held_in
+        The worker's folder of ``HeldOpportunities``; None where nothing is held.
     """
 
     job_id: str
@@ -54,6 +74,8 @@ class PlanRequest:
     run: int = 1
     opportunity_block: Parcel = field(default_factory=lambda: Parcel(None))
     bound: str | None = None
+    parent: Parent | None = None
+    held_in: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

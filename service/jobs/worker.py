@@ -11,6 +11,7 @@ import threading
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final, TypeVar
 
 import sqlalchemy as sa
@@ -21,12 +22,13 @@ from planner_core.budget import Progress
 from service.answers.blocks import proof_blocks
 from service.db.clock import utc_now
 from service.db.failures import why_unavailable
-from service.db.rows import JobRow, ScenarioRow, WorkerRow
+from service.db.rows import JobRow, PlanRow, ScenarioRow, WorkerRow
 from service.db.session import Database
 from service.jobs import lease
 from service.jobs.child import Answered, Ending, Refused, Stopped
+from service.jobs.held import HeldBlocks, make_folder, remove_folder
 from service.jobs.lease import Lease, Outcome
-from service.jobs.plan_request import Parcel, PlanAnswer, PlanRequest
+from service.jobs.plan_request import Parcel, Parent, PlanAnswer, PlanRequest
 from service.jobs.queue import DbosConsumer, DbosQueue
 from service.jobs.reconcile import Reconciler
 from service.jobs.renewal import Renewal
@@ -78,6 +80,7 @@ class Worker:
             look_every_s=_COURIER_LOOKS_EVERY_S,
             private=settings.webhook_private_addresses,
         )
+        self._held_in = make_folder()
         self._stopping = threading.Event()
         self._stop_request = StopRequest()
         self._idle = threading.Event()
@@ -127,20 +130,21 @@ class Worker:
                 lease.return_unstarted(session, self._queue, job_id, dispatch)
             return
         with self._database.transaction() as session:
-            held = lease.start(session, job_id, dispatch, lease_s=self._settings.lease_s)
-        if held is None:
+            own = lease.start(session, job_id, dispatch, lease_s=self._settings.lease_s)
+        if own is None:
             return
         request, origin = self._insist(
-            self._database.reading, lambda session: _request(session, job_id, held.run)
+            self._database.reading,
+            lambda session: _request(session, job_id, own.run, self._held_in),
         )
-        named: dict[str, str | int] = {"job_id": job_id, "run": held.run, "solver": request.solver}
+        named: dict[str, str | int] = {"job_id": job_id, "run": own.run, "solver": request.solver}
         if origin.request_id is not None:
             named["request_id"] = origin.request_id
         with (
             about_job(job_id, origin.request_id),
             tracing.running(origin.traceparent, **named) as span,
         ):
-            self._run(held, request, span)
+            self._run(own, request, span)
 
     def _run(self, held: Lease, request: PlanRequest, span: JobSpan) -> None:
         limits = Limits(
@@ -251,6 +255,7 @@ class Worker:
             _raise_unless_it_passes(error, "could not take leave")
         self._queue.close()
         self._database.close()
+        remove_folder(self._held_in)
 
 
 def outcome_of(ending: Ending) -> Outcome:
@@ -281,7 +286,9 @@ class _Origin:
     traceparent: str | None
 
 
-def _request(session: Session, job_id: str, run: int) -> tuple[PlanRequest, _Origin]:
+def _request(
+    session: Session, job_id: str, run: int, held_in: Path | None
+) -> tuple[PlanRequest, _Origin]:
     wanted = (
         sa.select(JobRow, ScenarioRow.sha256, ScenarioRow.content)
         .join(ScenarioRow, ScenarioRow.id == JobRow.scenario_id)
@@ -299,8 +306,32 @@ def _request(session: Session, job_id: str, run: int) -> tuple[PlanRequest, _Ori
         limits=job.limits,
         opportunity_block=Parcel(opportunity_store.load(session, sha256)),
         bound=bound_store.load(session, sha256),
+        parent=_parent(session, job, held_in),
+        held_in=None if held_in is None else str(held_in),
     )
     return request, _Origin(request_id=job.request_id, traceparent=job.traceparent)
+
+
+def _parent(session: Session, job: JobRow, held_in: Path | None) -> Parent | None:
+    """Return the plan that a replan goes on from, less what the worker holds of it."""
+    plan_id = (job.change or {}).get("replan_of")
+    wanted = (
+        sa.select(ScenarioRow.sha256, ScenarioRow.content)
+        .join(JobRow, JobRow.scenario_id == ScenarioRow.id)
+        .join(PlanRow, PlanRow.job_id == JobRow.id)
+        .where(PlanRow.id == plan_id)
+    )
+    found = None if plan_id is None else session.execute(wanted).one_or_none()
+    if found is None:
+        return None
+    sha256, content = found
+    is_held = held_in is not None and HeldBlocks(held_in).holds(sha256)
+    return Parent(
+        scenario_sha256=sha256,
+        content=content,
+        bound=bound_store.load(session, sha256),
+        opportunity_block=Parcel(None if is_held else opportunity_store.load(session, sha256)),
+    )
 
 
 def _raise_unless_it_passes(error: SQLAlchemyError, consequence: str) -> None:

@@ -203,24 +203,3 @@ def test_a_flight_that_comes_too_near_to_the_sun_is_not_flyable() -> None:
     assert is_kept(0.0)
     assert is_kept(flown.nearest_sun_deg - 0.1)
     assert not is_kept(flown.nearest_sun_deg + 0.1)
-
-
-def test_panels_beside_the_boresight_face_the_sun_while_the_satellite_turns_about_it() -> None:
-    free = _mission()
-    scenario, timeline = _files(*((s, *_below(free, s + 15.0)) for s in (300.0, 1500.0)))
-    scenario["satellites"][0]["resources"] = {"preset": "paper", "panel_angle_deg": 90.0}
-    (mission,) = missions(scenario, timeline)
-    look, _ = world.line_of_sight(world.orbit(mission), mission.tasks[1].site.ecef_km, 1500.0)
-    towards = world.sun_km(mission, 1500.0)
-    from_sun_deg = math.degrees(math.acos(float(look @ towards) / norm(towards)))
-    # The least turn from the sun, with bursts and settling: from where it arrived it is more.
-    leaves_s = 1500.0 - abs(from_sun_deg - 90.0) - 35.0
-    visit = {"mode": "sunpoint", "start": _instant(430.0), "end": _instant(leaves_s),
-             "turn_to_s": 60.0, "turn_back_s": 60.0}  # fmt: skip
-    timeline["satellites"][0]["actions"].insert(1, visit)
-    (mission,) = missions(scenario, timeline)
-    verdict = judge(mission, reference := _reference(mission), _as_told(reference))
-    assert verdict.too_short == ()
-    assert verdict.share("collect") == 1.0
-    assert len(reference.visits) == 1
-    assert verdict.incidence["sun"] > 0.999

@@ -10,12 +10,16 @@ from hypothesis import event, given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget
+from planner_core.certified.proofs.bound import Bound
+from planner_core.certified.proofs.resource_bound import quick_bound
 from planner_core.domain import Stability
 from planner_core.errors import InvalidScenario
 from planner_core.pinning.pinned_problem import apply_pins
 from planner_core.problem import COLLECT, CONTACT, Blocked, Kept, Pinned, Problem
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
+from planner_core.replanning.known import KnownPrices, bound_at, prices_of
+from planner_core.replanning.programs import fewest_changes
 from planner_core.replanning.question import Question
 from planner_core.replanning.replan import solve_replan
 from planner_core.replanning.undo import parts_of, value, without
@@ -228,3 +232,70 @@ def test_a_promise_that_nothing_can_image_is_refused() -> None:
         solve_replan(question, Certified(), Budget(), 0)
     assert caught.value.fault.code == "promise_not_kept"
     assert caught.value.fault.pointer == "/replan/promises/0"
+
+
+@examples(60)
+@given(seed=SEEDS)
+def test_the_fewest_changes_are_what_brute_force_finds(seed: int) -> None:
+    happened = event_at_random(seed, use_resources=True)
+    if happened is None:
+        return
+    question = replace(happened.question, promised=())
+    problem = question.problem
+    everyone = range(len(problem.satellites))
+    found = fewest_changes(question, everyone, Budget())
+    is_base = np.zeros(len(problem.opportunities), dtype=np.bool_)
+    is_base[question.base] = True
+    is_image = problem.opportunities.kind == COLLECT
+    counting = replace(problem, worth=np.where(is_base & is_image, 1.0, 0.0))
+    best = best_plan(counting)
+    if best is None or found is None or not found.is_proven:
+        event("not proven")
+        return
+    timeline = replay(problem, found.plan)
+    assert timeline.is_valid
+    assert found.num_kept == round(replay(counting, best).reward)
+    event(f"shed: {int((is_base & is_image).sum()) - found.num_kept}")
+
+
+@examples(60)
+@given(seed=SEEDS, use_resources=st.booleans(), has_prices=st.booleans())
+def test_the_multipliers_of_the_plan_before_prove_a_bound(
+    seed: int, use_resources: bool, has_prices: bool
+) -> None:
+    happened = event_at_random(seed, use_resources=use_resources)
+    if happened is None:
+        return
+    question = replace(happened.question, promised=())
+    problem, whole = question.problem, happened.whole
+    rng = np.random.default_rng(seed)
+    # Whatever they are: of some targets nothing may be known, and what is known may be far off.
+    ids = [name for name in whole.target_ids if rng.random() < 0.7]
+    proof = quick_bound(whole, 0.0)
+    some = rng.uniform(0.0, 2.0, len(ids))
+    if has_prices and proof.prices is not None and len(proof.prices) == len(whole.target_ids):
+        some = proof.prices[[whole.target_ids.index(name) for name in ids]]
+    unit = 0.5 if use_resources else None
+    known = KnownPrices(
+        bound=Bound(value=0.0, proof="dp", prices=some, unit=unit), target_ids=tuple(ids)
+    )
+    prices = known.on(problem)
+    best = best_plan(problem)
+    assert prices is not None
+    if best is None:
+        return
+    reward = replay(problem, best).reward
+    assert bound_at(problem, prices, 0.0).value >= reward - 1e-6
+    solution = solve_replan(question, Certified(), Budget(), 0, known)
+    assert solution.bound is not None
+    assert solution.bound >= reward - 1e-6
+
+
+def test_prices_without_multipliers_are_nothing_known() -> None:
+    whole = random_problem(0, use_resources=False)
+    assert prices_of(None, whole.target_ids) is None
+    assert prices_of(Bound(value=1.0, proof="milp"), whole.target_ids) is None
+    of_fewer = KnownPrices(
+        bound=Bound(value=1.0, proof="lagrangian", prices=np.zeros(1)), target_ids=("a", "b")
+    )
+    assert of_fewer.on(whole) is None

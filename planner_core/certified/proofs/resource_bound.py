@@ -363,6 +363,17 @@ def resource_value(problem: Problem, prices: Floats, unit: float) -> float:
     )
 
 
+def value_at(problem: Problem, prices: Floats, unit: float, enough: float) -> float:
+    """Return the bound of ``resource_value``, or ``enough`` where that is more.
+
+    The finer recorder is asked where one satellite is to be asked, which may stop early.
+    """
+    stop = np.zeros(1, dtype=np.uint8)
+    is_alone = sum(len(s) > 0 for s in problem.satellites) == 1
+    levels = TUNING.fine if is_alone else TUNING.coarse
+    return _value(problem, relaxations(problem, levels), prices, unit, enough, stop)
+
+
 def _value(
     problem: Problem,
     satellites: tuple[SatelliteRelaxation, ...],

@@ -1,0 +1,112 @@
+"""Small programs for HiGHS over the tasks of a few plans: exact where windows cannot see far.
+
+A contact that is lost fills a recorder hours before anything breaks, and what a window takes out
+there another one would have to put in. Over the tasks of one or two plans there are so few choices
+that the best mix is found at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from planner_core.budget import Budget, Termination, ignored
+from planner_core.certified.mip.contact_sets import FixedContacts
+from planner_core.domain import Objective
+from planner_core.precedence.relation import is_transitive, num_near_pairs
+from planner_core.problem import CONTACT, Bools, Problem
+from planner_core.problem.plan import Plan
+from planner_core.problem.restrict import restricted
+from planner_core.replanning.question import Question
+from planner_core.solvers.milp import Milp
+from planner_core.solvers.sequential import blocked_rows
+
+_MOST_PAIRS: Final = 200_000  # of tasks near each other: beyond that programs take seconds
+_WORTH_BESIDE: Final = 1e-3  # of a kept image: of plans that keep as much the one that earns more
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fewest:
+    """The plan that changes least, and whether that is proven.
+
+    Attributes
+    ----------
+    num_kept
+        How many images of the base it keeps, and no valid plan keeps more of them where
+        ``is_proven``.
+    """
+
+    plan: Plan
+    num_kept: int
+    is_proven: bool
+
+
+def fewest_changes(question: Question, satellites: Sequence[int], budget: Budget) -> Fewest | None:
+    """Return the plan that keeps most images of the base, contacts being free.
+
+    Nothing but the base and contacts can help to keep the base: images in their place are left to
+    others. Where turns by way of another task are quicker than direct ones this is no proof.
+
+    Parameters
+    ----------
+    satellites
+        Those whose part of the base may change; what the others do is left alone.
+    """
+    problem = question.problem
+    table = problem.opportunities
+    is_base = np.zeros(len(table), dtype=np.bool_)
+    is_base[question.base] = True
+    others = is_base & ~np.isin(table.satellite, satellites)
+    is_offered = (is_base | (table.kind == CONTACT) | question.is_promised) & ~others
+    is_offered[problem.kept_rows] = True
+    for index in satellites:
+        own = problem.satellites[index].rows
+        is_shut = blocked_rows(problem, problem.satellites[index], np.flatnonzero(others).tolist())
+        is_offered[own[(is_shut != 0) & ~is_base[own]]] = False
+    is_offered &= np.isin(table.satellite, satellites)
+    rows = np.flatnonzero(is_offered).astype(np.int32)
+    part = restricted(_counting(question, is_base), rows)
+    if num_near_pairs(part) > _MOST_PAIRS:
+        return None
+    found = Milp().solve(part, budget.part(report=ignored), 0)
+    found_rows = {int(rows[action.opportunity]) for action in found.plan.actions}
+    taken = sorted(found_rows.union(np.flatnonzero(others).tolist()))
+    is_whole = len(satellites) == len(problem.satellites) and is_transitive(problem)
+    return Fewest(
+        plan=Plan.of(problem, taken),
+        num_kept=int((is_base[taken] & (table.kind[taken] != CONTACT)).sum()),
+        is_proven=is_whole and found.termination is Termination.OPTIMAL,
+    )
+
+
+def _counting(question: Question, is_base: Bools) -> Problem:
+    """Return the problem in which images of the base count one each, and others next to nothing."""
+    problem = question.problem
+    is_image = problem.opportunities.kind != CONTACT
+    worth = np.where(is_base & is_image, 1.0, 0.0)
+    least = _WORTH_BESIDE / max(1.0, float(problem.best_worth.sum()))
+    worth += least * np.where(is_base & is_image, problem.worth, 0.0)
+    worth += (1.0 + len(question.base)) * question.is_promised
+    return replace(problem, worth=worth, full_worth=None, objective=Objective.collected())
+
+
+def mixed(question: Question, plans: Sequence[Plan], budget: Budget, seed: int) -> Plan | None:
+    """Return the best mix of the base and some plans, changes counted; None where none is found.
+
+    Its contacts are those of the last plan: with these fixed the relaxation is nearly tight.
+    """
+    problem = question.searched
+    table = problem.opportunities
+    offered = np.zeros(len(table), dtype=np.bool_)
+    offered[question.base] = True
+    for plan in plans:
+        offered[[action.opportunity for action in plan.actions]] = True
+    last = [action.opportunity for action in plans[-1].actions]
+    contacts = tuple(row for row in last if table.kind[row] == CONTACT)
+    program = FixedContacts(problem, offered, contacts, budget, seed)
+    if not np.isfinite(program.relaxed()) or budget.is_spent():
+        return None
+    return program.plan(0.0)

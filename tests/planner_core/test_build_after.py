@@ -1,0 +1,89 @@
+"""Opportunities of a scenario that follows another one: as if computed from nothing."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from datetime import timedelta
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import planner_core.build_after
+from benchmarks.missions import ORBIT, paper_scenario
+from planner_core.budget import Budget
+from planner_core.build import ScenarioOpportunities, compute_opportunities
+from planner_core.build_after import PlanBefore, opportunities_after
+from planner_core.domain import Horizon, Scenario, Target
+from planner_core.problem import Opportunities
+from tests.examples import examples
+
+
+def mission(num_targets: int, seed: int = 0) -> Scenario:
+    whole = paper_scenario(num_targets, seed, use_resources=True)
+    (one,) = whole.satellites
+    other = replace(one, id="other", orbit=replace(ORBIT, raan_deg=90.0, norad_cat_id=2))
+    horizon = Horizon(start=whole.horizon.start, end=whole.horizon.start + timedelta(hours=6))
+    return replace(whole, satellites=(one, other), horizon=horizon)
+
+
+def assert_same(found: ScenarioOpportunities, expected: ScenarioOpportunities) -> None:
+    for field in fields(Opportunities):
+        ours, theirs = (getattr(o.opportunities, field.name) for o in (found, expected))
+        assert ours.dtype == theirs.dtype, field.name
+        np.testing.assert_array_equal(ours, theirs, err_msg=field.name)
+    np.testing.assert_array_equal(found.target_access, expected.target_access)
+    for ours, theirs in zip(found.sunlight, expected.sunlight, strict=True):
+        np.testing.assert_array_equal(ours.enter_s, theirs.enter_s)
+        np.testing.assert_array_equal(ours.exit_s, theirs.exit_s)
+    assert found.warnings == expected.warnings
+
+
+@examples(15)
+@given(
+    seed=st.integers(0, 1000),
+    num_new=st.integers(0, 6),
+    is_spaced=st.booleans(),
+    data=st.data(),
+)
+def test_it_is_bit_for_bit_what_is_computed_from_nothing(
+    seed: int, num_new: int, is_spaced: bool, data: st.DataObject
+) -> None:
+    whole = mission(40, seed)
+    if is_spaced:
+        whole = replace(whole, collect_spacing_s=20.0)
+    before = replace(whole, targets=whole.targets[num_new:])
+    known = compute_opportunities(before, Budget())
+    kept = [t for t in before.targets if data.draw(st.integers(0, 9)) > 0]
+    dearer = [replace(t, reward=3.0) if i % 5 == 0 else t for i, t in enumerate(kept)]
+    moved = [replace(t, lat_deg=-t.lat_deg) if i % 11 == 3 else t for i, t in enumerate(dearer)]
+    targets: list[Target] = data.draw(st.permutations([*moved, *whole.targets[:num_new]]))
+    asked = replace(whole, targets=tuple(targets))
+    earlier = PlanBefore(scenario=before, opportunities=known)
+    assert_same(
+        opportunities_after(asked, earlier, Budget()), compute_opportunities(asked, Budget())
+    )
+
+
+def test_only_what_is_new_is_looked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = mission(40)
+    before = replace(whole, targets=whole.targets[1:])
+    earlier = PlanBefore(scenario=before, opportunities=compute_opportunities(before, Budget()))
+    computed: list[int] = []
+
+    def counted(scenario: Scenario, budget: Budget) -> ScenarioOpportunities:
+        computed.append(len(scenario.targets))
+        return compute_opportunities(scenario, budget)
+
+    monkeypatch.setattr(planner_core.build_after, "compute_opportunities", counted)
+    opportunities_after(before, earlier, Budget())
+    assert computed == []
+    opportunities_after(whole, earlier, Budget())
+    assert computed == [1]
+    end = whole.horizon.end + timedelta(hours=1)
+    longer = replace(whole, horizon=Horizon(start=whole.horizon.start, end=end))
+    assert_same(
+        opportunities_after(longer, earlier, Budget()), compute_opportunities(longer, Budget())
+    )
+    assert computed == [1, 40]
