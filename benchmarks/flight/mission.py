@@ -135,7 +135,7 @@ class Mission:
         In the order of time.
     visits
         None where the timeline does not say when the satellite is at the sun: in the paper's
-        model it charges in all idle time.
+        model it charges in all idle time, and no visit takes a turn.
     curve, power, data
         None where the plan was made without resources.
     """
@@ -241,7 +241,7 @@ def _task(
 
 def _visits(actions: Sequence[Json], start: datetime) -> tuple[SunVisit, ...] | None:
     found = [each for each in actions if each["mode"] == "sunpoint"]
-    if not any("turn_to_s" in each for each in found):
+    if not any(each.get("turn_to_s") or each.get("turn_back_s") for each in found):
         return None
     return tuple(SunVisit(_since(start, each["start"]), _since(start, each["end"]))
                  for each in found)  # fmt: skip
