@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Final
 
-MAX_CELLS: Final = 30_000_000
+MAX_CELLS: Final = 36_000_000
 """Of one satellite's table over tasks and units of worth."""
 
 MAX_PAIRS: Final = 8_000_000

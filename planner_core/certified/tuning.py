@@ -57,14 +57,16 @@ class Tuning:
     far_above
         Share of a bound: a plan or another bound that far away says little of the best plan.
     little
-        Share of a bound or of a gap: what a step gains at least, for another one to be made.
-    goal_step
-        Share of a goal by which it is given up where nothing comes near it.
+        Share of a bound, a gap, a goal or a step: what a move of it is at least.
+    worth_a_step
+        Share of a bound that a quick oracle must gain, for an exact one to be asked at all.
     levels_per_collect
         Parts of a typical collect, in energy or worth, where tables are small.
     fine, coarse
         Levels of the recorder that the smallest collect fills, where a proof counts and where many
         prices are tried.
+    units_per_reward
+        In which exact programmes count a typical target's worth, where many prices are tried.
     max_units
         Units of worth that a bound by exact programmes may count.
     price_shares
@@ -96,8 +98,8 @@ class Tuning:
         Of a target's worth, that is as good as nothing.
     moves_at_a_time, moves_in_a_step
         Of the window search between two looks at the budget; and under resources.
-    moves_per_task, moves_beside_passes
-        Of the window search in a turn, for each task; and where an ascent on passes has its turns.
+    moves_per_task
+        Of the window search in a turn; ``little`` of them beside an ascent on passes.
     disturbance
         Largest share of a plan, or of prices, that a random move changes.
 
@@ -152,7 +154,8 @@ class Tuning:
     shorter: float = 0.6
     far_above: float = 0.2
     little: float = 0.01
-    goal_step: float = 0.02
+    worth_a_step: float = 0.005
+    units_per_reward: int = 48
     levels_per_collect: int = 24
     fine: int = 8
     coarse: int = 2
@@ -175,7 +178,6 @@ class Tuning:
     moves_at_a_time: int = 500
     moves_in_a_step: int = 250
     moves_per_task: float = 5.0
-    moves_beside_passes: float = 0.05
     disturbance: float = 0.3
 
     near: float = 0.2

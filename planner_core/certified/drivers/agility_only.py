@@ -288,7 +288,7 @@ def solve_free(problem: Problem, budget: Budget, seed: int, gap: float, effort: 
 def _approach(search: FreeSearch, effort: Effort) -> None:
     """Better the plan by windows, and the bound by prices, until both lead no further."""
     is_spaced = search.problem.offers_choice
-    moves = TUNING.moves_beside_passes if is_spaced else TUNING.moves_per_task
+    moves = TUNING.moves_per_task * (TUNING.little if is_spaced else 1.0)
     left, num_idle = effort.moves_per_task, 0.0
     while left > 0 and num_idle < TUNING.tries * TUNING.moves_per_task and not search.best.is_done:
         if is_spaced and not search.is_priced_out:

@@ -135,7 +135,7 @@ class _FleetPricing:
         prices.learn(search.best.plan)
         search.price(prices, 1)
         self.prices = prices
-        has_full_recorders = prices.value < (1.0 - TUNING.little) * energy.value
+        has_full_recorders = prices.value < (1.0 - TUNING.worth_a_step) * energy.value
         # With turns to the sun each pair of near tasks has a column, and a relaxation takes as long
         # as ten programs over the few tasks that most answers take.
         is_small = np.count_nonzero(usage) <= TUNING.most_relaxed

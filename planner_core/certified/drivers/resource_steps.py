@@ -176,7 +176,7 @@ class ResourceSearch:
         value = min(best.bound.value, energy.value)
         prices = PriceSearch(self.problem, value, energy.multipliers, self.budget.stop)
         prices.learn(best.plan)
-        if energy.value < before - TUNING.little * before:
+        if energy.value < before - TUNING.worth_a_step * before:
             self.price(prices, 1)
         return prices
 

@@ -185,7 +185,7 @@ class ChoiceSearch:
                 value, found = self._settled(satellite, part, max(wanted, best + 1))
                 if wanted <= max(best, 0):
                     break
-                wanted = int(wanted * (1.0 - TUNING.goal_step))
+                wanted = int(wanted * (1.0 - TUNING.tight))
             if value > best:
                 best, path = value, found
         return best, path

@@ -65,7 +65,7 @@ class PriceSearch:
 
     def _unit(self, value: float) -> float:
         largest = max(len(s.satellite) for s in self.satellites)
-        unit = 2.0 ** np.floor(np.log2(self._typical)) / TUNING.levels_per_collect
+        unit = 2.0 ** np.floor(np.log2(self._typical)) / TUNING.units_per_reward
         while value / len(self.satellites) / unit > MAX_CELLS / largest:
             unit *= 2.0
         return float(unit)

@@ -228,7 +228,7 @@ class SatelliteRelaxation:
         """
         needs = _Needs.of(self.network, levels, weight, self._price_in(weight), near)
         top = needs.top
-        step = max(1, int(TUNING.goal_step * top))
+        step = max(1, int(TUNING.little * top))
         goal = top
         if near is not None and near < top:
             goal = min(top, near + step)
