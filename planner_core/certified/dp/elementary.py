@@ -207,15 +207,10 @@ def label_part(
         f_low &= open_low[b]
         f_high &= open_high[b]
         if far_node[b] != NOWHERE:
-            v_low, v_high = far_low[b] & open_low[b], far_high[b] & open_high[b]
-            if far_value[b] > far:
-                far, far_at, f_low, f_high = _merged(
-                    far_value[b], far_node[b], v_low, v_high, far, f_low, f_high, bit_weight
-                )
-            else:
-                far, far_at, f_low, f_high = _merged(
-                    far, far_at, f_low, f_high, far_value[b], v_low, v_high, bit_weight
-                )
+            far, far_at, f_low, f_high = _merged(
+                far_value[b], far_node[b], far_low[b] & open_low[b], far_high[b] & open_high[b],
+                far, far_at, f_low, f_high, bit_weight,
+            )  # fmt: skip
         # The best value.
         paid = not ((f_low & own_low) | (f_high & own_high))
         best, at = far + (w if paid else 0.0), far_at
@@ -235,13 +230,9 @@ def label_part(
         # What it remembers, of what others have imaged too.
         m_low, m_high = f_low, f_high
         if not is_far:
-            m_low, m_high = low[at] & open_low[b], high[at] & open_high[b]
-            for q in range(num_started[at], num_started[b]):
-                started = start_bit[q]
-                if started < 64:
-                    m_low &= ~(one << np.uint64(started))
-                else:
-                    m_high &= ~(one << np.uint64(started - 64))
+            new_low, new_high = _begun(start_bit, num_started[at], num_started[b])
+            m_low = low[at] & open_low[b] & ~new_low
+            m_high = high[at] & open_high[b] & ~new_high
             lost = _weight_of(m_low & ~f_low & ~own_low, m_high & ~f_high & ~own_high, bit_weight)
             if best - far_reached < lost:
                 m_low &= f_low
@@ -266,13 +257,9 @@ def label_part(
                     continue
                 if is_wait:
                     q, new_low, new_high = num_started[b], zero, zero
-                while q > num_started[a]:
-                    q -= 1
-                    started = start_bit[q]
-                    if started < 64:
-                        new_low |= one << np.uint64(started)
-                    else:
-                        new_high |= one << np.uint64(started - 64)
+                if q > num_started[a]:
+                    more_low, more_high = _begun(start_bit, num_started[a], q)
+                    q, new_low, new_high = num_started[a], new_low | more_low, new_high | more_high
                 left_low = m_low & (~low[a] | new_low)
                 left_high = m_high & (~high[a] | new_high)
                 if not (left_low | left_high):
@@ -292,36 +279,52 @@ def label_part(
         to = far_from[b]
         if to >= end:
             continue
-        for q in range(num_started[b], num_started[to]):
-            started = start_bit[q]
-            if started < 64:
-                m_low &= ~(one << np.uint64(started))
-            else:
-                m_high &= ~(one << np.uint64(started - 64))
-        if far_node[to] == NOWHERE:
-            far_value[to], far_node[to], far_low[to], far_high[to] = best, b, m_low, m_high
-        elif best > far_value[to]:
-            far_value[to], far_node[to], far_low[to], far_high[to] = _merged(
-                best, b, m_low, m_high, far_value[to], far_low[to], far_high[to], bit_weight
-            )
-        else:
-            far_value[to], far_node[to], far_low[to], far_high[to] = _merged(
-                far_value[to], far_node[to], far_low[to], far_high[to],
-                best, m_low, m_high, bit_weight,
-            )  # fmt: skip
+        new_low, new_high = _begun(start_bit, num_started[b], num_started[to])
+        _pass_on(labels, to, best, b, m_low & ~new_low, m_high & ~new_high)
     return best_end, best_at
+
+
+@borrowing
+def _pass_on(
+    labels: Labels, to: int, value: float, at: int, low: np.uint64, high: np.uint64
+) -> None:
+    """Let all nodes from one on follow a label."""
+    if labels.far_node[to] != NOWHERE:
+        value, at, low, high = _merged(
+            value, at, low, high, labels.far_value[to], labels.far_node[to],
+            labels.far_low[to], labels.far_high[to], labels.bit_weight,
+        )  # fmt: skip
+    labels.far_value[to], labels.far_node[to] = value, at
+    labels.far_low[to], labels.far_high[to] = low, high
 
 
 @borrowing
 def _merged(
     value: float, at: int, low: np.uint64, high: np.uint64,
-    other: float, other_low: np.uint64, other_high: np.uint64, bit_weight: Floats,
+    other: float, other_at: int, other_low: np.uint64, other_high: np.uint64, bit_weight: Floats,
 ) -> tuple[float, int, np.uint64, np.uint64]:  # fmt: skip
-    """Return a label that stands for two, the better one first."""
+    """Return the better of two labels, the second of equal ones, so that it stands for both."""
+    if value <= other:
+        value, at, low, high, other, other_low, other_high = (
+            other, other_at, other_low, other_high, value, low, high,
+        )  # fmt: skip
     if value - other < _weight_of(low & ~other_low, high & ~other_high, bit_weight):
         low &= other_low
         high &= other_high
     return value, at, low, high
+
+
+@borrowing
+def _begun(start_bit: Ints, first: int, last: int) -> tuple[np.uint64, np.uint64]:
+    """Return the bits of groups that began one after another."""
+    low, high = np.uint64(0), np.uint64(0)
+    for q in range(first, last):
+        started = start_bit[q]
+        if started < 64:
+            low |= np.uint64(1) << np.uint64(started)
+        else:
+            high |= np.uint64(1) << np.uint64(started - 64)
+    return low, high
 
 
 @borrowing
