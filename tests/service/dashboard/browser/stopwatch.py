@@ -1,7 +1,7 @@
 """Own satellites to an approved plan, in the browser alone, at a person's pace, with a stopwatch.
 
     .ci/browser .venv/bin/python -m tests.service.dashboard.browser.stopwatch \
-        SATELLITES.tle TARGETS.csv STATIONS.geojson [TIME_LIMIT_S]
+        SATELLITES.tle TARGETS.csv STATIONS.geojson [SOLVER TIME_LIMIT_S]
 
 prints each step with its seconds. Hands and eyes are allowed for by pauses; what the service takes
 is the rest.
@@ -70,8 +70,8 @@ class Walk:
         print(f"          {self.browser.text(outcome)}")
 
 
-def to_an_approved_plan(walk: Walk, files: tuple[Path, Path, Path], time_s: str | None) -> None:
-    """Walk from the first page to the plan; without a time limit it is the form's."""
+def to_an_approved_plan(walk: Walk, files: tuple[Path, Path, Path], how: tuple[str, ...]) -> None:
+    """Walk from the first page to the plan; solver and time limit are the form's unless given."""
     browser = walk.browser
     with walk.step("Open the address, choose New plan"):
         browser.open("/")
@@ -79,8 +79,11 @@ def to_an_approved_plan(walk: Walk, files: tuple[Path, Path, Path], time_s: str 
         browser.wait(lambda: browser.text("#satellites .choices"), "no form")
     for kind, file in zip(("satellites", "targets", "stations"), files, strict=True):
         walk.upload(kind, file)
-    if time_s is not None:
-        with walk.step(f"Type a time limit of {time_s} s"):
+    if how:
+        solver, time_s = how
+        with walk.step(f"Choose {solver}, type a time limit of {time_s} s"):
+            time.sleep(AIM_S)
+            browser.find(f"#solver option[value={solver}]").click()
             browser.find("#time-s").clear()
             walk.type("#time-s", time_s)
     with walk.step("Look at the suggested start, press Plan"):
@@ -100,7 +103,7 @@ def to_an_approved_plan(walk: Walk, files: tuple[Path, Path, Path], time_s: str 
         browser.wait(lambda: browser.text("#plan-state") == "approved", "not approved")
 
 
-def main(satellites: str, targets: str, stations: str, time_s: str | None = None) -> None:
+def main(satellites: str, targets: str, stations: str, *how: str) -> None:
     """Start a service that knows nothing, and walk."""
     with (
         tempfile.TemporaryDirectory() as folder,
@@ -108,7 +111,7 @@ def main(satellites: str, targets: str, stations: str, time_s: str | None = None
         opened(line.split()[-1]) as browser,
     ):
         walk = Walk(browser)
-        to_an_approved_plan(walk, (Path(satellites), Path(targets), Path(stations)), time_s)
+        to_an_approved_plan(walk, (Path(satellites), Path(targets), Path(stations)), how)
         whole_s = sum(seconds for _, seconds in walk.steps)
         print(f"{whole_s:6.1f} s  in {len(walk.steps)} steps")
 
