@@ -310,7 +310,10 @@ def build_problem(scenario: Scenario, computed: ScenarioOpportunities, budget: B
             lit = always_sunlit(scenario.horizon.duration_s)
         start = started(scenario, index, states.get(satellite.id), computed.opportunities)
         if index in pasts:
-            start = carried(pasts[index], _flown_problem(pasts[index], budget), start)
+            past = pasts[index]
+            part = _flown_problem(past, budget)
+            of_data = part if past.before is None else _flown_problem(past.of_data, budget)
+            start = carried(past, part, of_data, start)
         images += start.images
         satellites.append(
             build_satellite_problem(

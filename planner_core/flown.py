@@ -39,6 +39,8 @@ class Past:
         Of the satellite in the scenario.
     state
         Where it begins.
+    before
+        An older state, where that one does not say what is on board.
     flown
         In order of start; those that end before the state say only where it looked.
     following
@@ -48,6 +50,7 @@ class Past:
     scenario: Scenario
     index: int
     state: State
+    before: State | None
     flown: tuple[Flown, ...]
     following: Flown | None
 
@@ -63,6 +66,11 @@ class Past:
         done = [f for f in self.flown if f.outcome != "skipped" and f.start < start]
         return max(done, key=lambda f: f.end, default=None)
 
+    @property
+    def of_data(self) -> Past:
+        """The same from the older state on, where there is one."""
+        return self if self.before is None else replace(self, state=self.before, before=None)
+
     def part(self) -> Scenario:
         """Return the scenario of the span from the state to the horizon."""
         end = self.scenario.horizon.start
@@ -72,7 +80,7 @@ class Past:
             self.scenario,
             horizon=Horizon(start=self.state.at, end=max(end, self.state.at + _MARGIN)),
             satellites=(self.scenario.satellites[self.index],),
-            states=(replace(self.state, attitude=None, on_board=()),),
+            states=(replace(self.state, attitude=None, on_board=None),),
             dynamics="physical",
             continuous_starts=False,
             forecast=None,
@@ -104,6 +112,7 @@ def pasts_of(scenario: Scenario) -> dict[int, Past]:
     if scenario.replan is None or not scenario.replan.flown:
         return {}
     states = {state.satellite_id: state for state in scenario.states}
+    before = {state.satellite_id: state for state in scenario.replan.before}
     found = {}
     for index, satellite in enumerate(scenario.satellites):
         own = [f for f in scenario.replan.flown if f.satellite_id == satellite.id]
@@ -111,8 +120,11 @@ def pasts_of(scenario: Scenario) -> dict[int, Past]:
             own.sort(key=lambda f: (f.start, f.end))
             begin = min(own[0].start, scenario.horizon.start)
             state = states.get(satellite.id, State(satellite_id=satellite.id, at=begin))
+            older = before.get(satellite.id)
+            if state.on_board is not None or (older is not None and older.at >= state.at):
+                older = None
             found[index] = Past(
-                scenario=scenario, index=index, state=state, flown=tuple(own),
+                scenario=scenario, index=index, state=state, before=older, flown=tuple(own),
                 following=_following(scenario, satellite.id),
             )  # fmt: skip
     return found
@@ -144,20 +156,22 @@ def flown_as(action: PinnedAction) -> Flown:
     )  # fmt: skip
 
 
-def carried(past: Past, part: Problem, given_start: Start) -> Start:
+def carried(past: Past, part: Problem, of_data: Problem, given_start: Start) -> Start:
     """Return what a satellite begins the horizon with.
 
     Parameters
     ----------
     part
         The problem of ``past.part()``, with what was done, in order, as its opportunities.
+    of_data
+        The same of ``past.of_data``.
     given_start
         What it would begin with had it only idled since its state.
     """
     scenario, horizon = past.scenario, past.scenario.horizon
     satellite = part.satellites[0]
     resources = scenario.satellites[past.index].resources
-    images = _queue(past, part)
+    images = _queue(past, of_data)
     heading, sun_from_s = given_start.heading, given_start.sun_from_s
     last = past.last
     if last is not None and (last.end > past.state.at or past.state.attitude is None):
@@ -219,7 +233,8 @@ def _heading_after(past: Past, part: Problem, last: Flown) -> tuple[Heading | No
 class _Recorder:
     """A recorder's queue: amounts, each with its image or without one."""
 
-    def __init__(self) -> None:
+    def __init__(self, satellite: int) -> None:
+        self.satellite = satellite
         self.items: list[ImageOnBoard] = []
 
     def put(self, image: ImageOnBoard) -> None:
@@ -235,57 +250,100 @@ class _Recorder:
             self.items[i] = replace(item, amount=0.0 if left <= _NOTHING else left)
             amount -= gone
 
+    def correct(self, level: float) -> None:
+        """Take away what came down unnoticed, or add what nobody told of."""
+        missing = level - sum(item.amount for item in self.items)
+        if missing < 0.0:
+            self.take(-missing)
+        else:
+            self.put(_image(self.satellite, _NO_TARGET, missing, 0.0, 0.0))
+
     def held(self) -> tuple[ImageOnBoard, ...]:
         return tuple(i for i in self.items if i.target != _NO_TARGET or i.amount > 0.0)
 
 
 def _queue(past: Past, part: Problem) -> tuple[ImageOnBoard, ...]:
-    """Return what the recorder holds when the horizon begins; images on the ground have 0."""
-    scenario, state = past.scenario, past.state
-    resources = scenario.satellites[past.index].resources
-    capacity_mbit, until = resources.recorder_capacity_mbit, scenario.horizon.start
-    targets = {target.id: i for i, target in enumerate(scenario.targets)}
-    recorder = _Recorder()
+    """Return what the recorder holds when the horizon begins; images on the ground have 0.
 
-    def data(amount: float) -> ImageOnBoard:
-        return _image(past, _NO_TARGET, amount, 0.0, 0.0)
+    ``part`` is of ``past.of_data``.
+    """
+    told, past = past.state, past.of_data
+    resources = past.scenario.satellites[past.index].resources
+    until = past.scenario.horizon.start
+    level = told.recorder(resources.recorder_capacity_mbit)
+    recorder = _recorder_at(past)
+    now, is_corrected = past.state.at, told is past.state or level is None
 
-    for listed in state.on_board:
-        target = targets[listed.target_id]
-        worth = scenario.targets[target].reward if listed.worth is None else listed.worth
-        collected_s = scenario.horizon.offset_s(listed.collected_at)
-        amount = listed.amount(capacity_mbit)
-        recorder.put(_image(past, target, amount, collected_s, worth))
-    held = state.recorder(capacity_mbit)
-    if held is None:
-        held = resources.initial_recorder_fraction
-    recorder.put(data(held - sum(item.amount for item in recorder.items)))
-    now = state.at
+    def wait(instant: datetime) -> None:
+        nonlocal now
+        amount = resources.telemetry_per_s * (instant - now).total_seconds()
+        recorder.put(_image(past.index, _NO_TARGET, amount, 0.0, 0.0))
+        now = instant
+
     for row, flown in enumerate(past.done):
         end = min(flown.end, until)
         if flown.start >= until:
             continue
-        recorder.put(data(resources.telemetry_per_s * (end - now).total_seconds()))
-        now = end
-        amount = _amount(past, part, row, flown)
-        if flown.target_id is None:
-            recorder.take(amount)
-        elif flown.is_imaged and flown.end <= until:
-            worth = float(part.worth_on_ground[row])
-            collected_s = scenario.horizon.offset_s(flown.end)
-            target = targets[flown.target_id]
-            recorder.put(_image(past, target, amount, collected_s, worth))
-        else:
-            recorder.put(data(amount))
-    recorder.put(data(resources.telemetry_per_s * (until - now).total_seconds()))
+        if not is_corrected and end > told.at:
+            wait(told.at)
+            recorder.correct(level or 0.0)
+            is_corrected = True
+        wait(end)
+        _record(past, part, row, flown, recorder)
+    if not is_corrected:
+        wait(told.at)
+        recorder.correct(level or 0.0)
+    wait(until)
     return _without_overflow(recorder.held())
 
 
+def _recorder_at(past: Past) -> _Recorder:
+    """Return the recorder at the state: what is listed, and then what else it holds."""
+    scenario, state, index = past.scenario, past.state, past.index
+    resources = scenario.satellites[index].resources
+    targets = {target.id: i for i, target in enumerate(scenario.targets)}
+    recorder = _Recorder(index)
+    for listed in state.on_board or ():
+        target = targets[listed.target_id]
+        worth = scenario.targets[target].reward if listed.worth is None else listed.worth
+        amount = listed.amount(resources.recorder_capacity_mbit)
+        collected_s = scenario.horizon.offset_s(listed.collected_at)
+        recorder.put(_image(index, target, amount, collected_s, worth))
+    listed_targets = {image.target for image in recorder.items}
+    for flown in past.flown if state.on_board is not None else ():
+        # What telemetry does not list any more is on the ground.
+        if flown.is_imaged and flown.end <= state.at:
+            target = targets[flown.target_id or ""]
+            if target not in listed_targets:
+                collected_s = scenario.horizon.offset_s(flown.end)
+                recorder.put(_image(index, target, 0.0, collected_s, 0.0))
+    held = state.recorder(resources.recorder_capacity_mbit)
+    if held is None:
+        held = resources.initial_recorder_fraction
+    rest = held - sum(item.amount for item in recorder.items)
+    recorder.put(_image(index, _NO_TARGET, rest, 0.0, 0.0))
+    return recorder
+
+
+def _record(past: Past, part: Problem, row: int, flown: Flown, recorder: _Recorder) -> None:
+    """Let an action write into a recorder, or take from it."""
+    scenario, amount = past.scenario, _amount(past, part, row, flown)
+    if flown.target_id is None:
+        recorder.take(amount)
+        return
+    if not flown.is_imaged or flown.end > scenario.horizon.start:
+        recorder.put(_image(past.index, _NO_TARGET, amount, 0.0, 0.0))
+        return
+    target = next(i for i, t in enumerate(scenario.targets) if t.id == flown.target_id)
+    worth, collected_s = float(part.worth_on_ground[row]), scenario.horizon.offset_s(flown.end)
+    recorder.put(_image(past.index, target, amount, collected_s, worth))
+
+
 def _image(
-    past: Past, target: int, amount: float, collected_s: float, worth: float
+    satellite: int, target: int, amount: float, collected_s: float, worth: float
 ) -> ImageOnBoard:
     return ImageOnBoard(
-        satellite=past.index, target=target, amount=amount, collected_s=collected_s, worth=worth
+        satellite=satellite, target=target, amount=amount, collected_s=collected_s, worth=worth
     )
 
 

@@ -192,7 +192,7 @@ def _images(scenario: Scenario, index: int, state: State) -> tuple[ImageOnBoard,
             if image.worth is None
             else image.worth,
         )
-        for image in state.on_board
+        for image in state.on_board or ()
     )
 
 

@@ -112,7 +112,7 @@ def plan_scenario(
         search = budget.part(_SEARCH) if aims else budget
         solution = solver.solve(relieved, search, seed)
     else:
-        question = question_of(scenario, relieved)
+        question = question_of(scenario, within_limits(problem))
         prices = None if before is None else before.prices
         solution = solve_replan(question, solver, budget, seed, prices)
     solution = flyable(without_on_board(problem), relieved, solution)

@@ -8,6 +8,7 @@ from datetime import datetime
 from typing import Final, Literal
 
 from planner_core.domain.checks import require
+from planner_core.domain.states import State
 from planner_core.errors import InvalidScenario
 from planner_core.pins import PinnedAction
 
@@ -100,6 +101,9 @@ class Replan:
     flown
         What began before the horizon. States are carried to its start by these actions. The last
         one of a satellite before its state says where that looked, if nothing else does.
+    before
+        Older states, where newer ones do not say what is on board: that follows from these and
+        from what was flown since, and the newer ones correct how much it is.
     """
 
     base: tuple[PinnedAction, ...]
@@ -108,6 +112,7 @@ class Replan:
     stability: Stability = field(default_factory=Stability)
     elements: Elements = "same"
     flown: tuple[Flown, ...] = ()
+    before: tuple[State, ...] = ()
 
     @property
     def near_s(self) -> float:

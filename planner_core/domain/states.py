@@ -151,7 +151,8 @@ class State:
     attitude
         Where it looks. None where that is not known: then the first task needs no turn.
     on_board
-        Images that come down first, in this order, and then what else the recorder holds.
+        Images that come down first, in this order, and then what else the recorder holds. None
+        where that is not known.
     """
 
     satellite_id: str
@@ -159,7 +160,7 @@ class State:
     battery_fraction: float | None = None
     recorder_fraction: float | None = None
     attitude: Attitude | None = None
-    on_board: tuple[OnBoard, ...] = ()
+    on_board: tuple[OnBoard, ...] | None = None
 
     def recorder(self, capacity_mbit: float | None) -> float | None:
         """Return what the recorder holds: what the images come to where that is all we know."""
@@ -222,10 +223,11 @@ def check_states(
 def _check_on_board(
     state: State, pointer: str, target_ids: Collection[str], capacity_mbit: float | None
 ) -> None:
-    for number, image in enumerate(state.on_board):
+    images = state.on_board or ()
+    for number, image in enumerate(images):
         image.check(f"{pointer}/on_board/{number}", state.at, target_ids, capacity_mbit)
     held = 1.0 if state.recorder_fraction is None else state.recorder_fraction
-    listed = math.fsum(image.amount(capacity_mbit) for image in state.on_board)
+    listed = math.fsum(image.amount(capacity_mbit) for image in images)
     if listed > held + _ROUNDING:
         raise InvalidScenario(
             "value_out_of_range",

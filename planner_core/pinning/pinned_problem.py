@@ -42,6 +42,7 @@ from planner_core.problem import (
     Problem,
     Struck,
 )
+from planner_core.problem.delivery import least_age_s
 from planner_core.problem.first_turns import too_soon
 from planner_core.problem.on_board import imaged_before
 from planner_core.problem.restrict import restricted
@@ -92,13 +93,18 @@ def with_frozen(scenario: Scenario, problem: Problem, pinned: Pinned, replan: Re
     in_outage = _in_outages(problem, pinned)
     rows = rows_of_base(scenario, table, replan)
     targets = {target.id: i for i, target in enumerate(scenario.targets)}
-    late = {
-        int(row): f"/replan/promises/{i}"
-        for i, promise in enumerate(replan.promises)
-        if promise.image_by is not None
-        for row in problem.collects_of(targets[promise.target_id])
-        if table.end_s[row] > scenario.horizon.offset_s(promise.image_by) + TIME_TOLERANCE_S
-    }
+    offset_s, down_s = scenario.horizon.offset_s, None
+    late: dict[int, str] = {}
+    for i, promise in enumerate(replan.promises):
+        own = problem.collects_of(targets[promise.target_id])
+        is_late = np.zeros(len(own), dtype=np.bool_)
+        if promise.image_by is not None:
+            is_late |= table.end_s[own] > offset_s(promise.image_by) + TIME_TOLERANCE_S
+        if promise.deliver_by is not None:
+            # At the earliest, whatever else is done.
+            down_s = table.end_s + least_age_s(problem) if down_s is None else down_s
+            is_late |= down_s[own] > offset_s(promise.deliver_by) + TIME_TOLERANCE_S
+        late |= {int(row): f"/replan/promises/{i}" for row in own[is_late]}
     pinned = replace(pinned, frozen_until_s=frozen_until_s, skipped={**late, **pinned.skipped})
     return replace(
         pinned,

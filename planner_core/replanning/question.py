@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Final
 
 import numpy as np
 
 from planner_core.domain import Stability
-from planner_core.problem import COLLECT, CONTACT, Bools, Floats, Ints, Problem
+from planner_core.problem import (
+    COLLECT,
+    CONTACT,
+    Bools,
+    Floats,
+    ImageOnBoard,
+    Ints,
+    Problem,
+)
 from planner_core.problem.plan import Plan
+from planner_core.problem.slew import TIME_TOLERANCE_S
 from planner_core.referee.replay import Timeline, replay
 
 _KEPT_VERDICTS: Final = 16  # plans of a fleet take megabytes each
@@ -28,6 +39,10 @@ class Question:
         How many actions it had after the freeze, those that are lost included.
     promised
         Targets that must be imaged, in the order of the promises.
+    deadline_s
+        By target, when an image of it must be on the ground.
+    on_board
+        Images from before the horizon, which the problem itself leaves out.
     """
 
     problem: Problem
@@ -35,6 +50,8 @@ class Question:
     num_base: int
     promised: tuple[int, ...]
     stability: Stability
+    deadline_s: Mapping[int, float] = field(default_factory=dict)
+    on_board: tuple[ImageOnBoard, ...] = ()
 
     @cached_property
     def bonus(self) -> Floats:
@@ -97,11 +114,36 @@ class Question:
         return self.num_base - kept
 
     def missing(self, plan: Plan) -> frozenset[int]:
-        """Return the promised targets that a plan does not image."""
+        """Return the promised targets that a plan does not image, or brings down too late."""
         table = self.problem.opportunities
         imaged = {
             int(table.place[action.opportunity])
             for action in plan.actions
             if table.kind[action.opportunity] == COLLECT
         }
-        return frozenset(self.promised) - imaged
+        imaged |= {image.target for image in self.on_board}
+        missing = frozenset(self.promised) - imaged
+        if not self.deadline_s:
+            return missing
+        down_s = self.down_s(plan)
+        late = {
+            target
+            for target, deadline_s in self.deadline_s.items()
+            if down_s.get(target, math.inf) > deadline_s + TIME_TOLERANCE_S
+        }
+        return missing | late
+
+    def down_s(self, plan: Plan) -> dict[int, float]:
+        """Return when the first image of each target is on the ground, of those that are."""
+        timeline = replay(replace(self.problem, on_board=self.on_board), plan)
+        found = {
+            target: image.delivered_s
+            for target, image in timeline.collected.items()
+            if image.delivered_s is not None
+        }
+        for one in timeline.brought_down:
+            if self.on_board[one.image].amount == 0.0:
+                found[one.target] = 0.0
+            elif one.delivered_s is not None:
+                found[one.target] = min(one.delivered_s, found.get(one.target, math.inf))
+        return found

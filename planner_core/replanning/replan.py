@@ -22,7 +22,8 @@ from planner_core.certified.proofs.resource_bound import quick_bound
 from planner_core.domain import Scenario
 from planner_core.errors import InvalidScenario
 from planner_core.pinning.pinned_problem import rows_of_base
-from planner_core.problem import Problem
+from planner_core.problem import COLLECT, CONTACT, Problem
+from planner_core.problem.on_board import without_on_board
 from planner_core.problem.plan import Plan
 from planner_core.replanning.known import KnownPrices, bound_at
 from planner_core.replanning.programs import fewest_changes, mixed
@@ -51,7 +52,13 @@ def question_of(scenario: Scenario, problem: Problem) -> Question:
     ]
     targets = {target.id: i for i, target in enumerate(scenario.targets)}
     return Question(
-        problem=problem,
+        problem=without_on_board(problem),
+        deadline_s={
+            targets[promise.target_id]: scenario.horizon.offset_s(promise.deliver_by)
+            for promise in replan.promises
+            if promise.deliver_by is not None
+        },
+        on_board=problem.on_board,
         base=np.array(sorted(rows), dtype=np.int32),
         num_base=len(later),
         promised=tuple(targets[promise.target_id] for promise in replan.promises),
@@ -166,7 +173,43 @@ def with_promised(question: Question, plan: Plan) -> Plan:
                 trials.append(trial)
         fewer = [t for t in trials if len(question.missing(t)) < len(question.missing(plan))]
         plan = max(fewer, key=lambda trial: value(question, trial), default=plan)
+    for target in sorted(question.missing(plan) & question.deadline_s.keys()):
+        plan = _with_downlink(question, plan, target)
     return plan
+
+
+def _with_downlink(question: Question, plan: Plan, target: int) -> Plan:
+    """Return the plan with a contact by which an image of a target is down in time, if any.
+
+    With another image of it where the one at hand is too late.
+    """
+    problem = question.problem
+    table, kept = problem.opportunities, set(problem.kept_rows.tolist())
+    taken = [action.opportunity for action in plan.actions]
+    own = [row for row in taken if table.kind[row] == COLLECT and table.place[row] == target]
+    images = [*own, *(row for row in problem.collects_of(target).tolist() if row not in own)]
+    holders = [(int(table.satellite[row]), float(table.end_s[row]), [row]) for row in images]
+    holders += [(i.satellite, 0.0, []) for i in question.on_board if i.target == target]
+    deadline_s = question.deadline_s[target]
+    best, fewest = plan, len(question.missing(plan))
+    for satellite, from_s, rows in holders:
+        others = [row for row in taken if row not in own or row in kept or row in rows]
+        for contact in problem.satellites[satellite].rows.tolist():
+            start_s = table.start_s[contact]
+            if table.kind[contact] != CONTACT or not from_s <= start_s <= deadline_s:
+                continue
+            new = [row for row in (*rows, contact) if row not in others]
+            gone = {other for row in new for other in conflicts(problem, row, others)}
+            if gone & kept:
+                continue
+            protected = {*np.flatnonzero(question.is_promised).tolist(), contact}
+            trial = repaired(problem, [*(set(others) - gone), *new], protected)
+            num_missing = len(question.missing(trial))
+            if num_missing < fewest and question.judged(trial).is_valid:
+                best, fewest = trial, num_missing
+        if fewest < len(question.missing(plan)):
+            return best
+    return best
 
 
 def _require_promises(question: Question, plan: Plan) -> None:
@@ -174,6 +217,10 @@ def _require_promises(question: Question, plan: Plan) -> None:
     for i, target in enumerate(question.promised):
         if target not in missing:
             continue
+        if target in question.deadline_s and target not in replace(question, deadline_s={}).missing(
+            plan
+        ):
+            raise _late(question, plan, target, i)
         why = (
             "each of its opportunities takes the place of something else promised or flown, or "
             "breaks battery or recorder"
@@ -185,6 +232,22 @@ def _require_promises(question: Question, plan: Plan) -> None:
             f"The promised target {problem.target_ids[target]!r} is not imaged: {why}.",
             pointer=f"/replan/promises/{i}",
         )
+
+
+def _late(question: Question, plan: Plan, target: int, number: int) -> InvalidScenario:
+    down_s = question.down_s(plan).get(target)
+    name = question.problem.target_ids[target]
+    said = (
+        "its image is never on the ground"
+        if down_s is None
+        else f"it is on the ground {down_s - question.deadline_s[target]:.0f} s too late"
+    )
+    return InvalidScenario(
+        "promise_not_kept",
+        f"The promised target {name!r} is not delivered in time: {said}, and no contact before "
+        "would do that leaves what is promised and flown.",
+        pointer=f"/replan/promises/{number}/deliver_by",
+    )
 
 
 def _first_bound(problem: Problem, known: KnownPrices | None, reward: float) -> Bound:

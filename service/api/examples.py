@@ -65,6 +65,12 @@ BODIES: Final[dict[str, Any]] = {
 EXECUTIONS: Final = [{"action_id": "a2", "outcome": "executed", "mbit": 120.5}]
 """What is reported of a plan."""
 
+STATES: Final = [
+    {"satellite_id": _ID, "at": "2019-01-01T06:00:00Z", "battery_fraction": 0.82,
+     "recorder_fraction": 0.31}
+]  # fmt: skip
+"""What telemetry tells of a plan's satellites."""
+
 _FEATURES: Final = {
     "type": "FeatureCollection",
     "features": [

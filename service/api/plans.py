@@ -2,27 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from datetime import datetime
 from typing import Annotated, Any, cast
 
-from fastapi import APIRouter, Body, Query, Response
+from fastapi import APIRouter, Query, Response
 from sqlalchemy.orm import Session
 
 from planner_core.errors import Fault
 from service.access.callers import Caller, Scope
 from service.api import job_intake as intake
 from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
-from service.api.deps import Call, CallDep
+from service.api.deps import CallDep
 from service.api.errors import problem_responses
 from service.api.etags import etagged
-from service.api.examples import EXECUTIONS
 from service.api.guard import require_scope
 from service.api.idempotency import OnceDep
 from service.api.paging import PagingDep, newest_first
 from service.api.timelines import Suffix, timeline_answer, timeline_responses
 from service.db.rows import (
-    ExecutionRow,
     JobRow,
     PlanActionRow,
     PlanRow,
@@ -37,17 +34,13 @@ from service.stores import deletion, job_store
 from service.webhooks import outbox
 from service.wire.base import Listed, parse_instant, read
 from service.wire.plans import (
-    MAX_REPORTED,
     TRANSITIONS,
-    ExecutionIn,
-    ExecutionOut,
     PlanActionOut,
     PlanEventOut,
     PlanIn,
     PlanOut,
     PlanSatelliteOut,
     PlanState,
-    ReportedOut,
     TransitionIn,
 )
 from service.wire.scenarios import HorizonOut
@@ -189,55 +182,6 @@ def list_actions(
     return Listed(items=[action_out(row, last) for row, last in page.rows], next=page.next)
 
 
-@router.post("/{plan_id}/executions", status_code=201, responses=problem_responses(404, 409, 422))
-def report_executions(
-    plan_id: str,
-    reports: Annotated[
-        list[ExecutionIn],
-        Body(min_length=1, max_length=MAX_REPORTED, examples=[EXECUTIONS]),
-    ],
-    call: CallDep,
-    once: OnceDep,
-) -> ReportedOut:
-    """Report what became of actions. Reports are added, never changed: the last one counts."""
-    with once.transaction() as session:
-        plan = find_plan(session, plan_id, call.caller)
-        rows = take_down(session, call, plan, reports)
-        return once.keep(session, ReportedOut(executions=tuple(map(_execution_out, rows))))
-
-
-def take_down(
-    session: Session, call: Call, plan: PlanRow, reports: Sequence[ExecutionIn], at: str = ""
-) -> list[ExecutionRow]:
-    """Store what was reported of a plan that has been published; errors point from ``at`` on."""
-    if plan.state in ("draft", "approved"):
-        raise ServiceError(
-            "invalid_transition", f"The plan is {plan.state}: it has not been published yet."
-        )
-    unknown = plan_store.unknown_actions(session, plan.id, [r.action_id for r in reports])
-    faults = [
-        Fault(code="unknown_action", detail=f"The plan has no action {each.action_id!r}.",
-              pointer=f"{at}/{i}/action_id")
-        for i, each in enumerate(reports)
-        if each.action_id in unknown
-    ]  # fmt: skip
-    if faults:
-        raise refuse(faults)
-    rows = plan_store.report(session, call.caller, plan.id, reports)
-    call.audit.record(session, "report", "plan", plan.id)
-    return rows
-
-
-@router.get("/{plan_id}/executions", responses=problem_responses(404))
-def list_executions(plan_id: str, call: CallDep, paging: PagingDep) -> Listed[ExecutionOut]:
-    """List what was reported of a plan, newest first."""
-    with call.database.reading() as session:
-        find_plan(session, plan_id, call.caller)
-        query = plan_store.executions(plan_id)
-        page = newest_first(session, query, ExecutionRow.id, paging)
-    return Listed(items=[_execution_out(row) for row in page.rows], next=page.next)
-
-
 @router.get(
     "/{plan_id}/timeline.{suffix}", response_class=Response, responses=timeline_responses(FORMS)
 )
@@ -269,6 +213,7 @@ def _plan_out(plan: PlanRow, satellites: list[PlanSatelliteRow]) -> PlanOut:
         "actions": f"{address}/actions",
         "history": f"{address}/history",
         "executions": f"{address}/executions",
+        "states": f"{address}/states",
         "timeline": f"{address}/timeline.json",
         "passes": f"{address}/passes",
         "job": f"/v1/jobs/{plan.job_id}",
@@ -294,10 +239,6 @@ def _plan_out(plan: PlanRow, satellites: list[PlanSatelliteRow]) -> PlanOut:
         created_at=plan.created_at,
         links=links,
     )
-
-
-def _execution_out(row: ExecutionRow) -> ExecutionOut:
-    return ExecutionOut.model_validate(row, from_attributes=True)
 
 
 def action_out(row: PlanActionRow, outcome: str | None) -> PlanActionOut:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from datetime import datetime
 
+import sqlalchemy as sa
 from fastapi import APIRouter
 from sqlalchemy.orm import Session
 
 from planner_core.domain import Agility
+from planner_core.errors import Fault
 from planner_core.problem.slew import INSTANT, slew_s
 from planner_core.referee.plan_diff import PlannedAction
 from planner_core.replanning.changes import Changed, changes_of, share_of
@@ -16,18 +19,22 @@ from service.api import job_intake as intake
 from service.api.deps import CallDep
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
-from service.api.plans import action_out, find_plan, take_down
-from service.db.rows import JobRow, PlanActionRow, PlanRow, ScenarioRow
+from service.api.plans import action_out, find_plan
+from service.api.telemetry import faults_of_states, take_down
+from service.db.rows import JobRow, PlanActionRow, PlanRow, SatelliteRow, ScenarioRow
 from service.jobs import submission
 from service.plans import replans
 from service.plans import store as plan_store
+from service.problems.faults import refuse
 from service.scenarios import freezing, replanning
 from service.scenarios.pin_inputs import with_settled_pins
 from service.scenarios.stored_question import StoredQuestion
 from service.scenarios.translate import read_file
 from service.stores import outage_store
 from service.wire.jobs import JobOut
+from service.wire.pins import StateIn
 from service.wire.replans import PlanChangeItem, PlanChangesOut, ReplanIn
+from service.wire.scenarios import FileSatellite, ScenarioFile
 
 router = APIRouter(prefix="/v1/plans", tags=["plans"])
 
@@ -55,9 +62,9 @@ def create_replan(plan_id: str, body: ReplanIn, call: CallDep, once: OnceDep) ->
         plan = find_plan(session, plan_id, call.caller)
         if body.executions:
             take_down(session, call, plan, body.executions, "/executions")
-        now = body.now or plan_store.now(session)
+        now = _to_the_millisecond(body.now or plan_store.now(session))
         freeze_until = max(body.freeze_until or now, now)
-        happened = _happened(session, plan, body, freeze_until)
+        happened = _happened(session, plan, body, file, now, freeze_until)
         asked = replanning.replan_file(file, body, happened)
         with replanning.pointing_into(body):
             if body.keep or body.skip:
@@ -73,8 +80,17 @@ def create_replan(plan_id: str, body: ReplanIn, call: CallDep, once: OnceDep) ->
         return once.keep(session, intake.accepted(session, call.response, made))
 
 
+def _to_the_millisecond(instant: datetime) -> datetime:
+    return instant.replace(microsecond=instant.microsecond // 1000 * 1000)
+
+
 def _happened(
-    session: Session, plan: PlanRow, body: ReplanIn, freeze_until: datetime
+    session: Session,
+    plan: PlanRow,
+    body: ReplanIn,
+    file: ScenarioFile,
+    now: datetime,
+    freeze_until: datetime,
 ) -> replanning.Happened:
     stations = {
         row.station_id
@@ -85,12 +101,54 @@ def _happened(
     stored = outage_store.concerning(
         session, satellites, stations, plan.horizon_start, body.horizon_end or plan.horizon_end
     )
+    states = _telemetry(session, plan, body, file, now)
+    is_corrected = bool(states) or any(
+        row.outcome in ("failed", "partial") or row.mbit is not None
+        for row in plan_store.last_reports(session, plan.id).values()
+    )
+    begins = now if is_corrected and now > file.horizon.start else None
     return replanning.Happened(
-        base=replans.base_of(session, plan.id),
+        base=replans.base_of(session, plan.id, begins),
         freeze_until=freeze_until,
+        begins=begins,
+        states=states,
+        flown=[] if begins is None else replans.flown_of(session, plan.id, begins),
+        elements=_newest(session, satellites) if body.elements == "newest" else {},
         outages=[outage_store.placed(row) for row in stored],
         targets=freezing.targets_by_catalog(session, body.add_target_catalog_ids),
     )
+
+
+def _telemetry(
+    session: Session, plan: PlanRow, body: ReplanIn, file: ScenarioFile, now: datetime
+) -> dict[str, StateIn]:
+    """Return the newest state of each satellite, where it is newer than the one it began with."""
+    faults = faults_of_states(session, plan, body.states, "/states")
+    faults += [
+        Fault(code="value_out_of_range", detail="A state cannot be of later than now.",
+              pointer=f"/states/{i}/at")
+        for i, state in enumerate(body.states)
+        if state.at > now
+    ]  # fmt: skip
+    if faults:
+        raise refuse(faults)
+    known = plan_store.last_states(session, plan.id, now)
+    known |= {state.satellite_id: state for state in sorted(body.states, key=lambda s: s.at)}
+    began = {state.satellite_id: state.at for state in file.states}
+    return {
+        own_id: state
+        for own_id, state in known.items()
+        if state.at >= began.get(own_id, file.horizon.start)
+    }
+
+
+def _newest(session: Session, satellite_ids: Sequence[str]) -> dict[str, FileSatellite]:
+    """Return the satellites with their elements of today, those that are still stored."""
+    wanted = sa.select(SatelliteRow.id).where(
+        SatelliteRow.id.in_(satellite_ids), SatelliteRow.deleted_at.is_(None)
+    )
+    stored = freezing.satellites_of(session, list(session.scalars(wanted)))
+    return {str(one.id): one for one in stored}
 
 
 @router.get("/{plan_id}/changes", responses=problem_responses(404))

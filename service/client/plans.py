@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import datetime
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 from service.client.jobs import Job, Jobs
 from service.client.transport import Transport, path_of
@@ -14,8 +14,11 @@ from service.wire.plans import ExecutionOut as Execution
 from service.wire.plans import PlanActionOut as PlanAction
 from service.wire.plans import PlanEventOut as PlanEvent
 from service.wire.plans import PlanOut as Plan
-from service.wire.plans import ReportedOut
+from service.wire.plans import PlanStateOut as PlanState
+from service.wire.plans import ReportedOut, StatesReportedOut
 from service.wire.replans import PlanChangesOut as PlanChanges
+
+_CSV: Final = {"Content-Type": "text/csv"}
 
 At = datetime | Literal["now"]
 
@@ -136,6 +139,44 @@ class Plans:
         )  # fmt: skip
         return told.executions
 
+    def report_csv(
+        self, plan_id: str, data: bytes, *, idempotency_key: str | None = None
+    ) -> Sequence[Execution]:
+        """Report what became of actions, as a table with a header."""
+        told = self._transport.post(
+            path_of("plans", plan_id, "executions"), ReportedOut, content=data, headers=_CSV,
+            idempotency_key=idempotency_key,
+        )  # fmt: skip
+        return told.executions
+
+    def add_states(
+        self,
+        plan_id: str,
+        states: Iterable[Mapping[str, Any]],
+        *,
+        idempotency_key: str | None = None,
+    ) -> Sequence[PlanState]:
+        """Add telemetry: ``{"satellite_id": …, "at": …, "battery_fraction": 0.8}``, and so on."""
+        told = self._transport.post(
+            path_of("plans", plan_id, "states"), StatesReportedOut,
+            json=[_in_text(each) for each in states], idempotency_key=idempotency_key,
+        )  # fmt: skip
+        return told.states
+
+    def add_states_csv(
+        self, plan_id: str, data: bytes, *, idempotency_key: str | None = None
+    ) -> Sequence[PlanState]:
+        """Add telemetry, as a table with a header."""
+        told = self._transport.post(
+            path_of("plans", plan_id, "states"), StatesReportedOut, content=data, headers=_CSV,
+            idempotency_key=idempotency_key,
+        )  # fmt: skip
+        return told.states
+
+    def states(self, plan_id: str) -> Iterator[PlanState]:
+        """Yield telemetry of a plan, newest first."""
+        return self._transport.pages(path_of("plans", plan_id, "states"), PlanState)
+
     def executions(self, plan_id: str) -> Iterator[Execution]:
         """Yield what was reported, newest first."""
         return self._transport.pages(path_of("plans", plan_id, "executions"), Execution)
@@ -169,3 +210,11 @@ class Plans:
             headers={} if if_match is None else {"If-Match": if_match},
             idempotency_key=None,
         )
+
+
+def _in_text(state: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a state with its instants as text."""
+    return {
+        name: instant_text(value) if isinstance(value, datetime) else value
+        for name, value in state.items()
+    }

@@ -522,6 +522,21 @@ class PlanEventRow(Row):
     waivers: Mapped[list[Json]] = mapped_column(sa.JSON)
 
 
+class PlanStateRow(Row):
+    """Telemetry of a satellite of a plan, as reported. Rows are added, never changed."""
+
+    __tablename__ = "plan_state"
+
+    id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
+    plan_id: Mapped[str] = mapped_column(sa.ForeignKey("plan.id"), index=True)
+    satellite_id: Mapped[str]
+    at: Mapped[datetime]
+    body: Mapped[Json]
+    owner: Mapped[str] = mapped_column(sa.String(64))
+    key_name: Mapped[str | None] = mapped_column(sa.String(64))
+    reported_at: Mapped[datetime]
+
+
 class PublisherRow(Row):
     """One row for each owner, locked by whoever publishes: one plan after the other."""
 

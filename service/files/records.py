@@ -20,7 +20,20 @@ B = TypeVar("B", bound=BaseModel)
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _WHOLE = re.compile(r"[+-]?\d{1,18}", re.ASCII)
 _TEXT_COLUMNS = frozenset(
-    {"id", "name", "satellite_id", "target_id", "station_id", "release", "due", "sensor_type"}
+    {
+        "id",
+        "name",
+        "satellite_id",
+        "target_id",
+        "station_id",
+        "release",
+        "due",
+        "sensor_type",
+        "action_id",
+        "outcome",
+        "at",
+        "detail",
+    }
 )
 _ALIASES = {
     "lat": "lat_deg",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
@@ -16,24 +16,51 @@ from service.webhooks import outbox
 from service.wire.base import Json
 from service.wire.instants import instant_text
 from service.wire.pins import PinnedActionIn
+from service.wire.plan_before import FlownIn
+from service.wire.plans import Outcome
 from service.wire.timelines import TimelineOut
 
 _GONE: Final = ("failed", "skipped")
 
 
-def base_of(session: Session, plan_id: str) -> list[PinnedActionIn]:
-    """Return the actions of a plan, in words, less those that were reported as not done."""
+def base_of(session: Session, plan_id: str, from_: datetime | None = None) -> list[PinnedActionIn]:
+    """Return the actions of a plan, in words, less those that were reported as not done.
+
+    With an instant those that end after it, as far as they do.
+    """
     gone = failed_actions(session, plan_id)
     return [
         PinnedActionIn(
             satellite_id=row.satellite_id,
             target_id=row.target_id,
             station_id=row.station_id,
-            start=row.start,
+            start=row.start if from_ is None else max(row.start, from_),
+            end=row.end,
         )
         for row in all_actions(session, plan_id)
-        if row.action_id not in gone
+        if row.action_id not in gone and (from_ is None or row.end > from_)
     ]
+
+
+def flown_of(session: Session, plan_id: str, until: datetime) -> list[FlownIn]:
+    """Return the actions of a plan that began before an instant, and what became of them."""
+    last = store.last_reports(session, plan_id)
+    found = []
+    for row in all_actions(session, plan_id):
+        report = last.get(row.action_id)
+        if row.start < until:
+            found.append(
+                FlownIn(
+                    satellite_id=row.satellite_id,
+                    target_id=row.target_id,
+                    station_id=row.station_id,
+                    start=row.start,
+                    end=row.end,
+                    outcome="executed" if report is None else cast(Outcome, report.outcome),
+                    mbit=None if report is None else report.mbit,
+                )
+            )
+    return found
 
 
 def all_actions(session: Session, plan_id: str) -> list[PlanActionRow]:

@@ -18,10 +18,13 @@ from service.db.rows import (
     PlanEventRow,
     PlanRow,
     PlanSatelliteRow,
+    PlanStateRow,
     PublisherRow,
 )
 from service.wire.base import dumped
+from service.wire.pins import StateIn
 from service.wire.plans import ExecutionIn, PlanState, WaiverIn
+from service.wire.stored import from_store
 from service.wire.timelines import IDLE_MODES, TimelineOut
 
 
@@ -209,6 +212,45 @@ def report(
     session.add_all(rows)
     session.flush()
     return rows
+
+
+def report_states(
+    session: Session, caller: Caller, plan_id: str, states: Sequence[StateIn]
+) -> list[PlanStateRow]:
+    """Take down telemetry."""
+    reported_at = now(session)
+    rows = [
+        PlanStateRow(
+            id=new_id(), plan_id=plan_id, satellite_id=each.satellite_id, at=each.at,
+            body=dumped(each), owner=caller.owner, key_name=caller.key_name,
+            reported_at=reported_at,
+        )
+        for each in states
+    ]  # fmt: skip
+    session.add_all(rows)
+    session.flush()
+    return rows
+
+
+def states(plan_id: str) -> sa.Select[PlanStateRow]:
+    """Return the query of all telemetry of a plan."""
+    return sa.select(PlanStateRow).where(PlanStateRow.plan_id == plan_id)
+
+
+def last_states(session: Session, plan_id: str, until: datetime) -> dict[str, StateIn]:
+    """Return the newest state of each satellite until an instant; of equal ones the last sent."""
+    wanted = states(plan_id).where(PlanStateRow.at <= until)
+    found: dict[str, StateIn] = {}
+    for row in session.scalars(wanted.order_by(PlanStateRow.at, PlanStateRow.id)):
+        found[row.satellite_id] = from_store(StateIn, row.body)
+    return found
+
+
+def last_reports(session: Session, plan_id: str) -> dict[str, ExecutionRow]:
+    """Return what was reported last of each action."""
+    return {
+        row.action_id: row for row in session.scalars(executions(plan_id).order_by(ExecutionRow.id))
+    }
 
 
 def executions(plan_id: str) -> sa.Select[ExecutionRow]:

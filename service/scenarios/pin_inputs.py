@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import TypeVar
 
-from planner_core.domain import Attitude, OnBoard, Outage, Promise, Replan, Stability, State
+from planner_core.domain import Attitude, Flown, OnBoard, Outage, Promise, Replan, Stability, State
 from planner_core.errors import InvalidScenario
 from planner_core.pins import BlockedInterval, PinnedAction, Pins
 from service.wire.pins import (
@@ -61,7 +61,9 @@ def state_from(body: StateIn) -> State:
         battery_fraction=body.battery_fraction,
         recorder_fraction=body.recorder_fraction,
         attitude=None if body.attitude is None else attitude_from(body.attitude),
-        on_board=tuple(
+        on_board=None
+        if body.on_board is None
+        else tuple(
             OnBoard(**{name: getattr(image, name) for name in OnBoardIn.model_fields})
             for image in body.on_board
         ),
@@ -85,11 +87,11 @@ def replan_from(body: ReplanOfFile) -> Replan:
     return Replan(
         base=tuple(action_from(action) for action in body.base),
         freeze_until=body.freeze_until,
-        promises=tuple(
-            Promise(target_id=promise.target_id, image_by=promise.image_by)
-            for promise in body.promises
-        ),
+        promises=tuple(Promise(**dict(promise)) for promise in body.promises),
         stability=Stability(**body.stability.model_dump()),
+        elements=body.elements,
+        flown=tuple(Flown(**dict(flown)) for flown in body.flown),
+        before=tuple(state_from(state) for state in body.before),
     )
 
 

@@ -5,16 +5,17 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from typing import Final
 
 from planner_core.errors import Fault, PlannerError
 from service.problems.faults import refuse
-from service.wire.pins import OutageIn, PinnedActionIn, PinsIn, PlacedOutage
-from service.wire.plan_before import PromiseIn, ReplanOfFile
+from service.scenarios.translate import scenario_from_file
+from service.wire.pins import OutageIn, PinnedActionIn, PinsIn, PlacedOutage, StateIn
+from service.wire.plan_before import FlownIn, PromiseIn, ReplanOfFile
 from service.wire.replans import ReplanIn
-from service.wire.scenarios import FileTarget, HorizonIn, ScenarioFile
+from service.wire.scenarios import FileSatellite, FileTarget, HorizonIn, ScenarioFile
 
 _PIN: Final = re.compile(r"/pins/(keep|skip)/(\d+)")
 
@@ -33,12 +34,24 @@ class Happened:
         Those stored that concern the question.
     targets
         Those of catalogues to be added, by the number of the catalogue in the body.
+    begins
+        When the new plan begins; None for when the plan before did.
+    states
+        Of satellites, the newest before that instant.
+    flown
+        What was done before it.
+    elements
+        Satellites with the orbits that are in force now, by id.
     """
 
     base: Sequence[PinnedActionIn]
     freeze_until: datetime
     outages: Sequence[PlacedOutage]
     targets: Sequence[tuple[int, FileTarget]]
+    begins: datetime | None = None
+    states: Mapping[str, StateIn] = field(default_factory=dict)
+    flown: Sequence[FlownIn] = ()
+    elements: Mapping[str, FileSatellite] = field(default_factory=dict)
 
 
 def replan_file(file: ScenarioFile, body: ReplanIn, happened: Happened) -> ScenarioFile:
@@ -51,6 +64,7 @@ def replan_file(file: ScenarioFile, body: ReplanIn, happened: Happened) -> Scena
     """
     targets = [*file.targets, *(FileTarget(**dict(t)) for t in body.add_targets)]
     targets += [target for _, target in happened.targets]
+    begins = happened.begins or file.horizon.start
     end = body.horizon_end or file.horizon.end
     flown = {
         action.target_id
@@ -58,7 +72,7 @@ def replan_file(file: ScenarioFile, body: ReplanIn, happened: Happened) -> Scena
         if action.start is not None and action.start < happened.freeze_until
     }
     faults = [
-        *_faults_of_times(file, end, happened.freeze_until),
+        *_faults_of_times(begins, end, happened.freeze_until),
         *_faults_of_added(file, body, happened),
         *_faults_of_dropped(file, body, flown),
         *_faults_of_promises(body, {target.id for target in targets}),
@@ -75,7 +89,9 @@ def replan_file(file: ScenarioFile, body: ReplanIn, happened: Happened) -> Scena
     return file.model_copy(
         update={
             "name": None,
-            "horizon": HorizonIn(start=file.horizon.start, end=end),
+            "horizon": HorizonIn(start=begins, end=end),
+            "satellites": [_with_elements(one, happened.elements) for one in file.satellites],
+            "states": _states(file, happened),
             "targets": [_with_reward(target, body.rewards) for target in targets],
             "outages": outages,
             "objective": body.objective or file.objective,
@@ -85,9 +101,63 @@ def replan_file(file: ScenarioFile, body: ReplanIn, happened: Happened) -> Scena
                 freeze_until=happened.freeze_until,
                 promises=_promises(file, body),
                 stability=body.stability,
+                elements=body.elements,
+                flown=_flown(file, happened),
+                before=_older(file, happened),
             ),
         }
     )
+
+
+def _with_elements(satellite: FileSatellite, newest: Mapping[str, FileSatellite]) -> FileSatellite:
+    """Return a satellite with the orbit that is in force now."""
+    now = newest.get(satellite.id or "")
+    if now is None:
+        return satellite
+    return satellite.model_copy(update={"tle": now.tle, "omm": now.omm, "oem": now.oem})
+
+
+def _states(file: ScenarioFile, happened: Happened) -> list[StateIn]:
+    """Return where each satellite begins: by telemetry, or as in the plan before."""
+    if happened.begins is None:
+        return list(file.states)
+    began = {state.satellite_id: state for state in _began(file)}
+    return list((began | dict(happened.states)).values())
+
+
+def _began(file: ScenarioFile) -> list[StateIn]:
+    """Return what each satellite of a question begins with, its resources' own levels written."""
+    known = {state.satellite_id: state for state in file.states}
+    found = []
+    for satellite in scenario_from_file(file).satellites:
+        r = satellite.resources
+        state = known.get(satellite.id)
+        if state is None:
+            state = StateIn(satellite_id=satellite.id, at=file.horizon.start)
+        levels = {"battery_fraction": r.initial_battery_fraction}
+        if state.on_board is None:  # what is listed says how much it is
+            levels["recorder_fraction"] = r.initial_recorder_fraction
+        missing = {name: own for name, own in levels.items() if getattr(state, name) is None}
+        found.append(state.model_copy(update=missing))
+    return found
+
+
+def _older(file: ScenarioFile, happened: Happened) -> list[StateIn]:
+    """Return the states from which on it is known what is on board, where newer ones are not."""
+    if happened.begins is None:
+        return [] if file.replan is None else file.replan.before
+    older = {} if file.replan is None else {s.satellite_id: s for s in file.replan.before}
+    return [
+        older.get(began.satellite_id, began) if began.on_board is None else began
+        for began in _began(file)
+        if began.satellite_id in happened.states or began.satellite_id in older
+    ]
+
+
+def _flown(file: ScenarioFile, happened: Happened) -> list[FlownIn]:
+    """Return what was flown before this plan and the one before it."""
+    earlier = [] if file.replan is None else file.replan.flown
+    return [*earlier, *happened.flown]
 
 
 def _with_reward(target: FileTarget, rewards: Mapping[str, float]) -> FileTarget:
@@ -138,8 +208,8 @@ def _promises(file: ScenarioFile, body: ReplanIn) -> list[PromiseIn]:
     return [*body.promises, *(one for one in before if one.target_id not in gone)]
 
 
-def _faults_of_times(file: ScenarioFile, end: datetime, freeze_until: datetime) -> list[Fault]:
-    if freeze_until < end and file.horizon.start < end:
+def _faults_of_times(begins: datetime, end: datetime, freeze_until: datetime) -> list[Fault]:
+    if freeze_until < end and begins < end:
         return []
     detail = "Nothing is left to plan: the horizon ends before freeze_until."
     return [Fault(code="value_out_of_range", detail=detail, pointer="/horizon_end")]

@@ -151,19 +151,13 @@ def canonical_of_file(file: ScenarioFile) -> str:
     if document["collect_alignment"] == "access":
         del document["collect_alignment"]
     _without_unset(document, "replan")
-    for action in document.get("replan", {}).get("base", ()):
-        _without_unset(action, *tuple(action))
+    if "replan" in document:
+        _plain_replan(document["replan"])
     _plain_objective(document)
     for outage in document["outages"]:
         _without_unset(outage, "id", "satellite_id", "station_id", "reason")
     for state in document["states"]:
-        _without_unset(state, "battery_fraction", "recorder_fraction", "attitude")
-        if not state["on_board"]:
-            del state["on_board"]
-        for image in state.get("on_board", ()):
-            _without_unset(image, "mbit", "recorder_fraction", "worth")
-        if "attitude" in state:
-            _without_unset(state["attitude"], *tuple(state["attitude"]))
+        _plain_state(state)
     for part in ("outages", "states"):
         if not document[part]:
             del document[part]
@@ -171,6 +165,32 @@ def canonical_of_file(file: ScenarioFile) -> str:
         if not any(document[part].values()):
             del document[part]
     return json.dumps(document, sort_keys=True, separators=(",", ":"), allow_nan=False)
+
+
+def _plain_replan(replan: dict[str, Any]) -> None:
+    """Leave out what younger releases may say of a plan to go on from."""
+    for action in replan["base"]:
+        _without_unset(action, *tuple(action))
+    for promise in replan["promises"]:
+        if promise["deliver_by"] is None:
+            del promise["deliver_by"]
+    for flown in replan["flown"]:
+        _without_unset(flown, "target_id", "station_id", "mbit")
+    for state in replan["before"]:
+        _plain_state(state)
+    for part in ("flown", "before"):
+        if not replan[part]:
+            del replan[part]
+    _without(replan, elements="same")
+
+
+def _plain_state(state: dict[str, Any]) -> None:
+    """Leave out of a state what it does not say."""
+    _without_unset(state, "battery_fraction", "recorder_fraction", "attitude", "on_board")
+    for image in state.get("on_board", ()):
+        _without_unset(image, "mbit", "recorder_fraction", "worth")
+    if "attitude" in state:
+        _without_unset(state["attitude"], *tuple(state["attitude"]))
 
 
 def _plain_objective(document: dict[str, Any]) -> None:

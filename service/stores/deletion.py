@@ -26,6 +26,7 @@ from service.db.rows import (
     PlanEventRow,
     PlanRow,
     PlanSatelliteRow,
+    PlanStateRow,
     Row,
     ScenarioOwnerRow,
     ScenarioPartRow,
@@ -81,7 +82,7 @@ def delete_plan(session: Session, plan: PlanRow) -> None:
             "invalid_transition", f"The plan is {plan.state}: withdraw it, then it can be deleted."
         )
     _require_unused(session, PlanRow, PlanRow.parent_id == plan.id, "The plan", "a change of this")
-    for row in (ExecutionRow, PlanEventRow, PlanActionRow, PlanSatelliteRow):
+    for row in (ExecutionRow, PlanStateRow, PlanEventRow, PlanActionRow, PlanSatelliteRow):
         _delete(session, row, row.plan_id == plan.id)
     _delete(session, PlanRow, PlanRow.id == plan.id)
 

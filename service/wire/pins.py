@@ -165,11 +165,12 @@ class StateIn(Body):
         description="Where it looked: no task begins before it can have turned to it from there. "
         "Null where that is not known: the first task needs no turn.",
     )
-    on_board: list[OnBoardIn] = Field(
-        [],
+    on_board: list[OnBoardIn] | None = Field(
+        None,
         max_length=100_000,
         description="Images that come down first, in this order, and then what else the recorder "
-        "holds. New images of their targets earn nothing.",
+        "holds; their targets need no other image. Null where that is not known: a replan then "
+        "goes by the plan and what was reported of it.",
     )
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field
 
-from service.wire.base import Body, Id, Instant
-from service.wire.pins import PinnedActionIn
+from service.wire.base import Body, Id, Instant, NonNegative
+from service.wire.pins import PinnedActionIn, StateIn
 
 Share = Annotated[float, Field(ge=0, le=1)]
 
@@ -17,6 +17,7 @@ class PromiseIn(Body):
 
     target_id: Id
     image_by: Instant | None = Field(None, description="When the image must have ended.")
+    deliver_by: Instant | None = Field(None, description="When it must be on the ground.")
 
 
 class StabilityIn(Body):
@@ -32,6 +33,21 @@ class StabilityIn(Body):
     )
 
 
+class FlownIn(Body):
+    """An action that began before the horizon, and what became of it."""
+
+    satellite_id: Id
+    target_id: Id | None = None
+    station_id: Id | None = None
+    start: Instant
+    end: Instant
+    outcome: Literal["executed", "failed", "skipped", "partial"] = "executed"
+    mbit: NonNegative | None = Field(
+        None,
+        description="Taken or brought down; null for what was planned, of what failed nothing.",
+    )
+
+
 class ReplanOfFile(Body):
     """The plan that a scenario's plans go on from."""
 
@@ -44,3 +60,12 @@ class ReplanOfFile(Body):
     )
     promises: list[PromiseIn] = Field([], max_length=10_000)
     stability: StabilityIn = StabilityIn()
+    elements: Literal["same", "newest"] = Field(
+        "same", description="Whether satellites have other elements than in the plan before."
+    )
+    flown: list[FlownIn] = Field(
+        [], max_length=1_000_000, description="What lies between the states and the horizon."
+    )
+    before: list[StateIn] = Field(
+        [], max_length=10_000, description="Older states, which tell what is on board."
+    )

@@ -7,6 +7,7 @@ from typing import Final, Literal
 from pydantic import Field
 
 from service.wire.base import Body, Id, Instant, Name, Open, Reason, Stored, Wire
+from service.wire.pins import AttitudeIn, OnBoardIn
 from service.wire.scenarios import HorizonOut
 from service.wire.timelines import ViolationOut
 
@@ -143,6 +144,27 @@ class ExecutionOut(Wire):
     owner: str
     key_name: str | None
     reported_at: Instant
+
+
+class PlanStateOut(Wire):
+    """Telemetry, as it came."""
+
+    id: str
+    satellite_id: str
+    at: Instant
+    battery_fraction: float | None
+    recorder_fraction: float | None
+    attitude: AttitudeIn | None
+    on_board: list[OnBoardIn] | None
+    owner: str
+    key_name: str | None
+    reported_at: Instant
+
+
+class StatesReportedOut(Wire):
+    """What was taken down of telemetry."""
+
+    states: tuple[PlanStateOut, ...]
 
 
 class ReportedOut(Wire):

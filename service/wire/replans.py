@@ -8,7 +8,7 @@ from pydantic import Field
 
 from service.wire.base import Body, Free, Id, Instant, Name, NonNegative, Open, Wire
 from service.wire.jobs import LimitsIn
-from service.wire.pins import OutageIn, PinnedActionIn
+from service.wire.pins import OutageIn, PinnedActionIn, StateIn
 from service.wire.places import TargetIn
 from service.wire.plan_before import PromiseIn, StabilityIn
 from service.wire.plans import MAX_REPORTED, ExecutionIn, PlanActionOut
@@ -25,6 +25,18 @@ class ReplanIn(Body):
     horizon_end: Instant | None = Field(None, description="That of the plan by default.")
     outages: list[OutageIn] = Field(
         [], max_length=1000, description="Of this replan alone; those stored are taken along."
+    )
+    states: list[StateIn] = Field(
+        [],
+        max_length=10_000,
+        description="Telemetry of this replan alone; of what was sent before the newest of each "
+        "satellite is taken along. With any, or where a report says that something failed, the "
+        "new plan begins at `now`.",
+    )
+    elements: Literal["same", "newest"] = Field(
+        "same",
+        description="`newest`: the elements of each satellite that are in force today. What is "
+        "frozen stays at its instants; what comes later is matched to the accesses of now.",
     )
     executions: list[ExecutionIn] = Field(
         [], max_length=MAX_REPORTED, description="Reports to take down first, as by `executions`."

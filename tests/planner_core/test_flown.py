@@ -26,6 +26,7 @@ from planner_core.domain import (
     State,
     Target,
 )
+from planner_core.errors import InvalidScenario
 from planner_core.pins import PinnedAction
 from planner_core.problem import COLLECT, Problem
 from planner_core.problem.plan import Plan
@@ -335,3 +336,51 @@ def test_a_replan_from_a_state_keeps_the_frozen_part_to_the_bit() -> None:
         assert [one for one in flown if one.start < freeze] == expected
         assert judged.bound is not None
         assert judged.bound.value >= judged.timeline.reward
+
+
+def _newer(scenario: Scenario, shift_deg: float) -> Scenario:
+    """Return the scenario with elements by which the satellite is further along its orbit."""
+    own = scenario.satellites[0]
+    newer = replace(own, orbit=orbit(mean_anomaly_deg=shift_deg))
+    assert scenario.replan is not None
+    return replace(
+        scenario, satellites=(newer,), replan=replace(scenario.replan, elements="newest")
+    )
+
+
+def test_newest_elements_leave_what_is_frozen_and_match_what_is_not() -> None:
+    """Some seconds along the orbit: accesses move by as much."""
+    whole = whole_of("free")
+    freeze = BEGIN + timedelta(hours=2)
+    scenario = _newer(continued(whole, BEGIN, freeze), 0.5)
+    problem = built(scenario)
+    kept = words(scenario, problem, Plan().with_kept(problem))
+    frozen = [one for one in whole.actions if one.start < freeze]
+    assert kept == frozen
+    judged = plan_scenario(scenario, Rule(), 0, Budget(0.5))
+    assert judged.timeline.is_valid
+    later = [
+        one for one in words(scenario, judged.problem, judged.solution.plan) if one.start >= freeze
+    ]
+    matched = 0
+    for one in whole.actions:
+        if one.start < freeze:
+            continue
+        near = [
+            abs((other.start - one.start).total_seconds())
+            for other in later
+            if (other.target_id, other.station_id) == (one.target_id, one.station_id)
+        ]
+        matched += min(near, default=np.inf) < 60.0
+    assert matched > 0.6 * sum(one.start >= freeze for one in whole.actions)
+
+
+def test_a_frozen_action_that_newest_elements_do_not_see_is_refused() -> None:
+    whole = whole_of("free")
+    scenario = _newer(continued(whole, BEGIN, BEGIN + timedelta(hours=2)), 90.0)
+    with pytest.raises(InvalidScenario) as caught:
+        built(scenario)
+    fault = caught.value.fault
+    assert fault.code == "frozen_not_kept"
+    assert (fault.pointer or "").startswith("/replan/base/")
+    assert "does not see" in fault.detail

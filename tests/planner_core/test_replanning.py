@@ -47,15 +47,23 @@ class Event:
 
 
 def event_at_random(
-    seed: int, *, use_resources: bool, size: int = 1, stability: Stability = BETA
+    seed: int,
+    *,
+    use_resources: bool,
+    size: int = 1,
+    stability: Stability = BETA,
+    is_exact: bool = True,
 ) -> Event | None:
-    """Return a plan that loses a span, is frozen to some instant and has promises."""
+    """Return a plan that loses a span, is frozen to some instant and has promises.
+
+    Not the best one but that of the rule, where it is not to be exact.
+    """
     rng = np.random.default_rng(seed)
     whole = random_problem(
         seed, use_resources=use_resources, num_satellites=2, num_targets=5 * size,
         num_collects=8 * size, num_contacts=3, num_stations=1,
     )  # fmt: skip
-    base = Certified().solve(whole, Budget(), 0).plan
+    base = (Certified() if is_exact else Rule()).solve(whole, Budget(), 0).plan
     if not base.actions or not replay(whole, base).is_valid:
         return None
     table = whole.opportunities

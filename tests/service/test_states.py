@@ -66,7 +66,7 @@ def test_states_are_stored_with_their_scenario(service: Service) -> None:
     scenario = post(service.client, PATH, body | {"states": [state]})
     assert plain["states"] == []
     assert scenario["sha256"] != plain["sha256"]
-    told = {"at": "2026-03-01T00:00:00.000Z", "attitude": None, "on_board": []}
+    told = {"at": "2026-03-01T00:00:00.000Z", "attitude": None, "on_board": None}
     assert scenario["states"] == [state | told]
     assert service.client.get(f"{PATH}/{scenario['id']}").json()["states"] == scenario["states"]
     file = service.client.get(f"{PATH}/{scenario['id']}?expand=true").json()

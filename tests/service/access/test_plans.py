@@ -16,6 +16,7 @@ from tests.service.problems import assert_problem
 
 Document = dict[str, Any]
 NOON = "2019-01-01T12:00:00.000Z"
+_LATER = ("approved", "published", "superseded", "withdrawn")
 
 
 def tasks(mission: Mission) -> list[Document]:
@@ -263,3 +264,56 @@ def test_a_plan_that_is_not_in_force_is_deleted_for_good(desk: Desk) -> None:
     assert client.delete(own, headers=key).status_code == 204
     assert_problem(client.get(own, headers=key), 404, "not_found")
     assert client.delete(job, headers=key).status_code == 204
+
+
+def test_each_transition_is_told_and_the_audit_says_whose_it_was(desk: Desk) -> None:
+    """Two controllers of one owner: one plans, one approves; all five states of two plans."""
+    planner, lead = desk.door.key("submit"), desk.door.key("approve")
+    boss = desk.door.key("admin", "boss")
+    events = [f"plan.{state}" for state in ("draft", *_LATER)]
+    hook = {"url": "https://ops.example/plans", "events": events}
+    assert desk.door.client.post("/v1/webhooks", json=hook, headers=planner).status_code == 201
+    first = desk.draft(planner)
+    desk.move(first, "approved", lead)
+    desk.move(first, "published", planner, effective_from=NOON)
+    second = desk.draft(planner)
+    desk.move(second, "approved", lead)
+    desk.move(second, "published", lead, effective_from=NOON)
+    desk.move(second, "withdrawn", lead)
+    with desk.door.jobs.database.reading() as session:
+        wanted = sa.select(WebhookDeliveryRow).order_by(WebhookDeliveryRow.id)
+        told = [json.loads(row.payload) for row in session.scalars(wanted)]
+    assert [each["type"] for each in told if each["data"]["plan_id"] == first["id"]] == [
+        "plan.draft", "plan.approved", "plan.published", "plan.superseded",
+    ]  # fmt: skip
+    assert [each["type"] for each in told if each["data"]["plan_id"] == second["id"]] == [
+        "plan.draft", "plan.approved", "plan.published", "plan.withdrawn",
+    ]  # fmt: skip
+    query = {"object_id": second["id"]}
+    audit = desk.door.client.get("/v1/audit-events", params=query, headers=boss).json()["items"]
+    assert [(each["action"], each["key_name"]) for each in audit][::-1] == [
+        ("create", "ops-submit"), ("approved", "ops-approve"), ("published", "ops-approve"),
+        ("withdrawn", "ops-approve"),
+    ]  # fmt: skip
+
+
+def test_telemetry_is_added_to_what_is_published_and_recorded(desk: Desk) -> None:
+    key, boss = desk.door.key("approve"), desk.door.key("admin", "boss")
+    draft = desk.draft(key)
+    own_id = draft["satellites"][0]["satellite_id"]
+    state = {"satellite_id": own_id, "at": NOON, "battery_fraction": 0.8}
+    early = desk.door.client.post(f"/v1/plans/{draft['id']}/states", json=[state], headers=key)
+    assert_problem(early, 409, "invalid_transition")
+    plan = desk.published(key, NOON)
+    address = f"/v1/plans/{plan['id']}/states"
+    assert_problem(desk.door.client.post(address, json=[], headers=key), 422, "value_out_of_range")
+    twice = key | {"Idempotency-Key": "states"}
+    answers = [desk.door.client.post(address, json=[state], headers=twice) for _ in range(2)]
+    assert answers[0].json() == answers[1].json()
+    newer = state | {"battery_fraction": 0.7}
+    assert desk.door.client.post(address, json=[newer], headers=key).status_code == 201
+    told = desk.get(plan, key, "/states")["items"]
+    assert [each["battery_fraction"] for each in told] == [0.7, 0.8]
+    query = {"object_id": plan["id"]}
+    audit = desk.door.client.get("/v1/audit-events", params=query, headers=boss).json()["items"]
+    assert [each["action"] for each in audit].count("report") == 2

@@ -267,3 +267,140 @@ def pin(action: PlanAction) -> dict[str, Any]:
 
 def place(action: PlanAction) -> tuple[Any, ...]:
     return (action.satellite_id, action.target_id, action.station_id, action.start)
+
+
+def _told(client: Client, plan: Plan, at: datetime) -> dict[str, Any]:
+    """Return what telemetry would tell at an instant if all went as planned."""
+    timeline = client.jobs.timeline(plan.job_id)
+    curve = timeline.satellites[0].resources
+    assert curve is not None
+    known = [one for one in curve.time if one <= at]
+    return {
+        "satellite_id": timeline.satellites[0].id,
+        "at": at,
+        "battery_fraction": curve.battery_fraction[len(known) - 1],
+        "recorder_fraction": curve.recorder_fraction[len(known) - 1],
+    }
+
+
+@pytest.fixture
+def flown(whole: Client) -> Plan:
+    """A published plan of its own, which reports may be added to."""
+    job = whole.jobs.submit(paper_mission(drawn_targets(60)), "certified", time_s=20).wait()
+    plan = whole.plans.create(job.id, name="Flown")
+    whole.plans.approve(plan.id)
+    return whole.plans.publish(plan.id, effective_from=plan.horizon.start)
+
+
+def test_a_replan_goes_on_from_telemetry(whole: Client, flown: Plan) -> None:
+    """What begins before the freeze stays to the bit; what was imaged is not imaged again."""
+    actions = sorted(whole.plans.actions(flown.id), key=lambda a: a.start)
+    now = noon(flown)
+    freeze = now + timedelta(hours=1)
+    last = max((a for a in actions if a.end < now), key=lambda a: a.end)
+    state = _told(whole, flown, last.end)
+    (sent,) = whole.plans.add_states(flown.id, [state])
+    assert sent.battery_fraction == state["battery_fraction"]
+    assert [one.id for one in whole.plans.states(flown.id)] == [sent.id]
+    draft = replanned(whole, flown, freeze_until=freeze)
+    assert draft.horizon.start == now
+    file = scenario_of(whole, draft)
+    assert [one["at"] for one in file["states"]] == [instant_text(last.end)]
+    before = {a: key for key, a in tasks(whole, flown).items()}
+    frozen = {
+        (*key[:4], max(a.start, now)): a.end
+        for a, key in before.items()
+        if a.end > now and a.start < freeze
+    }
+    kept = {key: a.end for key, a in tasks(whole, draft).items() if a.start < freeze}
+    assert kept == frozen
+    imaged = {a.target_id for a in actions if a.start < now and a.target_id is not None}
+    again = {a.target_id for a in whole.plans.actions(draft.id) if a.start >= freeze}
+    assert not again & imaged
+    timeline = whole.jobs.timeline(draft.job_id)
+    on_board = {one.target_id for one in timeline.satellites[0].on_board}
+    assert on_board == imaged
+    assert timeline.totals.bound is not None
+    assert timeline.totals.reward <= timeline.totals.bound + 1e-6
+    # From that draft on goes another one, by what was flown since the same telemetry.
+    whole.plans.approve(draft.id)
+    whole.plans.publish(draft.id, effective_from=now)
+    later = freeze + timedelta(hours=2)
+    job = whole.plans.replan(
+        draft.id,
+        now=later,
+        states=[_told(whole, draft, later) | {"at": instant_text(later)}],
+        limits={"time_s": 20},
+    ).wait(120)
+    third = whole.plans.draft_of(job)
+    assert third.horizon.start == later
+    known = {one.target_id for one in whole.jobs.timeline(third.job_id).satellites[0].on_board}
+    done = {a.target_id for a in whole.plans.actions(draft.id) if a.end <= later and a.target_id}
+    assert known == imaged | done
+
+
+def test_a_failed_image_is_open_again_and_its_energy_gone(whole: Client, flown: Plan) -> None:
+    now = noon(flown)
+    images = [a for a in whole.plans.actions(flown.id) if a.mode == "collect" and a.end < now]
+    table = f"action_id,outcome,detail\n{images[-1].id},failed,Wheel 3 saturated\n"
+    (report,) = whole.plans.report_csv(flown.id, table.encode())
+    assert (report.outcome, report.detail) == ("failed", "Wheel 3 saturated")
+    draft = replanned(whole, flown)
+    assert draft.horizon.start == now
+    told = {one["start"]: one for one in scenario_of(whole, draft)["replan"]["flown"]}
+    assert told[instant_text(images[-1].start)]["outcome"] == "failed"
+    on_board = {one.target_id for one in whole.jobs.timeline(draft.job_id).satellites[0].on_board}
+    assert on_board == {a.target_id for a in images[:-1]}
+
+
+def test_telemetry_comes_as_a_table(whole: Client, flown: Plan) -> None:
+    own_id = flown.satellites[0].satellite_id
+    at = instant_text(noon(flown))
+    table = (
+        "satellite_id,at,battery_fraction,recorder_fraction,los_x,los_y,los_z,sun\n"
+        f"{own_id},{at},0.8,0.25,0,0.6,0.8,\n{own_id},{at},0.7,,,,,true\n"
+    )
+    first, second = whole.plans.add_states_csv(flown.id, table.encode())
+    assert first.attitude is not None
+    assert first.attitude.line_of_sight == [0.0, 0.6, 0.8]
+    assert second.attitude is not None
+    assert (second.attitude.sun, second.recorder_fraction) == (True, None)
+    for bad, row, word in (
+        (f"satellite_id,at,battery_fraction\n{own_id},{at},1.5\n", 2, "battery_fraction"),
+        (f"satellite_id,at\n{own_id},yesterday\n", 2, "at"),
+    ):
+        with pytest.raises(ServiceError) as caught:
+            whole.plans.add_states_csv(flown.id, bad.encode())
+        (fault,) = caught.value.errors
+        assert fault.row == row
+        assert word in fault.detail
+
+
+def test_telemetry_that_cannot_be_is_refused_with_its_place(whole: Client, flown: Plan) -> None:
+    own_id, at = flown.satellites[0].satellite_id, instant_text(noon(flown))
+    fine = {"satellite_id": own_id, "at": at}
+    image = {"target_id": "none", "collected_at": at, "recorder_fraction": 0.1}
+    for state, code, pointer in (
+        (fine | {"satellite_id": "none"}, "unknown_satellite", "/0/satellite_id"),
+        (fine | {"on_board": [image]}, "unknown_target", "/0/on_board/0/target_id"),
+        (fine | {"attitude": {"target_id": "none"}}, "unknown_target", "/0/attitude/target_id"),
+        (fine | {"battery": 0.5}, "unknown_field", "/0/battery"),
+    ):
+        with pytest.raises(ServiceError) as caught:
+            whole.plans.add_states(flown.id, [state])
+        (fault,) = caught.value.errors
+        assert (fault.code, fault.pointer) == (code, pointer)
+    with pytest.raises(ServiceError) as caught:
+        whole.plans.replan(
+            flown.id,
+            now=noon(flown),
+            states=[fine | {"at": instant_text(noon(flown) + timedelta(seconds=1))}],
+        )
+    assert caught.value.errors[0].pointer == "/states/0/at"
+
+
+def test_newest_elements_keep_what_is_frozen_at_its_instants(whole: Client, flown: Plan) -> None:
+    """Of satellites that are not stored any more nothing newer is known: they stay as they are."""
+    draft = replanned(whole, flown, elements="newest", freeze_until=noon(flown))
+    assert scenario_of(whole, draft)["replan"]["elements"] == "newest"
+    assert tasks(whole, draft).keys() == tasks(whole, flown).keys()
