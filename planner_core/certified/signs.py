@@ -30,3 +30,9 @@ NEVER: Final = float("-inf")
 
 ANY_LEVEL: Final = 2.0
 """Of capacity: no limit."""
+
+ANYWHERE: Final = -2
+"""In place of the contact that a path has taken last: any of them, or none."""
+
+UNREACHED_UNITS: Final = -(2**30)
+"""Instead of units that add up to fewer than ``sizes.MAX_QUEUE_UNITS``: below 0 with those too."""

@@ -426,6 +426,13 @@ class ProofOut(Wire):
             "capacity, in the order of the opportunities."
         ),
     )
+    queue_levels: int | None = Field(
+        None,
+        description=(
+            "With a half-life: the levels of energy in a collect, where programmes that know the "
+            "queue of the recorder prove the bound."
+        ),
+    )
     elementary: bool | None = Field(
         None, description="Whether the prices are for paths that take a target once in each pass."
     )

@@ -43,15 +43,25 @@ class EnergyLevels(NamedTuple):
     give: Ints
 
 
-def energy_levels(network: Network, per_collect: int) -> EnergyLevels:
-    """Return levels of which the cheapest collect costs ``per_collect``, unless they are many."""
+def energy_levels(
+    network: Network, per_collect: int, *, is_optimistic: bool = True
+) -> EnergyLevels:
+    """Return levels of which the cheapest collect costs ``per_collect``, unless they are many.
+
+    Optimistic ones lose no plan; with others every path keeps its limits.
+    """
     collects = network.energy_cost[~network.is_contact.astype(np.bool_)]
     positive = collects[collects > 0.0]
     step = float(positive.min()) / per_collect if len(positive) else 1.0
     left = np.minimum(network.energy_floor, network.energy_cap - network.energy_cost)
     span = float((network.energy_cap - np.minimum.accumulate(left)).max(initial=0.0))
     step = max(step, span / MAX_ENERGY_LEVELS)
-    if network.straight_give.any():
+    if not is_optimistic:
+        # What arcs give back is left out.
+        cap, cost = _down(network.energy_cap, step), _up(network.energy_cost, step)
+        floor = _up(network.energy_floor, step)
+        give = np.zeros(len(network.straight_give), dtype=np.int32)
+    elif network.straight_give.any():
         cap, cost, floor, give = _rounded_potentials(network, step)
     else:
         cap = _up(network.energy_cap, step)
@@ -63,7 +73,7 @@ def energy_levels(network: Network, per_collect: int) -> EnergyLevels:
         cost=cost,
         floor=floor,
         lowest=lowest,
-        start=int(np.ceil(network.energy_start / step - LEVEL)),
+        start=int((_up if is_optimistic else _down)(np.array(network.energy_start), step)),
         width=int((cap - np.minimum(cost, 0) - lowest).max(initial=0)) + 1,
         give=give,
     )
@@ -146,7 +156,7 @@ def most_by_energy(
 
 
 @inlined
-def sink(idle: Floats, levels: int) -> None:
+def sink(idle: Floats | Ints, levels: int) -> None:
     """Let the lowest level be so much lower: whoever has more energy has that much as well."""
     if levels > 0:
         width = len(idle)
@@ -158,7 +168,7 @@ def sink(idle: Floats, levels: int) -> None:
 
 
 @inlined
-def raise_to(values: Floats, others: Floats, up: int) -> None:
+def raise_to(values: Floats | Ints, others: Floats | Ints, up: int) -> None:
     """Raise values to those of a table that begins ``up`` levels higher, or lower."""
     if len(others) == 0:
         return

@@ -17,8 +17,11 @@ from planner_core.certified.drivers.resource_steps import ResourceSearch
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.alternating import TurnSearch
 from planner_core.certified.lns.choices import ChoiceSearch
+from planner_core.certified.lns.queue_plans import plan_with_queues
+from planner_core.certified.lns.resource_search import ResourceWindows
 from planner_core.certified.multipliers.latency import LatencyAscent
-from planner_core.certified.proofs.bound import rounded_bound
+from planner_core.certified.proofs.bound import Bound, rounded_bound
+from planner_core.certified.proofs.queues import queue_value
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import COLLECT, CONTACT, Floats, Ints, Kept, Problem
 from planner_core.problem.plan import Plan
@@ -33,26 +36,43 @@ def close_in_on_the_ground(search: ResourceSearch, unit: float) -> None:
     tried: set[tuple[int, ...]] = set()
     rng = np.random.default_rng(search.seed)
     num_idle = number = 0
-    _lower(best, ascent)
-    search.choose(unit)
+    _lower(best, ascent, TUNING.rounds // 2)
+    named = [_lower_by_queues(best, ascent, TUNING.levels_per_collect // 2)]
+    if not named[0]:
+        search.choose(unit)
     while num_idle < TUNING.patience and not best.is_done:
         before = best.reward
         own = _contacts_of(best.problem, best.plan)
-        offered = (*reversed(ascent.contact_sets), own, *_near(best.problem, own, rng))
+        offered = (*named, *reversed(ascent.contact_sets), own, *_near(best.problem, own, rng))
         contacts = next((one for one in offered if one not in tried), own)
         tried.add(contacts)
-        _plan_with(best, contacts, unit, search.seed + number)
+        _plan_with(best, contacts, ascent.bound.prices, unit, search.seed + number)
         number += 1
         num_idle = 0 if best.reward > before else num_idle + 1
-        _lower(best, ascent)
+        _lower(best, ascent, TUNING.several)
+    if named[0] and not best.is_done:
+        _lower_by_queues(best, ascent, TUNING.levels_per_collect)
 
 
-def _lower(best: Incumbent, ascent: LatencyAscent) -> None:
+def _lower(best: Incumbent, ascent: LatencyAscent, num_rounds: int) -> None:
     """Go on with the ascent for a while."""
-    ascent.improve(TUNING.rounds, best.reward, best.budget.stop)
+    for _ in range(num_rounds):
+        # At first no plan is known that is good: steps towards it would be too long.
+        level = max(best.reward, (1.0 - TUNING.goal_step) * ascent.bound.value)
+        ascent.improve(1, level, best.budget.stop)
     value = rounded_bound(best.problem, ascent.bound.value, best.reward)
     best.lower(replace(ascent.bound, value=value))
     best.report("prices")
+
+
+def _lower_by_queues(best: Incumbent, ascent: LatencyAscent, per_collect: int) -> tuple[int, ...]:
+    """Let exact programmes of queues bound the plans; return the contacts of the best paths."""
+    prices = ascent.bound.prices
+    assert prices is not None
+    value, rows = queue_value(best.problem, prices, per_collect, best.budget.stop)
+    best.lower(Bound(value=value, proof="dp", prices=prices, queue_levels=per_collect))
+    best.report("queues")
+    return tuple(sorted(rows[best.problem.opportunities.kind[rows] == CONTACT].tolist()))
 
 
 def _near(
@@ -69,28 +89,54 @@ def _contacts_of(problem: Problem, plan: Plan) -> tuple[int, ...]:
     return tuple(sorted(row for row in rows if problem.opportunities.kind[row] == CONTACT))
 
 
-def _plan_with(best: Incumbent, contacts: tuple[int, ...], unit: float, seed: int) -> None:
+def _plan_with(
+    best: Incumbent, contacts: tuple[int, ...], prices: Floats | None, unit: float, seed: int
+) -> None:
     """Look for plans that take these contacts, as far as stations can serve them."""
-    problem = best.problem
+    problem, stop = best.problem, best.budget.stop
     served = _served(problem, contacts)
-    part = with_contacts(problem, served, None)
-    choices = ChoiceSearch(part, unit, seed, best.budget.stop)
-    choices.start(np.zeros(len(problem.opportunities), dtype=np.bool_), TUNING.first_goal)
-    plan, reached = choices.plan, 0.0
+    assert prices is not None
+    plan = plan_with_queues(_taking(problem, served), prices, np.random.default_rng(seed), stop)
+    is_known = plan is not None
+    part = with_contacts(problem, served, plan)
+    if plan is None:
+        choices = ChoiceSearch(part, unit, seed, stop)
+        choices.start(np.zeros(len(problem.opportunities), dtype=np.bool_), TUNING.first_goal)
+        plan = choices.plan
+    reached = 0.0
     best.offer(plan)
     for _ in range(TUNING.tries):
         if best.is_done:
             return
-        turns = TurnSearch(part, plan, unit, best.budget, seed)
-        turns.turn(TUNING.tries)
-        best.offer(turns.plan)
+        plan = _bettered(best, part, plan, unit, seed, is_known=is_known)
+        best.offer(plan)
         best.report("plans")
-        plan = turns.plan
         earned = replay(problem, plan).reward
         if earned <= reached:
             return
         reached = earned
         part = with_contacts(problem, served, plan)
+
+
+def _bettered(
+    best: Incumbent, part: Problem, plan: Plan, unit: float, seed: int, *, is_known: bool
+) -> Plan:
+    """Return a plan that is better by windows, and by choices of tasks unless it is from queues."""
+    if is_known:
+        windows = ResourceWindows(part, seed)
+        windows.adopt(plan)
+        windows.make_moves(TUNING.patience * TUNING.moves_in_a_step, best.budget)
+        return windows.plan
+    turns = TurnSearch(part, plan, unit, best.budget, seed)
+    turns.turn(TUNING.tries)
+    return turns.plan
+
+
+def _taking(problem: Problem, contacts: list[int]) -> Problem:
+    """Return the problem with contacts that must be taken."""
+    already = {kept.row for kept in problem.pinned.kept}
+    new = tuple(Kept(row=row, pointer="") for row in contacts if row not in already)
+    return replace(problem, pinned=replace(problem.pinned, kept=(*problem.pinned.kept, *new)))
 
 
 def with_contacts(problem: Problem, contacts: list[int], plan: Plan | None) -> Problem:
@@ -101,12 +147,9 @@ def with_contacts(problem: Problem, contacts: list[int], plan: Plan | None) -> P
     plan
         What else is in the queue; nothing by default.
     """
-    already = {kept.row for kept in problem.pinned.kept}
-    new = tuple(Kept(row=row, pointer="") for row in contacts if row not in already)
     return replace(
-        problem,
+        _taking(problem, contacts),
         worth=worth_with(problem, contacts, plan),
-        pinned=replace(problem.pinned, kept=(*problem.pinned.kept, *new)),
         left_on_board=None if problem.objective.collected_share > 0.0 else 0.0,
     )
 

@@ -24,6 +24,7 @@ from planner_core.certified.proofs.certificate import (
 from planner_core.certified.proofs.continuous import continuous_value
 from planner_core.certified.proofs.lagrangian import lagrangian_value
 from planner_core.certified.proofs.latency import latency_value
+from planner_core.certified.proofs.queues import queue_value
 from planner_core.certified.proofs.resource_bound import resource_value
 from planner_core.certified.proofs.totals import totals_bound
 from planner_core.certified.tolerances import WRITTEN
@@ -40,6 +41,8 @@ def to_json(bound: Bound) -> str:
         document["prices"] = bound.prices.tolist()
     if bound.contact_prices is not None:
         document["contact_prices"] = bound.contact_prices.tolist()
+    if bound.queue_levels is not None:
+        document["queue_levels"] = bound.queue_levels
     if bound.is_elementary:
         document["elementary"] = True
     if bound.unit is not None:
@@ -67,6 +70,7 @@ def from_json(text: str) -> Bound:
         proof=cast(Proof, document["proof"]),
         prices=prices("prices"),
         contact_prices=prices("contact_prices"),
+        queue_levels=document.get("queue_levels"),
         is_elementary=bool(document.get("elementary", False)),
         unit=document.get("unit"),
         certificate=Certificate(
@@ -103,6 +107,8 @@ def is_proven(problem: Problem, bound: Bound) -> bool | None:
         return None
     if problem.continuous_starts:
         value = continuous_value(problem, bound.prices)
+    elif bound.queue_levels is not None:
+        value, _ = queue_value(problem, bound.prices, bound.queue_levels)
     elif bound.contact_prices is not None:
         value = latency_value(problem, bound.prices, bound.contact_prices)
     elif bound.unit is not None:

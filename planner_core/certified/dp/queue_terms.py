@@ -1,0 +1,128 @@
+"""What the programme over contacts and queues knows of one satellite."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planner_core.certified.dp.contact_queues import Queues
+from planner_core.certified.dp.data_levels import data_levels
+from planner_core.certified.dp.energy_labels import energy_levels
+from planner_core.certified.dp.resource_network import Network, part_of
+from planner_core.certified.sizes import (
+    MAX_QUEUE_ENTRIES,
+    MAX_QUEUE_STEPS,
+    MAX_QUEUE_UNITS,
+    MAX_QUEUE_WORK,
+    QUEUE_STEPS,
+)
+from planner_core.certified.tolerances import DOWN, DOWN_S
+from planner_core.problem import COLLECT, CONTACT, Floats, Ints, Problem, SatelliteProblem
+
+
+def queues_of(
+    problem: Problem,
+    satellite: SatelliteProblem,
+    network: Network,
+    price: Floats,
+    *,
+    per_collect: int,
+    num_classes: int,
+    rows: Ints | None = None,
+    keeps_battery: bool = False,
+    keeps_recorder: bool = False,
+) -> Queues | None:
+    """Return the programme of a satellite; None where it would take too long.
+
+    Parameters
+    ----------
+    network
+        Its network, relaxed or strict as the programme is.
+    price
+        Of each target. Shape ``(num_targets,)``.
+    per_collect
+        How many levels of energy the cheapest collect takes.
+    num_classes
+        Of promises.
+    rows
+        Those of its tasks that count, ascending; all by default.
+    keeps_battery, keeps_recorder
+        Whether energy, or data, is rounded so that all paths keep their limits, and not so that no
+        plan is lost.
+    """
+    if rows is None:
+        rows = np.arange(len(satellite), dtype=np.int32)
+    else:
+        network = part_of(network, rows)
+    kind, table_rows = satellite.kind[rows], satellite.rows[rows]
+    is_image, contact = kind == COLLECT, np.flatnonzero(kind == CONTACT).astype(np.int32)
+    energy = energy_levels(network, per_collect, is_optimistic=not keeps_battery)
+    data = data_levels(network, 1, is_optimistic=not keeps_recorder)
+    number = np.full(len(rows), -1, dtype=np.int32)
+    number[contact] = np.arange(len(contact))
+    kept = np.flatnonzero(np.append(network.is_kept[contact], False))
+    places = np.searchsorted(kept, np.arange(len(contact) + 1))
+    first = np.append(-1, kept)[places].astype(np.int32)
+    on_board = problem.objective.collected_share * problem.worth_on_ground[table_rows]
+    span = int((network.idle_from - np.arange(len(rows))).max(initial=0)) + 1
+    num_tables = min(len(rows), span)
+    begins = np.append(0, contact)[first + 1]
+    num_tasks = int((np.append(contact, len(rows)) - begins).sum())
+    width = data.num_levels * energy.width
+    arcs = 2.0 + len(network.straight_rows) / max(1, len(rows))
+    kept_entries = num_classes * width * (num_tables + len(contact) + 1)
+    if num_tasks * width * arcs > MAX_QUEUE_WORK or kept_entries > MAX_QUEUE_ENTRIES:
+        return None
+    level = float(data.least[1] - data.least[0]) if data.num_levels > 1 else 1.0
+    volume = satellite.volume[rows[contact]] + DOWN
+    step = max(level / QUEUE_STEPS, float(volume.max(initial=0.0)) / MAX_QUEUE_STEPS)
+    prices = np.where(is_image, np.append(price, 0.0)[satellite.place[rows] * is_image], 0.0)
+    most = problem.worth[table_rows]
+    setup_s = problem.downlinks.stations.setup_s[satellite.place[rows][contact]]
+    return Queues(
+        network=network,
+        energy=energy,
+        data=data,
+        contact=contact,
+        number=number,
+        first=first,
+        down_s=_down_s(problem, satellite, rows[contact], volume, step),
+        step=step,
+        ready_s=satellite.start_s[rows][contact] + setup_s - DOWN_S,
+        volume=volume,
+        num_classes=num_classes,
+        queued=-network.data_floor - DOWN,
+        end_s=satellite.end_s[rows],
+        on_board=np.where(is_image, on_board, 0.0),
+        decaying=np.where(is_image, problem.worth_on_ground[table_rows] - on_board, 0.0),
+        most=most,
+        price=prices,
+        half_life_s=float(problem.objective.half_life_s or np.inf),
+        unit=max(float(most.sum()), 1e-9) / MAX_QUEUE_UNITS,
+        num_tables=max(1, num_tables),
+        takes_worthless=False,
+    )
+
+
+def _down_s(
+    problem: Problem, satellite: SatelliteProblem, contacts: Ints, volume: Floats, step: float
+) -> Floats:
+    """Return when contacts have taken down so many steps; infinite for what they have no time for.
+
+    Shape ``(num_contacts, num_steps)``.
+    """
+    links, access = problem.downlinks, problem.opportunities.access[satellite.rows[contacts]]
+    amounts = step * np.arange(int(volume.max(initial=0.0) / step) + 2)
+    found = np.full((len(contacts), len(amounts)), np.inf)
+    for at, row in enumerate(contacts.tolist()):
+        ready_s = satellite.start_s[row] + float(links.stations.setup_s[satellite.place[row]])
+        fits = amounts <= volume[at]
+        passing = links.passes.get(int(access[at]))
+        if passing is None:
+            gain = float(links.stations.gain[satellite.place[row]])
+            rate_per_s = satellite.resources.downlink_per_s * gain
+            found[at, fits] = ready_s + amounts[fits] / max(rate_per_s, 1e-12)
+        else:
+            before, whole = passing.until(np.array([ready_s, passing.time_s[-1]]))
+            found[at, fits] = passing.when(np.minimum(before + amounts[fits], whole))
+    found -= DOWN_S
+    return found

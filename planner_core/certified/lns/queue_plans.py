@@ -1,0 +1,105 @@
+"""Plans with given contacts, where images are worth less the later they come down.
+
+With the contacts that a plan must take, the programme over queues has one stretch of tasks between
+two contacts after another, and takes a fraction of a second. It may take a target twice; then one
+of the two is settled on, until there is none.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planner_core.certified.dp.contact_queues import most_by_queues
+from planner_core.certified.dp.queue_terms import queues_of
+from planner_core.certified.dp.resource_network import strict_network_of
+from planner_core.certified.tuning import TUNING
+from planner_core.problem import COLLECT, Bools, Bytes, Floats, Ints, Problem, SatelliteProblem
+from planner_core.problem.plan import Plan
+from planner_core.referee.replay import replay
+
+
+def plan_with_queues(
+    problem: Problem, price: Floats, rng: np.random.Generator, stop: Bytes
+) -> Plan | None:
+    """Return a good plan that takes no contacts but those that it must; None without programmes.
+
+    A recorder that is rounded against a plan costs an image at each contact: 206.4 of 209.7 and
+    not 208. So it is rounded in favour of plans first, and against them where one overflows.
+
+    Parameters
+    ----------
+    price
+        Of each target, which keeps satellites from taking it twice. Shape ``(num_targets,)``.
+    """
+    for keeps_recorder in (False, True):
+        plan = _plan(problem, price, rng, stop, keeps_recorder=keeps_recorder)
+        if plan is None or stop[0] or replay(problem, plan).is_valid:
+            break
+    return plan
+
+
+def _plan(
+    problem: Problem,
+    price: Floats,
+    rng: np.random.Generator,
+    stop: Bytes,
+    *,
+    keeps_recorder: bool,
+) -> Plan | None:
+    """Return a plan of one satellite after another, each over the targets that are left."""
+    is_free = np.ones(len(problem.target_ids), dtype=np.bool_)
+    rows = list[int]()
+    for satellite in problem.satellites:
+        if len(satellite) == 0:
+            continue
+        path = _settled(
+            problem, satellite, is_free, price, rng, stop, keeps_recorder=keeps_recorder
+        )
+        if path is None:
+            return None
+        images = path[satellite.kind[path] == COLLECT]
+        is_free[satellite.place[images]] = False
+        rows += satellite.rows[path].tolist()
+    return Plan.of(problem, rows)
+
+
+def _settled(
+    problem: Problem,
+    satellite: SatelliteProblem,
+    is_free: Bools,
+    price: Floats,
+    rng: np.random.Generator,
+    stop: Bytes,
+    *,
+    keeps_recorder: bool,
+) -> Ints | None:
+    """Return a path of a satellite that takes each target once, of those that are free."""
+    network = strict_network_of(problem, satellite)
+    is_image = satellite.kind == COLLECT
+    is_open = is_image & is_free[satellite.place * is_image]
+    is_open &= problem.worth[satellite.rows] > 0.0
+    is_open |= network.is_kept
+    while not stop[0]:
+        rows = np.flatnonzero(is_open).astype(np.int32)
+        queues = queues_of(
+            problem,
+            satellite,
+            network,
+            price,
+            per_collect=TUNING.levels_per_collect,
+            num_classes=1,
+            rows=rows,
+            keeps_battery=True,
+            keeps_recorder=keeps_recorder,
+        )
+        if queues is None:
+            return None
+        path = rows[most_by_queues(queues, stop)[1]]
+        images = rng.permutation(path[is_image[path]])
+        _, first, counts = np.unique(satellite.place[images], return_index=True, return_counts=True)
+        if counts.max(initial=1) == 1:
+            return path
+        twice = images[first[counts > 1]]
+        is_open &= ~(is_image & np.isin(satellite.place, satellite.place[twice]))
+        is_open[twice] = True
+    return None

@@ -1,0 +1,64 @@
+r"""An upper bound where images are worth less the later they come down: queues before contacts.
+
+Prices of targets, as in ``latency``, but none of contacts: for each satellite an exact programme
+knows which contact comes next and what waits for it (``planner_core.certified.dp.contact_queues``).
+Left out are stations. It takes seconds where prices of contacts take hundredths, and proves half a
+percent more.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planner_core.certified.dp.contact_queues import most_by_queues
+from planner_core.certified.dp.queue_terms import queues_of
+from planner_core.certified.dp.resource_network import network_of
+from planner_core.certified.sizes import PROMISES
+from planner_core.precedence.relation import is_transitive_on
+from planner_core.problem import Bytes, Floats, Ints, Problem, SatelliteProblem
+from planner_core.worth import surplus
+
+
+def is_supported(satellite: SatelliteProblem) -> bool:
+    """Return whether no path of the satellite needs a task that is worth nothing."""
+    own = satellite.resources
+    is_dear = own.sun_pointing == "free" and own.idle_drain_per_s == 0.0
+    return is_dear and is_transitive_on(satellite)
+
+
+def queue_value(
+    problem: Problem, prices: Floats, per_collect: int, stop: Bytes | None = None
+) -> tuple[float, Ints]:
+    """Return the bound that prices of targets prove, and the rows of paths that reach it.
+
+    Infinite where the programme would take too long, or ``stop`` is set.
+
+    Parameters
+    ----------
+    prices
+        Shape ``(num_targets,)``.
+    per_collect
+        How many levels of energy a collect takes.
+    """
+    price = surplus(prices, problem.best_worth)
+    stop = np.zeros(1, dtype=np.uint8) if stop is None else stop
+    value, paths = float(price.sum()), [np.empty(0, dtype=np.int32)]
+    for satellite in problem.satellites:
+        if len(satellite) == 0:
+            continue
+        queues = None
+        if is_supported(satellite):
+            queues = queues_of(
+                problem,
+                satellite,
+                network_of(problem, satellite),
+                price,
+                per_collect=per_collect,
+                num_classes=PROMISES,
+            )
+        if queues is None:
+            return np.inf, paths[0]
+        gained, path = most_by_queues(queues, stop)
+        value += gained
+        paths.append(satellite.rows[path])
+    return value, np.concatenate(paths)

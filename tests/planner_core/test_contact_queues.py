@@ -1,0 +1,158 @@
+"""Queues before contacts, where images are worth less the later they come down."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import Literal
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from planner_core.certified.dp.contact_queues import most_by_queues
+from planner_core.certified.dp.queue_terms import queues_of
+from planner_core.certified.dp.resource_network import strict_network_of
+from planner_core.certified.lns.queue_plans import plan_with_queues
+from planner_core.certified.proofs import queues
+from planner_core.certified.proofs.bound import Bound, rounded_bound
+from planner_core.certified.proofs.documents import from_json, is_proven, to_json
+from planner_core.certified.proofs.latency import latency_value
+from planner_core.certified.proofs.queues import is_supported, queue_value
+from planner_core.domain import Objective
+from planner_core.problem import CONTACT, Kept, Problem
+from planner_core.problem.delivery import with_objective
+from planner_core.problem.plan import Plan
+from planner_core.referee.replay import replay
+from tests.examples import examples
+from tests.planner_core.brute_force import best_reward
+from tests.planner_core.problems import TIGHT, make_problem, random_problem, varied_problem
+from tests.planner_core.test_delivery import ROOMY, collect, contact
+
+SEEDS = st.integers(0, 10**6)
+STARVED = replace(TIGHT, battery_min_fraction=0.5, initial_battery_fraction=0.62)
+_problem = partial(varied_problem, scarce=STARVED)
+Dynamics = Literal["physical", "paper"]
+STOP = np.zeros(1, dtype=np.uint8)
+
+
+@pytest.mark.parametrize("dynamics", ["physical", "paper"])
+@examples(400)
+@given(
+    seed=SEEDS,
+    collected_share=st.sampled_from([0.0, 0.3, 0.9]),
+    half_life_s=st.floats(60.0, 2000.0),
+    num_satellites=st.integers(1, 2),
+    has_quality=st.booleans(),
+    per_collect=st.sampled_from([1, 3, 24]),
+)
+def test_no_plan_beats_any_prices(
+    dynamics: Dynamics,
+    seed: int,
+    collected_share: float,
+    half_life_s: float,
+    num_satellites: int,
+    has_quality: bool,
+    per_collect: int,
+) -> None:
+    problem = _problem(seed, dynamics, num_satellites, num_contacts=3, has_quality=has_quality)
+    objective = Objective(collected_share=collected_share, half_life_s=half_life_s)
+    problem = with_objective(problem, objective)
+    best = best_reward(problem)
+    rng = np.random.default_rng(seed)
+    free = np.zeros(len(problem.target_ids))
+    some = np.maximum(rng.uniform(-0.5, 1.0, len(free)) * problem.best_worth, 0.0)
+    for prices in (free, some):
+        assert queue_value(problem, prices, per_collect)[0] >= best - 1e-9
+
+
+def _narrow(seed: int) -> Problem:
+    """Return a mission whose contacts take down an image or two each, at next to no energy."""
+    rng = np.random.default_rng(seed)
+    tasks = [collect(target, float(t)) for target, t in enumerate(rng.integers(0, 500, 5))]
+    begins_s = 40.0 + 70.0 * np.sort(rng.choice(12, 3, replace=False))
+    tasks += [contact(t, t + 30.0 * float(rng.integers(1, 3))) for t in begins_s]
+    problem = make_problem(tasks, num_targets=5, resources=ROOMY)
+    return with_objective(problem, Objective(collected_share=0.0, half_life_s=200.0))
+
+
+def test_images_that_a_contact_has_no_time_for_count_with_a_later_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Short contacts would else bring down whatever waits, and no promise would name the next."""
+    by_queues, by_contacts, without_promises = [], [], []
+    none = np.zeros(5)
+    for seed in range(60):
+        problem = _narrow(seed)
+        best = best_reward(problem)
+        if best > 0.0:
+            by_queues.append(queue_value(problem, none, 24)[0] / best)
+            by_contacts.append(latency_value(problem, none, none[:3]) / best)
+            with monkeypatch.context() as patch:
+                patch.setattr(queues, "PROMISES", 1)
+                without_promises.append(queue_value(problem, none, 24)[0] / best)
+    assert len(by_queues) > 50
+    assert min(by_queues) >= 1.0 - 1e-9
+    assert np.mean(by_queues) < 0.95 * np.mean(by_contacts)
+    assert np.mean(by_queues) < np.mean(without_promises)
+
+
+def test_queues_bound_plans_better_than_prices_of_contacts() -> None:
+    problem = random_problem(3, num_collects=200, num_targets=90, num_contacts=6, span_s=6000.0)
+    problem = with_objective(problem, Objective(collected_share=0.0, half_life_s=900.0))
+    prices = np.zeros(len(problem.target_ids))
+    value, rows = queue_value(problem, prices, 12)
+    assert value < latency_value(problem, prices, np.zeros(6))
+    assert np.any(problem.opportunities.kind[rows] == CONTACT)
+    bound = Bound(
+        value=rounded_bound(problem, value, 0.0), proof="dp", prices=prices, queue_levels=12
+    )
+    read = from_json(to_json(bound))
+    assert read.queue_levels == 12
+    assert is_proven(problem, read)
+    assert not is_proven(problem, replace(read, value=0.99 * read.value))
+
+
+@pytest.mark.parametrize("dynamics", ["physical", "paper"])
+@examples(150)
+@given(seed=SEEDS, half_life_s=st.floats(60.0, 2000.0), per_collect=st.sampled_from([3, 24]))
+def test_paths_of_the_strict_programme_are_plans(
+    dynamics: Dynamics, seed: int, half_life_s: float, per_collect: int
+) -> None:
+    problem = _problem(seed, dynamics, 1, num_contacts=3)
+    problem = with_objective(problem, Objective(collected_share=0.0, half_life_s=half_life_s))
+    satellite = problem.satellites[0]
+    programme = queues_of(
+        problem,
+        satellite,
+        strict_network_of(problem, satellite),
+        np.zeros(len(problem.target_ids)),
+        per_collect=per_collect,
+        num_classes=3,
+        keeps_battery=True,
+        keeps_recorder=True,
+    )
+    if programme is None or not is_supported(satellite):
+        return
+    value, path = most_by_queues(programme, STOP)
+    plan = Plan.of(problem, satellite.rows[path].tolist())
+    timeline = replay(problem, plan)
+    assert {v.code for v in timeline.violations} <= {"duplicate", "station_conflict"}
+    assert (len(path) > 0) == (value > 0.0)
+
+
+def test_plans_take_the_contacts_that_they_must_and_no_target_twice() -> None:
+    problem = random_problem(3, num_collects=200, num_targets=90, num_contacts=6, span_s=6000.0)
+    problem = with_objective(problem, Objective(collected_share=0.0, half_life_s=900.0))
+    contacts = np.flatnonzero(problem.opportunities.kind == CONTACT)[[1, 4]].tolist()
+    kept = tuple(Kept(row=row, pointer="") for row in contacts)
+    taking = replace(problem, pinned=replace(problem.pinned, kept=kept))
+    rng = np.random.default_rng(0)
+    plan = plan_with_queues(taking, np.zeros(len(problem.target_ids)), rng, STOP)
+    assert plan is not None
+    rows = [action.opportunity for action in plan.actions]
+    assert [r for r in rows if problem.opportunities.kind[r] == CONTACT] == contacts
+    timeline = replay(problem, plan)
+    assert timeline.is_valid
+    assert timeline.reward > 0.0
