@@ -203,3 +203,15 @@ def test_a_flight_that_comes_too_near_to_the_sun_is_not_flyable() -> None:
     assert is_kept(0.0)
     assert is_kept(flown.nearest_sun_deg - 0.1)
     assert not is_kept(flown.nearest_sun_deg + 0.1)
+
+
+@pytest.mark.parametrize("turn_s", [None, 0.0, 20.0])
+def test_only_visits_that_take_a_turn_say_when_the_satellite_is_at_the_sun(
+    turn_s: float | None,
+) -> None:
+    scenario, timeline = _files((300.0, 0.0, 0.0))
+    visit = {"mode": "sunpoint", "start": _instant(0.0), "end": _instant(280.0),
+             "turn_to_s": turn_s and 0.0, "turn_back_s": turn_s}  # fmt: skip
+    timeline["satellites"][0]["actions"].insert(0, visit)
+    (mission,) = missions(scenario, timeline)
+    assert (mission.visits is None) == (not turn_s)
