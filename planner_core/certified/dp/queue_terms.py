@@ -59,18 +59,13 @@ def queues_of(
     data = data_levels(network, 1, is_optimistic=not keeps_recorder)
     number = np.full(len(rows), -1, dtype=np.int32)
     number[contact] = np.arange(len(contact))
-    kept = np.flatnonzero(np.append(network.is_kept[contact], False))
-    places = np.searchsorted(kept, np.arange(len(contact) + 1))
-    first = np.append(-1, kept)[places].astype(np.int32)
+    first = _must_follow(network, contact)
     on_board = problem.objective.collected_share * problem.worth_on_ground[table_rows]
-    span = int((network.idle_from - np.arange(len(rows))).max(initial=0)) + 1
-    num_tables = min(len(rows), span)
-    begins = np.append(0, contact)[first + 1]
-    num_tasks = int((np.append(contact, len(rows)) - begins).sum())
+    num_tables = min(len(rows), int((network.idle_from - np.arange(len(rows))).max(initial=0)) + 1)
     width = data.num_levels * energy.width
-    arcs = 2.0 + len(network.straight_rows) / max(1, len(rows))
     kept_entries = num_classes * width * (num_tables + len(contact) + 1)
-    if num_tasks * width * arcs > MAX_QUEUE_WORK or kept_entries > MAX_QUEUE_ENTRIES:
+    work = width * _num_extensions(network, contact, first)
+    if work > MAX_QUEUE_WORK or kept_entries > MAX_QUEUE_ENTRIES:
         return None
     level = float(data.least[1] - data.least[0]) if data.num_levels > 1 else 1.0
     volume = satellite.volume[rows[contact]] + DOWN
@@ -101,6 +96,21 @@ def queues_of(
         num_tables=max(1, num_tables),
         takes_worthless=False,
     )
+
+
+def _must_follow(network: Network, contact: Ints) -> Ints:
+    """Return for each layer the contact that a path must take before its own; -1 for none."""
+    kept = np.flatnonzero(np.append(network.is_kept[contact], False))
+    places = np.searchsorted(kept, np.arange(len(contact) + 1))
+    return np.append(-1, kept)[places].astype(np.int32)
+
+
+def _num_extensions(network: Network, contact: Ints, first: Ints) -> float:
+    """Return how often paths are extended by a task, about, in all layers together."""
+    m = len(network.place)
+    begins = np.append(0, contact)[first + 1]
+    num_tasks = int((np.append(contact, m) - begins).sum())
+    return num_tasks * (2.0 + len(network.straight_rows) / max(1, m))
 
 
 def _down_s(
