@@ -58,7 +58,7 @@ def _lower(best: Incumbent, ascent: LatencyAscent, num_rounds: int) -> None:
     """Go on with the ascent for a while."""
     for _ in range(num_rounds):
         # At first no plan is known that is good: steps towards it would be too long.
-        level = max(best.reward, (1.0 - TUNING.goal_step) * ascent.bound.value)
+        level = max(best.reward, (1.0 - TUNING.little) * ascent.bound.value)
         ascent.improve(1, level, best.budget.stop)
     value = rounded_bound(best.problem, ascent.bound.value, best.reward)
     best.lower(replace(ascent.bound, value=value))

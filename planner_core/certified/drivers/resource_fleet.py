@@ -138,9 +138,9 @@ class _FleetPricing:
         has_full_recorders = prices.value < (1.0 - TUNING.worth_a_step) * energy.value
         # With turns to the sun each pair of near tasks has a column, and a relaxation takes as long
         # as ten programs over the few tasks that most answers take.
-        is_small = np.count_nonzero(usage) <= TUNING.most_relaxed
-        is_small = is_small and not search.problem.turns_to_the_sun
-        if search.is_fleet and is_small and has_full_recorders:
+        is_small = bool(np.count_nonzero(usage) <= TUNING.most_relaxed)
+        is_relaxed = is_small and not search.problem.turns_to_the_sun
+        if search.is_fleet and is_relaxed and has_full_recorders:
             for share in TUNING.price_shares[1:-1]:
                 self._ask_near(share * energy.multipliers)
             # Without cutting planes at first: that finds tasks.
