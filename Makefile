@@ -11,6 +11,9 @@ LOCK := $(UV) pip compile --universal --python-version 3.11 --generate-hashes \
 	--no-emit-index-url
 PIP := $(BIN)/python -m pip -qq --disable-pip-version-check
 
+# Where it is set each of the hundred processes of a run would compile every module anew.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: help setup demo serve test explore chaos fuzz flight browser screenshots check \
 	check-types check-rest format lock dist paper paper-quick clean
 
