@@ -38,6 +38,7 @@ LUCK = {
     ("GET", "/v1/satellites/{satellite_id}/oem.kvn"),  # of a satellite whose orbit came as one
     ("POST", "/v1/jobs/{job_id}/cancel"),  # before the job has ended
     ("POST", "/v1/plans/{plan_id}/executions"),  # of a published plan, by its actions' own ids
+    ("POST", "/v1/plans/{plan_id}/states"),  # of its own satellites, within its horizon
     ("POST", "/v1/plans/{plan_id}/replans"),  # from an instant of its own
     ("DELETE", "/v1/scenarios/{scenario_id}"),  # once no job has it
     ("DELETE", "/v1/jobs/{job_id}"),  # once no comparison has it
