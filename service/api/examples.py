@@ -62,10 +62,10 @@ BODIES: Final[dict[str, Any]] = {
 }
 """By the name of the schema."""
 
-EXECUTIONS: Final = [{"action_id": "a2", "outcome": "executed", "mbit": 120.5}]
+_EXECUTIONS: Final = [{"action_id": "a2", "outcome": "executed", "mbit": 120.5}]
 """What is reported of a plan."""
 
-STATES: Final = [
+_STATES: Final = [
     {"satellite_id": _ID, "at": "2019-01-01T06:00:00Z", "battery_fraction": 0.82,
      "recorder_fraction": 0.31}
 ]  # fmt: skip
@@ -123,6 +123,13 @@ FILES: Final[dict[tuple[str, str], Any]] = {
         "time,lat_deg,lon_deg,clear_probability\n"
         "2026-01-31T00:00:00Z,46,7,0.8\n2026-01-31T00:00:00Z,46,8,0.7\n"
         "2026-01-31T00:00:00Z,47,7,0.5\n2026-01-31T00:00:00Z,47,8,0.4\n"
+    ),
+    ("/v1/plans/{plan_id}/executions", "application/json"): _EXECUTIONS,
+    ("/v1/plans/{plan_id}/executions", "text/csv"): "action_id,outcome,mbit\na2,executed,120.5\n",
+    ("/v1/plans/{plan_id}/states", "application/json"): _STATES,
+    ("/v1/plans/{plan_id}/states", "text/csv"): (
+        "satellite_id,at,battery_fraction\n"
+        f"{_STATES[0]['satellite_id']},{_STATES[0]['at']},{_STATES[0]['battery_fraction']}\n"
     ),
     ("/v1/target-catalogs", "application/geo+json"): _FEATURES,
     ("/v1/target-catalogs", "text/csv"): "id,lat_deg,lon_deg,reward\nbern,46.948,7.447,1\n",

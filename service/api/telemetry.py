@@ -12,7 +12,6 @@ from sqlalchemy.orm import Session
 from planner_core.errors import Fault
 from service.api.deps import ANY_FILE, Call, CallDep, RawBodyDep, file_type
 from service.api.errors import problem_responses
-from service.api.examples import EXECUTIONS, STATES
 from service.api.idempotency import OnceDep
 from service.api.imports import BYTES
 from service.api.paging import PagingDep, newest_first
@@ -46,14 +45,14 @@ _STATE_COLUMNS: Final = (
 _LINE_OF_SIGHT: Final = ("los_x", "los_y", "los_z")
 
 
-def _bodies(schema: str, columns: str, example: object) -> dict[str, Any]:
+def _bodies(schema: str, columns: str) -> dict[str, Any]:
     item = {"$ref": f"#/components/schemas/{schema}"}
     listed = {"type": "array", "items": item, "minItems": 1, "maxItems": MAX_REPORTED}
     return {
         "requestBody": {
             "required": True,
             "content": {
-                "application/json": {"schema": listed, "example": example},
+                "application/json": {"schema": listed},
                 "text/csv": {"schema": {"type": "string", "description": columns}},
                 ANY_FILE: BYTES,
             },
@@ -66,7 +65,7 @@ def _bodies(schema: str, columns: str, example: object) -> dict[str, Any]:
     status_code=201,
     responses=problem_responses(404, 409, 413, 415, 422),
     openapi_extra=_bodies(
-        "ExecutionIn", "A header with action_id, outcome and any of at, mbit, detail.", EXECUTIONS
+        "ExecutionIn", "A header with action_id, outcome and any of at, mbit, detail."
     ),
 )
 def report_executions(plan_id: str, data: RawBodyDep, call: CallDep, once: OnceDep) -> ReportedOut:
@@ -115,7 +114,6 @@ def list_executions(plan_id: str, call: CallDep, paging: PagingDep) -> Listed[Ex
         "StateIn",
         "A header with satellite_id, at and any of battery_fraction, recorder_fraction, and of one "
         "way to say where it looks: target_id, station_id, sun (true) or los_x, los_y, los_z.",
-        STATES,
     ),
 )
 def report_states(

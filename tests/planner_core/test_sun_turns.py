@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget
@@ -171,6 +171,8 @@ def test_a_load_at_all_times_empties_the_battery_in_shadow() -> None:
     assert broken[0].at_s == pytest.approx(0.25 / (1e-3 - 1 / 2500))
 
 
+# The turn to an image that is left out would begin after the one to the next.
+@example(seed=248, num_satellites=1)
 @examples(300)
 @given(seed=SEEDS, num_satellites=st.integers(1, 3))
 def test_no_plan_beats_the_bounds(seed: int, num_satellites: int) -> None:

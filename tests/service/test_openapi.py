@@ -227,6 +227,10 @@ def live_a_plan(client: Client) -> None:
     again = f"{plan['links']['self']}/replans"
     asked = client.http.post(again, json={"now": plan["horizon"]["start"]})
     assert asked.status_code == 202, asked.text
+    told = {"satellite_id": actions[0]["satellite_id"], "at": plan["horizon"]["start"]}
+    states = f"{plan['links']['self']}/states"
+    answer = client.http.post(states, json=[told | {"battery_fraction": 0.9}])
+    assert answer.status_code == 201, answer.text
 
 
 def delete_for_good(client: Client) -> None:

@@ -79,7 +79,8 @@ class ResourceTerms:
     energy_cost, cap_cost
         What taking a task costs, and what a full battery loses by it.
     full
-        Level of a full battery before the task.
+        Level of a full battery before the task, where it is not taken; less by what ``cap_cost``
+        is above the cost where it is.
     battery_floor, battery_floor_taken
         Lowest level after the task: in any case, and where it is taken.
     data_gain
@@ -161,10 +162,14 @@ def physical_terms(problem: Problem, satellite: SatelliteProblem) -> ResourceTer
     floor = r.battery_min_fraction + idle.reserve - charged_from
     next_s = np.append(start_s[1:], problem.horizon_s)
     emptied = np.where(is_contact, -r.telemetry_per_s * end_s, np.inf)
+    # Who leaves the sun for a later task may do so before the turn to this one would begin: what
+    # is not taken caps the battery by what comes after it, too.
+    full = idle.full - charged_to
+    full_untaken = np.maximum.accumulate(full[::-1])[::-1]
     return ResourceTerms(
         energy_cost=cost,
-        cap_cost=cost,
-        full=idle.full - charged_to,
+        cap_cost=cost + full_untaken - full,
+        full=full_untaken,
         battery_floor=_floor_of_any(satellite, floor, charged_from, charged_to),
         battery_floor_taken=floor,
         data_gain=gain,

@@ -57,7 +57,8 @@ def test_every_action_is_an_activity_at_its_time(plan: Document, answered: Answe
         for name in ("start", "end"):
             at = datetime.fromtimestamp(shown[name] / 1000.0, UTC)
             assert at == datetime.fromisoformat(action[name])
-        assert shown["name"] == (action["target_id"] or action["station_id"] or "sun")
+        name = action["target_name"] or action["target_id"] or action["station_name"] or "sun"
+        assert shown["name"] == name
 
 
 def test_groups_are_satellites_and_modes(plan: Document) -> None:
