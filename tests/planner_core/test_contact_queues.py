@@ -32,6 +32,8 @@ from tests.planner_core.test_delivery import ROOMY, collect, contact
 
 SEEDS = st.integers(0, 10**6)
 STARVED = replace(TIGHT, battery_min_fraction=0.5, initial_battery_fraction=0.62)
+EMPTY = replace(TIGHT, initial_recorder_fraction=0.0)
+"""The programme is for recorders that begin so."""
 _problem = partial(varied_problem, scarce=STARVED)
 Dynamics = Literal["physical", "paper"]
 STOP = np.zeros(1, dtype=np.uint8)
@@ -73,7 +75,9 @@ def _narrow(seed: int) -> Problem:
     tasks = [collect(target, float(t)) for target, t in enumerate(rng.integers(0, 500, 5))]
     begins_s = 40.0 + 70.0 * np.sort(rng.choice(12, 3, replace=False))
     tasks += [contact(t, t + 30.0 * float(rng.integers(1, 3))) for t in begins_s]
-    problem = make_problem(tasks, num_targets=5, resources=ROOMY)
+    problem = make_problem(
+        tasks, num_targets=5, resources=replace(ROOMY, initial_recorder_fraction=0.0)
+    )
     return with_objective(problem, Objective(collected_share=0.0, half_life_s=200.0))
 
 
@@ -99,7 +103,9 @@ def test_images_that_a_contact_has_no_time_for_count_with_a_later_one(
 
 
 def test_queues_bound_plans_better_than_prices_of_contacts() -> None:
-    problem = random_problem(3, num_collects=200, num_targets=90, num_contacts=6, span_s=6000.0)
+    problem = random_problem(
+        3, num_collects=200, num_targets=90, num_contacts=6, span_s=6000.0, resources=EMPTY
+    )
     problem = with_objective(problem, Objective(collected_share=0.0, half_life_s=900.0))
     prices = np.zeros(len(problem.target_ids))
     value, rows = queue_value(problem, prices, 12)
@@ -143,7 +149,9 @@ def test_paths_of_the_strict_programme_are_plans(
 
 
 def test_plans_take_the_contacts_that_they_must_and_no_target_twice() -> None:
-    problem = random_problem(3, num_collects=200, num_targets=90, num_contacts=6, span_s=6000.0)
+    problem = random_problem(
+        3, num_collects=200, num_targets=90, num_contacts=6, span_s=6000.0, resources=EMPTY
+    )
     problem = with_objective(problem, Objective(collected_share=0.0, half_life_s=900.0))
     contacts = np.flatnonzero(problem.opportunities.kind == CONTACT)[[1, 4]].tolist()
     kept = tuple(Kept(row=row, pointer="") for row in contacts)
