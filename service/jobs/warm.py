@@ -1,9 +1,9 @@
 """Compile the kernels before they are needed, and load them, so that no job pays for it.
 
 ``python -m service.jobs.warm`` fills the cache of compiled kernels on disk. Each part plans a
-tiny mission that needs some of them; the essential ones are those that a mission of one
-satellite may need without free starts, the demonstration's among them: a search in which kernels
-are compiled has less time for its plan.
+tiny mission that needs some of them; the essential ones are those that a mission of one satellite
+may need without free starts and half-lives, the demonstration's among them: a search in which
+kernels are compiled has less time for its plan.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from planner_core.build import build_problem, compute_opportunities
 from planner_core.certified.lns.alternating import TurnSearch
 from planner_core.certified.multipliers.energy import EnergyPaths, ascent_on_energy
 from planner_core.certified.multipliers.latency import LatencyAscent
+from planner_core.certified.proofs.queues import queue_value
 from planner_core.domain import (
     Agility,
     GroundStation,
@@ -228,9 +229,17 @@ def _shortage() -> None:
     TurnSearch(problem, plan, problem.typical_worth, Budget(), 0).turn(1)
     paths, nothing = EnergyPaths(problem), np.zeros(len(problem.target_ids))
     ascent_on_energy(problem, paths, nothing, 1, 0).improve(1, Budget().stop)
-    late = with_objective(problem, Objective(collected_share=0.0, half_life_s=3600.0))
-    LatencyAscent(late, nothing).improve(1, 0.0, Budget().stop)
     Mcts(worthless="sunpoint").solve(problem, Budget(), 0)
+
+
+def _late() -> None:
+    """Have images that are worth less the later they come down."""
+    late = with_objective(
+        _built(_over_the_globe()), Objective(collected_share=0.0, half_life_s=3600.0)
+    )
+    nothing = np.zeros(len(late.target_ids))
+    LatencyAscent(late, nothing).improve(1, 0.0, Budget().stop)
+    queue_value(late, nothing, 1)
 
 
 def _slow() -> None:
@@ -271,6 +280,7 @@ PARTS: Final[dict[str, Callable[[], None]]] = {
     **ESSENTIAL,
     "continuous": _continuous,
     "continuous with resources": _continuous_with_resources,
+    "late": _late,
     "fleet": _fleet,
     "fleet with resources": _fleet_with_resources,
 }

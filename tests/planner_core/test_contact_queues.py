@@ -32,8 +32,6 @@ from tests.planner_core.test_delivery import ROOMY, collect, contact
 
 SEEDS = st.integers(0, 10**6)
 STARVED = replace(TIGHT, battery_min_fraction=0.5, initial_battery_fraction=0.62)
-EMPTY = replace(TIGHT, initial_recorder_fraction=0.0)
-"""The programme is for recorders that begin so."""
 _problem = partial(varied_problem, scarce=STARVED)
 Dynamics = Literal["physical", "paper"]
 STOP = np.zeros(1, dtype=np.uint8)
@@ -104,7 +102,7 @@ def test_images_that_a_contact_has_no_time_for_count_with_a_later_one(
 
 def test_queues_bound_plans_better_than_prices_of_contacts() -> None:
     problem = random_problem(
-        3, num_collects=200, num_targets=90, num_contacts=6, span_s=6000.0, resources=EMPTY
+        3, num_collects=200, num_targets=90, num_contacts=6, span_s=6000.0, resources=TIGHT
     )
     problem = with_objective(problem, Objective(collected_share=0.0, half_life_s=900.0))
     prices = np.zeros(len(problem.target_ids))
@@ -150,7 +148,7 @@ def test_paths_of_the_strict_programme_are_plans(
 
 def test_plans_take_the_contacts_that_they_must_and_no_target_twice() -> None:
     problem = random_problem(
-        3, num_collects=200, num_targets=90, num_contacts=6, span_s=6000.0, resources=EMPTY
+        3, num_collects=200, num_targets=90, num_contacts=6, span_s=6000.0, resources=TIGHT
     )
     problem = with_objective(problem, Objective(collected_share=0.0, half_life_s=900.0))
     contacts = np.flatnonzero(problem.opportunities.kind == CONTACT)[[1, 4]].tolist()

@@ -23,7 +23,10 @@ def test_a_backup_is_one_file_of_what_was_committed(settings: Settings, tmp_path
     """A writer is in the middle of a transaction, and goes on afterwards."""
     file = tmp_path / "backup.db"
     database = Database(settings.database_url)
-    insert = "INSERT INTO target_catalog VALUES ('{}', 'c', 0, '2026-01-01 00:00:00.000000', NULL)"
+    insert = (
+        "INSERT INTO target_catalog (id, name, num_targets, created_at) "
+        "VALUES ('{}', 'c', 0, '2026-01-01 00:00:00.000000')"
+    )
     with database.engine.begin() as connection:
         connection.exec_driver_sql(insert.format("before"))
     with database.engine.begin() as connection:

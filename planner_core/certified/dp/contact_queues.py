@@ -285,13 +285,31 @@ def _down_s(q: Queues, layer: int, promised: int, amount: float) -> float:
         return np.inf
     at = int(amount / q.step)
     down_s = q.down_s[layer, at] if at < q.down_s.shape[1] else np.inf
-    after = layer + promised
-    if down_s < np.inf or promised == 0 or after >= len(q.contact):
+    if down_s < np.inf:
         return down_s
     at = int(max(0.0, amount - q.volume[layer]) / q.step)
-    if promised < q.num_classes and at < q.down_s.shape[1] and q.down_s[after, at] < np.inf:
-        return float(q.down_s[after, at])
-    return float(q.ready_s[after:].min())
+    after = layer + promised
+    if 0 < promised < q.num_classes:
+        is_whole = after < len(q.contact) and at < q.down_s.shape[1]
+        if is_whole and q.down_s[after, at] < np.inf:
+            return float(q.down_s[after, at])
+    return _later_down_s(q, max(after, layer + 1), at)
+
+
+@inlined
+def _later_down_s(q: Queues, after: int, at: int) -> float:
+    """Return when so many steps may be down by a contact from ``after`` on, or by several.
+
+    A level that a contact takes down as a whole, by its rounding, may need another one too.
+    """
+    earliest_s, is_short = np.inf, False
+    for contact in range(after, len(q.contact)):
+        down_s = q.ready_s[contact]
+        if not is_short:
+            down_s = q.down_s[contact, at] if at < q.down_s.shape[1] else np.inf
+        is_short = is_short or down_s == np.inf
+        earliest_s = min(earliest_s, down_s)
+    return earliest_s
 
 
 @kernel

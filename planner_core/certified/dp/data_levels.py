@@ -62,6 +62,9 @@ def data_levels(network: Network, per_collect: int, *, is_optimistic: bool) -> D
     def limit(data: Floats | float) -> Ints:
         return np.floor(np.asarray(data) / unit + room).astype(np.int32) - base
 
+    start = int(rounded(network.data_start, LEVEL)) - base
+    # A full recorder may be rounded to more than any task can be in.
+    num_levels = max(int(limit(highest)), start) + 1
     floor = rounded(network.data_floor, -abs(room)) - base
     delivered = limit(network.delivered)
     if not is_optimistic:
@@ -69,16 +72,14 @@ def data_levels(network: Network, per_collect: int, *, is_optimistic: bool) -> D
         emptied = np.where(network.is_contact == 1, floor, 0)
         delivered = np.maximum(delivered, np.maximum.accumulate(emptied[::-1])[::-1])
     return DataLevels(
-        num_levels=int(limit(highest)) + 1,
+        num_levels=num_levels,
         gain=rounded(network.data_gain, LEVEL),
         floor=floor,
         before=limit(network.data_before),
         after=limit(network.data_after),
         delivered=delivered.astype(np.int32),
-        least=np.asarray(
-            unit * (np.arange(int(limit(highest)) + 1) + base - abs(room)), np.float64
-        ),
-        start=int(rounded(network.data_start, LEVEL)) - base,
+        least=np.asarray(unit * (np.arange(num_levels) + base - abs(room)), np.float64),
+        start=start,
         end=int(limit(network.data_end)),
     )
 

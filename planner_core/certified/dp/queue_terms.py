@@ -33,8 +33,6 @@ def queues_of(
 ) -> Queues | None:
     """Return the programme of a satellite; None where it would take too long.
 
-    None also where the recorder begins with data: levels have room for what a path itself records.
-
     Parameters
     ----------
     network
@@ -51,8 +49,6 @@ def queues_of(
         Whether energy, or data, is rounded so that all paths keep their limits, and not so that no
         plan is lost.
     """
-    if satellite.resources.initial_recorder_fraction > 0.0:
-        return None
     if rows is None:
         rows = np.arange(len(satellite), dtype=np.int32)
     else:

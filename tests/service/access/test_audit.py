@@ -179,6 +179,9 @@ CHANGES: dict[tuple[str, str], tuple[Callable[[httpx.Client], str], str, str]] =
         delete(new_station, "/v1/ground-stations"), "delete", "ground_station",
     ),
     ("post", "/v1/target-catalogs"): (new_catalog, "create", "target_catalog"),
+    ("patch", "/v1/target-catalogs/{catalog_id}"): (
+        rename(new_catalog, "/v1/target-catalogs"), "update", "target_catalog",
+    ),
     ("delete", "/v1/target-catalogs/{catalog_id}"): (
         delete(new_catalog, "/v1/target-catalogs"), "delete", "target_catalog",
     ),
