@@ -35,8 +35,7 @@ def flow(problem: Problem, satellite: SatelliteProblem, action: Action) -> list[
         gain = float(links.stations.gain[station])
         return [Piece(begins_s, action.end_s, satellite.resources.downlink_per_s * gain)]
     inside = (rate.time_s > begins_s) & (rate.time_s < action.end_s)
-    cuts_s = [begins_s, *rate.time_s[inside].tolist(), action.end_s]
-    return [
-        Piece(from_s, to_s, float(np.interp((from_s + to_s) / 2.0, rate.time_s, rate.per_s)))
-        for from_s, to_s in itertools.pairwise(cuts_s)
-    ]
+    cuts_s = np.array([begins_s, *rate.time_s[inside], action.end_s])
+    per_s = np.interp((cuts_s[:-1] + cuts_s[1:]) / 2.0, rate.time_s, rate.per_s)
+    pieces = zip(itertools.pairwise(cuts_s.tolist()), per_s.tolist(), strict=True)
+    return [Piece(from_s, to_s, mean_per_s) for (from_s, to_s), mean_per_s in pieces]

@@ -6,6 +6,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Literal
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -14,11 +15,13 @@ from planner_core.budget import Budget, Termination
 from planner_core.certified.proofs.resource_bound import quick_bound, resource_value
 from planner_core.certified.solver import Certified
 from planner_core.domain import Objective
-from planner_core.problem import COLLECT
+from planner_core.problem import COLLECT, Problem
 from planner_core.problem.delivery import with_objective
 from planner_core.problem.plan import Plan
+from planner_core.reasons import delivery
 from planner_core.reasons.explain import explain
-from planner_core.referee.replay import replay
+from planner_core.reasons.reason import TargetOutcome
+from planner_core.referee.replay import Timeline, replay
 from planner_core.solvers.milp import Milp
 from planner_core.solvers.rule import Rule
 from tests.examples import examples
@@ -116,11 +119,18 @@ def test_a_reason_says_that_an_image_would_not_come_down() -> None:
     assert second.reason.reward_delta == 0.0
 
 
+@pytest.mark.parametrize("takes_twice", [False, True])
+@pytest.mark.parametrize("num_satellites", [1, 2])
 @pytest.mark.parametrize("seed", range(30))
-def test_what_reasons_say_of_the_reward_is_what_the_referee_awards(seed: int) -> None:
+def test_what_reasons_say_of_the_reward_is_what_the_referee_awards(
+    seed: int, num_satellites: int, takes_twice: bool
+) -> None:
     objective = Objective(collected_share=0.3, half_life_s=None if seed % 2 else 400.0)
-    problem = with_objective(_problem(seed, "physical", 1, num_contacts=3), objective)
+    problem = _problem(seed, "physical", num_satellites, num_contacts=3)
+    problem = with_objective(problem, objective)
     plan = Rule().solve(problem, Budget(), 0).plan
+    if takes_twice:
+        plan = with_second_images(problem, plan)
     before = replay(problem, plan)
     for outcome in explain(problem, plan, before):
         reason = outcome.reason
@@ -129,6 +139,54 @@ def test_what_reasons_say_of_the_reward_is_what_the_referee_awards(seed: int) ->
         rows = [a.opportunity for p, a in enumerate(plan.actions) if p not in reason.blocking]
         after = replay(problem, Plan.of(problem, [*rows, reason.opportunity]))
         assert reason.reward_delta == pytest.approx(after.reward - before.reward, abs=1e-9)
+
+
+def with_second_images(problem: Problem, plan: Plan) -> Plan:
+    """Return the plan with every further image of its targets that breaks nothing."""
+    taken = {a.opportunity for a in plan.actions}
+    places = {int(problem.opportunities.place[row]) for row in taken}
+    for row in np.flatnonzero(problem.opportunities.kind == COLLECT).tolist():
+        if row in taken or int(problem.opportunities.place[row]) not in places:
+            continue
+        trial = Plan.of(problem, [*(a.opportunity for a in plan.actions), row])
+        if replay(problem, trial).is_valid:
+            plan = trial
+    return plan
+
+
+def test_reasons_replay_what_promises_most_and_no_more_than_allowed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    problem = random_problem(
+        3, num_collects=200, num_targets=150, num_contacts=6, span_s=3000.0, num_satellites=2
+    )
+    problem = with_objective(problem, Objective(collected_share=0.3))
+    plan = Rule().solve(problem, Budget(), 0).plan
+    replayed: list[Plan] = []
+
+    def noted(of: Problem, trial: Plan) -> Timeline:
+        replayed.append(trial)
+        return replay(of, trial)
+
+    monkeypatch.setattr(delivery, "replay", noted)
+    outcomes = explain(problem, plan, replay(problem, plan))
+    for trial in replayed:
+        satellites = {problem.opportunities.satellite[a.opportunity] for a in trial.actions}
+        assert len(satellites) == 1
+
+    def unsure(outcomes: tuple[TargetOutcome, ...]) -> set[int]:
+        reasons = ((one.target, one.reason) for one in outcomes)
+        return {target for target, r in reasons if r and "not worked out" in r.detail}
+
+    num_all = sum(len(trial.actions) for trial in replayed)
+    replayed.clear()
+    most = num_all // 3
+    monkeypatch.setattr(delivery, "_MOST_ACTIONS", most)
+    fewer = explain(problem, plan, replay(problem, plan))
+    longest = max(len(trial.actions) for trial in replayed)
+    # Beside the trials each satellite is replayed once as it is.
+    assert most <= sum(len(trial.actions) for trial in replayed) <= most + 3 * longest
+    assert unsure(outcomes) < unsure(fewer)
 
 
 @pytest.mark.parametrize("dynamics", ["physical", "paper"])
