@@ -67,10 +67,10 @@ class Budget:
         num_threads: int = 1,
     ):
         self.stop: Bytes = np.zeros(1, dtype=np.uint8)
+        self._cancelled: Bytes = np.zeros(1, dtype=np.uint8)
         self.report = report
         self.num_threads = num_threads
         self._deadline = None if time_s is None else time.monotonic() + time_s
-        self._cancelled = False
 
     def part(self, share: float = 1.0, report: Callable[[Progress], None] | None = None) -> Budget:
         """Return a budget for a part of the work, which ends with the whole or before it.
@@ -86,9 +86,13 @@ class Budget:
         """
         return _Part(self, share, report or self.report)
 
+    def until_cancelled(self) -> Budget:
+        """Return a budget for work that is of use only as a whole: the time does not end it."""
+        return _Whole(self)
+
     def cancel(self) -> None:
         """Ask the work to stop; safe to call from another thread."""
-        self._cancelled = True
+        self._cancelled[0] = 1
         self.stop[0] = 1
 
     def expire(self) -> None:
@@ -99,7 +103,7 @@ class Budget:
     @property
     def is_cancelled(self) -> bool:
         """Whether someone asked the work to stop."""
-        return self._cancelled
+        return bool(self._cancelled[0])
 
     def is_spent(self) -> bool:
         """Return whether the work should stop now and answer with the best it has."""
@@ -130,6 +134,7 @@ class _Part(Budget):
     def __init__(self, whole: Budget, share: float, report: Callable[[Progress], None]) -> None:
         super().__init__(None, report, whole.num_threads)
         self.stop = whole.stop
+        self._cancelled = whole._cancelled
         self._whole = whole
         left_s = whole.remaining_s()
         # What remains to the whole after this part, by its own clock.
@@ -141,13 +146,24 @@ class _Part(Budget):
     def expire(self) -> None:
         self._whole.expire()
 
-    @property
-    def is_cancelled(self) -> bool:
-        return self._whole.is_cancelled
-
     def is_spent(self) -> bool:
         return self._whole.is_spent() or (self._reserve_s > 0.0 and self.remaining_s() == 0.0)
 
     def remaining_s(self) -> float | None:
         left_s = self._whole.remaining_s()
         return None if left_s is None else max(0.0, left_s - self._reserve_s)
+
+
+class _Whole(Budget):
+    """What is needed before there can be any plan: it ends when somebody cancels."""
+
+    def __init__(self, whole: Budget) -> None:
+        super().__init__(None, whole.report, whole.num_threads)
+        self._cancelled = self.stop = whole._cancelled
+        self._whole = whole
+
+    def cancel(self) -> None:
+        self._whole.cancel()
+
+    def expire(self) -> None:
+        self._whole.expire()

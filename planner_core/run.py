@@ -94,15 +94,17 @@ def plan_scenario(
     PropagationFailed
         Where SGP4 cannot carry an orbit through the horizon.
     Cancelled
-        Where the budget ended before there was a problem to plan.
+        Where somebody cancelled before there was a problem to plan. A budget that ended before
+        there was one has the search answer with the first plan that it finds.
     """
     clock = [time.perf_counter()]
+    preparation = budget.until_cancelled()
     opportunities = computed
     if opportunities is None and before is not None:
-        opportunities = opportunities_after(scenario, before, budget)
-    opportunities = opportunities or compute_opportunities(scenario, budget)
+        opportunities = opportunities_after(scenario, before, preparation)
+    opportunities = opportunities or compute_opportunities(scenario, preparation)
     clock.append(time.perf_counter())
-    problem = build_problem(scenario, opportunities, budget)
+    problem = build_problem(scenario, opportunities, preparation)
     clock.append(time.perf_counter())
     budget.report(Progress(phase="solve", fraction=0.0))
     relieved = without_on_board(within_limits(problem))

@@ -7,6 +7,7 @@ import math
 import os
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from enum import Enum, auto
 from multiprocessing import get_context
@@ -28,6 +29,7 @@ from service.jobs.child import (
     Started,
     Stopped,
 )
+from service.jobs.grace import Grace
 from service.jobs.plan_request import PlanRequest
 
 log = logging.getLogger(__name__)
@@ -37,10 +39,8 @@ START_S: Final = 120.0
 """How long a first start may take; it includes compiling the kernels."""
 CANCEL_GRACE_S: Final = 1.25
 """From "cancel" to the kill, for a search that does not stop by itself."""
-TIME_GRACE_S: Final = 5.0
-"""From the end of the time limit to the kill."""
-VERIFY_GRACE_S: Final = 30.0
-"""The same once the search is over and the referee works: its plan is worth the wait."""
+_LAST_WORDS_S: Final = 5.0
+"""How long a process may take to end whose pipe is closed."""
 
 _UNKNOWN_EXIT: Final = 255
 """What `multiprocessing` answers where the fork server, which alone would know, is gone."""
@@ -174,7 +174,8 @@ class _Run:
         self._progress: Progress | None = None
         self._blocks: list[Block] = []
         self._opportunity_block: bytes | None = None
-        self._verifying = False
+        self._is_told = False
+        self._grace: Grace | None = None
         self._next_tick_s = 0.0
         self._expire_at_s = math.inf
         self._started = False
@@ -214,7 +215,7 @@ class _Run:
         elif isinstance(message, Started):
             self._started = True
             self._expire_at_s = time.monotonic() + self._limits.time_s
-            self._kill_at_s = self._expire_at_s + TIME_GRACE_S
+            self._kill_at_s = math.inf
         elif isinstance(message, Progress):
             self._note(message)
         return None
@@ -224,9 +225,19 @@ class _Run:
         if progress.phase != self._phase:
             self._phase = progress.phase
             self._on_phase(progress.phase)
-        if progress.phase == "verify" and not self._verifying:
-            self._verifying = True
-            self._kill_at_s += VERIFY_GRACE_S
+            if self._is_told:
+                self._grant_grace()
+
+    def _grant_grace(self) -> None:
+        """Have what is left of this phase end in time; the next one has a grace of its own."""
+        self._is_told = True
+        if self._cancelled and self._phase != "verify":
+            self._kill_at_s = min(self._kill_at_s, time.monotonic() + CANCEL_GRACE_S)
+            return
+        # Once the search is over there is a plan, which is worth the wait.
+        self._kill_at_s = math.inf
+        with suppress(psutil.NoSuchProcess):  # it has ended; its last words are still to be read
+            self._grace = Grace(self._process.pid or 0, self._phase or "access")
 
     def _settled(self, ending: Ending) -> Ending:
         if isinstance(ending, Stopped) and not self._cancelled:
@@ -234,7 +245,7 @@ class _Run:
         return ending
 
     def _crashed(self) -> Ending | Lost:
-        self._process.join(TIME_GRACE_S)
+        self._process.join(_LAST_WORDS_S)
         if self._cancelled:
             return Stopped()
         code = self._process.exitcode
@@ -253,9 +264,16 @@ class _Run:
             # A budget ends a search by itself; a kernel that cannot read a clock needs telling.
             self._expire_at_s = math.inf
             self._say(Command.EXPIRE)
-        if now_s >= self._kill_at_s:
+            self._grant_grace()
+        if now_s >= self._kill_at_s or self._has_spent_its_grace():
             return Stopped() if self._cancelled else self._out_of_time()
         return None
+
+    def _has_spent_its_grace(self) -> bool:
+        try:
+            return self._grace is not None and self._grace.is_over()
+        except psutil.NoSuchProcess:
+            return False  # it has ended; its last words are still to be read
 
     def _held_mb(self) -> float:
         try:
@@ -280,8 +298,7 @@ class _Run:
             return Abandoned()
         if order is Order.CANCEL and not self._cancelled:
             self._cancelled = True
-            grace_s = VERIFY_GRACE_S if self._verifying else CANCEL_GRACE_S
-            self._kill_at_s = min(self._kill_at_s, time.monotonic() + grace_s)
+            self._grant_grace()
             self._say(Command.CANCEL)
         return None
 

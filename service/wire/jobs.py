@@ -21,7 +21,10 @@ class LimitsIn(Body):
     """What a job may use; the server's defaults where it says nothing."""
 
     time_s: float | None = Field(
-        None, gt=0, description="Seconds of work; the search then answers with its best plan."
+        None,
+        gt=0,
+        description="Seconds of work; the search then answers with its best plan, "
+        "which is its first one where the time was too short for more.",
     )
     memory_mb: int | None = Field(
         None, ge=64, le=1_000_000, description="Megabytes; a job that holds more is failed."

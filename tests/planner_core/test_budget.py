@@ -52,6 +52,31 @@ def test_a_part_has_its_share_of_the_time_and_no_more_than_the_whole() -> None:
     assert part.is_spent()
 
 
+def test_what_is_needed_as_a_whole_ends_when_somebody_cancels_and_not_with_the_time() -> None:
+    told: list[Progress] = []
+    budget = Budget(0.0, told.append, num_threads=3)
+    needed = budget.part().until_cancelled()
+    assert needed.num_threads == 3
+    assert needed.remaining_s() is None
+    needed.report(Progress(phase="access", fraction=0.0))
+    assert len(told) == 1
+    budget.expire()
+    assert budget.is_spent()
+    assert not needed.is_spent()
+    assert needed.stop[0] == 0
+    budget.cancel()
+    assert needed.is_spent()
+    assert needed.is_cancelled
+    assert needed.stop[0] == 1
+
+
+def test_who_cancels_what_is_needed_as_a_whole_cancels_all() -> None:
+    budget = Budget()
+    budget.until_cancelled().cancel()
+    assert budget.is_cancelled
+    assert budget.stop[0] == 1
+
+
 def test_a_part_reports_what_it_is_told_to() -> None:
     seen: list[Progress] = []
     whole = Budget(report=seen.append)

@@ -80,6 +80,22 @@ def test_timelines_pass_an_independent_check(
     assert timeline["totals"]["reward"] == answer.reward
 
 
+@pytest.mark.parametrize("use_resources", [True, False])
+@pytest.mark.parametrize("solver", sorted(SOLVERS))
+def test_time_that_is_over_before_the_search_leaves_its_first_plan(
+    solver: str, use_resources: bool
+) -> None:
+    """On a busy machine access alone may take all of it."""
+    budget = Budget(0.0)
+    budget.expire()
+    scenario = {**paper_mission(drawn_targets(60, seed=3)), "use_resources": use_resources}
+    answer = run(scenario, solver, budget=budget)
+    assert answer.termination in ("time_limit", "horizon_complete", "optimal", "gap_reached")
+    document = json.loads(answer.timeline)
+    assert document["validity"] == "valid"
+    assert answer.reward > 0.0
+
+
 def test_angles_are_those_of_an_action_with_its_own_start() -> None:
     scenario = paper_mission(drawn_targets(150), use_resources=False, continuous_starts=True)
     answer = run(scenario, "rule")

@@ -11,6 +11,7 @@ import psutil
 import pytest
 
 from planner_core.budget import Progress
+from service.jobs import grace
 from service.jobs import runner as runner_module
 from service.jobs.child import Answered, Ending, Refused, Stopped
 from service.jobs.plan_request import Parcel, PlanRequest
@@ -101,13 +102,28 @@ def test_a_search_that_honours_its_budget_keeps_its_plan_at_the_time_limit(
     assert rewards == sorted(rewards, key=lambda reward: reward or 0.0)
 
 
+@pytest.mark.parametrize(
+    ("solver", "limit", "value"),
+    [("deaf", "STALL_S", 0.2), ("endless", "GRACE_CPU_S", {"solve": 0.2})],
+    ids=["does nothing", "computes"],
+)
 def test_a_search_that_ignores_its_time_limit_is_killed(
-    runner: Runner, log: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(runner_module, "TIME_GRACE_S", 0.2)
-    ending = run(runner, log, "deaf", time_s=0.2)
+    runner: Runner, log: Path, monkeypatch: pytest.MonkeyPatch,
+    solver: str, limit: str, value: object,
+) -> None:  # fmt: skip
+    monkeypatch.setattr(grace, limit, value)
+    ending = run(runner, log, solver, time_s=0.2)
     assert isinstance(ending, Refused)
     assert (ending.code, ending.detail) == ("time_limit", "No plan within the limit of 0.2 s.")
+
+
+def test_who_gets_little_of_the_machine_has_longer_to_hand_over_its_plan(
+    runner: Runner, log: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two seconds by the clock after its limit, and less than one of them computed."""
+    monkeypatch.setattr(grace, "GRACE_CPU_S", {"solve": 1.0})
+    ending = run(runner, log, "starved", time_s=0.1)
+    assert isinstance(ending, Answered)
 
 
 def test_a_cancelled_search_keeps_its_best_plan(runner: Runner, log: Path) -> None:
@@ -186,7 +202,7 @@ def test_an_answer_counts_even_when_its_process_is_gone_before_it_is_heard(
                 time.sleep(0.5)
             return super().tick(progress)
 
-    monkeypatch.setattr(runner_module, "TIME_GRACE_S", 0.0)
+    monkeypatch.setattr(grace, "GRACE_CPU_S", {"access": 0.0, "solve": 0.0})
     ending = run(runner, log, "search", HeldUp(), time_s=0.2)
     assert isinstance(ending, Answered)
     assert ending.answer.termination == "time_limit"

@@ -55,6 +55,14 @@ def run(request: PlanRequest, budget: Budget) -> PlanAnswer:
         case "deaf":
             budget.report(Progress(phase="solve", fraction=0.5))
             time.sleep(300)
+        case "endless":
+            budget.report(Progress(phase="solve", fraction=0.5))
+            while True:
+                pass
+        case "starved":
+            budget.report(Progress(phase="solve", fraction=0.5))
+            compute_now_and_then(seconds=2.0)
+            return answer(request, "time_limit")
         case "no_plan":
             while not budget.is_spent():
                 budget.report(Progress(phase="access", fraction=0.1))
@@ -93,6 +101,15 @@ def run(request: PlanRequest, budget: Budget) -> PlanAnswer:
         case "bug":
             raise KeyError("a fault of ours, with inner details")
     raise AssertionError(request.solver)
+
+
+def compute_now_and_then(*, seconds: float) -> None:
+    """Go on as a process does that gets a small share of the machine."""
+    until_s = time.monotonic() + seconds
+    while time.monotonic() < until_s:
+        for _ in range(20_000):
+            pass
+        time.sleep(0.05)
 
 
 def search(request: PlanRequest, budget: Budget) -> PlanAnswer:
