@@ -134,7 +134,7 @@ def plan_scenario(
     bound = _best_bound(relieved, solution, timeline, budget, known_bound)
     on_board = most_on_board(problem)
     if on_board > 0.0:
-        bound = bound and bound.with_on_board(on_board, timeline.reward)
+        bound = bound and _of_all(bound.with_on_board(on_board), timeline)
         if not _is_met(bound, timeline) and solution.termination is Termination.OPTIMAL:
             solution = replace(solution, termination=Termination.HORIZON_COMPLETE)
     budget.report(
@@ -178,14 +178,14 @@ def _best_bound(
     reward = timeline.earned_by_new
     known = known and known.without_on_board()
     claimed = (bound for bound in (known, solution.proven) if bound is not None)
-    sound = [bound for bound in claimed if not _is_beaten(bound, timeline)]
+    sound = [bound for bound in claimed if not _is_beaten(bound, timeline, reward)]
     # Prices that a search has settled on are better than those of a moment.
     is_settled = not problem.use_resources and any(
         bound is solution.proven and bound.proof == "lagrangian" for bound in sound
     )
     if known not in sound and not is_settled and all(bound.value > reward for bound in sound):
         quick = _quick_bound(problem, reward, budget)
-        sound = [b for b in (*sound, quick) if not _is_beaten(b, timeline)]
+        sound = [b for b in (*sound, quick) if not _is_beaten(b, timeline, reward)]
     if not sound:
         return None
     best = min(sound, key=lambda bound: bound.value)
@@ -208,10 +208,16 @@ def _is_met(bound: Bound | None, timeline: Timeline) -> bool:
     return bound is not None and timeline.reward >= bound.value * (1.0 - _ROUNDING)
 
 
-def _is_beaten(bound: Bound, timeline: Timeline) -> bool:
+def _of_all(bound: Bound, timeline: Timeline) -> Bound | None:
+    """Return the bound of new images and those on board; None if it is below a valid plan."""
+    if _is_beaten(bound, timeline, timeline.reward):
+        return None
+    return replace(bound, value=max(bound.value, timeline.reward))
+
+
+def _is_beaten(bound: Bound, timeline: Timeline, reward: float) -> bool:
     """Return whether a valid plan earns more than the bound allows, and say so if it does."""
     allowed = bound.value + _ROUNDING * max(1.0, abs(bound.value))
-    reward = timeline.earned_by_new
     is_beaten = timeline.is_valid and reward > allowed
     if is_beaten:
         log.error("the %s bound %r is below %r, which a valid plan earns", bound.proof,

@@ -13,6 +13,7 @@ import pytest
 from hypothesis import event, given
 from hypothesis import strategies as st
 
+from planner_core import run
 from planner_core.budget import Budget
 from planner_core.certified.proofs.documents import from_json, is_proven, to_json
 from planner_core.certified.proofs.resource_bound import quick_bound
@@ -35,6 +36,7 @@ from planner_core.problem.on_board import most_on_board, with_on_board, without_
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import Timeline, replay
 from planner_core.run import Judged, plan_scenario
+from planner_core.solvers.base import Termination
 from planner_core.solvers.registry import SOLVERS, Certified
 from tests.examples import examples
 from tests.geometry import hours, orbit, satellite
@@ -101,7 +103,7 @@ def test_no_plan_earns_more_than_the_bound(seed: int) -> None:
     mine = replay(problem, plan)
     if best == 0.0 or not mine.is_valid:
         return
-    bound = proven.with_on_board(most, mine.reward)
+    bound = proven.with_on_board(most)
     assert bound.value >= best - 1e-6
     assert mine.reward <= best + 1e-9
     event(f"as good as the best: {mine.reward >= best - 1e-6}")
@@ -237,6 +239,17 @@ def test_a_plan_brings_down_what_is_on_board_and_says_so() -> None:
     for name in ("t1", "t2", "t3"):
         assert (outcomes[name].outcome, outcomes[name].reason) == ("downlinked", None)
     assert timeline.reward == pytest.approx(timeline.earned_by_new + first.earned + second.earned)
+
+
+def test_a_bound_that_a_plan_beats_by_what_is_on_board_is_not_repeated(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    image = OnBoard(target_id="t1", collected_at=BEGIN, mbit=50.0, worth=100.0)
+    monkeypatch.setattr(run, "most_on_board", lambda _: 1e-6)
+    judged = _judged(_mission(image, recorder=0.3))
+    assert judged.bound is None
+    assert judged.solution.termination is not Termination.OPTIMAL
+    assert "which a valid plan earns" in caplog.text
 
 
 def test_without_contacts_they_stay_on_board() -> None:

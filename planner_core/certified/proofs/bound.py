@@ -54,9 +54,9 @@ class Bound:
     log: str | None = None
     on_board: float = 0.0
 
-    def with_on_board(self, most: float, reward: float) -> Bound:
-        """Return the bound of new images and of those on board, never below a plan's reward."""
-        return replace(self, value=max(self.value + most, reward), on_board=most)
+    def with_on_board(self, most: float) -> Bound:
+        """Return the bound of new images and of those on board, which earn ``most`` at most."""
+        return replace(self, value=self.value + most, on_board=most)
 
     def without_on_board(self) -> Bound:
         """Return the bound of new images alone."""
