@@ -23,7 +23,8 @@ from planner_core.problem import Problem
 from planner_core.problem.on_board import most_on_board, without_on_board
 from planner_core.reasons.explain import explain
 from planner_core.reasons.reason import Search, TargetOutcome
-from planner_core.referee.replay import Timeline, replay
+from planner_core.referee.replay import replay
+from planner_core.referee.timeline import Timeline
 from planner_core.replanning.relief import flyable, within_limits
 from planner_core.replanning.replan import question_of, solve_replan
 from planner_core.solvers.base import Solution, Solver

@@ -16,7 +16,8 @@ from planner_core.certified.proofs.bound import (
 from planner_core.certified.tolerances import LEAST_BOUND, SAME
 from planner_core.problem import CONTACT, Problem
 from planner_core.problem.plan import Plan
-from planner_core.referee.replay import Timeline, replay
+from planner_core.referee.replay import replay
+from planner_core.referee.timeline import Timeline
 from planner_core.solvers.base import Solution
 
 

@@ -13,7 +13,8 @@ import numpy as np
 from planner_core.domain import Preference
 from planner_core.problem import COLLECT, CONTACT, Floats, Ints, Problem
 from planner_core.problem.plan import Action, Plan
-from planner_core.referee.replay import Timeline, replay
+from planner_core.referee.replay import replay
+from planner_core.referee.timeline import Timeline
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

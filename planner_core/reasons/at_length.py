@@ -13,7 +13,8 @@ from planner_core.reasons.displacing import displace_each
 from planner_core.reasons.explain import earned_by, explain
 from planner_core.reasons.forcing import PlannedSatellite, force_each
 from planner_core.reasons.reason import UNKNOWN_SEARCH, Search, TargetOutcome
-from planner_core.referee.replay import Timeline, Violation, replay
+from planner_core.referee.replay import replay
+from planner_core.referee.timeline import Timeline, Violation
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -14,7 +14,8 @@ from typing import Final, NamedTuple
 from planner_core.problem import Problem
 from planner_core.problem.plan import Action, Plan
 from planner_core.reasons.reason import Reason
-from planner_core.referee.replay import Timeline, replay
+from planner_core.referee.replay import replay
+from planner_core.referee.timeline import Timeline
 
 _MOST_ACTIONS: Final = 8_000
 """That the referee replays for the reasons of one plan, at 0.4 ms each: about three seconds."""

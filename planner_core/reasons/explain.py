@@ -47,7 +47,7 @@ from planner_core.reasons.reason import (
     TargetOutcome,
 )
 from planner_core.reasons.teller import Teller
-from planner_core.referee.replay import Timeline
+from planner_core.referee.timeline import Timeline
 from planner_core.worth import gain
 
 NO_ACCESS: Final = {

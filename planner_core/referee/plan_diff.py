@@ -10,7 +10,7 @@ from typing import Final
 
 from planner_core.domain import Scenario
 from planner_core.problem import COLLECT, Problem
-from planner_core.referee.replay import Mode, Timeline
+from planner_core.referee.timeline import Mode, Timeline
 
 _SAME_TIME: Final = timedelta(milliseconds=1)
 

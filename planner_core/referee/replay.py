@@ -10,199 +10,28 @@ import heapq
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from planner_core.problem import (
-    COLLECT,
-    CONTACT,
-    Floats,
-    Problem,
-)
-from planner_core.problem.plan import Action, Plan
-from planner_core.problem.slew import TIME_TOLERANCE_S
-from planner_core.referee.brought_down import BroughtDown, brought_down_of
+from planner_core.problem import COLLECT, CONTACT, Floats, Problem
+from planner_core.problem.plan import Plan
+from planner_core.referee.brought_down import brought_down_of
 from planner_core.referee.delivery import delivered_s
 from planner_core.referee.idle_time import Idle
 from planner_core.referee.pinned_plan import breaches
-from planner_core.referee.resource_profile import (
-    Point,
-    Profile,
-    integrate,
-    thin,
+from planner_core.referee.resource_profile import Point, Profile, integrate, thin
+from planner_core.referee.rules import limits, stations, turns, windows
+from planner_core.referee.timeline import (
+    Collected,
+    JudgedAction,
+    Resourceline,
+    SatelliteTimeline,
+    Slew,
+    Timeline,
+    Violation,
 )
-from planner_core.referee.sight import turn_between, turn_from_start
 from planner_core.worth import share_earned
-
-Mode = Literal["collect", "contact", "sunpoint", "hold"]
-ViolationCode = Literal[
-    "window",
-    "overlap",
-    "slew",
-    "station",
-    "duplicate",
-    "battery",
-    "recorder",
-    "pin",
-    "outage",
-    "frozen",
-]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Violation:
-    """A rule that the plan breaks.
-
-    Attributes
-    ----------
-    at_s
-        When, in seconds from the start of the horizon.
-    needed, available
-        What the rule asks for and what the plan leaves: seconds, or fractions of capacity.
-    blamed
-        Positions in ``plan.actions`` of the actions that break it; those earn nothing.
-    inherited
-        Whether it held at the start already, and no action has a part in it.
-    """
-
-    code: ViolationCode
-    satellite: int
-    at_s: float
-    needed: float
-    available: float
-    detail: str
-    blamed: tuple[int, ...]
-    inherited: bool = False
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Slew:
-    """The turn before an action; ``needed_s`` includes settling."""
-
-    angle_deg: float
-    needed_s: float
-    available_s: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class JudgedAction:
-    """One action of the timeline. ``opportunity`` and ``position`` are None in idle time.
-
-    Attributes
-    ----------
-    worth
-        Of a collect: what its image earns by itself.
-    delivered_s
-        Of a collect: when its last bit is on the ground; None for never.
-    turn_to_s, turn_back_s
-        Of sun-pointing: the turn to the sun that ends at its start, and the one from its end.
-    """
-
-    mode: Mode
-    start_s: float
-    end_s: float
-    opportunity: int | None
-    position: int | None
-    slew: Slew | None
-    reward: float
-    battery_end: float | None
-    recorder_end: float | None
-    worth: float | None = None
-    delivered_s: float | None = None
-    turn_to_s: float | None = None
-    turn_back_s: float | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Resourceline:
-    """Battery and recorder fractions over time; shape ``(k,)`` each."""
-
-    time_s: Floats
-    battery: Floats
-    recorder: Floats
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SatelliteTimeline:
-    """What one satellite does, and its resources (None where they do not count)."""
-
-    actions: tuple[JudgedAction, ...]
-    resources: Resourceline | None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Collected:
-    """How a target was collected: by which plan action, and whether its image is down.
-
-    Attributes
-    ----------
-    worth
-        What the image earns.
-    delivered_s, age_s
-        When its last bit is on the ground, and how long after the collect; None for never.
-    """
-
-    position: int
-    satellite: int
-    worth: float
-    delivered_s: float | None
-    age_s: float | None
-
-    @property
-    def is_downlinked(self) -> bool:
-        """Whether the image is on the ground by the end of the horizon."""
-        return self.delivered_s is not None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Timeline:
-    """A plan, judged.
-
-    Attributes
-    ----------
-    reward
-        Sum over targets of the best worth of their collects by actions that break nothing, and
-        of what images earn that were on board at the start.
-    collected
-        By target index.
-    downlinked, on_board
-        What contacts took down, and what is in the recorder at the end, by satellite, in recorder
-        capacities.
-    battery_min, recorder_max
-        The lowest battery and the highest recorder of any satellite at any instant.
-    brought_down
-        Of each image that a recorder held at the start, in the problem's order.
-    """
-
-    satellites: tuple[SatelliteTimeline, ...]
-    violations: tuple[Violation, ...]
-    reward: float
-    collected: Mapping[int, Collected]
-    downlinked: tuple[float, ...]
-    on_board: tuple[float, ...]
-    battery_min: float | None
-    recorder_max: float | None
-    brought_down: tuple[BroughtDown, ...] = ()
-
-    @property
-    def earned_by_new(self) -> float:
-        """What the images of the plan itself earn."""
-        return math.fsum(image.worth for image in self.collected.values())
-
-    @property
-    def is_valid(self) -> bool:
-        """Whether nothing is broken; imaging a target twice is allowed, it earns nothing."""
-        return all(v.code == "duplicate" for v in self.violations)
-
-    @property
-    def validity(self) -> Literal["valid", "inherited", "violations"]:
-        """What is to be said of it: inherited violations are no fault of the plan."""
-        if self.is_valid:
-            return "valid"
-        own = (v for v in self.violations if v.code != "duplicate" and not v.inherited)
-        return "violations" if any(own) else "inherited"
 
 
 def plan_sha256(problem: Problem, plan: Plan) -> str:
@@ -234,13 +63,13 @@ def replay(problem: Problem, plan: Plan) -> Timeline:
     for positions in by_satellite:
         positions.sort(key=lambda p: plan.actions[p])
 
-    violations: list[Violation] = _windows(problem, plan)
+    violations: list[Violation] = windows(problem, plan)
     slews: dict[int, Slew | None] = {}
     for index, positions in enumerate(by_satellite):
-        found, turns = _turns(problem, plan, index, positions)
+        found, slewed = turns(problem, plan, index, positions)
         violations += found
-        slews |= turns
-    violations += _stations(problem, plan)
+        slews |= slewed
+    violations += stations(problem, plan)
     violations += [Violation(**b._asdict()) for b in breaches(problem, plan)]
 
     profiles: list[Profile | None] = [None] * len(problem.satellites)
@@ -250,7 +79,7 @@ def replay(problem: Problem, plan: Plan) -> Timeline:
                 problem, problem.satellites[index], [plan.actions[p] for p in positions]
             )
             profiles[index] = profile
-            violations += _limits(problem, index, positions, profile)
+            violations += limits(problem, index, positions, profile)
 
     blamed = {p for v in violations for p in v.blamed}
     down_s = _delivered(problem, plan, by_satellite, profiles)
@@ -276,207 +105,6 @@ def replay(problem: Problem, plan: Plan) -> Timeline:
         recorder_max=max((p.recorder for p in points), default=None),
         brought_down=brought_down,
     )
-
-
-def _windows(problem: Problem, plan: Plan) -> list[Violation]:
-    """Each action lies in its access and in the horizon, and has its opportunity's length."""
-    table = problem.opportunities
-    found = []
-    for position, action in enumerate(plan.actions):
-        i = action.opportunity
-        first_s = max(0.0, float(table.access_start_s[i]))
-        last_s = min(problem.horizon_s, float(table.access_end_s[i]))
-        early_s, late_s = first_s - action.start_s, action.end_s - last_s
-        length_s = float(table.end_s[i] - table.start_s[i])
-        is_own_start = problem.continuous_starts and table.kind[i] == COLLECT
-        shift_s = abs(action.start_s - float(table.start_s[i]))
-        if early_s > TIME_TOLERANCE_S:
-            at_s, needed, available = action.start_s, first_s, action.start_s
-            detail = f"It starts {early_s:.3f} s before its access."
-        elif late_s > TIME_TOLERANCE_S:
-            at_s, needed, available = action.end_s, last_s, action.end_s
-            detail = f"It ends {late_s:.3f} s after its access."
-        elif abs(action.end_s - action.start_s - length_s) > TIME_TOLERANCE_S:
-            at_s, needed, available = action.start_s, length_s, action.end_s - action.start_s
-            detail = f"It lasts {available:.3f} s instead of {length_s:.3f} s."
-        elif shift_s > TIME_TOLERANCE_S and not is_own_start:
-            at_s, needed, available = action.start_s, float(table.start_s[i]), action.start_s
-            detail = "It is not one of the scenario's opportunities."
-        else:
-            continue
-        found.append(
-            Violation(code="window", satellite=int(table.satellite[i]), at_s=at_s, needed=needed,
-                      available=available, detail=detail, blamed=(position,))
-        )  # fmt: skip
-    return found
-
-
-def _turns(
-    problem: Problem, plan: Plan, index: int, positions: Sequence[int]
-) -> tuple[list[Violation], dict[int, Slew | None]]:
-    """Tasks of one satellite neither overlap nor follow faster than it turns: C(a, b)."""
-    found: list[Violation] = []
-    slews: dict[int, Slew | None] = {}
-    previous: Action | None = None
-    busy_until: Action | None = None
-    for position in positions:
-        action = plan.actions[position]
-        slews[position] = first = _first_slew(problem, index, action)
-        if first is not None and first.available_s < first.needed_s - TIME_TOLERANCE_S:
-            detail = (
-                f"The turn of {first.angle_deg:.2f} deg from where it looked at the start takes "
-                f"{first.needed_s:.3f} s."
-            )
-            found.append(
-                Violation(code="slew", satellite=index, at_s=action.start_s,
-                          needed=first.needed_s, available=first.available_s, detail=detail,
-                          blamed=(position,))
-            )  # fmt: skip
-        if previous is not None and busy_until is not None:
-            angle_deg, needed_s = turn_between(problem, index, previous, action)
-            available_s = action.start_s - previous.end_s
-            slews[position] = Slew(angle_deg=angle_deg, needed_s=needed_s, available_s=available_s)
-            gap_s = action.start_s - busy_until.end_s
-            code: ViolationCode | None = None
-            if gap_s < -TIME_TOLERANCE_S:
-                code, needed, available = "overlap", 0.0, gap_s
-                detail = f"It starts {-gap_s:.3f} s before the task ahead of it ends."
-            elif available_s < needed_s - TIME_TOLERANCE_S:
-                code, needed, available = "slew", needed_s, available_s
-                detail = f"The turn of {angle_deg:.2f} deg takes {needed_s:.3f} s."
-            if code is not None:
-                found.append(
-                    Violation(code=code, satellite=index, at_s=action.start_s, needed=needed,
-                              available=available, detail=detail, blamed=(position,))
-                )  # fmt: skip
-        previous = action
-        if busy_until is None or action.end_s > busy_until.end_s:
-            busy_until = action
-    return found, slews
-
-
-def _first_slew(problem: Problem, index: int, action: Action) -> Slew | None:
-    """Return the turn to an action from where its satellite looked at the start, if known."""
-    heading, turn = problem.satellites[index].heading, turn_from_start(problem, index, action)
-    if heading is None or turn is None:
-        return None
-    available_s = action.start_s - heading.free_from_s
-    return Slew(angle_deg=turn[0], needed_s=turn[1], available_s=available_s)
-
-
-def _stations(problem: Problem, plan: Plan) -> list[Violation]:
-    """Check that no station serves more satellites at a time than it has antennas."""
-    table = problem.opportunities
-    found = []
-    busy: dict[int, list[float]] = {}
-    contacts = [p for p, a in enumerate(plan.actions) if table.kind[a.opportunity] == CONTACT]
-    for position in sorted(contacts, key=lambda p: plan.actions[p]):
-        action = plan.actions[position]
-        station = int(table.place[action.opportunity])
-        ends = busy.setdefault(station, [])
-        while ends and ends[0] <= action.start_s + TIME_TOLERANCE_S:
-            heapq.heappop(ends)
-        antennas = int(problem.station_antennas[station])
-        if len(ends) < antennas:
-            heapq.heappush(ends, action.end_s)
-            continue
-        found.append(
-            Violation(
-                code="station",
-                satellite=int(table.satellite[action.opportunity]),
-                at_s=action.start_s,
-                needed=float(len(ends) + 1),
-                available=float(antennas),
-                detail=f"Station {problem.station_ids[station]} serves another satellite "
-                f"until {ends[0]:.3f} s.",
-                blamed=(position,),
-            )
-        )
-    return found
-
-
-def _limits(
-    problem: Problem, index: int, positions: Sequence[int], profile: Profile
-) -> list[Violation]:
-    """Battery stays strictly above its minimum, recorder strictly below its maximum.
-
-    From a state beyond a limit, actions that do not worsen it break nothing: a contact that
-    empties a recorder which was too full at the start is the way back.
-    """
-    r = problem.satellites[index].resources
-
-    def is_low(point: Point) -> bool:
-        return point.battery <= r.battery_min_fraction
-
-    def is_full(point: Point) -> bool:
-        return point.recorder >= r.recorder_max_fraction
-
-    def drains(before: Point, after: Point) -> bool:
-        return after.battery < before.battery or after.battery <= 0.0
-
-    def fills(before: Point, after: Point) -> bool:
-        return after.recorder > before.recorder or after.recorder >= 1.0
-
-    began_s = profile.points[0].time_s
-    found = []
-    for code, is_broken, worsens, limit in (
-        ("battery", is_low, drains, r.battery_min_fraction),
-        ("recorder", is_full, fills, r.recorder_max_fraction),
-    ):
-        blamed = [
-            (before.time_s, after.time_s, position, worsens(before, after))
-            for position, before, after in zip(
-                positions, profile.before, profile.after, strict=True
-            )
-            if is_broken(after) or (problem.dynamics == "physical" and is_broken(before))
-        ]
-        for start_s, end_s, worst in _excursions(problem, profile.points, code, limit):
-            partners = tuple(
-                position
-                for before_s, after_s, position, is_worse in blamed
-                if before_s <= end_s and after_s >= start_s and (is_worse or start_s > began_s)
-            )
-            found.append(
-                Violation(
-                    code="battery" if code == "battery" else "recorder",
-                    satellite=index,
-                    at_s=start_s,
-                    needed=limit,
-                    available=worst,
-                    detail=f"The {code} reaches {worst:.4f} of its capacity; "
-                    f"the limit is {limit:.4f}.",
-                    blamed=partners,
-                    inherited=start_s == began_s and not partners,
-                )
-            )
-    return found
-
-
-def _excursions(
-    problem: Problem, points: Sequence[Point], code: str, limit: float
-) -> list[tuple[float, float, float]]:
-    """Return (start, end, worst value) of each stay at or beyond a limit."""
-    values = [p.battery if code == "battery" else p.recorder for p in points]
-    sign = -1.0 if code == "battery" else 1.0
-    found: list[tuple[float, float, float]] = []
-    start_s: float | None = None
-    worst = limit
-    for i, value in enumerate(values):
-        is_broken = sign * (value - limit) >= 0.0
-        if is_broken and start_s is None:
-            start_s, worst = points[i].time_s, value
-            step = value - values[i - 1] if i else 0.0
-            if problem.dynamics == "physical" and step != 0.0:
-                share = (limit - values[i - 1]) / step
-                start_s = points[i - 1].time_s + share * (points[i].time_s - points[i - 1].time_s)
-        elif is_broken:
-            worst = max(worst, value) if sign > 0 else min(worst, value)
-        elif start_s is not None:
-            found.append((start_s, points[i].time_s, worst))
-            start_s = None
-    if start_s is not None:
-        found.append((start_s, points[-1].time_s, worst))
-    return found
 
 
 def _collected(

@@ -22,7 +22,8 @@ from planner_core.problem import (
 )
 from planner_core.problem.plan import Plan
 from planner_core.problem.slew import TIME_TOLERANCE_S
-from planner_core.referee.replay import Timeline, replay
+from planner_core.referee.replay import replay
+from planner_core.referee.timeline import Timeline
 
 _KEPT_VERDICTS: Final = 16  # plans of a fleet take megabytes each
 

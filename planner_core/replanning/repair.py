@@ -9,7 +9,8 @@ from planner_core.precedence.relation import excluded_by
 from planner_core.problem import COLLECT, CONTACT, Problem
 from planner_core.problem.plan import Plan
 from planner_core.problem.slew import TIME_TOLERANCE_S
-from planner_core.referee.replay import Violation, replay
+from planner_core.referee.replay import replay
+from planner_core.referee.timeline import Violation
 
 LIMITS: Final = ("battery", "recorder")
 _MOST_TRIED: Final = 30  # contacts in place of a lost one

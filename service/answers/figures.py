@@ -9,7 +9,7 @@ import numpy as np
 
 from planner_core.domain import Scenario
 from planner_core.problem import Problem
-from planner_core.referee.replay import Collected, SatelliteTimeline, Timeline
+from planner_core.referee.timeline import Collected, SatelliteTimeline, Timeline
 from service.wire.timelines import AgesOut, ImageFiguresOut, SatelliteTotalsOut
 
 _QUANTILES = (0.5, 0.9, 1.0)

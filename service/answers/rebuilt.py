@@ -13,7 +13,8 @@ from planner_core.problem import Problem
 from planner_core.problem.plan import Plan
 from planner_core.reasons.reason import Search
 from planner_core.referee.plan_diff import PlannedAction, PlanView
-from planner_core.referee.replay import Timeline, replay
+from planner_core.referee.replay import replay
+from planner_core.referee.timeline import Timeline
 from planner_core.solvers.registry import outlook_of
 from service.answers.reading import Finder
 from service.scenarios.opportunities import Described

@@ -16,14 +16,8 @@ from planner_core.orbits.sgp4_record import GRAVITY
 from planner_core.problem import Problem
 from planner_core.problem.slew import TIME_TOLERANCE_S
 from planner_core.reasons.reason import Change, Reason, TargetOutcome
-from planner_core.referee.replay import (
-    JudgedAction,
-    Resourceline,
-    Slew,
-    Timeline,
-    Violation,
-    plan_sha256,
-)
+from planner_core.referee.replay import plan_sha256
+from planner_core.referee.timeline import JudgedAction, Resourceline, Slew, Timeline, Violation
 from planner_core.run import Judged
 from planner_core.valuation import clear_probabilities
 from service.answers.figures import ages_of, num_delivered, on_board_mbit, satellite_totals

@@ -12,7 +12,8 @@ from planner_core.budget import Budget
 from planner_core.build import build_problem, compute_opportunities
 from planner_core.domain import Scenario
 from planner_core.problem import COLLECT, Problem
-from planner_core.referee.replay import Timeline, plan_sha256, replay
+from planner_core.referee.replay import plan_sha256, replay
+from planner_core.referee.timeline import Timeline
 from service.answers.reading import READERS, Reading, plan_in
 from service.commands.scenario_files import read_object
 from service.commands.summary import table

@@ -21,7 +21,8 @@ from planner_core.problem.plan import Plan
 from planner_core.reasons import delivery
 from planner_core.reasons.explain import explain
 from planner_core.reasons.reason import TargetOutcome
-from planner_core.referee.replay import Timeline, replay
+from planner_core.referee.replay import replay
+from planner_core.referee.timeline import Timeline
 from planner_core.solvers.milp import Milp
 from planner_core.solvers.rule import Rule
 from tests.examples import examples

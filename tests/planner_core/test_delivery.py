@@ -14,7 +14,8 @@ from planner_core.errors import InvalidScenario
 from planner_core.problem import COLLECT, CONTACT, Problem
 from planner_core.problem.delivery import least_age_s, with_objective
 from planner_core.problem.plan import Plan
-from planner_core.referee.replay import Timeline, replay
+from planner_core.referee.replay import replay
+from planner_core.referee.timeline import Timeline
 from tests.planner_core.problems import TIGHT, Task, make_problem, random_problem
 
 ROOMY = Resources(

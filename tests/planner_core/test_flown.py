@@ -30,7 +30,8 @@ from planner_core.errors import InvalidScenario
 from planner_core.pins import PinnedAction
 from planner_core.problem import COLLECT, Problem
 from planner_core.problem.plan import Plan
-from planner_core.referee.replay import Timeline, replay
+from planner_core.referee.replay import replay
+from planner_core.referee.timeline import Timeline
 from planner_core.run import plan_scenario
 from planner_core.solvers.registry import Certified, Rule
 from tests.geometry import hours, orbit, satellite

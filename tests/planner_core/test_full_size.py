@@ -17,7 +17,8 @@ from planner_core.certified.proofs import documents as proofs
 from planner_core.certified.proofs.resource_bound import quick_bound
 from planner_core.domain import Dynamics, GroundStation
 from planner_core.problem import ACCESS_FOUND, Problem
-from planner_core.referee.replay import Timeline, replay
+from planner_core.referee.replay import replay
+from planner_core.referee.timeline import Timeline
 from planner_core.solvers.base import Solver
 from planner_core.solvers.registry import (
     Certified,

@@ -14,7 +14,7 @@ from hypothesis import event, given
 from hypothesis import strategies as st
 
 from planner_core import run
-from planner_core.budget import Budget
+from planner_core.budget import Budget, Termination
 from planner_core.certified.proofs.documents import from_json, is_proven, to_json
 from planner_core.certified.proofs.resource_bound import quick_bound
 from planner_core.domain import (
@@ -34,9 +34,9 @@ from planner_core.problem import COLLECT, CONTACT, ImageOnBoard, Pinned, Problem
 from planner_core.problem.delivery import with_objective
 from planner_core.problem.on_board import most_on_board, with_on_board, without_on_board
 from planner_core.problem.plan import Plan
-from planner_core.referee.replay import Timeline, replay
+from planner_core.referee.replay import replay
+from planner_core.referee.timeline import Timeline
 from planner_core.run import Judged, plan_scenario
-from planner_core.solvers.base import Termination
 from planner_core.solvers.registry import SOLVERS, Certified
 from tests.examples import examples
 from tests.geometry import hours, orbit, satellite

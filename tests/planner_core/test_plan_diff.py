@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.referee.plan_diff import PlannedAction, PlanView, plan_diff
-from planner_core.referee.replay import Mode
+from planner_core.referee.timeline import Mode
 from tests.examples import examples
 
 START = datetime(2026, 3, 1, tzinfo=UTC)

@@ -30,7 +30,8 @@ from planner_core.problem import (
 from planner_core.problem.plan import Plan
 from planner_core.reasons.explain import explain
 from planner_core.reasons.reason import Change, Search
-from planner_core.referee.replay import Timeline, replay
+from planner_core.referee.replay import replay
+from planner_core.referee.timeline import Timeline
 from planner_core.solvers.registry import ForwardSearch, Milp, Rule
 from tests.examples import examples
 from tests.planner_core.brute_force import best_plan

@@ -12,7 +12,8 @@ from planner_core.budget import Budget
 from planner_core.certified.proofs.resource_bound import quick_bound
 from planner_core.problem import COLLECT, CONTACT, Problem
 from planner_core.problem.plan import Plan
-from planner_core.referee.replay import Timeline, replay
+from planner_core.referee.replay import replay
+from planner_core.referee.timeline import Timeline
 from planner_core.replanning.relief import flyable, within_limits
 from planner_core.solvers.registry import SOLVERS, Certified
 from tests.planner_core.problems import TIGHT, Task, make_problem, random_problem

@@ -24,7 +24,8 @@ from planner_core.problem import COLLECT, Problem
 from planner_core.problem.plan import Plan
 from planner_core.problem.slew import slew_s
 from planner_core.problem.sun_turns import SunPath, sun_turn_s
-from planner_core.referee.replay import Timeline, replay
+from planner_core.referee.replay import replay
+from planner_core.referee.timeline import Timeline
 from planner_core.solvers.milp import relaxation_bound
 from planner_core.solvers.priced import better_of, energy_of, is_priced, with_choices
 from planner_core.solvers.registry import SOLVERS, Certified, Milp

@@ -15,7 +15,8 @@ from planner_core.problem import (
     Sunlight,
 )
 from planner_core.problem.plan import Action, Plan
-from planner_core.referee.replay import Timeline, plan_sha256, replay
+from planner_core.referee.replay import plan_sha256, replay
+from planner_core.referee.timeline import Timeline
 from tests.planner_core.problems import TIGHT, Task, make_problem
 
 

@@ -33,7 +33,7 @@ from planner_core.reasons.what_if import (
     what_if,
 )
 from planner_core.referee.plan_diff import PlanView, plan_diff
-from planner_core.referee.replay import JudgedAction
+from planner_core.referee.timeline import JudgedAction
 from planner_core.run import Judged, plan_scenario
 from planner_core.solvers.base import Solver
 from planner_core.solvers.registry import (

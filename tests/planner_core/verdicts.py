@@ -7,7 +7,8 @@ import pytest
 from planner_core.budget import Budget, Termination
 from planner_core.certified.solver import Certified
 from planner_core.problem import Problem
-from planner_core.referee.replay import Timeline, replay
+from planner_core.referee.replay import replay
+from planner_core.referee.timeline import Timeline
 
 
 def encloses(problem: Problem, best: float) -> bool:
