@@ -3,37 +3,109 @@
 
 import { h } from "./dom.js";
 
-/** @typedef {{path: string[], before: string | number, input: HTMLInputElement}} Field */
+/** @typedef {import("./types.js").Schema} Schema */
 /** @typedef {Record<string, any>} Thing */
+/**
+ * @typedef {{path: string[], before: unknown, input: HTMLInputElement | HTMLSelectElement,
+ *   read: (text: string) => unknown}} Field
+ */
 
 /** What no change can touch, or what has a call of its own. */
-const FIXED = new Set(["id", "created_at", "updated_at", "norad_cat_id", "epoch", "tle", "omm", "links", "is_built_in", "spacecraft"]);
+const FIXED = new Set(["id", "created_at", "updated_at", "norad_cat_id", "epoch", "tle", "omm", "oem", "links", "is_built_in", "spacecraft"]);
 /** What a change replaces as a whole. */
 const WHOLE = new Set(["resources"]);
+/** The part of the API's description that tells of each part of a thing. */
+const DESCRIBED_BY = { agility: "AgilityIn", sensor: "SensorIn", resources: "OwnResources", "": "GroundStationIn" };
 
 /**
- * Return a field for each text and number; lists and what is not set are left to the API.
+ * Return a field for each figure; what is set can be changed but not unset.
  * @param {Thing} thing
+ * @param {Record<string, Schema>} schemas of the API
  * @param {string[]} [within]
  * @returns {Field[]}
  */
-export function fieldsOf(thing, within = []) {
+export function fieldsOf(thing, schemas, within = []) {
   return Object.entries(thing).flatMap(([name, value]) => {
     if (within.length === 0 && FIXED.has(name)) return [];
     const path = [...within, name];
-    if (typeof value === "object" && value !== null && !Array.isArray(value)) return fieldsOf(value, path);
-    if (typeof value !== "number" && typeof value !== "string") return [];
-    const isNumber = typeof value === "number";
-    const input = h("input", { type: isNumber ? "number" : "text", step: isNumber && "any", value, required: true });
-    input.dataset.path = path.join(".");
-    return [{ path, before: value, input }];
+    if (typeof value === "object" && value !== null && !Array.isArray(value)) return fieldsOf(value, schemas, path);
+    const part = DESCRIBED_BY[/** @type {keyof typeof DESCRIBED_BY} */ (within[0] ?? "")] ?? "";
+    const made = inputFor(value, schemas[part]?.properties?.[name] ?? {});
+    if (made === null) return [];
+    made.input.dataset.path = path.join(".");
+    return [{ path, before: value, ...made }];
   });
 }
 
+/**
+ * @param {unknown} value
+ * @param {Schema} schema
+ * @returns {Pick<Field, "input" | "read"> | null} null for what has no simple field
+ */
+function inputFor(value, schema) {
+  const options = schema.anyOf ?? [schema];
+  const choices = options.flatMap((one) => one.enum ?? []).filter((one) => one !== null);
+  if (typeof value === "boolean") return select([true, false], value, (text) => text === "true");
+  if (typeof value === "string" && choices.length > 0) return select(choices, value, (text) => text);
+  if (typeof value === "string") return typed("text", value, true, (text) => text.trim());
+  if (typeof value === "number") return typed("number", value, true, Number);
+  if (isKnots(value)) return typed("text", shownKnots(value), value.length > 0, knotsIn);
+  const isNumber = options.some((one) => one.type === "number");
+  return value === null && isNumber ? typed("number", "", false, (text) => (text === "" ? null : Number(text))) : null;
+}
+
+/**
+ * @param {unknown[]} choices
+ * @param {unknown} value
+ * @param {Field["read"]} read
+ */
+function select(choices, value, read) {
+  const words = (/** @type {unknown} */ one) => (one === true ? "yes" : one === false ? "no" : String(one));
+  const options = choices.map((one) => h("option", { value: String(one) }, words(one)));
+  const input = h("select", {}, ...options);
+  input.value = String(value);
+  return { input, read };
+}
+
+/**
+ * @param {"text" | "number"} type
+ * @param {string | number} value
+ * @param {boolean} required
+ * @param {Field["read"]} read
+ */
+function typed(type, value, required, read) {
+  const placeholder = required ? null : "none";
+  return { input: h("input", { type, step: type === "number" && "any", value, required, placeholder }), read };
+}
+
+/**
+ * @param {unknown} value
+ * @returns {value is number[][]}
+ */
+function isKnots(value) {
+  return Array.isArray(value) && value.every((one) => Array.isArray(one) && one.length === 2);
+}
+
+/** @param {number[][]} knots */
+function shownKnots(knots) {
+  return knots.map(([at, what]) => `${at}: ${what}`).join(", ");
+}
+
+/** @param {string} text */
+function knotsIn(text) {
+  const parts = text.split(",").filter((one) => one.trim() !== "");
+  const knots = parts.map((one) => one.split(":").map(Number));
+  if (!knots.every((one) => one.length === 2 && one.every(Number.isFinite))) {
+    throw new Error(`${text}: give pairs with a colon, between commas, as in 5: 150, 90: 600.`);
+  }
+  return knots;
+}
+
 /** @param {Field} field */
-export function labelled({ path, input }) {
+export function labelled({ path, before, input }) {
   const words = path.join(": ").replaceAll("_", " ");
-  return h("p", { class: "field" }, h("label", {}, words, input));
+  const about = isKnots(before) ? h("small", {}, path.at(-1) === "elevation_mask" ? "Azimuth: elevation, in degrees" : "Elevation in degrees: rate") : null;
+  return h("p", { class: "field" }, h("label", {}, words, input), about);
 }
 
 /**
@@ -45,9 +117,9 @@ export function labelled({ path, input }) {
 export function changesIn(thing, fields) {
   /** @type {Thing} */
   const changes = {};
-  for (const { path, before, input } of fields) {
-    const value = typeof before === "number" ? Number(input.value) : input.value.trim();
-    if (value === before) continue;
+  for (const { path, before, input, read } of fields) {
+    const value = read(input.value);
+    if (JSON.stringify(value) === JSON.stringify(before)) continue;
     const [first, ...rest] = path;
     if (first === undefined) continue;
     if (rest.length === 0) {

@@ -1,12 +1,13 @@
 // @ts-check
 /** Satellites, stations and spacecraft types as they are now, and what is out. */
 
-import { call, list, post } from "./api.js";
+import { call, get, list, post } from "./api.js";
 import { byId, fill, h } from "./dom.js";
 import { changesIn, fieldsOf, labelled } from "./fields.js";
 import { utc } from "./format.js";
 import { instantOf } from "./instants.js";
 import { startPage, whileBusy } from "./page.js";
+import { fillSpacecraft } from "./spacecraft_choice.js";
 
 /** @typedef {{id: string, name: string, is_built_in?: boolean}} Named */
 /** @typedef {import("./types.js").OutageOut} OutageOut */
@@ -17,13 +18,15 @@ const HOUR_MS = 3_600_000;
 
 /** @type {{thing: Record<string, any>, etag: string, fields: import("./fields.js").Field[]} | null} */
 let open = null;
+/** @type {Record<string, import("./types.js").Schema>} */
+let schemas = {};
 
 startPage(async () => {
+  schemas = (await get("/openapi.json")).components.schemas;
   const [satellites, stations, types] = await Promise.all(Object.keys(KINDS).map(read));
   for (const [i, [kind, word]] of Object.entries(KINDS).entries()) {
     const own = [satellites, stations, types][i] ?? [];
-    const options = own.filter((one) => !one.is_built_in).map(({ id, name }) => h("option", { value: `/v1/${kind}/${encodeURIComponent(id)}` }, `${word} ${name}`));
-    byId("thing").append(...options);
+    byId("thing").append(...own.filter((one) => !one.is_built_in).map((one) => optionOf(kind, word, one)));
   }
   byId("outage-of").append(
     ...(stations ?? []).map(({ id, name }) => h("option", { value: `station_id ${id}` }, `station ${name}`)),
@@ -32,8 +35,17 @@ startPage(async () => {
   field("outage-start").value = utc(Date.now());
   byId("thing").addEventListener("change", () => edit());
   installForms();
-  await showOutages();
+  await Promise.all([fillSpacecraft(/** @type {HTMLSelectElement} */ (byId("type-base"))), showOutages()]);
 });
+
+/**
+ * @param {string} kind
+ * @param {string} word
+ * @param {Named} one
+ */
+function optionOf(kind, word, { id, name }) {
+  return h("option", { value: `/v1/${kind}/${encodeURIComponent(id)}` }, `${word} ${name}`);
+}
 
 /** @param {string} kind @returns {Promise<Named[]>} */
 async function read(kind) {
@@ -53,7 +65,7 @@ async function edit() {
   if (path === "") return;
   const response = await call(path, { cache: "no-store" });
   const thing = await response.json();
-  open = { thing, etag: response.headers.get("ETag") ?? "", fields: fieldsOf(thing) };
+  open = { thing, etag: response.headers.get("ETag") ?? "", fields: fieldsOf(thing, schemas) };
   fill(byId("edit-fields"), ...open.fields.map(labelled));
 }
 
@@ -68,8 +80,23 @@ function installForms() {
     // Whoever was quicker is not overwritten.
     const headers = { "Content-Type": "application/json", "If-Match": open.etag };
     await call(field("thing").value, { method: "PATCH", headers, body: JSON.stringify(changes) });
+    const name = changes.name;
+    const option = byId("thing").querySelector("option:checked");
+    if (name && option) option.textContent = `${option.textContent?.split(" ", 1)[0]} ${name}`;
     await edit();
     byId("edit-status").textContent = "Saved.";
+  });
+  onSubmit("type-form", "type-error", async () => {
+    const { agility, sensor, resources } = await get(`/v1/spacecraft/${encodeURIComponent(field("type-base").value)}`);
+    const name = field("type-name").value.trim();
+    /** @type {Named} */
+    const made = await post("/v1/spacecraft", { name, agility, sensor, resources });
+    const option = optionOf("spacecraft", KINDS.spacecraft, made);
+    byId("thing").append(option);
+    field("thing").value = option.value;
+    field("type-name").value = "";
+    await Promise.all([fillSpacecraft(/** @type {HTMLSelectElement} */ (byId("type-base"))), edit()]);
+    byId("edit-status").textContent = "Added: change what is different.";
   });
   onSubmit("outage-form", "outage-error", async () => {
     const of = field("outage-of").value;

@@ -3,11 +3,13 @@
 
 import { get, list, post } from "./api.js";
 import { byId, fill, h, notice } from "./dom.js";
+import { chosenForecast, installForecasts } from "./forecast_choice.js";
 import { utc } from "./format.js";
 import { startPage, whileBusy } from "./page.js";
 import { installSatelliteForm } from "./satellite_form.js";
 import { aboutOf, titleOf } from "./scenarios.js";
 import { SchemaForm } from "./schema_form.js";
+import { fillSpacecraft } from "./spacecraft_choice.js";
 import { allChoices } from "./uploads.js";
 
 /** @typedef {import("./types.js").ScenarioOut} ScenarioOut */
@@ -46,6 +48,8 @@ startPage(async () => {
   await Promise.all([
     ...Object.values(choices).map((choice) => choice.refresh()),
     installSatelliteForm((id) => choices.satellites.add([id])),
+    fillSpacecraft(/** @type {HTMLSelectElement} */ (byId("satellites-type"))),
+    installForecasts(),
     showScenarios(),
   ]);
 });
@@ -130,6 +134,7 @@ async function scenarioId() {
     allow_old_elements: input("allow-old").checked,
     collect_spacing_s: spacing(),
     continuous_starts: input("continuous-starts").checked,
+    forecast_id: chosenForecast(),
   });
   for (const warning of made.warnings) notice("warn", warning);
   return made.id;

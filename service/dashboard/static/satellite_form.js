@@ -5,6 +5,7 @@ import { get, post } from "./api.js";
 import { byId, h } from "./dom.js";
 import { whileBusy } from "./page.js";
 import { SchemaForm } from "./schema_form.js";
+import { fillSpacecraft } from "./spacecraft_choice.js";
 
 /** @typedef {import("./types.js").Schema} Schema */
 
@@ -22,14 +23,8 @@ export async function installSatelliteForm(onStored) {
   const own = part("OwnResources");
   const name = h("input", { id: "one-name", maxlength: 200 });
   const tle = h("textarea", { id: "one-tle", rows: 3, spellcheck: "false" });
-  /** @type {{items: {id: string, name: string}[]}} */
-  const { items } = await get("/v1/spacecraft?limit=500");
-  const type = h(
-    "select",
-    { id: "one-type" },
-    ...items.map((one) => h("option", { value: one.id }, one.name)),
-  );
-  type.value = "generic_optical";
+  const type = h("select", { id: "one-type" });
+  await fillSpacecraft(type);
   const outcome = h("div", { role: "status" });
   const button = h("button", { type: "button", class: "needs-submit" }, "Store this satellite");
   button.addEventListener("click", () =>

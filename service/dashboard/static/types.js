@@ -411,4 +411,15 @@
  * @property {string | null} reason
  */
 
+/**
+ * @typedef {object} ForecastOut
+ * @property {string} id
+ * @property {string} name
+ * @property {string} first
+ * @property {string} last
+ * @property {number} num_values
+ * @property {number | null} num_targets of values by target
+ * @property {string[]} notes
+ */
+
 export {};

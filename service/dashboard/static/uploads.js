@@ -140,11 +140,14 @@ async function sendSatellites(file) {
   const types = { csv: "text/csv", xml: "application/xml" };
   const byEnding = types[/** @type {"csv" | "xml"} */ (endingOf(file))] ?? "text/plain";
   const mediaType = (await isJson(file)) ? "application/json" : byEnding;
+  const type = /** @type {HTMLSelectElement} */ (byId("satellites-type"));
+  const query = new URLSearchParams(type.value ? { spacecraft: type.value } : {});
   /** @type {any} */
-  const answer = await upload("/v1/satellites/import", file, mediaType);
+  const answer = await upload(`/v1/satellites/import?${query}`, file, mediaType);
   const ids = answer.items.map((/** @type {{id: string}} */ item) => item.id);
   const parts = told(answer, "satellite");
-  parts.push(" New ones have the figures of the built-in type generic_optical: change them under Fleet.");
+  const named = type.selectedOptions[0]?.textContent ?? "generic_optical";
+  parts.push(` New ones have the figures of the type ${named}: change them under Fleet.`);
   return { told: parts, ids };
 }
 

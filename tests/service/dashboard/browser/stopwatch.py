@@ -1,4 +1,4 @@
-"""Own satellites to an approved plan, in the browser alone, at a person's pace, with a stopwatch.
+"""Own satellites to a published plan, in the browser alone, at a person's pace, with a stopwatch.
 
     .ci/browser .venv/bin/python -m tests.service.dashboard.browser.stopwatch \
         SATELLITES.tle TARGETS.csv STATIONS.geojson [SOLVER TIME_LIMIT_S]
@@ -70,7 +70,7 @@ class Walk:
         print(f"          {self.browser.text(outcome)}")
 
 
-def to_an_approved_plan(walk: Walk, files: tuple[Path, Path, Path], how: tuple[str, ...]) -> None:
+def to_a_published_plan(walk: Walk, files: tuple[Path, Path, Path], how: tuple[str, ...]) -> None:
     """Walk from the first page to the plan; solver and time limit are the form's unless given."""
     browser = walk.browser
     with walk.step("Open the address, choose New plan"):
@@ -101,6 +101,10 @@ def to_an_approved_plan(walk: Walk, files: tuple[Path, Path, Path], how: tuple[s
         walk.type("#step-reason", "Checked by the shift lead")
         walk.click("#step-approved")
         browser.wait(lambda: browser.text("#plan-state") == "approved", "not approved")
+    with walk.step("Look at the instant from which it is in force, publish"):
+        time.sleep(LOOK_S)
+        walk.click("#step-published")
+        browser.wait(lambda: browser.text("#plan-state") == "published", "not published")
 
 
 def main(satellites: str, targets: str, stations: str, *how: str) -> None:
@@ -111,7 +115,7 @@ def main(satellites: str, targets: str, stations: str, *how: str) -> None:
         opened(line.split()[-1]) as browser,
     ):
         walk = Walk(browser)
-        to_an_approved_plan(walk, (Path(satellites), Path(targets), Path(stations)), how)
+        to_a_published_plan(walk, (Path(satellites), Path(targets), Path(stations)), how)
         whole_s = sum(seconds for _, seconds in walk.steps)
         print(f"{whole_s:6.1f} s  in {len(walk.steps)} steps")
 

@@ -220,3 +220,29 @@ def test_priorities_of_targets_are_changed(browser: Browser, api: httpx.Client) 
     changed = {one["id"]: one["reward"] for one in targets if one["reward"] != 1}
     assert changed == {"p7": 12.5, "p149": 3}
     assert "Place 149 (p149)" in browser.text("#targets")
+
+
+def test_an_image_that_came_in_part_is_reported_with_what_there_is_of_it(
+    browser: Browser, api: httpx.Client, job: Json
+) -> None:
+    plan_id = take_over(browser, job)
+    browser.wait(lambda: browser.drawn("gantt"), "no timeline")
+    actions = listed(api, f"/v1/plans/{plan_id}/actions")
+    image = min((a for a in actions if a["mode"] == "collect"), key=lambda a: a["start"])
+    choose(browser, image)
+    browser.find("#report-mbit").send_keys("12.5")
+    browser.find("#report-detail").send_keys("The last lines are missing")
+    browser.click("#report-partial")
+    browser.wait(lambda: browser.text("#chosen-action p").endswith(", partial"), "not reported")
+    (report,) = listed(api, f"/v1/plans/{plan_id}/executions")
+    told = {name: report[name] for name in ("action_id", "outcome", "mbit", "detail")}
+    assert told == {
+        "action_id": image["id"],
+        "outcome": "partial",
+        "mbit": 12.5,
+        "detail": "The last lines are missing",
+    }
+    listed_as = f"return document.querySelector('#action-choice option[value=\"{image['id']}\"]')"
+    assert browser.run(f"{listed_as}.text").endswith(", partial")
+    (now,) = (a for a in listed(api, f"/v1/plans/{plan_id}/actions") if a["id"] == image["id"])
+    assert now["outcome"] == "partial"
