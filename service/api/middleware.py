@@ -54,9 +54,8 @@ class RequestContext:
             seconds = time.perf_counter() - started
             self.counters.count(scope, status, seconds)
             caller: Caller | None = scope["state"].get("caller")
-            # Dashboards ask again and again for what has not changed: metrics count that.
             logger.log(
-                logging.DEBUG if status == HTTPStatus.NOT_MODIFIED else logging.INFO,
+                logging.DEBUG if _is_routine(status, scope["path"]) else logging.INFO,
                 "request",
                 extra={
                     "method": scope["method"],
@@ -67,3 +66,14 @@ class RequestContext:
                     "key_id": caller.key_id if caller else None,
                 },
             )
+
+
+def _is_routine(status: int, path: str) -> bool:
+    """Return whether a request is one of many alike, which metrics count.
+
+    Dashboards ask again and again for what has not changed; who waits for the service to be
+    ready, ten times a second.
+    """
+    if status == HTTPStatus.NOT_MODIFIED:
+        return True
+    return status == HTTPStatus.SERVICE_UNAVAILABLE and path.startswith("/health/")

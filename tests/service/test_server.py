@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import signal
 import socket
 import subprocess
@@ -32,6 +33,9 @@ def test_serve_says_once_when_it_is_ready_and_ends_cleanly(
         assert len(children) >= 1
         _, alive = psutil.wait_procs(children, timeout=PATIENCE_S)
         assert alive == []
+    # It waits for its workers by asking itself: that is not worth a line each time.
+    waits = [line for line in (tmp_path / "serve.log").read_text().splitlines() if "/ready" in line]
+    assert [json.loads(line)["status"] for line in waits] == [200, 200]
 
 
 def test_the_body_of_an_answer_does_not_wait_for_the_acknowledgement_of_its_head() -> None:
