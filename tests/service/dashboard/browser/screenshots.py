@@ -137,6 +137,9 @@ def screens(browser: Browser, addresses: dict[str, tuple[str, str]]) -> None:
     for page, (address, is_ready) in addresses.items():
         browser.open(address)
         browser.wait(lambda text=is_ready: browser.text(text), f"{page} is not ready")  # type: ignore[misc]
+        if page == "fleet":
+            browser.find("#thing option:nth-child(2)").click()
+            browser.wait(lambda: browser.text("#edit-fields"), "no figures")
         for width, height in SCREENS:
             for scheme in ("light", "dark"):
                 colors(browser, scheme)

@@ -18,6 +18,12 @@ from tests.service.serving import serving
 
 AT = demo_mission.HORIZON["start"].replace("T00", "T06")
 
+LEAST_MAP_SHARE = 0.3
+MAP_SHARE = """
+const box = document.querySelector("#wall-map canvas").getBoundingClientRect();
+return box.width * box.height / (innerWidth * innerHeight);
+"""
+
 
 def published(api: httpx.Client) -> Json:
     """Plan the small mission and put the plan in force."""
@@ -47,6 +53,7 @@ def test_the_wall_comes_back_by_itself_when_the_service_does(
         for size in SCREENS:
             show_at(wall, *size)
             wall.wait(lambda: wall.run(CUT_OFF) == [], f"cut off at {size}")
+            wall.wait(lambda: wall.run(MAP_SHARE) > LEAST_MAP_SHARE, f"much is empty at {size}")
         driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
     wall.wait(lambda: "No answer since" in wall.text("#wall-status"), "it does not tell")
     # What it knows it goes on telling.
