@@ -25,8 +25,8 @@ from planner_core.reasons.explain import explain
 from planner_core.reasons.reason import Search, TargetOutcome
 from planner_core.referee.replay import replay
 from planner_core.referee.timeline import Timeline
-from planner_core.replanning.relief import flyable, within_limits
-from planner_core.replanning.replan import question_of, solve_replan
+from planner_core.replanning.relief import flyable, replanned, within_limits
+from planner_core.replanning.replan import question_of
 from planner_core.solvers.base import Solution, Solver
 
 log = logging.getLogger(__name__)
@@ -108,17 +108,18 @@ def plan_scenario(
     problem = build_problem(scenario, opportunities, preparation)
     clock.append(time.perf_counter())
     budget.report(Progress(phase="solve", fraction=0.0))
-    relieved = without_on_board(within_limits(problem))
+    own = without_on_board(problem)
+    relieved = within_limits(own)
     # A replan changes as little as it must; nothing else may ask for more changes.
     aims = scenario.objective.prefer if scenario.replan is None else ()
     if scenario.replan is None:
         search = budget.part(_SEARCH) if aims else budget
-        solution = solver.solve(relieved, search, seed)
+        found = solver.solve(relieved, search, seed)
+        solution = flyable(own, relieved, found)
     else:
-        question = question_of(scenario, within_limits(problem))
+        question = replace(question_of(scenario, problem), problem=own)
         prices = None if before is None else before.prices
-        solution = solve_replan(question, solver, budget, seed, prices)
-    solution = flyable(without_on_board(problem), relieved, solution)
+        solution = replanned(question, relieved, solver, budget, seed, prices)
     if problem.continuous_starts:
         solution = with_own_starts(problem, solution, budget)
     is_optimal = solution.termination is Termination.OPTIMAL
@@ -132,7 +133,11 @@ def plan_scenario(
     clock.append(time.perf_counter())
     budget.report(Progress(phase="verify", fraction=0.0))
     timeline = replay(problem, solution.plan)
-    bound = _best_bound(relieved, solution, timeline, budget, known_bound)
+    # A replan has asked the multipliers of the plan before, or has begun with a quick bound.
+    has_asked = scenario.replan is not None and solution.proven is not None
+    bound = _best_bound(
+        relieved, solution, timeline, budget, known_bound, wants_quick=not has_asked
+    )
     on_board = most_on_board(problem)
     if on_board > 0.0:
         bound = bound and _of_all(bound.with_on_board(on_board), timeline)
@@ -168,9 +173,15 @@ def plan_scenario(
 
 
 def _best_bound(
-    problem: Problem, solution: Solution, timeline: Timeline, budget: Budget, known: Bound | None
+    problem: Problem,
+    solution: Solution,
+    timeline: Timeline,
+    budget: Budget,
+    known: Bound | None,
+    *,
+    wants_quick: bool,
 ) -> Bound | None:
-    """Return the lowest of what is known, what the solver has proven and a quick bound.
+    """Return the lowest of what is known, what the solver has proven and a quick bound if wanted.
 
     Each of them is of what new images earn. A plan that may not be flown can earn more than any
     that may: no bound is below its reward.
@@ -184,7 +195,8 @@ def _best_bound(
     is_settled = not problem.use_resources and any(
         bound is solution.proven and bound.proof == "lagrangian" for bound in sound
     )
-    if known not in sound and not is_settled and all(bound.value > reward for bound in sound):
+    is_loose = not is_settled and all(bound.value > reward for bound in sound)
+    if known not in sound and is_loose and (wants_quick or not sound):
         quick = _quick_bound(problem, reward, budget)
         sound = [b for b in (*sound, quick) if not _is_beaten(b, timeline, reward)]
     if not sound:

@@ -47,9 +47,9 @@ FREEZE: Final = timedelta(minutes=5)
 """From the end of a pass: what begins sooner stays as it is."""
 POLICIES: Final = {"1": 1, "2": 2, "4": 4, "pass": None}
 """Plans a day; None for one at every pass."""
-LIMITS_S: Final = (4.0, 0.6)
+LIMITS_S: Final = (3.0, 0.4)
 """CPU seconds for a plan that hardly has one before it, and for others."""
-GAP: Final = 0.01
+GAP: Final = 0.02
 STABILITY: Final = Stability(weight=0.1, contact_weight=0.1)
 """At 0.03 a plan from scratch that earns 12 of 435 more may cost 190 of 280 actions, every day."""
 

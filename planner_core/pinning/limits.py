@@ -43,13 +43,15 @@ _MAX_STATES: Final = 200
 def check_limits(
     problem: Problem,
     ruled_out: Sequence[tuple[str, Longs]],
-    kept: Sequence[tuple[Kept, Bools]],
-    in_outage: Bools,
+    asked: Sequence[tuple[Kept, Bools]],
+    frozen: Sequence[Kept],
+    facts: Bools,
 ) -> None:
     """Raise where battery or recorder cannot bear what one satellite must or must not do.
 
     Contacts may help; that satellites share antennas is left out, but for contacts that are kept.
-    Where no plan keeps the limits without pins either, as with what is out, they are not to blame.
+    Where no plan keeps the limits without pins either, as with what is out or what is frozen, they
+    are not to blame.
 
     Parameters
     ----------
@@ -57,9 +59,11 @@ def check_limits(
         With all its opportunities.
     ruled_out
         Pins, and the opportunities that each rules out.
-    kept
-        Actions to be kept, and what cannot stand beside each. Shape ``(n,)``.
-    in_outage
+    asked
+        Actions that pins keep, and what cannot stand beside each. Shape ``(n,)``.
+    frozen
+        Actions that are flown whatever is pinned.
+    facts
         Opportunities that are not to be had whatever is pinned. Shape ``(n,)``.
 
     Raises
@@ -69,33 +73,34 @@ def check_limits(
     """
     if not problem.use_resources:
         return
-    kept = sorted(kept, key=lambda pair: pair[0].row)
+    asked = sorted(asked, key=lambda pair: pair[0].row)
     for index, satellite in enumerate(problem.satellites):
         own = set(satellite.rows.tolist())
-        must = [one for one, _ in kept if one.row in own]
-        missing = in_outage.copy()
+        flown = [kept for kept in frozen if kept.row in own]
+        missing = facts.copy()
         for _, rows in ruled_out:
             missing[rows] = True
-        for _, excluded in kept:
+        for _, excluded in asked:
             missing |= excluded
+        must = flown + [kept for kept, _ in asked if kept.row in own]
         if can_keep(problem, index, must, missing):
             continue
-        missing = in_outage.copy()
-        if not can_keep(problem, index, [], missing):
+        missing = facts.copy()
+        if not can_keep(problem, index, flown, missing):
             continue
         for pointer, rows in ruled_out:
             missing[rows] = True
-            if not can_keep(problem, index, [], missing):
+            if not can_keep(problem, index, flown, missing):
                 raise InvalidScenario(
                     "pin_breaks_limits",
                     "Without the contacts that it and the pins before it rule out no plan keeps "
-                    f"the limits: {_what_breaks(problem, [])}",
+                    f"the limits: {_what_breaks(problem, flown)}",
                     pointer=pointer,
                 )
-        must = []
-        for one, excluded in kept:
+        must = flown
+        for one, excluded in asked:
             missing |= excluded
-            must += [one] if one.row in own else []
+            must = [*must, one] if one.row in own else must
             if not can_keep(problem, index, must, missing):
                 raise InvalidScenario(
                     "pin_breaks_limits",

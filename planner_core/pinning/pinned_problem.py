@@ -340,8 +340,14 @@ def apply_pins(problem: Problem, pinned: Pinned) -> Problem:
         ),
         target_access=_access_left(problem, part),
     )
-    facts = in_outage | is_too_soon
-    check_limits(problem, list(_pins_that_rule_out(problem, pinned)), beside, facts)
+    facts, frozen, asked = in_outage | is_too_soon, [], []
+    for kept, excluded in beside:
+        if pinned.is_frozen(float(problem.opportunities.start_s[kept.row])):
+            facts |= excluded
+            frozen.append(kept)
+        else:
+            asked.append((kept, excluded))
+    check_limits(problem, list(_pins_that_rule_out(problem, pinned)), asked, frozen, facts)
     return part
 
 
@@ -404,7 +410,7 @@ def _ruled_out(problem: Problem, pinned: Pinned) -> Bools:
     """Return the opportunities that are forbidden, skipped, blocked, out, too soon or no use."""
     table = problem.opportunities
     is_out: Bools = _in_outages(problem, pinned) | too_soon(problem)
-    if pinned.frozen_until_s > 0.0:
+    if pinned.frozen_until_s is not None:
         is_frozen = table.start_s < pinned.frozen_until_s - TIME_TOLERANCE_S
         is_frozen[[kept.row for kept in pinned.kept]] = False
         is_out |= is_frozen

@@ -316,7 +316,8 @@ class Pinned:
     struck
         By target, the collects that were ruled out.
     frozen_until_s
-        What starts before it is kept or not taken at all.
+        What starts before it is kept or not taken at all; None where the plan follows no other
+        one.
     """
 
     kept: tuple[Kept, ...] = ()
@@ -324,11 +325,17 @@ class Pinned:
     blocked: tuple[Blocked, ...] = ()
     forbidden: frozenset[int] = frozenset()
     struck: Mapping[int, tuple[Struck, ...]] = field(default_factory=dict)
-    frozen_until_s: float = 0.0
+    frozen_until_s: float | None = None
+
+    @property
+    def follows(self) -> bool:
+        """Whether the plan follows another one."""
+        return self.frozen_until_s is not None
 
     def is_frozen(self, start_s: float) -> bool:
         """Return whether a task that starts then may neither be added nor dropped."""
-        return start_s < self.frozen_until_s - TIME_TOLERANCE_S
+        until_s = self.frozen_until_s
+        return until_s is not None and start_s < until_s - TIME_TOLERANCE_S
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -19,9 +19,10 @@ from planner_core.problem.plan import Plan
 from planner_core.referee.brought_down import brought_down_of
 from planner_core.referee.delivery import delivered_s
 from planner_core.referee.idle_time import Idle
+from planner_core.referee.limits import limits_broken
 from planner_core.referee.pinned_plan import breaches
 from planner_core.referee.resource_profile import Point, Profile, integrate, thin
-from planner_core.referee.rules import limits, stations, turns, windows
+from planner_core.referee.rules import stations, turns, windows
 from planner_core.referee.timeline import (
     Collected,
     JudgedAction,
@@ -79,7 +80,7 @@ def replay(problem: Problem, plan: Plan) -> Timeline:
                 problem, problem.satellites[index], [plan.actions[p] for p in positions]
             )
             profiles[index] = profile
-            violations += limits(problem, index, positions, profile)
+            violations += limits_broken(problem, plan, index, positions, profile)
 
     blamed = {p for v in violations for p in v.blamed}
     down_s = _delivered(problem, plan, by_satellite, profiles)

@@ -1,4 +1,4 @@
-"""The rules that a plan must keep, beside its pins: windows, turns, stations, and limits."""
+"""The rules that a plan must keep, beside its pins and limits: windows, turns and stations."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from planner_core.problem import COLLECT, CONTACT, Problem
 from planner_core.problem.plan import Action, Plan
 from planner_core.problem.slew import TIME_TOLERANCE_S
-from planner_core.referee.resource_profile import Point, Profile
 from planner_core.referee.sight import turn_between, turn_from_start
 from planner_core.referee.timeline import Slew, Violation, ViolationCode
 
@@ -127,88 +126,4 @@ def stations(problem: Problem, plan: Plan) -> list[Violation]:
                 blamed=(position,),
             )
         )
-    return found
-
-
-def limits(
-    problem: Problem, index: int, positions: Sequence[int], profile: Profile
-) -> list[Violation]:
-    """Battery stays strictly above its minimum, recorder strictly below its maximum.
-
-    From a state beyond a limit, actions that do not worsen it break nothing: a contact that
-    empties a recorder which was too full at the start is the way back.
-    """
-    r = problem.satellites[index].resources
-
-    def is_low(point: Point) -> bool:
-        return point.battery <= r.battery_min_fraction
-
-    def is_full(point: Point) -> bool:
-        return point.recorder >= r.recorder_max_fraction
-
-    def drains(before: Point, after: Point) -> bool:
-        return after.battery < before.battery or after.battery <= 0.0
-
-    def fills(before: Point, after: Point) -> bool:
-        return after.recorder > before.recorder or after.recorder >= 1.0
-
-    began_s = profile.points[0].time_s
-    found = []
-    for code, is_broken, worsens, limit in (
-        ("battery", is_low, drains, r.battery_min_fraction),
-        ("recorder", is_full, fills, r.recorder_max_fraction),
-    ):
-        blamed = [
-            (before.time_s, after.time_s, position, worsens(before, after))
-            for position, before, after in zip(
-                positions, profile.before, profile.after, strict=True
-            )
-            if is_broken(after) or (problem.dynamics == "physical" and is_broken(before))
-        ]
-        for start_s, end_s, worst in _excursions(problem, profile.points, code, limit):
-            partners = tuple(
-                position
-                for before_s, after_s, position, is_worse in blamed
-                if before_s <= end_s and after_s >= start_s and (is_worse or start_s > began_s)
-            )
-            found.append(
-                Violation(
-                    code="battery" if code == "battery" else "recorder",
-                    satellite=index,
-                    at_s=start_s,
-                    needed=limit,
-                    available=worst,
-                    detail=f"The {code} reaches {worst:.4f} of its capacity; "
-                    f"the limit is {limit:.4f}.",
-                    blamed=partners,
-                    inherited=start_s == began_s and not partners,
-                )
-            )
-    return found
-
-
-def _excursions(
-    problem: Problem, points: Sequence[Point], code: str, limit: float
-) -> list[tuple[float, float, float]]:
-    """Return (start, end, worst value) of each stay at or beyond a limit."""
-    values = [p.battery if code == "battery" else p.recorder for p in points]
-    sign = -1.0 if code == "battery" else 1.0
-    found: list[tuple[float, float, float]] = []
-    start_s: float | None = None
-    worst = limit
-    for i, value in enumerate(values):
-        is_broken = sign * (value - limit) >= 0.0
-        if is_broken and start_s is None:
-            start_s, worst = points[i].time_s, value
-            step = value - values[i - 1] if i else 0.0
-            if problem.dynamics == "physical" and step != 0.0:
-                share = (limit - values[i - 1]) / step
-                start_s = points[i - 1].time_s + share * (points[i].time_s - points[i - 1].time_s)
-        elif is_broken:
-            worst = max(worst, value) if sign > 0 else min(worst, value)
-        elif start_s is not None:
-            found.append((start_s, points[i].time_s, worst))
-            start_s = None
-    if start_s is not None:
-        found.append((start_s, points[-1].time_s, worst))
     return found

@@ -38,7 +38,8 @@ class Violation:
     blamed
         Positions in ``plan.actions`` of the actions that break it; those earn nothing.
     inherited
-        Whether it held at the start already, and no action has a part in it.
+        Whether no plan could help it: it held at the start, or what is frozen leads to it; and no
+        action that was free to go has a part in it.
     """
 
     code: ViolationCode

@@ -44,7 +44,10 @@ class KnownPrices:
         new = np.maximum(0.0, problem.best_worth - _LEFT * problem.typical_worth)
         known = [before.get(name, new[i]) for i, name in enumerate(problem.target_ids)]
         unit = self.bound.unit
-        if unit is not None and len(problem.target_ids) > len(self.target_ids):
+        is_coarse = unit is not None and unit > _LEFT * problem.typical_worth
+        if unit is not None and is_coarse and len(problem.target_ids) > len(self.target_ids):
+            # What is left of a new target is then whole units too. Once: replan after replan with
+            # half the unit of the one before would ask for ever more labels.
             unit *= _LEFT
         prices = np.minimum(known, problem.best_worth)
         return replace(self.bound, prices=prices, unit=unit, certificate=None)

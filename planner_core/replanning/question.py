@@ -99,6 +99,10 @@ class Question:
             del verdicts[next(iter(verdicts))]
         return found
 
+    def may_fly(self, plan: Plan) -> bool:
+        """Return whether a plan breaks nothing but what no plan could help."""
+        return self.judged(plan).validity != "violations"
+
     def stable_worth(self, plan: Plan) -> float:
         """Return what the kept actions of a plan count."""
         return float(self.bonus[[action.opportunity for action in plan.actions]].sum())

@@ -1,57 +1,115 @@
-"""Problems in which a recorder is too full at the start: contacts are the way back.
+"""Problems that begin beyond a limit, or whose frozen part leads there: contacts are the way back.
 
-Searches and bounds know limits as limits. They are given the same problem with recorders that are
-just within theirs: whatever may be flown from the fuller ones may be flown from these, so that what
-is proven holds. The plan is then made one that may be flown.
+Searches and bounds know limits as limits. They are given the same problem with satellites that
+begin with an emptier recorder and a fuller battery, so that what is frozen, and telemetry, keep the
+limits: whatever may be flown from the worse start may be flown from the better one, so that what is
+proven holds. The plan is then made one that may be flown.
 """
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 from typing import Final
 
-from planner_core.budget import Termination
+import numpy as np
+
+from planner_core.budget import Budget, Termination
+from planner_core.pinning.limits import can_keep
 from planner_core.problem import CONTACT, Problem, SatelliteProblem
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
+from planner_core.referee.resource_profile import Point, integrate
+from planner_core.referee.unavoidable import beyond_from_s
+from planner_core.replanning.known import KnownPrices
+from planner_core.replanning.question import Question
 from planner_core.replanning.repair import conflicts, repaired
-from planner_core.solvers.base import Solution
+from planner_core.replanning.replan import require_promises, solve_replan, with_promised
+from planner_core.replanning.undo import parts_of, undone
+from planner_core.solvers.base import Solution, Solver
 
-_CLEARLY: Final = 1e-6  # of a recorder: farther from the limit than searches keep anyway
+_CLEARLY: Final = 1e-6  # of a capacity: farther from the limit than searches keep anyway
 
 
 def within_limits(problem: Problem) -> Problem:
-    """Return the problem with recorders that telemetry alone does not fill.
+    """Return the problem with satellites for which some plan keeps battery and recorder within.
 
-    The problem itself where none is beyond its limit at the start.
+    The problem itself where that is so already.
     """
-    if not problem.use_resources or not any(map(_is_too_full, problem.satellites)):
+    if not problem.use_resources:
         return problem
-    return replace(
-        problem,
-        satellites=tuple(
-            _relieved(satellite, problem.horizon_s) if _is_too_full(satellite) else satellite
-            for satellite in problem.satellites
-        ),
-    )
+    relieved = tuple(_relieved(problem, index) for index in range(len(problem.satellites)))
+    is_same = all(a is b for a, b in zip(relieved, problem.satellites, strict=True))
+    return problem if is_same else replace(problem, satellites=relieved)
 
 
-def flyable(problem: Problem, searched: Problem, solution: Solution) -> Solution:
+def flyable(
+    problem: Problem, searched: Problem, solution: Solution, protected: Collection[int] = ()
+) -> Solution:
     """Return an answer to ``within_limits(problem)`` as one to the problem itself.
 
     Contacts come first until the recorder is within its limit. What was optimal there need not be
     so here.
+
+    Parameters
+    ----------
+    protected
+        Rows that are dropped last.
     """
     if searched is problem:
         return solution
     rows = {action.opportunity for action in solution.plan.actions}
-    for index, satellite in enumerate(problem.satellites):
-        if _is_too_full(satellite):
+    for index, (own, relieved) in enumerate(
+        zip(problem.satellites, searched.satellites, strict=True)
+    ):
+        if own.resources != relieved.resources:
             rows = _with_relief(problem, index, rows)
     ended = solution.termination
     if ended is Termination.OPTIMAL:
         ended = Termination.HORIZON_COMPLETE
-    return replace(solution, plan=repaired(problem, rows, ()), termination=ended)
+    return replace(solution, plan=repaired(problem, rows, protected), termination=ended)
+
+
+def replanned(
+    question: Question,
+    searched: Problem,
+    solver: Solver,
+    budget: Budget,
+    seed: int,
+    known: KnownPrices | None = None,
+) -> Solution:
+    """Return the plan that follows the base, from whatever it begins with.
+
+    Parameters
+    ----------
+    searched
+        ``within_limits`` of the question's problem.
+    known
+        As in ``solve_replan``.
+
+    Raises
+    ------
+    InvalidScenario
+        ``promise_not_kept``
+    """
+    problem = question.problem
+    found = solve_replan(replace(question, problem=searched), solver, budget, seed, known)
+    if searched is problem:
+        return found
+    protected = np.flatnonzero(question.is_promised).tolist()
+    solution = flyable(problem, searched, found, protected)
+    plan = undone(question, with_promised(question, solution.plan), budget)
+    require_promises(question, plan)
+    return replace(
+        solution,
+        plan=plan,
+        statistics={
+            **solution.statistics,
+            "stability": question.stable_worth(plan),
+            "changed": float(question.changed(plan)),
+            "parts": float(len(parts_of(question, plan))),
+        },
+    )
 
 
 def _is_too_full(satellite: SatelliteProblem) -> bool:
@@ -59,19 +117,72 @@ def _is_too_full(satellite: SatelliteProblem) -> bool:
     return r.initial_recorder_fraction >= r.recorder_max_fraction
 
 
-def _relieved(satellite: SatelliteProblem, horizon_s: float) -> SatelliteProblem:
+def _relieved(problem: Problem, index: int) -> SatelliteProblem:
+    """Return a satellite from whose start all that may be flown keeps the limits."""
+    satellite = problem.satellites[index]
+    if _is_too_full(satellite):
+        r = satellite.resources
+        room = r.telemetry_per_s * problem.horizon_s + _CLEARLY
+        start = max(0.0, r.recorder_max_fraction - room)
+        satellite = replace(satellite, resources=replace(r, initial_recorder_fraction=start))
+    if not problem.pinned.follows:
+        return satellite
+    is_full = beyond_from_s(problem, index) is not None
+    for relieve in (_emptied, _charged) if is_full else (_charged, _emptied):
+        if _keeps_limits(problem, index, satellite):
+            return satellite
+        satellite = relieve(problem, index, satellite)
+    return satellite if _keeps_limits(problem, index, satellite) else _unlimited(satellite)
+
+
+def _keeps_limits(problem: Problem, index: int, satellite: SatelliteProblem) -> bool:
+    """Return whether what a satellite must take, and contacts, may keep the limits."""
+    satellites = [*problem.satellites]
+    satellites[index] = satellite
+    own = set(satellite.rows.tolist())
+    kept = [one for one in problem.pinned.kept if one.row in own]
+    none = np.zeros(len(problem.opportunities), dtype=np.bool_)
+    return can_keep(replace(problem, satellites=tuple(satellites)), index, kept, none)
+
+
+def _emptied(problem: Problem, index: int, satellite: SatelliteProblem) -> SatelliteProblem:
+    """Return the satellite with a recorder in which what is kept, and telemetry, finds room."""
     r = satellite.resources
-    room = r.telemetry_per_s * horizon_s + _CLEARLY
-    start = max(0.0, r.recorder_max_fraction - room)
+    over = max(p.recorder for p in _levels(problem, index, satellite)) - r.recorder_max_fraction
+    start = max(0.0, r.initial_recorder_fraction - max(0.0, over + _CLEARLY))
     return replace(satellite, resources=replace(r, initial_recorder_fraction=start))
+
+
+def _charged(problem: Problem, index: int, satellite: SatelliteProblem) -> SatelliteProblem:
+    """Return the satellite with a battery that lasts for what is kept."""
+    r = satellite.resources
+    under = r.battery_min_fraction - min(p.battery for p in _levels(problem, index, satellite))
+    start = min(1.0, r.initial_battery_fraction + max(0.0, under + _CLEARLY))
+    return replace(satellite, resources=replace(r, initial_battery_fraction=start))
+
+
+def _unlimited(satellite: SatelliteProblem) -> SatelliteProblem:
+    """Return the satellite with no limits but those of battery and recorder themselves."""
+    r = replace(satellite.resources, recorder_max_fraction=1.0, battery_min_fraction=0.0)
+    return replace(satellite, resources=r)
+
+
+def _levels(problem: Problem, index: int, satellite: SatelliteProblem) -> tuple[Point, ...]:
+    """Return battery and recorder of a satellite that does what it must and nothing else."""
+    table = problem.opportunities
+    rows = [row for row in problem.kept_rows.tolist() if table.satellite[row] == index]
+    return integrate(problem, satellite, Plan.of(problem, rows).actions).points
 
 
 def _with_relief(problem: Problem, index: int, rows: set[int]) -> set[int]:
     """Return the plan's rows with contacts until the recorder of a satellite is within its limit.
 
     The earliest ones that can stand beside what is kept; other tasks make room, and images that
-    would fill it meanwhile.
+    would fill it meanwhile. The rows themselves where some plan is within its limit throughout.
     """
+    from_s = beyond_from_s(problem, index)
+    if from_s is None:
+        return rows
     table, r = problem.opportunities, problem.satellites[index].resources
     taken = problem.kept_rows.tolist()
     until_s = problem.horizon_s
@@ -81,7 +192,8 @@ def _with_relief(problem: Problem, index: int, rows: set[int]) -> set[int]:
         taken.append(row)
         timeline = replay(problem, Plan.of(problem, taken))
         judged = {a.opportunity: a.recorder_end for a in timeline.satellites[index].actions}
-        if (judged[row] or 0.0) < r.recorder_max_fraction:
+        is_within = (judged[row] or 0.0) < r.recorder_max_fraction
+        if is_within and table.end_s[row] > from_s:
             until_s = float(table.end_s[row])
             break
     return set(taken) | {

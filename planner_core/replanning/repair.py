@@ -55,7 +55,9 @@ def _with_contact(problem: Problem, plan: Plan, broken: Violation) -> Plan | Non
     for row in [row for row in free if not conflicts(problem, row, taken)][:_MOST_TRIED]:
         trial = Plan.of(problem, [*taken, row])
         after = replay(problem, trial)
-        own_broken = [v for v in after.violations if v.satellite == broken.satellite]
+        own_broken = [
+            v for v in after.violations if v.satellite == broken.satellite and not v.inherited
+        ]
         if all(v.at_s > broken.at_s for v in own_broken if v.code in LIMITS) and len(
             after.violations
         ) <= len(before.violations):
@@ -76,7 +78,8 @@ def _shed(
         and action.start_s <= broken.at_s + TIME_TOLERANCE_S
         and (table.kind[action.opportunity] == COLLECT or broken.code == "battery")
     ]
-    candidates = ahead if broken.code in LIMITS else [*blamed, *ahead]
+    # Where what is frozen leads beyond a limit, what makes it worse comes after that.
+    candidates = [*ahead, *reversed(blamed)] if broken.code in LIMITS else [*blamed, *ahead]
     loose = [row for row in candidates if row not in kept]
     if not loose:
         return None

@@ -98,7 +98,7 @@ def solve_replan(
             best.lower(found.proven)
         plan = _better_of(question, plan, found.plan, budget, seed)
     plan = within_share(question, plan, budget)
-    _require_promises(question, plan)
+    require_promises(question, plan)
     return _solution(question, plan, best, budget)
 
 
@@ -107,10 +107,14 @@ def first_plan(question: Question, budget: Budget) -> Plan:
     problem = question.problem
     protected = set(np.flatnonzero(question.is_promised).tolist())
     base = Plan.of(problem, question.base.tolist()).with_kept(problem)
-    broken = {v.satellite for v in question.judged(base).violations if v.code in LIMITS}
+    broken = {
+        v.satellite
+        for v in question.judged(base).violations
+        if v.code in LIMITS and not v.inherited
+    }
     if broken:
         fewest = fewest_changes(question, sorted(broken), budget)
-        if fewest is not None and question.judged(fewest.plan).is_valid:
+        if fewest is not None and question.may_fly(fewest.plan):
             return with_promised(question, fewest.plan)
     return with_promised(question, repaired(problem, question.base.tolist(), protected))
 
@@ -132,11 +136,11 @@ def improved(question: Question, start: Plan, budget: Budget, seed: int) -> Plan
 
 def _better_of(question: Question, plan: Plan, other: Plan, budget: Budget, seed: int) -> Plan:
     """Return the plan, or the best mix of the base, it and one that earns more."""
-    before, after = question.judged(plan), question.judged(other)
-    if (after.is_valid, after.reward) <= (before.is_valid, before.reward + _EQUAL):
+    before, after = question.judged(plan).reward, question.judged(other).reward
+    if (question.may_fly(other), after) <= (question.may_fly(plan), before + _EQUAL):
         return plan
     mix = mixed(question, (plan, other), budget, seed) if question.problem.use_resources else None
-    start = other if mix is None or not question.judged(mix).is_valid else mix
+    start = other if mix is None or not question.may_fly(mix) else mix
     nearer = improved(question, with_promised(question, start), budget, seed)
     return _best(question, plan, nearer)
 
@@ -145,8 +149,7 @@ def _best(question: Question, *plans: Plan) -> Plan:
     """Return the plan that is valid, misses no promise and is worth most; of equals the first."""
 
     def rank(plan: Plan) -> tuple[bool, int, float]:
-        is_valid = question.judged(plan).is_valid
-        return is_valid, -len(question.missing(plan)), value(question, plan)
+        return question.may_fly(plan), -len(question.missing(plan)), value(question, plan)
 
     best = plans[0]
     for plan in plans[1:]:
@@ -169,7 +172,7 @@ def with_promised(question: Question, plan: Plan) -> Plan:
             if gone & (kept | protected):
                 continue
             trial = repaired(problem, [*(set(taken) - gone), row], protected)
-            if target not in question.missing(trial) and question.judged(trial).is_valid:
+            if target not in question.missing(trial) and question.may_fly(trial):
                 trials.append(trial)
         fewer = [t for t in trials if len(question.missing(t)) < len(question.missing(plan))]
         plan = max(fewer, key=lambda trial: value(question, trial), default=plan)
@@ -205,14 +208,15 @@ def _with_downlink(question: Question, plan: Plan, target: int) -> Plan:
             protected = {*np.flatnonzero(question.is_promised).tolist(), contact}
             trial = repaired(problem, [*(set(others) - gone), *new], protected)
             num_missing = len(question.missing(trial))
-            if num_missing < fewest and question.judged(trial).is_valid:
+            if num_missing < fewest and question.may_fly(trial):
                 best, fewest = trial, num_missing
         if fewest < len(question.missing(plan)):
             return best
     return best
 
 
-def _require_promises(question: Question, plan: Plan) -> None:
+def require_promises(question: Question, plan: Plan) -> None:
+    """Raise ``promise_not_kept`` where a plan misses something promised."""
     problem, missing = question.problem, question.missing(plan)
     for i, target in enumerate(question.promised):
         if target not in missing:

@@ -48,7 +48,11 @@ class ViolationOut(Wire):
     available: float = Field(description="What the plan leaves, in the same unit.")
     actions: tuple[str, ...] = Field(description="Ids of the actions in question.")
     detail: str
-    inherited: bool = Field(False, description="It held at the start; no action has a part in it.")
+    inherited: bool = Field(
+        False,
+        description="It held at the start, or what is frozen leads to it; no action that was free "
+        "to be planned has a part in it.",
+    )
 
 
 class AgesOut(Wire):
@@ -263,8 +267,8 @@ class TimelineHead(Wire):
     termination: str
     runtime_s: RuntimeOut
     validity: Open[Validity] = Field(
-        description="`inherited`: what is broken was so at the horizon's start, and no action has "
-        "a part in it."
+        description="`inherited`: what is broken was so at the horizon's start, or what is frozen "
+        "leads to it; no action that was free to be planned has a part in it."
     )
     violations: tuple[ViolationOut, ...]
     totals: TotalsOut

@@ -307,3 +307,19 @@ def test_prices_without_multipliers_are_nothing_known() -> None:
         bound=Bound(value=1.0, proof="lagrangian", prices=np.zeros(1)), target_ids=("a", "b")
     )
     assert of_fewer.on(whole) is None
+
+
+def test_replans_one_after_the_other_do_not_count_in_ever_smaller_units() -> None:
+    """Each with a target more: at a unit halved each time labels would double each time."""
+    whole = random_problem(0, num_targets=9, num_collects=12)
+    unit = 1.0
+    for number in range(3, 9):
+        known = KnownPrices(
+            bound=Bound(value=1.0, proof="dp", prices=np.zeros(number), unit=unit),
+            target_ids=whole.target_ids[:number],
+        )
+        found = known.on(whole)
+        assert found is not None
+        assert found.unit is not None
+        unit = found.unit
+    assert unit == 0.5

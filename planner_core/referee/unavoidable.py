@@ -1,0 +1,81 @@
+"""What battery and recorder come to at best, whatever is planned after a freeze.
+
+A plan that follows another one begins with what is flown. Where that leads beyond a limit no plan
+is to blame: battery and recorder are compared with what they are if nothing is added that draws
+energy or writes data, and every contact that is left takes data down.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Sequence
+from typing import Final, Literal
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from planner_core.problem import CONTACT, Problem
+from planner_core.problem.plan import Plan
+from planner_core.referee.resource_profile import Point, integrate
+
+_SAME: Final = 1e-9  # of a capacity
+_known: WeakKeyDictionary[Problem, dict[tuple[str, int], tuple[Point, ...]]] = WeakKeyDictionary()
+
+
+def is_unavoidable(
+    problem: Problem, index: int, code: Literal["battery", "recorder"], level: float, at_s: float
+) -> bool:
+    """Return whether no plan is within a limit at an instant, or better there than ``level``.
+
+    True is proven: contacts may overlap here, and need neither energy nor turns.
+    """
+    if not problem.pinned.follows:
+        return False
+    best = _level_at(problem, _at_best(problem, index, code), code, at_s)
+    r = problem.satellites[index].resources
+    if code == "battery":
+        return best <= r.battery_min_fraction + _SAME and level >= best - _SAME
+    return best >= r.recorder_max_fraction - _SAME and level <= best + _SAME
+
+
+def beyond_from_s(problem: Problem, index: int) -> float | None:
+    """Return when the recorder of a satellite is first too full in every plan; None for never."""
+    limit = problem.satellites[index].resources.recorder_max_fraction
+    points = _at_best(problem, index, "recorder")
+    return next((point.time_s for point in points if point.recorder >= limit), None)
+
+
+def _at_best(problem: Problem, index: int, code: str) -> tuple[Point, ...]:
+    found = _known.setdefault(problem, {})
+    if (code, index) not in found:
+        rows = _flown(problem, index)
+        if code == "recorder":
+            rows = sorted({*rows, *_contacts(problem, index)})
+        actions = sorted(Plan.of(problem, rows).actions)
+        found[code, index] = integrate(problem, problem.satellites[index], actions).points
+    return found[code, index]
+
+
+def _flown(problem: Problem, index: int) -> list[int]:
+    """Return what a satellite does in every plan."""
+    table = problem.opportunities
+    return [row for row in problem.kept_rows.tolist() if table.satellite[row] == index]
+
+
+def _contacts(problem: Problem, index: int) -> list[int]:
+    """Return the longest contact of each pass of a satellite."""
+    table = problem.opportunities
+    rows = problem.satellites[index].rows
+    rows = rows[table.kind[rows] == CONTACT]
+    longest = rows[np.argsort(table.start_s[rows] - table.end_s[rows], kind="stable")]
+    _, first = np.unique(table.access[longest], return_index=True)
+    own: list[int] = longest[first].tolist()
+    return own
+
+
+def _level_at(problem: Problem, points: Sequence[Point], code: str, at_s: float) -> float:
+    time_s = [point.time_s for point in points]
+    level = [point.battery if code == "battery" else point.recorder for point in points]
+    if problem.dynamics == "physical":
+        return float(np.interp(at_s, time_s, level))
+    return level[max(0, bisect_right(time_s, at_s) - 1)]
