@@ -42,6 +42,18 @@ export class ProgressText {
     const since = Date.parse(this.job.started_at ?? this.job.created_at);
     // A screen whose clock is behind the service's counts from when it began to look.
     const elapsed = Math.max(Date.now() - since, performance.now() - this.shownAt);
-    this.clock.textContent = `, for ${countdown(elapsed)}`;
+    this.clock.textContent = `, for ${countdown(elapsed)}${ending(this.job, elapsed)}`;
   }
+}
+
+/**
+ * Say when the search ends at the latest, as far as that is known.
+ * @param {JobOut} job
+ * @param {number} elapsed milliseconds
+ */
+function ending(job, elapsed) {
+  if (job.started_at === null) return "";
+  if (job.progress?.phase === "verify") return ": the search is over, the plan is being checked";
+  const left = job.limits.time_s * 1000 - elapsed;
+  return left > 0 ? `; the search ends within ${countdown(left)}` : "; the search is ending";
 }

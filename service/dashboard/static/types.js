@@ -43,6 +43,7 @@
  * @property {number} seed
  * @property {number} attempt
  * @property {string | null} label
+ * @property {{time_s: number}} limits
  * @property {ProgressOut | null} progress
  * @property {string} created_at
  * @property {string | null} started_at

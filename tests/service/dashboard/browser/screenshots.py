@@ -77,7 +77,7 @@ def compared(api: httpx.Client, scenario_id: str) -> Json:
         "scenario_id": scenario_id,
         "runs": [{"solver": name} for name in names],
         "label": "Which solver",
-        "limits": {"time_s": 15},
+        "limits": {"time_s": 60},
     }
     table = post(api, "/v1/comparisons", body)
     while table["state"] == "running":
@@ -138,7 +138,9 @@ def screens(browser: Browser, addresses: dict[str, tuple[str, str]]) -> None:
         browser.open(address)
         browser.wait(lambda text=is_ready: browser.text(text), f"{page} is not ready")  # type: ignore[misc]
         if page == "fleet":
-            browser.find("#thing option:nth-child(2)").click()
+            a_satellite = "#thing option:nth-child(2)"
+            browser.wait(lambda: browser.driver.find_elements("css selector", a_satellite), "none")
+            browser.find(a_satellite).click()
             browser.wait(lambda: browser.text("#edit-fields"), "no figures")
         for width, height in SCREENS:
             for scheme in ("light", "dark"):
