@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -28,6 +29,7 @@ FOLDER: Final = Path(__file__).resolve().parents[4] / "docs" / "images"
 LARGEST_BYTES: Final = 300_000
 WIDTH: Final = 1400
 NUM_COLORS: Final = 256
+A_SATELLITE: Final = "#thing option:nth-child(2)"
 SCREENS: Final = ((1280, 900), (1920, 1080))
 
 
@@ -138,9 +140,9 @@ def screens(browser: Browser, addresses: dict[str, tuple[str, str]]) -> None:
         browser.open(address)
         browser.wait(lambda text=is_ready: browser.text(text), f"{page} is not ready")  # type: ignore[misc]
         if page == "fleet":
-            a_satellite = "#thing option:nth-child(2)"
-            browser.wait(lambda: browser.driver.find_elements("css selector", a_satellite), "none")
-            browser.find(a_satellite).click()
+            found = partial(browser.driver.find_elements, "css selector", A_SATELLITE)
+            browser.wait(found, "nothing to change")
+            browser.find(A_SATELLITE).click()
             browser.wait(lambda: browser.text("#edit-fields"), "no figures")
         for width, height in SCREENS:
             for scheme in ("light", "dark"):
