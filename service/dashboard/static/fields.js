@@ -17,6 +17,14 @@ const WHOLE = new Set(["resources"]);
 /** The part of the API's description that tells of each part of a thing. */
 const DESCRIBED_BY = { agility: "AgilityIn", sensor: "SensorIn", resources: "OwnResources", "": "GroundStationIn" };
 
+/** @type {Record<string, string>} */
+const PARTS = { "": "", agility: "Agility", sensor: "Sensor", resources: "Battery, recorder and downlink" };
+/** Longer endings first. @type {[string, string][]} */
+const UNITS = [
+  ["_deg_s2", "deg/s²"], ["_deg_s", "deg/s"], ["_mbit_s", "Mbit/s"], ["_mbit", "Mbit"], ["_fraction", "0 to 1"],
+  ["_deg", "deg"], ["_wh", "Wh"], ["_w", "W"], ["_s", "s"], ["_h", "h"], ["_m", "m"],
+];
+
 /**
  * Return a field for each figure; what is set can be changed but not unset.
  * @param {Thing} thing
@@ -101,11 +109,35 @@ function knotsIn(text) {
   return knots;
 }
 
+/**
+ * Return the fields part by part, under operators' words.
+ * @param {Field[]} fields
+ */
+export function grouped(fields) {
+  return Object.entries(PARTS).flatMap(([part, title]) => {
+    const own = fields.filter(({ path }) => (path.length > 1 ? path[0] : "") === part);
+    if (own.length === 0) return [];
+    const inputs = h("div", { class: "fields" }, ...own.map(labelled));
+    return [title === "" ? inputs : h("fieldset", {}, h("legend", {}, title), inputs)];
+  });
+}
+
 /** @param {Field} field */
-export function labelled({ path, before, input }) {
-  const words = path.join(": ").replaceAll("_", " ");
-  const about = isKnots(before) ? h("small", {}, path.at(-1) === "elevation_mask" ? "Azimuth: elevation, in degrees" : "Elevation in degrees: rate") : null;
-  return h("p", { class: "field" }, h("label", {}, words, input), about);
+function labelled({ path, before, input }) {
+  const name = path.at(-1) ?? "";
+  const about = isKnots(before) ? h("small", {}, name === "elevation_mask" ? "Azimuth: elevation, in degrees" : "Elevation in degrees: rate") : null;
+  return h("p", { class: "field" }, h("label", {}, wordsOf(name), input), about);
+}
+
+/**
+ * Return the name of a figure as people read it, with its unit.
+ * @param {string} name as the API has it
+ */
+export function wordsOf(name) {
+  const [ending, unit] = UNITS.find(([one]) => name.endsWith(one)) ?? ["", ""];
+  const words = name.slice(0, name.length - ending.length).replaceAll("_", " ");
+  const whole = words.replace("off nadir", "off-nadir").replace(/^min (.*)$|^(.*) min$/, "$1$2, at least").replace(/ max$/, ", at most");
+  return whole.charAt(0).toUpperCase() + whole.slice(1) + (unit === "" ? "" : `, ${unit}`);
 }
 
 /**

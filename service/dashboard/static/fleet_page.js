@@ -3,7 +3,7 @@
 
 import { call, get, list, post } from "./api.js";
 import { byId, fill, h } from "./dom.js";
-import { changesIn, fieldsOf, labelled } from "./fields.js";
+import { changesIn, fieldsOf, grouped } from "./fields.js";
 import { utc } from "./format.js";
 import { instantOf } from "./instants.js";
 import { startPage, whileBusy } from "./page.js";
@@ -66,7 +66,7 @@ async function edit() {
   const response = await call(path, { cache: "no-store" });
   const thing = await response.json();
   open = { thing, etag: response.headers.get("ETag") ?? "", fields: fieldsOf(thing, schemas) };
-  fill(byId("edit-fields"), ...open.fields.map(labelled));
+  fill(byId("edit-fields"), ...grouped(open.fields));
 }
 
 function installForms() {

@@ -45,6 +45,8 @@ def test_a_satellite_is_changed_in_figures_choices_and_curves(
     address = f"/v1/satellites/{eye['id']}"
     browser.open("/fleet")
     open_thing(browser, "satellite Eye", address, "sensor.off_nadir_max_deg")
+    assert browser.text("#edit-fields fieldset:nth-of-type(1)").startswith("Agility")
+    assert "Off-nadir, at most, deg" in browser.text("#edit-fields")
     type_into(browser, "name", "Old eye")
     type_into(browser, "sensor.off_nadir_max_deg", "30")
     type_into(browser, "sensor.sun_exclusion_deg", "25")  # it had none
