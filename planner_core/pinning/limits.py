@@ -43,7 +43,7 @@ _MAX_STATES: Final = 200
 def check_limits(
     problem: Problem,
     ruled_out: Sequence[tuple[str, Longs]],
-    asked: Sequence[tuple[Kept, Bools]],
+    asked: Sequence[tuple[Kept, Longs]],
     frozen: Sequence[Kept],
     facts: Bools,
 ) -> None:
@@ -60,7 +60,7 @@ def check_limits(
     ruled_out
         Pins, and the opportunities that each rules out.
     asked
-        Actions that pins keep, and what cannot stand beside each. Shape ``(n,)``.
+        Actions that pins keep, and the opportunities that cannot stand beside each.
     frozen
         Actions that are flown whatever is pinned.
     facts
@@ -81,7 +81,7 @@ def check_limits(
         for _, rows in ruled_out:
             missing[rows] = True
         for _, excluded in asked:
-            missing |= excluded
+            missing[excluded] = True
         must = flown + [kept for kept, _ in asked if kept.row in own]
         if can_keep(problem, index, must, missing):
             continue
@@ -99,7 +99,7 @@ def check_limits(
                 )
         must = flown
         for one, excluded in asked:
-            missing |= excluded
+            missing[excluded] = True
             must = [*must, one] if one.row in own else must
             if not can_keep(problem, index, must, missing):
                 raise InvalidScenario(

@@ -127,11 +127,10 @@ def rows_of_base(scenario: Scenario, table: Opportunities, replan: Replan) -> di
     satellites = {satellite.id: i for i, satellite in enumerate(scenario.satellites)}
     targets = {target.id: i for i, target in enumerate(scenario.targets)}
     stations = {station.id: i for i, station in enumerate(scenario.ground_stations)}
-    there: dict[tuple[int, int, int], list[int]] = {}
-    for row, key in enumerate(
-        zip(table.satellite.tolist(), table.kind.tolist(), table.place.tolist(), strict=True)
-    ):
-        there.setdefault(key, []).append(row)
+    num_places = 1 + max(len(targets), len(stations))
+    keys = (table.satellite.astype(np.int64) * 2 + table.kind) * num_places + table.place
+    order = np.argsort(keys, kind="stable")
+    keys = keys[order]
     found: dict[int, int] = {}
     for i, action in enumerate(replan.base):
         assert action.satellite_id is not None
@@ -144,7 +143,8 @@ def rows_of_base(scenario: Scenario, table: Opportunities, replan: Replan) -> di
             else (CONTACT, stations[action.station_id or ""])
         )
         start_s = scenario.horizon.offset_s(action.start)
-        rows = there.get((satellites[action.satellite_id], kind, place), [])
+        key = (satellites[action.satellite_id] * 2 + kind) * num_places + place
+        rows = order[keys.searchsorted(key) : keys.searchsorted(key, "right")].tolist()
         nearest = min(rows, key=lambda row: abs(table.start_s[row] - start_s), default=None)
         if nearest is not None and abs(table.start_s[nearest] - start_s) <= replan.near_s:
             found[i] = nearest
@@ -324,7 +324,7 @@ def apply_pins(problem: Problem, pinned: Pinned) -> Problem:
     beside = _kept_that_exclude(problem, pinned)
     is_struck = _ruled_out(problem, pinned)
     for _, excluded in beside:
-        is_struck |= excluded
+        is_struck[excluded] = True
     whole = replace(problem, pinned=pinned)
     left = np.flatnonzero(~is_struck).astype(np.int32)
     part = restricted(whole, left)
@@ -343,7 +343,7 @@ def apply_pins(problem: Problem, pinned: Pinned) -> Problem:
     facts, frozen, asked = in_outage | is_too_soon, [], []
     for kept, excluded in beside:
         if pinned.is_frozen(float(problem.opportunities.start_s[kept.row])):
-            facts |= excluded
+            facts[excluded] = True
             frozen.append(kept)
         else:
             asked.append((kept, excluded))
@@ -457,8 +457,8 @@ def _in_outages(problem: Problem, pinned: Pinned) -> Bools:
     return is_out
 
 
-def _kept_that_exclude(problem: Problem, pinned: Pinned) -> list[tuple[Kept, Bools]]:
-    """Return for each kept action the opportunities that cannot stand beside it."""
+def _kept_that_exclude(problem: Problem, pinned: Pinned) -> list[tuple[Kept, Longs]]:
+    """Return for each kept action the opportunities that cannot stand beside it, ascending."""
     table = problem.opportunities
     contacts = np.array(
         [kept.row for kept in pinned.kept if table.kind[kept.row] == CONTACT], dtype=np.int64
@@ -468,13 +468,13 @@ def _kept_that_exclude(problem: Problem, pinned: Pinned) -> list[tuple[Kept, Boo
     found = []
     for kept in pinned.kept:
         satellite = problem.satellites[int(table.satellite[kept.row])]
-        excluded = np.zeros(len(table), dtype=np.bool_)
-        excluded[satellite.rows] = excluded_by(satellite, int(problem.local_row[kept.row]))
+        beside = satellite.rows[excluded_by(satellite, int(problem.local_row[kept.row]))]
         if table.kind[kept.row] == COLLECT:
-            excluded |= (table.kind == COLLECT) & (table.place == table.place[kept.row])
+            others = problem.collects_of(int(table.place[kept.row])).astype(np.int64)
         else:
-            excluded |= _without_antenna(problem, kept.row, contacts)
-        found.append((kept, excluded & ~is_kept))
+            others = np.flatnonzero(_without_antenna(problem, kept.row, contacts))
+        rows = np.union1d(beside.astype(np.int64), others)
+        found.append((kept, rows[~is_kept[rows]]))
     return found
 
 
@@ -500,25 +500,28 @@ def _without_antenna(problem: Problem, row: int, kept: Longs) -> Bools:
 def _struck(
     problem: Problem,
     is_struck: Bools,
-    keepers: list[tuple[int, Bools]],
+    keepers: list[tuple[int, Longs]],
     in_outage: Bools,
     is_too_soon: Bools,
 ) -> dict[int, tuple[Struck, ...]]:
     """Return the collects that are ruled out, by target."""
     table = problem.opportunities
-    found: dict[int, tuple[Struck, ...]] = {}
-    for row in np.flatnonzero(is_struck & (table.kind == COLLECT)):
+    beside: dict[int, list[int]] = {}
+    for kept, excluded in keepers:
+        for row in excluded.tolist():
+            beside.setdefault(row, []).append(kept)
+    found: dict[int, list[Struck]] = {}
+    for row in np.flatnonzero(is_struck & (table.kind == COLLECT)).tolist():
         struck = Struck(
-            row=problem.scenario_row(int(row)),
+            row=problem.scenario_row(row),
             satellite=int(table.satellite[row]),
             start_s=float(table.start_s[row]),
             end_s=float(table.end_s[row]),
-            kept=tuple(kept for kept, excluded in keepers if excluded[row]),
+            kept=tuple(beside.get(row, ())),
             why="outage" if in_outage[row] else "heading" if is_too_soon[row] else "pin",
         )
-        target = int(table.place[row])
-        found[target] = (*found.get(target, ()), struck)
-    return found
+        found.setdefault(int(table.place[row]), []).append(struck)
+    return {target: tuple(struck) for target, struck in found.items()}
 
 
 def _access_left(problem: Problem, part: Problem) -> np.ndarray:

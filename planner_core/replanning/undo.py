@@ -77,18 +77,22 @@ def undone(question: Question, plan: Plan, budget: Budget) -> Plan:
 
 
 def within_share(question: Question, plan: Plan, budget: Budget) -> Plan:
-    """Return the plan with changes taken back that gain least, until few enough are left."""
+    """Return the plan with changes taken back that gain least, until few enough are left.
+
+    Once the time is over whichever comes first: the share holds all the same.
+    """
     share = question.stability.max_changed_share
     while share is not None and question.changed(plan) > share * question.num_base:
+        num_changed = question.changed(plan)
         trials = (without(question, plan, part) for part in parts_of(question, plan))
-        fewer = [
-            trial
-            for trial in trials
-            if trial is not None and question.changed(trial) < question.changed(plan)
-        ]
-        if not fewer or budget.is_spent():
+        fewer = (t for t in trials if t is not None and question.changed(t) < num_changed)
+        if budget.is_spent():
+            found = next(fewer, None)
+        else:
+            found = max(fewer, key=lambda trial: value(question, trial), default=None)
+        if found is None:
             break
-        plan = max(fewer, key=lambda trial: value(question, trial))
+        plan = found
     return plan
 
 

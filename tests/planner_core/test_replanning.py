@@ -22,7 +22,7 @@ from planner_core.replanning.known import KnownPrices, bound_at, prices_of
 from planner_core.replanning.programs import fewest_changes
 from planner_core.replanning.question import Question
 from planner_core.replanning.replan import solve_replan
-from planner_core.replanning.undo import parts_of, value, without
+from planner_core.replanning.undo import parts_of, value, within_share, without
 from planner_core.solvers.registry import Certified, Rule
 from tests.examples import examples
 from tests.planner_core.brute_force import best_plan
@@ -199,6 +199,24 @@ def test_changes_stay_within_their_share_where_they_can(seed: int) -> None:
         for row in question.base
     )
     assert question.changed(plan) == lost
+
+
+def test_the_share_of_changes_holds_when_the_time_is_over() -> None:
+    num_taken_back = 0
+    for seed in range(8):
+        free = event_at_random(seed, use_resources=False, size=3)
+        assert free is not None
+        strict = Stability(weight=0.0, max_changed_share=0.0)
+        question = replace(free.question, promised=(), stability=strict)
+        plan = Rule().solve(question.problem, Budget(), 0).plan
+        stable = within_share(question, plan, Budget(0.0))
+        lost = question.num_base - sum(
+            not question.problem.pinned.is_frozen(question.problem.opportunities.start_s[row])
+            for row in question.base
+        )
+        assert question.changed(stable) == lost
+        num_taken_back += question.changed(plan) - lost
+    assert num_taken_back
 
 
 def test_a_target_worth_more_than_the_changes_is_taken_and_one_worth_less_is_not() -> None:
