@@ -24,7 +24,12 @@ from typing import IO, Any, Final
 
 import numpy as np
 import platformdirs
-from numba.core.caching import CompileResultCacheImpl, FunctionCache, _CacheLocator
+from numba.core.caching import (
+    CompileResultCacheImpl,
+    FunctionCache,
+    IndexDataCacheFile,
+    _CacheLocator,
+)
 
 from planner_core.sources import PACKAGE, fingerprint
 
@@ -77,6 +82,7 @@ class SharedCache(FunctionCache):
 
     def __init__(self, dispatcher: Any) -> None:
         super().__init__(dispatcher.py_func)
+        self._cache_file = _Index(self._cache_path, self._impl.filename_base, None)
         self._dispatcher = dispatcher
         self._lock: Path | None = None
         self._file: IO[bytes] | None = None
@@ -117,6 +123,17 @@ class SharedCache(FunctionCache):
         except OSError:  # nowhere to write: each process compiles for itself
             return False
         return True
+
+
+class _Index(IndexDataCacheFile):
+    """Which versions of a kernel there are: none that were compiled for a class that is gone."""
+
+    def _load_index(self) -> dict[Any, str]:
+        try:
+            known: dict[Any, str] = super()._load_index()
+        except (AttributeError, ImportError):
+            return {}
+        return known
 
 
 class _Locator(_CacheLocator):

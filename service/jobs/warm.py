@@ -47,7 +47,7 @@ from planner_core.kernel_cache import kernel_folder
 from planner_core.pins import BlockedInterval, PinnedAction, Pins
 from planner_core.precedence.arcs import arc_network_of
 from planner_core.precedence.relation import excluded_by
-from planner_core.problem import Problem
+from planner_core.problem import CONTACT, Problem
 from planner_core.problem.delivery import with_objective
 from planner_core.run import plan_scenario
 from planner_core.solvers.base import Solver
@@ -239,7 +239,8 @@ def _late() -> None:
     )
     nothing = np.zeros(len(late.target_ids))
     LatencyAscent(late, nothing).improve(1, 0.0, Budget().stop)
-    queue_value(late, nothing, 1)
+    num_contacts = np.count_nonzero(late.opportunities.kind == CONTACT)
+    queue_value(late, nothing, 1, contact_prices=np.zeros(num_contacts))
 
 
 def _slow() -> None:

@@ -88,3 +88,33 @@ def test_an_edit_below_compiles_the_callers_and_nothing_else(
 ) -> None:
     assert _run(tmp_path, compiled, **change) == ([value, 2.0], [0, 1])
     assert _run(tmp_path, compiled, **change) == ([value, 2.0], [1, 1])
+
+
+_SUM = """
+from typing import NamedTuple
+import numpy as np
+from planner_core.bundles import bundle
+from planner_core.jit import kernel
+
+@bundle
+class {name}(NamedTuple):
+    values: np.ndarray
+
+@kernel
+def total(of):
+    return of.values.sum()
+
+print(total({name}(np.ones(3))))
+"""
+
+
+def test_what_was_compiled_for_a_class_that_is_gone_is_compiled_anew(tmp_path: Path) -> None:
+    for name in ("Table", "Tables"):
+        (tmp_path / "sums.py").write_text(_SUM.format(name=name))
+        said = subprocess.run(
+            [sys.executable, "-B", "-c", "import sums"],
+            env={**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), os.getcwd()]),
+                 "NUMBA_CACHE_DIR": str(tmp_path / "kernels")},
+            check=True, stdout=subprocess.PIPE, text=True,
+        ).stdout  # fmt: skip
+        assert said == "3.0\n"

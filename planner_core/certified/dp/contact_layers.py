@@ -65,7 +65,7 @@ def layers_of(network: Network) -> Layers:
     return Layers(contact=contact, first=first.astype(np.int64), group=group, number=number)
 
 
-class _Tables(NamedTuple):
+class Tables(NamedTuple):
     """The most gained by a path that ends with a task, by energy, as ``most_by_energy`` has it.
 
     Attributes
@@ -103,7 +103,7 @@ def most_by_contacts(
         Room to work in, of shapes ``(m, width)`` and ``(m,)`` at least.
     """
     num_contacts = len(layers.contact)
-    tables = _Tables(
+    tables = Tables(
         own,
         num_own,
         np.empty((num_contacts, levels.width)),
@@ -112,18 +112,18 @@ def most_by_contacts(
     num_layers = len(layers.first)
     best, last = 0.0, -1
     for layer in range(num_layers):
-        best, last = _fill(network, levels, layers, weight, layer, tables)
+        best, last = fill_layer(network, levels, layers, weight, layer, tables)
     return best, *_path_to(network, levels, layers, weight, tables, last)
 
 
 @kernel
-def _fill(
+def fill_layer(
     network: Network,
     levels: EnergyLevels,
     layers: Layers,
     weight: Floats,
     layer: int,
-    tables: _Tables,
+    tables: Tables,
 ) -> tuple[float, int]:
     """Fill the tables of a layer; return the most of any path in it, and its last task."""
     own, num_own = tables.own, tables.num_own
@@ -192,7 +192,7 @@ def _path_to(
     levels: EnergyLevels,
     layers: Layers,
     weight: Floats,
-    tables: _Tables,
+    tables: Tables,
     last: int,
 ) -> tuple[Ints, Ints]:
     """Return the rows of a path in the last layer that gains its most, and the layer of each.
@@ -207,7 +207,7 @@ def _path_to(
     while k >= 0:
         if layers.number[k] >= 0 and layers.group[k] != layer:
             layer = layers.group[k]
-            _fill(network, levels, layers, weight, layer, tables)
+            fill_layer(network, levels, layers, weight, layer, tables)
         rows[length], passed[length] = k, layer
         length += 1
         energy = max(energy, levels.floor[k])

@@ -39,8 +39,8 @@ class Queues(NamedTuple):
     number
         Which contact each task is; -1 for others.
     first
-        Of each layer, the contact that a path cannot but take before its own; -1 for none. Shape
-        ``(num_contacts + 1,)``.
+        Of each layer, the earliest contact that a path may go on from in it; -1 for the start.
+        Shape ``(num_contacts + 1,)``.
     down_s
         When each contact has taken down so many steps of what was recorded; infinite for what it
         has no time for. Shape ``(num_contacts, num_steps)``.

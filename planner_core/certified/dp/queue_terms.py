@@ -16,6 +16,7 @@ from planner_core.certified.sizes import (
     QUEUE_STEPS,
 )
 from planner_core.certified.tolerances import DOWN, DOWN_S
+from planner_core.certified.tuning import TUNING
 from planner_core.problem import COLLECT, CONTACT, Floats, Ints, Problem, SatelliteProblem
 
 
@@ -28,6 +29,7 @@ def queues_of(
     per_collect: int,
     num_classes: int,
     rows: Ints | None = None,
+    earliest: Ints | None = None,
     keeps_battery: bool = False,
     keeps_recorder: bool = False,
 ) -> Queues | None:
@@ -45,6 +47,9 @@ def queues_of(
         Of promises.
     rows
         Those of its tasks that count, ascending; all by default.
+    earliest
+        Of contacts, and of none in the end, the earliest that a path needs to come from without
+        another between; -1 for the start. Shape ``(num_contacts + 1,)``.
     keeps_battery, keeps_recorder
         Whether energy, or data, is rounded so that all paths keep their limits, and not so that no
         plan is lost.
@@ -56,22 +61,22 @@ def queues_of(
     kind, table_rows = satellite.kind[rows], satellite.rows[rows]
     is_image, contact = kind == COLLECT, np.flatnonzero(kind == CONTACT).astype(np.int32)
     energy = energy_levels(network, per_collect, is_optimistic=not keeps_battery)
-    data = data_levels(network, 1, is_optimistic=not keeps_recorder)
+    data = data_levels(network, TUNING.coarse, is_optimistic=not keeps_recorder)
     number = np.full(len(rows), -1, dtype=np.int32)
     number[contact] = np.arange(len(contact))
     first = _must_follow(network, contact)
+    first = first if earliest is None else np.maximum(first, earliest)
     on_board = problem.objective.collected_share * problem.worth_on_ground[table_rows]
     num_tables = min(len(rows), int((network.idle_from - np.arange(len(rows))).max(initial=0)) + 1)
     width = data.num_levels * energy.width
-    kept_entries = num_classes * width * (num_tables + len(contact) + 1)
-    work = width * _num_extensions(network, contact, first)
-    if work > MAX_QUEUE_WORK or kept_entries > MAX_QUEUE_ENTRIES:
+    num_kept = num_classes * (num_tables + len(contact) + 1)
+    num_done = _num_extensions(network, contact, first)
+    if width * num_done > MAX_QUEUE_WORK or width * num_kept > MAX_QUEUE_ENTRIES:
         return None
     level = float(data.least[1] - data.least[0]) if data.num_levels > 1 else 1.0
     volume = satellite.volume[rows[contact]] + DOWN
     step = max(level / QUEUE_STEPS, float(volume.max(initial=0.0)) / MAX_QUEUE_STEPS)
     prices = np.where(is_image, np.append(price, 0.0)[satellite.place[rows] * is_image], 0.0)
-    most = problem.worth[table_rows]
     setup_s = problem.downlinks.stations.setup_s[satellite.place[rows][contact]]
     return Queues(
         network=network,
@@ -89,10 +94,10 @@ def queues_of(
         end_s=satellite.end_s[rows],
         on_board=np.where(is_image, on_board, 0.0),
         decaying=np.where(is_image, problem.worth_on_ground[table_rows] - on_board, 0.0),
-        most=most,
+        most=problem.worth[table_rows],
         price=prices,
         half_life_s=float(problem.objective.half_life_s or np.inf),
-        unit=max(float(most.sum()), 1e-9) / MAX_QUEUE_UNITS,
+        unit=max(float(problem.worth[table_rows].sum()), 1e-9) / MAX_QUEUE_UNITS,
         num_tables=max(1, num_tables),
         takes_worthless=False,
     )

@@ -20,7 +20,7 @@ from planner_core.certified.lns.choices import ChoiceSearch
 from planner_core.certified.lns.queue_plans import plan_with_queues
 from planner_core.certified.lns.resource_search import ResourceWindows
 from planner_core.certified.multipliers.latency import LatencyAscent
-from planner_core.certified.proofs.bound import Bound, rounded_bound
+from planner_core.certified.proofs.bound import rounded_bound
 from planner_core.certified.proofs.queues import queue_value
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import COLLECT, CONTACT, Floats, Ints, Kept, Problem
@@ -37,7 +37,9 @@ def close_in_on_the_ground(search: ResourceSearch, unit: float) -> None:
     rng = np.random.default_rng(search.seed)
     num_idle = number = 0
     _lower(best, ascent, TUNING.rounds // 2)
-    named = [_lower_by_queues(best, ascent, TUNING.levels_per_collect // 2)]
+    # Which contacts are good is known long before how good.
+    level = _level(best, ascent)
+    named = [_lower_by_queues(best, ascent, TUNING.levels_per_collect // 2, level)]
     if not named[0]:
         search.choose(unit)
     while num_idle < TUNING.patience and not best.is_done:
@@ -48,29 +50,44 @@ def close_in_on_the_ground(search: ResourceSearch, unit: float) -> None:
         tried.add(contacts)
         _plan_with(best, contacts, ascent.bound.prices, unit, search.seed + number)
         number += 1
+        if number == 1 and named[0]:
+            _lower(best, ascent, TUNING.rounds // 2)
+            _lower_by_queues(best, ascent, TUNING.levels_per_collect // 2, best.reward)
         num_idle = 0 if best.reward > before else num_idle + 1
         _lower(best, ascent, TUNING.several)
     if named[0] and not best.is_done:
-        _lower_by_queues(best, ascent, TUNING.levels_per_collect)
+        _lower_by_queues(best, ascent, TUNING.levels_per_collect, best.reward)
 
 
 def _lower(best: Incumbent, ascent: LatencyAscent, num_rounds: int) -> None:
     """Go on with the ascent for a while."""
     for _ in range(num_rounds):
-        # At first no plan is known that is good: steps towards it would be too long.
-        level = max(best.reward, (1.0 - TUNING.little) * ascent.bound.value)
-        ascent.improve(1, level, best.budget.stop)
+        ascent.improve(1, _level(best, ascent), best.budget.stop)
     value = rounded_bound(best.problem, ascent.bound.value, best.reward)
     best.lower(replace(ascent.bound, value=value))
     best.report("prices")
 
 
-def _lower_by_queues(best: Incumbent, ascent: LatencyAscent, per_collect: int) -> tuple[int, ...]:
+def _level(best: Incumbent, ascent: LatencyAscent) -> float:
+    """Return what a plan may earn: at first none is known that is good."""
+    return max(best.reward, (1.0 - TUNING.little) * ascent.bound.value)
+
+
+def _lower_by_queues(
+    best: Incumbent, ascent: LatencyAscent, per_collect: int, level: float
+) -> tuple[int, ...]:
     """Let exact programmes of queues bound the plans; return the contacts of the best paths."""
-    prices = ascent.bound.prices
-    assert prices is not None
-    value, rows = queue_value(best.problem, prices, per_collect, best.budget.stop)
-    best.lower(Bound(value=value, proof="dp", prices=prices, queue_levels=per_collect))
+    bound = ascent.bound
+    assert bound.prices is not None
+    value, rows = queue_value(
+        best.problem,
+        bound.prices,
+        per_collect,
+        best.budget.stop,
+        contact_prices=bound.contact_prices,
+        level=level,
+    )
+    best.lower(replace(bound, value=value, queue_levels=per_collect))
     best.report("queues")
     return tuple(sorted(rows[best.problem.opportunities.kind[rows] == CONTACT].tolist()))
 

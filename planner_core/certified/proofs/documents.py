@@ -108,7 +108,13 @@ def is_proven(problem: Problem, bound: Bound) -> bool | None:
     if problem.continuous_starts:
         value = continuous_value(problem, bound.prices)
     elif bound.queue_levels is not None:
-        value, _ = queue_value(problem, bound.prices, bound.queue_levels)
+        value, _ = queue_value(
+            problem,
+            bound.prices,
+            bound.queue_levels,
+            contact_prices=bound.contact_prices,
+            level=bound.value,
+        )
     elif bound.contact_prices is not None:
         value = latency_value(problem, bound.prices, bound.contact_prices)
     elif bound.unit is not None:

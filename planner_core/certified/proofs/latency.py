@@ -25,6 +25,7 @@ import numpy as np
 
 from planner_core.bundles import bundle
 from planner_core.certified.dp.contact_layers import Layers, layers_of, most_by_contacts
+from planner_core.certified.dp.contact_pairs import most_by_pairs
 from planner_core.certified.dp.energy_labels import EnergyLevels, energy_levels
 from planner_core.certified.dp.resource_network import Network, network_of
 from planner_core.certified.signs import NEVER
@@ -35,6 +36,7 @@ from planner_core.precedence.relation import is_transitive_on
 from planner_core.problem import (
     COLLECT,
     CONTACT,
+    Bools,
     Floats,
     Ints,
     Problem,
@@ -138,12 +140,26 @@ class LatencyRelaxation:
         tolls
             Of its contacts, by volume. Shape ``(num_contacts,)``.
         """
-        m, num_layers = len(self.rows), len(self.layers.first)
-        weight = np.empty((num_layers, m))
-        passed = 0.0 if self.may_need_all else NEVER
-        _weigh(self.terms, self.layers, prices[self.target], tolls, passed, weight)
+        m, weight = len(self.rows), self._weight(prices, tolls)
         own, num_own = np.empty((m, self.levels.width)), np.zeros(m, dtype=np.int64)
         return most_by_contacts(self.network, self.levels, self.layers, weight, own, num_own)
+
+    def most_by_pairs(self, prices: Floats, tolls: Floats) -> Floats | None:
+        """Return the most that it can gain by contacts that follow each other.
+
+        None where contacts share layers. Shape ``(num_contacts + 1, num_contacts + 1)``: the start
+        and then each contact, with the next one or with none.
+        """
+        if len(self.layers.first) <= len(self.contacts):
+            return None
+        weight = self._weight(prices, tolls)
+        return most_by_pairs(self.network, self.levels, self.layers, weight)
+
+    def _weight(self, prices: Floats, tolls: Floats) -> Floats:
+        weight = np.empty((len(self.layers.first), len(self.rows)))
+        passed = 0.0 if self.may_need_all else NEVER
+        _weigh(self.terms, self.layers, prices[self.target], tolls, passed, weight)
+        return weight
 
     def loads(self, path: Ints, layer: Ints, tolls: Floats) -> Floats:
         """Return what a path lets each contact take down more than it can.
@@ -221,8 +237,50 @@ def latency_value(problem: Problem, prices: Floats, contact_prices: Floats) -> f
     contact_prices
         By volume, of the table's contacts in order. Shape ``(num_contacts,)``.
     """
+    price, tolls = _settled(problem, prices, contact_prices)
+    gained = (one.most(price, tolls[one.contacts])[0] for one in latency_relaxations(problem))
+    return float(price.sum()) + sum(gained)
+
+
+def earliest_before(
+    problem: Problem, prices: Floats, contact_prices: Floats, level: float
+) -> dict[int, Ints]:
+    """Return which contacts may be next after which in a plan that earns more than ``level``.
+
+    Returns
+    -------
+    By satellite, where anything is known of it, for each contact the earliest that a path can come
+    from without another between, and in the end that after which none needs to follow; -1 for the
+    start. Shape ``(num_contacts + 1,)``.
+    """
+    price, tolls = _settled(problem, prices, contact_prices)
+    most: dict[int, Floats] = {}
+    others = float(price.sum())
+    indices = [index for index, one in enumerate(problem.satellites) if len(one)]
+    for index, one in zip(indices, latency_relaxations(problem), strict=True):
+        pairs = one.most_by_pairs(price, tolls[one.contacts])
+        if pairs is None:
+            others += one.most(price, tolls[one.contacts])[0]
+        else:
+            most[index] = pairs
+    total = others + sum(float(pairs.max()) for pairs in most.values())
+    return {
+        index: _earliest(total - float(pairs.max()) + pairs > level)
+        for index, pairs in most.items()
+    }
+
+
+def _earliest(may_follow: Bools) -> Ints:
+    num_contacts = len(may_follow) - 1
+    # Where nothing leads to a contact its layer is empty: it would begin at the contact itself.
+    none = np.minimum(np.arange(num_contacts + 1), num_contacts - 1)
+    found = np.where(may_follow.any(axis=0), may_follow.argmax(axis=0) - 1, none)
+    return found.astype(np.int32)
+
+
+def _settled(problem: Problem, prices: Floats, contact_prices: Floats) -> tuple[Floats, Floats]:
+    """Return prices of targets, with one of nothing at the end, and of the table's rows."""
     price = np.append(surplus(prices, problem.best_worth), 0.0)
     tolls = np.zeros(len(problem.opportunities))
     tolls[problem.opportunities.kind == CONTACT] = np.maximum(contact_prices, 0.0)
-    gained = (one.most(price, tolls[one.contacts])[0] for one in latency_relaxations(problem))
-    return float(price.sum()) + sum(gained)
+    return price, tolls

@@ -1,9 +1,10 @@
 r"""An upper bound where images are worth less the later they come down: queues before contacts.
 
-Prices of targets, as in ``latency``, but none of contacts: for each satellite an exact programme
-knows which contact comes next and what waits for it (``planner_core.certified.dp.contact_queues``).
-Left out are stations. It takes seconds where prices of contacts take hundredths, and proves half a
-percent more.
+Prices of targets, as in ``latency``: for each satellite an exact programme knows which contact
+comes next and what waits for it (``planner_core.certified.dp.contact_queues``). Left out are
+stations. Prices of contacts say which of them may follow each other in a plan that earns more than
+some level (``planner_core.certified.dp.contact_pairs``); what is left takes seconds where those
+prices take hundredths, and proves a percent more.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import numpy as np
 from planner_core.certified.dp.contact_queues import most_by_queues
 from planner_core.certified.dp.queue_terms import queues_of
 from planner_core.certified.dp.resource_network import network_of
+from planner_core.certified.proofs.latency import earliest_before
 from planner_core.certified.sizes import PROMISES
 from planner_core.precedence.relation import is_transitive_on
 from planner_core.problem import Bytes, Floats, Ints, Problem, SatelliteProblem
@@ -27,11 +29,18 @@ def is_supported(satellite: SatelliteProblem) -> bool:
 
 
 def queue_value(
-    problem: Problem, prices: Floats, per_collect: int, stop: Bytes | None = None
+    problem: Problem,
+    prices: Floats,
+    per_collect: int,
+    stop: Bytes | None = None,
+    *,
+    contact_prices: Floats | None = None,
+    level: float = -np.inf,
 ) -> tuple[float, Ints]:
     """Return the bound that prices of targets prove, and the rows of paths that reach it.
 
-    Infinite where the programme would take too long, or ``stop`` is set.
+    Infinite where the programme would take too long, or ``stop`` is set. With prices of contacts
+    paths are left out that by them earn no more than a level, and no bound is below that.
 
     Parameters
     ----------
@@ -39,11 +48,16 @@ def queue_value(
         Shape ``(num_targets,)``.
     per_collect
         How many levels of energy a collect takes.
+    contact_prices
+        As of ``latency_value``. Shape ``(num_contacts,)``.
     """
     price = surplus(prices, problem.best_worth)
     stop = np.zeros(1, dtype=np.uint8) if stop is None else stop
     value, paths = float(price.sum()), [np.empty(0, dtype=np.int32)]
-    for satellite in problem.satellites:
+    earliest: dict[int, Ints] = {}
+    if contact_prices is not None and all(map(is_supported, problem.satellites)):
+        earliest = earliest_before(problem, prices, contact_prices, level)
+    for index, satellite in enumerate(problem.satellites):
         if len(satellite) == 0:
             continue
         queues = None
@@ -55,10 +69,11 @@ def queue_value(
                 price,
                 per_collect=per_collect,
                 num_classes=PROMISES,
+                earliest=earliest.get(index),
             )
         if queues is None:
             return np.inf, paths[0]
         gained, path = most_by_queues(queues, stop)
         value += gained
         paths.append(satellite.rows[path])
-    return value, np.concatenate(paths)
+    return max(value, level), np.concatenate(paths)
