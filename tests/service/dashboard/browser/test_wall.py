@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
+import socket
 from pathlib import Path
-from urllib.parse import urlsplit
 
 import httpx
 from selenium import webdriver
@@ -38,10 +39,20 @@ def client(url: str) -> httpx.Client:
     return httpx.Client(base_url=url, timeout=PATIENCE_S, trust_env=False)
 
 
+def free_port() -> str:
+    """Return a port that no connection of another program is given while the service is down."""
+    for port in range(20_000, 32_000):
+        with socket.socket() as probe, contextlib.suppress(OSError):
+            probe.bind(("127.0.0.1", port))
+            return str(port)
+    raise OSError("no port is free")
+
+
 def test_the_wall_comes_back_by_itself_when_the_service_does(
     driver: webdriver.Chrome, tmp_path: Path
 ) -> None:
-    with serving(tmp_path, "serve", "--workers", "1") as (_, line):
+    port = free_port()
+    with serving(tmp_path, "serve", "--workers", "1", "--port", port) as (_, line):
         url = line.split()[-1]
         with client(url) as api:
             plan = published(api)
@@ -60,7 +71,6 @@ def test_the_wall_comes_back_by_itself_when_the_service_does(
     before = wall.text("#wall-passes")
     wall.wait(lambda: wall.text("#wall-passes") != before, "the countdown stands still")
     assert "%" in wall.text("#wall-satellites")
-    port = str(urlsplit(url).port)
     with serving(tmp_path, "serve", "--workers", "1", "--port", port) as (_, line):
         assert line.split()[-1] == url
         wall.wait(lambda: "No answer" not in wall.text("#wall-status"), "it does not come back")
