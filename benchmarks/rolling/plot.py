@@ -1,6 +1,7 @@
 """Draw what policies delivered (``python -m benchmarks.rolling.plot CSV PNG``).
 
-A dot is a week with luck of its own, a bar the mean of the weeks that every policy has flown.
+A dot is a week with luck of its own, a bar the mean of them. Policies that have not flown every
+week are left out.
 """
 
 from __future__ import annotations
@@ -17,26 +18,22 @@ from benchmarks.rolling.loop import POLICIES
 NAMES = {"1": "one plan a day", "2": "two", "4": "four", "pass": "at every pass"}
 
 
-def common_seeds(rows: list[dict[str, str]], policies: list[str]) -> list[str]:
-    """Return the seeds that all of these policies have flown, in order."""
-    flown = [{row["seed"] for row in rows if row["policy"] == policy} for policy in policies]
-    return sorted(set.intersection(*flown))
+def compared(rows: list[dict[str, str]]) -> list[str]:
+    """Return the policies that have flown all the weeks of a table, in order."""
+    weeks = {row["seed"] for row in rows}
+    flown = {policy: {r["seed"] for r in rows if r["policy"] == policy} for policy in POLICIES}
+    return [policy for policy in POLICIES if flown[policy] == weeks]
 
 
 def main(table: str, picture: str) -> None:
     """Draw the table into a picture."""
     rows = rows_of(Path(table))
-    policies = [policy for policy in POLICIES if any(row["policy"] == policy for row in rows)]
-    seeds = common_seeds(rows, policies)
+    policies = compared(rows)
     figure = Figure(figsize=(8, 3.4), layout="constrained")
     worth, urgent = figure.subplots(1, 2)
     for axes, name, scale in ((worth, "worth", 1.0), (urgent, "urgent_down_in_time", 100.0)):
         for place, policy in enumerate(policies):
-            own = [
-                scale * float(row[name])
-                for row in rows
-                if row["policy"] == policy and row["seed"] in seeds
-            ]
+            own = [scale * float(row[name]) for row in rows if row["policy"] == policy]
             mean = float(np.mean(own))
             axes.bar(place, mean, width=0.62, color="#0b6fb8")
             axes.plot([place] * len(own), own, "o", color="#17324d", markersize=4)
