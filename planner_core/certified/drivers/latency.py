@@ -37,10 +37,11 @@ def close_in_on_the_ground(search: ResourceSearch, unit: float) -> None:
     rng = np.random.default_rng(search.seed)
     num_idle = number = 0
     _lower(best, ascent, TUNING.rounds // 2)
-    # Which contacts are good is known long before how good.
-    level = _level(best, ascent)
-    named = [_lower_by_queues(best, ascent, TUNING.levels_per_collect // 2, level)]
-    if not named[0]:
+    levels, named = TUNING.levels_per_collect, list[tuple[int, ...]]()
+    if len(best.problem.satellites) == 1:
+        # Which contacts are good is known long before how good. For a fleet it takes too long.
+        named.append(_lower_by_queues(best, ascent, levels // 2, _level(best, ascent)))
+    if not any(named):
         search.choose(unit)
     while num_idle < TUNING.patience and not best.is_done:
         before = best.reward
@@ -50,13 +51,13 @@ def close_in_on_the_ground(search: ResourceSearch, unit: float) -> None:
         tried.add(contacts)
         _plan_with(best, contacts, ascent.bound.prices, unit, search.seed + number)
         number += 1
-        if number == 1 and named[0]:
+        if number == 1 and any(named):
             _lower(best, ascent, TUNING.rounds // 2)
-            _lower_by_queues(best, ascent, TUNING.levels_per_collect // 2, best.reward)
+            _lower_by_queues(best, ascent, levels // 2, best.reward)
         num_idle = 0 if best.reward > before else num_idle + 1
         _lower(best, ascent, TUNING.several)
-    if named[0] and not best.is_done:
-        _lower_by_queues(best, ascent, TUNING.levels_per_collect, best.reward)
+    if not best.is_done:
+        _lower_by_queues(best, ascent, levels, best.reward)
 
 
 def _lower(best: Incumbent, ascent: LatencyAscent, num_rounds: int) -> None:
