@@ -106,6 +106,18 @@ def _told_and_shown(page: str, printed: str) -> list[tuple[str, str]]:
     return [(one, shown) for one, shown in pairs if shown]
 
 
+@needs_tools
+def test_the_day_of_operations_goes_as_its_page_says(tmp_path: Path) -> None:
+    page = "docs/operations-day.md"
+    shown = [
+        (_lasting(told), _lasting(own))
+        for told, own in _told_and_shown(page, _output(page, tmp_path))
+    ]
+    assert len(shown) == 4
+    for told, own in shown:
+        assert told == own
+
+
 def test_only_what_differs_from_run_to_run_may_differ_from_the_page() -> None:
     table = "solver  reward  search  total  validity\nrule      76.2   {}  valid\nplan {}\n"
     same = [table.format("3.347  21.81", 64 * "a"), table.format("9.9    10.2", 64 * "b")]
