@@ -6,9 +6,9 @@ lost whatever is planned, and the least that any valid plan changes, where that 
 it what solver ``certified`` makes of the same problem from scratch. Access and compilation are not
 counted. One run each, on one core, after a warm-up on a small mission.
 
-``python -m benchmarks.replan one`` or ``four`` picks the mission. ``python -m benchmarks.replan
-fleet SPACECRAFT CITIES`` is the mission of ``benchmarks.fleet`` with 24 satellites and 10,000
-targets: urgent requests one by one, on a worker that holds the plan, and what each step takes.
+``python -m benchmarks.replan one`` or ``four`` picks the mission. ``--fleet SPACECRAFT CITIES`` is
+the mission of ``benchmarks.fleet`` with 24 satellites and 10,000 targets: urgent requests one by
+one, on a worker that holds the plan, and what each step takes.
 """
 
 from __future__ import annotations
@@ -264,12 +264,13 @@ def fleet(files: fleet_missions.Files, number: int) -> None:
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("missions", nargs="*", default=[])
-    parser.add_argument("--requests", type=int, default=100)
+    parser.add_argument("missions", nargs="*", choices=[*MISSIONS, []], default=[])
+    parser.add_argument("--fleet", nargs=2, type=Path, metavar=("SPACECRAFT", "CITIES"))
+    parser.add_argument("--requests", type=int, default=100, help="of a fleet")
     parser.add_argument("--brief", action="store_true", help="replans alone")
     options = parser.parse_args()
-    if options.missions[:1] == ["fleet"]:
-        spacecraft, cities = map(Path, options.missions[1:])
+    if options.fleet:
+        spacecraft, cities = options.fleet
         fleet(fleet_missions.Files(spacecraft=spacecraft, cities=cities), options.requests)
         return
     chosen = options.missions or list(MISSIONS)

@@ -24,8 +24,13 @@ from planner_core.referee.unavoidable import beyond_from_s
 from planner_core.replanning.known import KnownPrices
 from planner_core.replanning.question import Question
 from planner_core.replanning.repair import conflicts, repaired
-from planner_core.replanning.replan import require_promises, solve_replan, with_promised
-from planner_core.replanning.undo import parts_of, undone
+from planner_core.replanning.replan import (
+    differences,
+    require_promises,
+    solve_replan,
+    with_promised,
+)
+from planner_core.replanning.undo import undone
 from planner_core.solvers.base import Solution, Solver
 
 _CLEARLY: Final = 1e-6  # of a capacity: farther from the limit than searches keep anyway
@@ -100,16 +105,8 @@ def replanned(
     solution = flyable(problem, searched, found, protected)
     plan = undone(question, with_promised(question, solution.plan), budget)
     require_promises(question, plan)
-    return replace(
-        solution,
-        plan=plan,
-        statistics={
-            **solution.statistics,
-            "stability": question.stable_worth(plan),
-            "changed": float(question.changed(plan)),
-            "parts": float(len(parts_of(question, plan))),
-        },
-    )
+    statistics = {**solution.statistics, **differences(question, plan)}
+    return replace(solution, plan=plan, statistics=statistics)
 
 
 def _is_too_full(satellite: SatelliteProblem) -> bool:

@@ -275,10 +275,17 @@ def _solution(question: Question, plan: Plan, best: Incumbent, budget: Budget) -
         solution,
         statistics={
             **solution.statistics,
-            "stability": kept,
+            **differences(question, plan),
             "stability_bound": max(summed, last.reward + kept),
-            "changed": float(question.changed(plan)),
             "base": float(question.num_base),
-            "parts": float(len(parts_of(question, plan))),
         },
     )
+
+
+def differences(question: Question, plan: Plan) -> dict[str, float]:
+    """Return how a plan differs from the base: what counts as kept, actions and parts changed."""
+    return {
+        "stability": question.stable_worth(plan),
+        "changed": float(question.changed(plan)),
+        "parts": float(len(parts_of(question, plan))),
+    }

@@ -174,6 +174,8 @@ def test_a_problem_with_other_starts_is_the_one_that_has_them_by_itself() -> Non
     by_access = {one: row for row, one in enumerate(_accesses(table))}
     rows = np.array([by_access[one] for one in _accesses(wanted)], dtype=np.int32)
     made = retimed(fixed, rows, wanted.start_s)
+    numbers = set(zip(made.problem.opportunities.access, wanted.access, strict=True))
+    assert len(numbers) == len(by_access)
     for field in fields(Opportunities):
         if field.name.startswith("los"):
             close = np.abs(

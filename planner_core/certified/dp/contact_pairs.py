@@ -1,9 +1,9 @@
-"""The most that a path may gain that takes one contact next after another, for each two of them.
+"""The most that a path gains in which one contact directly follows another, for all such pairs.
 
-``contact_layers`` knows the most of any path up to a task in a layer. Here the tables are filled
-once more from the end: the most that may follow a task in a layer, by the energy it leaves. At the
-contact that a path goes on from the two add up. What is below a plan that is known need not be
-looked at where paths are told more exactly.
+``contact_layers`` is the forward pass: the most of any path up to a task in a layer. Here a
+backward pass adds the completion: the most that may follow a task in a layer, by the energy that is
+left. At the contact where a path enters a layer the two add up. Pairs that cannot beat a known plan
+are left out of the exact programme (``contact_queues``).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from planner_core.jit import inlined, kernel
 from planner_core.problem import Floats
 
 
-class _Rest(NamedTuple):
+class _Completions(NamedTuple):
     """The most that a path gains after a task, in one layer at a time.
 
     Energy is counted from the task's ``lowest``.
@@ -30,23 +30,23 @@ class _Rest(NamedTuple):
     after
         By the energy that is left after it. Shape ``(m, width)``.
     following
-        If the next task is it or a later one that all may follow, by energy before. Shape
+        With that task or a later one next, after idling, by the energy before it. Shape
         ``(m + 1, width)``.
     in_layer
-        Of contacts, if the next one is a layer's. Shape ``(num_contacts, num_layers, width)``.
-    anyhow
-        Of contacts, whatever follows. Shape ``(num_contacts, width)``.
+        After a contact, in each layer. Shape ``(num_contacts, num_layers, width)``.
+    best
+        After a contact, in any layer. Shape ``(num_contacts, width)``.
     """
 
     after: Floats
     following: Floats
     in_layer: Floats
-    anyhow: Floats
+    best: Floats
 
 
 @kernel
 def most_by_pairs(network: Network, levels: EnergyLevels, layers: Layers, weight: Floats) -> Floats:
-    """Return the most that a path gains with a contact, or none, next after another or the start.
+    """Return the most of a path that goes from one contact, or the start, directly to another.
 
     Each contact must have a layer of its own.
 
@@ -57,8 +57,8 @@ def most_by_pairs(network: Network, levels: EnergyLevels, layers: Layers, weight
 
     Returns
     -------
-    By the contact before, the start first, and the next one, none last; minus infinity where no
-    path does. Shape ``(num_contacts + 1, num_layers)``.
+    A row for the start and for each contact, a column for each next contact and for none; minus
+    infinity where there is no such path. Shape ``(num_contacts + 1, num_layers)``.
     """
     (num_layers, m), width = weight.shape, levels.width
     num_contacts = len(layers.contact)
@@ -70,7 +70,7 @@ def most_by_pairs(network: Network, levels: EnergyLevels, layers: Layers, weight
     )
     for layer in range(num_layers):
         fill_layer(network, levels, layers, weight, layer, tables)
-    rest = _Rest(
+    completions = _Completions(
         np.empty((m, width)),
         np.empty((m + 1, width)),
         np.full((num_contacts, num_layers, width), -np.inf),
@@ -78,11 +78,11 @@ def most_by_pairs(network: Network, levels: EnergyLevels, layers: Layers, weight
     )
     most = np.full((num_contacts + 1, num_layers), -np.inf)
     for layer in range(num_layers - 1, -1, -1):
-        most[0, layer] = _complete(network, levels, layers, weight, layer, rest)
+        most[0, layer] = _fill_backward(network, levels, layers, weight, layer, completions)
         for contact in range(num_contacts):
             for x in range(width):
-                further = rest.in_layer[contact, layer, x]
-                rest.anyhow[contact, x] = max(rest.anyhow[contact, x], further)
+                further = completions.in_layer[contact, layer, x]
+                completions.best[contact, x] = max(completions.best[contact, x], further)
                 if x < tables.num_at_contact[contact]:
                     gained = tables.at_contact[contact, x] + further
                     most[contact + 1, layer] = max(most[contact + 1, layer], gained)
@@ -90,38 +90,42 @@ def most_by_pairs(network: Network, levels: EnergyLevels, layers: Layers, weight
 
 
 @kernel
-def _complete(
+def _fill_backward(
     network: Network,
     levels: EnergyLevels,
     layers: Layers,
     weight: Floats,
     layer: int,
-    rest: _Rest,
+    completions: _Completions,
 ) -> float:
-    """Fill the tables of a layer from its end; return the most of a path that begins in it."""
+    """Fill the completions of a layer from its end; return the most of a path that begins in it."""
     is_last, m, width = layer == len(layers.first) - 1, weight.shape[1], levels.width
     if not is_last:
         m = layers.contact[layer] + 1
-    rest.after[:m] = 0.0 if is_last else -np.inf
-    rest.following[m] = -np.inf
+    completions.after[:m] = 0.0 if is_last else -np.inf
+    completions.following[m] = -np.inf
     for k in range(m - 1, -1, -1):
-        number, after, following = layers.number[k], rest.after[k], rest.following[k]
+        number, after, following = layers.number[k], completions.after[k], completions.following[k]
         later = network.idle_from[k]
         if number == layer:
-            after[:] = rest.anyhow[number]
+            after[:] = completions.best[number]
         elif later < m:
-            _raise_from(after, rest.following[later], levels.lowest[k] - levels.lowest[later])
+            _raise_from(
+                after, completions.following[later], levels.lowest[k] - levels.lowest[later]
+            )
         following[:] = -np.inf
         if k + 1 < m:
-            _raise_from(following, rest.following[k + 1], levels.lowest[k] - levels.lowest[k + 1])
+            _raise_from(
+                following, completions.following[k + 1], levels.lowest[k] - levels.lowest[k + 1]
+            )
         if number >= 0 and number != layer:
-            rest.in_layer[number, layer] = after
+            completions.in_layer[number, layer] = after
         elif weight[layer, k] != NEVER:
-            _precede(network, levels, k, weight[layer, k], rest)
+            _extend_backward(network, levels, k, weight[layer, k], completions)
     if m == 0:
         return 0.0 if is_last else -np.inf
     start = min(max(0, levels.start - levels.lowest[0]), width - 1)
-    begun = float(rest.following[0, start])
+    begun = float(completions.following[0, start])
     return max(begun, 0.0) if is_last else begun
 
 
@@ -134,20 +138,24 @@ def _raise_from(values: Floats, others: Floats, up: int) -> None:
 
 
 @kernel
-def _precede(network: Network, levels: EnergyLevels, k: int, weight: float, rest: _Rest) -> None:
-    """Let a task be the next one, of those whom it follows directly and of all it may follow."""
+def _extend_backward(
+    network: Network, levels: EnergyLevels, k: int, weight: float, completions: _Completions
+) -> None:
+    """Extend completions by a task in front: after idling, and by arcs from tasks near it."""
     low, cap, cost = levels.lowest[k], levels.cap[k], levels.cost[k]
     least, last = max(levels.floor[k], low), levels.width - 1
-    after = rest.after[k]
+    after = completions.after[k]
     for x in range(levels.width):
         left = min(low + x, cap) - cost
         if left >= least:
             gained = weight + after[min(left - low, last)]
-            rest.following[k, x] = max(rest.following[k, x], gained)
+            completions.following[k, x] = max(completions.following[k, x], gained)
     for at in range(network.straight_first[k], network.straight_first[k + 1]):
         i = network.straight_rows[at]
         begin = levels.lowest[i] + levels.give[at]
         for x in range(levels.width):
             left = min(begin + x, cap) - cost
             if left >= least:
-                rest.after[i, x] = max(rest.after[i, x], weight + after[min(left - low, last)])
+                completions.after[i, x] = max(
+                    completions.after[i, x], weight + after[min(left - low, last)]
+                )

@@ -63,7 +63,7 @@ def data_levels(network: Network, per_collect: int, *, is_optimistic: bool) -> D
         return np.floor(np.asarray(data) / unit + room).astype(np.int32) - base
 
     start = int(rounded(network.data_start, LEVEL)) - base
-    # A full recorder may be rounded to more than any task can be in.
+    # A full recorder may be rounded up beyond the limit of every task.
     num_levels = max(int(limit(highest)), start) + 1
     floor = rounded(network.data_floor, -abs(room)) - base
     delivered = limit(network.delivered)

@@ -48,8 +48,8 @@ def queues_of(
     rows
         Those of its tasks that count, ascending; all by default.
     earliest
-        Of contacts, and of none in the end, the earliest that a path needs to come from without
-        another between; -1 for the start. Shape ``(num_contacts + 1,)``.
+        Direct predecessors of contacts (``latency.earliest_predecessors``); any by default. Shape
+        ``(num_contacts + 1,)``.
     keeps_battery, keeps_recorder
         Whether energy, or data, is rounded so that all paths keep their limits, and not so that no
         plan is lost.

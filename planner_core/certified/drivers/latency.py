@@ -39,7 +39,7 @@ def close_in_on_the_ground(search: ResourceSearch, unit: float) -> None:
     _lower(best, ascent, TUNING.rounds // 2)
     levels, named = TUNING.levels_per_collect, list[tuple[int, ...]]()
     if len(best.problem.satellites) == 1:
-        # Which contacts are good is known long before how good. For a fleet it takes too long.
+        # Coarse levels suffice to name good contacts. A fleet's programmes take too long.
         named.append(_lower_by_queues(best, ascent, levels // 2, _level(best, ascent)))
     if not any(named):
         search.choose(unit)
@@ -70,7 +70,7 @@ def _lower(best: Incumbent, ascent: LatencyAscent, num_rounds: int) -> None:
 
 
 def _level(best: Incumbent, ascent: LatencyAscent) -> float:
-    """Return what a plan may earn: at first none is known that is good."""
+    """Return what the best plan earns, or a value near the bound until a good one is known."""
     return max(best.reward, (1.0 - TUNING.little) * ascent.bound.value)
 
 

@@ -37,6 +37,7 @@ from planner_core.problem import (
     COLLECT,
     CONTACT,
     Bools,
+    Bytes,
     Floats,
     Ints,
     Problem,
@@ -145,10 +146,10 @@ class LatencyRelaxation:
         return most_by_contacts(self.network, self.levels, self.layers, weight, own, num_own)
 
     def most_by_pairs(self, prices: Floats, tolls: Floats) -> Floats | None:
-        """Return the most that it can gain by contacts that follow each other.
+        """Return the most that it can gain by each pair of contacts that follow each other.
 
-        None where contacts share layers. Shape ``(num_contacts + 1, num_contacts + 1)``: the start
-        and then each contact, with the next one or with none.
+        As ``contact_pairs.most_by_pairs`` has it; None where contacts share layers. Shape
+        ``(num_contacts + 1, num_contacts + 1)``.
         """
         if len(self.layers.first) <= len(self.contacts):
             return None
@@ -237,27 +238,29 @@ def latency_value(problem: Problem, prices: Floats, contact_prices: Floats) -> f
     contact_prices
         By volume, of the table's contacts in order. Shape ``(num_contacts,)``.
     """
-    price, tolls = _settled(problem, prices, contact_prices)
+    price, tolls = _multipliers(problem, prices, contact_prices)
     gained = (one.most(price, tolls[one.contacts])[0] for one in latency_relaxations(problem))
     return float(price.sum()) + sum(gained)
 
 
-def earliest_before(
-    problem: Problem, prices: Floats, contact_prices: Floats, level: float
+def earliest_predecessors(
+    problem: Problem, prices: Floats, contact_prices: Floats, level: float, stop: Bytes
 ) -> dict[int, Ints]:
-    """Return which contacts may be next after which in a plan that earns more than ``level``.
+    """Return the earliest direct predecessor of each contact in plans worth more than ``level``.
 
     Returns
     -------
-    By satellite, where anything is known of it, for each contact the earliest that a path can come
-    from without another between, and in the end that after which none needs to follow; -1 for the
-    start. Shape ``(num_contacts + 1,)``.
+    By satellite, in the order of its contacts, the earliest contact that may come directly before
+    each; the last entry is the earliest that may be a path's last. -1 stands for the start. Empty
+    once ``stop`` is set. Shape ``(num_contacts + 1,)``.
     """
-    price, tolls = _settled(problem, prices, contact_prices)
+    price, tolls = _multipliers(problem, prices, contact_prices)
     most: dict[int, Floats] = {}
     others = float(price.sum())
     indices = [index for index, one in enumerate(problem.satellites) if len(one)]
     for index, one in zip(indices, latency_relaxations(problem), strict=True):
+        if stop[0]:
+            return {}
         pairs = one.most_by_pairs(price, tolls[one.contacts])
         if pairs is None:
             others += one.most(price, tolls[one.contacts])[0]
@@ -278,8 +281,8 @@ def _earliest(may_follow: Bools) -> Ints:
     return found.astype(np.int32)
 
 
-def _settled(problem: Problem, prices: Floats, contact_prices: Floats) -> tuple[Floats, Floats]:
-    """Return prices of targets, with one of nothing at the end, and of the table's rows."""
+def _multipliers(problem: Problem, prices: Floats, contact_prices: Floats) -> tuple[Floats, Floats]:
+    """Return prices of targets, a 0 at the end, and of contacts by row of the table."""
     price = np.append(surplus(prices, problem.best_worth), 0.0)
     tolls = np.zeros(len(problem.opportunities))
     tolls[problem.opportunities.kind == CONTACT] = np.maximum(contact_prices, 0.0)

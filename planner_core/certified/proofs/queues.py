@@ -14,7 +14,7 @@ import numpy as np
 from planner_core.certified.dp.contact_queues import most_by_queues
 from planner_core.certified.dp.queue_terms import queues_of
 from planner_core.certified.dp.resource_network import network_of
-from planner_core.certified.proofs.latency import earliest_before
+from planner_core.certified.proofs.latency import earliest_predecessors
 from planner_core.certified.sizes import PROMISES
 from planner_core.precedence.relation import is_transitive_on
 from planner_core.problem import Bytes, Floats, Ints, Problem, SatelliteProblem
@@ -40,7 +40,7 @@ def queue_value(
     """Return the bound that prices of targets prove, and the rows of paths that reach it.
 
     Infinite where the programme would take too long, or ``stop`` is set. With prices of contacts
-    paths are left out that by them earn no more than a level, and no bound is below that.
+    paths that by these earn no more than ``level`` are left out; the bound is ``level`` at least.
 
     Parameters
     ----------
@@ -54,24 +54,23 @@ def queue_value(
     price = surplus(prices, problem.best_worth)
     stop = np.zeros(1, dtype=np.uint8) if stop is None else stop
     value, paths = float(price.sum()), [np.empty(0, dtype=np.int32)]
+    satellites = {index: one for index, one in enumerate(problem.satellites) if len(one)}
+    if not all(map(is_supported, satellites.values())):
+        return np.inf, paths[0]
     earliest: dict[int, Ints] = {}
-    if contact_prices is not None and all(map(is_supported, problem.satellites)):
-        earliest = earliest_before(problem, prices, contact_prices, level)
-    for index, satellite in enumerate(problem.satellites):
-        if len(satellite) == 0:
-            continue
-        queues = None
-        if is_supported(satellite):
-            queues = queues_of(
-                problem,
-                satellite,
-                network_of(problem, satellite),
-                price,
-                per_collect=per_collect,
-                num_classes=PROMISES,
-                earliest=earliest.get(index),
-            )
-        if queues is None:
+    if contact_prices is not None:
+        earliest = earliest_predecessors(problem, prices, contact_prices, level, stop)
+    for index, satellite in satellites.items():
+        queues = queues_of(
+            problem,
+            satellite,
+            network_of(problem, satellite),
+            price,
+            per_collect=per_collect,
+            num_classes=PROMISES,
+            earliest=earliest.get(index),
+        )
+        if queues is None or stop[0]:
             return np.inf, paths[0]
         gained, path = most_by_queues(queues, stop)
         value += gained
