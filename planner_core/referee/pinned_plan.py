@@ -2,33 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
-
 from planner_core.problem import COLLECT, Problem
 from planner_core.problem.plan import Plan
 from planner_core.problem.slew import TIME_TOLERANCE_S
-
-BreachCode = Literal["pin", "outage", "frozen"]
-
-
-class Breach(NamedTuple):
-    """A pin or an outage that a plan breaks; ``blamed`` are positions in ``plan.actions``."""
-
-    satellite: int
-    at_s: float
-    needed: float
-    available: float
-    detail: str
-    blamed: tuple[int, ...]
-    code: BreachCode = "pin"
+from planner_core.referee.timeline import Violation, ViolationCode
 
 
-def breaches(problem: Problem, plan: Plan) -> list[Breach]:
+def breaches(problem: Problem, plan: Plan) -> list[Violation]:
     """Return every kept action that is missing and every action that is ruled out."""
     pinned, table = problem.pinned, problem.opportunities
     starts = {action.opportunity: action.start_s for action in plan.actions}
     found = [
-        Breach(
+        Violation(
             satellite=int(table.satellite[kept.row]),
             at_s=float(table.start_s[kept.row]),
             needed=1.0,
@@ -65,7 +50,7 @@ def breaches(problem: Problem, plan: Plan) -> list[Breach]:
             why.append("Its target is forbidden.")
         if row in pinned.skipped:
             why.append(f"It is what {pinned.skipped[row]} skips.")
-        codes: list[tuple[BreachCode, str]] = [("pin", detail) for detail in why]
+        codes: list[tuple[ViolationCode, str]] = [("pin", detail) for detail in why]
         codes += [
             ("outage", f"It lies in the outage {blocked.pointer}.")
             for blocked in spans
@@ -74,7 +59,7 @@ def breaches(problem: Problem, plan: Plan) -> list[Breach]:
         if pinned.is_frozen(action.start_s) and row not in kept_rows:
             codes.append(("frozen", "It starts before the freeze, and was not planned there."))
         found += [
-            Breach(
+            Violation(
                 satellite=satellite, at_s=action.start_s, needed=0.0, available=1.0,
                 detail=detail, blamed=(position,), code=code,
             )

@@ -71,7 +71,7 @@ def replay(problem: Problem, plan: Plan) -> Timeline:
         violations += found
         slews |= slewed
     violations += stations(problem, plan)
-    violations += [Violation(**b._asdict()) for b in breaches(problem, plan)]
+    violations += breaches(problem, plan)
 
     profiles: list[Profile | None] = [None] * len(problem.satellites)
     if problem.use_resources:
