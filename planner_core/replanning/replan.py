@@ -21,7 +21,7 @@ from planner_core.certified.proofs.lagrangian import lagrangian_bound
 from planner_core.certified.proofs.resource_bound import quick_bound
 from planner_core.domain import Scenario
 from planner_core.errors import InvalidScenario
-from planner_core.pinning.pinned_problem import rows_of_base
+from planner_core.pinning.rows_meant import rows_of_base
 from planner_core.problem import COLLECT, CONTACT, Problem
 from planner_core.problem.on_board import without_on_board
 from planner_core.problem.plan import Plan

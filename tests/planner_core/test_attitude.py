@@ -27,7 +27,7 @@ from planner_core.domain import (
 from planner_core.errors import InvalidScenario
 from planner_core.idling import sunlit_from
 from planner_core.orbits.omm import omm_from_elements
-from planner_core.pinning.pinned_problem import apply_pins
+from planner_core.pinning.apply_pins import apply_pins
 from planner_core.problem import Heading, Kept, Pinned, Problem
 from planner_core.problem.plan import Plan
 from planner_core.problem.sun_turns import sun_turn_s

@@ -15,7 +15,7 @@ from planner_core.budget import Budget
 from planner_core.certified.proofs.resource_bound import quick_bound
 from planner_core.domain import Dynamics, Stability
 from planner_core.errors import InvalidScenario
-from planner_core.pinning.pinned_problem import apply_pins
+from planner_core.pinning.apply_pins import apply_pins
 from planner_core.problem import COLLECT, CONTACT, Kept, Pinned, Problem
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay

@@ -28,7 +28,7 @@ from planner_core.domain import (
     Target,
 )
 from planner_core.errors import InvalidScenario
-from planner_core.pinning.pinned_problem import apply_pins
+from planner_core.pinning.apply_pins import apply_pins
 from planner_core.preferences.downlinks import with_more_downlinks
 from planner_core.problem import COLLECT, CONTACT, ImageOnBoard, Pinned, Problem
 from planner_core.problem.delivery import with_objective

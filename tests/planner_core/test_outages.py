@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from planner_core.budget import Budget
 from planner_core.domain import Dynamics
 from planner_core.errors import InvalidScenario
-from planner_core.pinning.pinned_problem import apply_pins
+from planner_core.pinning.apply_pins import apply_pins
 from planner_core.problem import COLLECT, CONTACT, Blocked, Kept, Pinned, Problem
 from planner_core.problem.plan import Plan
 from planner_core.reasons.explain import explain

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from planner_core.budget import Budget, Termination
 from planner_core.domain import Agility, Dynamics
 from planner_core.errors import Fault, InvalidScenario
+from planner_core.pinning.apply_pins import apply_pins
 from planner_core.pinning.limits import _keep_best
-from planner_core.pinning.pinned_problem import apply_pins
 from planner_core.problem import (
     COLLECT,
     CONTACT,

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from planner_core.budget import Budget, Termination
 from planner_core.domain import Agility, Dynamics
 from planner_core.errors import InvalidScenario
-from planner_core.pinning.pinned_problem import apply_pins
+from planner_core.pinning.apply_pins import apply_pins
 from planner_core.problem import (
     ACCESS_TOO_SHORT,
     COLLECT,
