@@ -2,12 +2,14 @@
 
 ``most_value`` counts worth in whole units and knows energy exactly; here it is the other way
 round, and the recorder is left out. That takes a fraction of the time, so that prices can be
-tried by the hundred. Energy is rounded in favour of the satellite: no plan is lost.
+tried by the hundred. For a proof energy is rounded in favour of the satellite, so that no plan is
+lost; a search for multipliers needs only an estimate.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -17,6 +19,9 @@ from planner_core.certified.sizes import MAX_ENERGY_LEVELS
 from planner_core.certified.tolerances import LEVEL
 from planner_core.jit import inlined, kernel
 from planner_core.problem import Floats, Ints, Longs
+
+Rounding = Literal["optimistic", "pessimistic", "nearest"]
+"""No plan is lost, every path keeps its limits, or neither."""
 
 
 @bundle
@@ -44,28 +49,22 @@ class EnergyLevels(NamedTuple):
 
 
 def energy_levels(
-    network: Network, per_collect: int, *, is_optimistic: bool = True
+    network: Network, per_collect: int, rounding: Rounding = "optimistic"
 ) -> EnergyLevels:
-    """Return levels of which the cheapest collect costs ``per_collect``, unless they are many.
-
-    Optimistic ones lose no plan; with others every path keeps its limits.
-    """
+    """Return levels of which the cheapest collect costs ``per_collect``, unless they are many."""
     collects = network.energy_cost[~network.is_contact.astype(np.bool_)]
     positive = collects[collects > 0.0]
     step = float(positive.min()) / per_collect if len(positive) else 1.0
     left = np.minimum(network.energy_floor, network.energy_cap - network.energy_cost)
     span = float((network.energy_cap - np.minimum.accumulate(left)).max(initial=0.0))
     step = max(step, span / MAX_ENERGY_LEVELS)
-    if not is_optimistic:
-        # What arcs give back is left out.
-        cap, cost = _down(network.energy_cap, step), _up(network.energy_cost, step)
-        floor = _up(network.energy_floor, step)
-        give = np.zeros(len(network.straight_give), dtype=np.int32)
-    elif network.straight_give.any():
-        cap, cost, floor, give = _rounded_potentials(network, step)
+    down, up = _ROUNDED[rounding]
+    if network.straight_give.any() and rounding != "pessimistic":
+        cap, cost, floor, give = _rounded_potentials(network, step, down, up)
     else:
-        cap = _up(network.energy_cap, step)
-        cost, floor = _down(network.energy_cost, step), _down(network.energy_floor, step)
+        # Where every path must keep its limits, what arcs give back is left out.
+        cap = up(network.energy_cap, step)
+        cost, floor = down(network.energy_cost, step), down(network.energy_floor, step)
         give = np.zeros(len(network.straight_give), dtype=np.int32)
     lowest = np.minimum.accumulate(np.minimum(floor, cap - cost)).astype(np.int32)
     return EnergyLevels(
@@ -73,7 +72,7 @@ def energy_levels(
         cost=cost,
         floor=floor,
         lowest=lowest,
-        start=int((_up if is_optimistic else _down)(np.array(network.energy_start), step)),
+        start=int(up(np.array(network.energy_start), step)),
         width=int((cap - np.minimum(cost, 0) - lowest).max(initial=0)) + 1,
         give=give,
     )
@@ -87,21 +86,36 @@ def _down(energy: Floats, step: float) -> Ints:
     return np.floor(energy / step + LEVEL).astype(np.int32)
 
 
-def _rounded_potentials(network: Network, step: float) -> tuple[Ints, Ints, Ints, Ints]:
+def _nearest(energy: Floats, step: float) -> Ints:
+    return np.rint(energy / step).astype(np.int32)
+
+
+_Round = Callable[[Floats, float], Ints]
+# What counts against the satellite, and what counts for it.
+_ROUNDED: dict[Rounding, tuple[_Round, _Round]] = {
+    "optimistic": (_down, _up),
+    "pessimistic": (_up, _down),
+    "nearest": (_nearest, _nearest),
+}
+
+
+def _rounded_potentials(
+    network: Network, step: float, down: _Round, up: _Round
+) -> tuple[Ints, Ints, Ints, Ints]:
     """Return cap, cost and floor by task, and what arcs give back, from potentials in levels.
 
     With turns to the sun no two costs are alike, and rounding each in favour of the satellite
     would lose up to a level with every task and every arc. Where what idle time adds up to is
     rounded instead, the errors along a path cancel.
     """
-    before, after = _down(network.energy_from, step), _up(network.energy_to, step)
-    draw = _down(network.energy_cost - network.energy_from + network.energy_to, step)
-    full = _up(network.energy_cap + network.energy_to, step)
-    least = _down(network.energy_floor + network.energy_from, step)
+    before, after = down(network.energy_from, step), up(network.energy_to, step)
+    draw = down(network.energy_cost - network.energy_from + network.energy_to, step)
+    full = up(network.energy_cap + network.energy_to, step)
+    least = down(network.energy_floor + network.energy_from, step)
     k = np.repeat(np.arange(len(draw)), np.diff(network.straight_first))
     i = network.straight_rows
     change = network.energy_to[k] - network.energy_from[i] + network.straight_give
-    give = np.where(network.straight_give > 0.0, _up(change, step) - after[k] + before[i], 0)
+    give = np.where(network.straight_give > 0.0, up(change, step) - after[k] + before[i], 0)
     cost = draw + before - after
     return full - after, cost, least - before, np.maximum(give, 0).astype(np.int32)
 

@@ -60,7 +60,7 @@ def queues_of(
         network = part_of(network, rows)
     kind, table_rows = satellite.kind[rows], satellite.rows[rows]
     is_image, contact = kind == COLLECT, np.flatnonzero(kind == CONTACT).astype(np.int32)
-    energy = energy_levels(network, per_collect, is_optimistic=not keeps_battery)
+    energy = energy_levels(network, per_collect, "pessimistic" if keeps_battery else "optimistic")
     data = data_levels(network, TUNING.coarse, is_optimistic=not keeps_recorder)
     number = np.full(len(rows), -1, dtype=np.int32)
     number[contact] = np.arange(len(contact))
