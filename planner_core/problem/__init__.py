@@ -1,7 +1,6 @@
 """The frozen problem, all that a solver and the referee ever see, and what it is made of."""
 
-from planner_core.problem.downlink import Downlinks, PassRate, StationLinks
-from planner_core.problem.problem import (
+from planner_core.problem.columns import (
     ACCESS_FOUND,
     ACCESS_TOO_SHORT,
     BETWEEN_STARTS,
@@ -12,21 +11,21 @@ from planner_core.problem.problem import (
     OUTSIDE_TIMES,
     RULED_OUT,
     WRONG_SENSOR_TYPE,
-    Blocked,
     Bools,
     Bytes,
     Floats,
+    Ints,
+    Longs,
+    Singles,
+)
+from planner_core.problem.downlink import Downlinks, PassRate, StationLinks
+from planner_core.problem.pinned import Blocked, Kept, Pinned, Struck
+from planner_core.problem.problem import (
     Heading,
     ImageOnBoard,
-    Ints,
-    Kept,
-    Longs,
     Opportunities,
-    Pinned,
     Problem,
     SatelliteProblem,
-    Singles,
-    Struck,
     Sunlight,
     line_of_sight,
 )

@@ -8,7 +8,8 @@ from typing import Final
 import numpy as np
 
 from planner_core.domain import Objective
-from planner_core.problem.problem import COLLECT, CONTACT, Floats, Longs, Problem, SatelliteProblem
+from planner_core.problem.columns import COLLECT, CONTACT, Floats, Longs
+from planner_core.problem.problem import Problem, SatelliteProblem
 from planner_core.problem.slew import TIME_TOLERANCE_S
 from planner_core.worth import share_earned
 

@@ -12,15 +12,9 @@ from bisect import bisect_left
 
 import numpy as np
 
+from planner_core.problem.columns import Bools, Ints
 from planner_core.problem.moving import longest_turn_s
-from planner_core.problem.problem import (
-    Bools,
-    Heading,
-    Ints,
-    Problem,
-    SatelliteProblem,
-    line_of_sight,
-)
+from planner_core.problem.problem import Heading, Problem, SatelliteProblem, line_of_sight
 from planner_core.problem.slew import INSTANT, TIME_TOLERANCE_S, angle_between_deg, slew_s
 from planner_core.problem.sun_turns import sun_turn_s
 from planner_core.problem.transitions import Transitions

@@ -12,16 +12,9 @@ from typing import Final
 
 import numpy as np
 
+from planner_core.problem.columns import COLLECT, CONTACT, Bools, Floats
 from planner_core.problem.delivery import fastest_downlink_per_s
-from planner_core.problem.problem import (
-    COLLECT,
-    CONTACT,
-    Bools,
-    Floats,
-    ImageOnBoard,
-    Problem,
-    SatelliteProblem,
-)
+from planner_core.problem.problem import ImageOnBoard, Problem, SatelliteProblem
 from planner_core.worth import delivery_share
 
 _ROUNDING_S: Final = 1e-5  # as of new images (``delivery.least_age_s``)

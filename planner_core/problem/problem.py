@@ -7,43 +7,27 @@ which say themselves which of them may follow each other.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Final, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from planner_core.domain import Agility, Dynamics, Objective, Resources
+from planner_core.problem.columns import (
+    COLLECT,
+    Bools,
+    Floats,
+    Ints,
+    Longs,
+    Singles,
+)
 from planner_core.problem.downlink import Downlinks
+from planner_core.problem.pinned import Pinned
 from planner_core.problem.pointing import Pointing, Vector, sight
-from planner_core.problem.slew import TIME_TOLERANCE_S
 from planner_core.problem.sun_turns import SunPath, SunTurns
 from planner_core.problem.transitions import Transitions
 from planner_core.worth import best_worths, common_unit, worth_of
-
-Floats = npt.NDArray[np.float64]
-Singles = npt.NDArray[np.float32]
-Ints = npt.NDArray[np.int32]
-Longs = npt.NDArray[np.int64]
-Bytes = npt.NDArray[np.uint8]
-Bools = npt.NDArray[np.bool_]
-
-COLLECT: Final = 0
-CONTACT: Final = 1
-
-ACCESS_FOUND: Final = 0
-NEVER_VISIBLE: Final = 1
-OUTSIDE_LIMITS: Final = 2
-ACCESS_TOO_SHORT: Final = 3
-RULED_OUT: Final = 4
-"""Geometry would allow it; what the scenario pins, or what is out, leaves no opportunity."""
-WRONG_SENSOR_TYPE: Final = 5
-OUTSIDE_TIMES: Final = 6
-"""An access is long enough, but not between the target's release and due times."""
-BETWEEN_STARTS: Final = 7
-"""There is room for a collect, but not at a start of the horizon's grid."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -237,107 +221,6 @@ class SatelliteProblem:
         return np.concatenate([[0.0], self.event_s])[self.event]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Kept:
-    """A row that every plan must take, and the pin (JSON pointer) that says so."""
-
-    row: int
-    pointer: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Blocked:
-    """A span in which a satellite or a station may not do tasks of some kinds.
-
-    Attributes
-    ----------
-    satellite, station
-        Whose span it is: an index of the scenario's satellites, or of its stations.
-    pointer
-        The pin or the outage that says so.
-    """
-
-    start_s: float
-    end_s: float
-    kinds: frozenset[int]
-    pointer: str
-    satellite: int | None = None
-    station: int | None = None
-
-    @property
-    def is_outage(self) -> bool:
-        """Whether it is a fact that was reported, and not an operator's wish."""
-        return self.pointer.startswith("/outages/")
-
-    def concerns(self, satellite: int, kind: int, place: int) -> bool:
-        """Return whether such a task may not overlap the span."""
-        if kind not in self.kinds:
-            return False
-        if self.station is not None:
-            return kind == CONTACT and place == self.station
-        return satellite == self.satellite
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Struck:
-    """A collect that pins, outages or where its satellite looked at the start rule out.
-
-    Attributes
-    ----------
-    row
-        Of the scenario's table, which the problem no longer has.
-    kept
-        Rows of the problem that it cannot stand beside; none where it is ruled out itself.
-    why
-        A pin, an outage that it lies in, or that its satellite cannot turn to it in time from
-        where it looked at the start.
-    """
-
-    row: int
-    satellite: int
-    start_s: float
-    end_s: float
-    kept: tuple[int, ...] = ()
-    why: Literal["pin", "outage", "heading"] = "pin"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Pinned:
-    """What the scenario pins, and what is out, in terms of the problem.
-
-    Attributes
-    ----------
-    blocked
-        Spans that pins block, and outages.
-    skipped
-        Rows that no plan may take, as long as they are in the table, and the pin that says so.
-    forbidden
-        Targets that no plan may collect.
-    struck
-        By target, the collects that were ruled out.
-    frozen_until_s
-        What starts before it is kept or not taken at all; None where the plan follows no other
-        one.
-    """
-
-    kept: tuple[Kept, ...] = ()
-    skipped: Mapping[int, str] = field(default_factory=dict)
-    blocked: tuple[Blocked, ...] = ()
-    forbidden: frozenset[int] = frozenset()
-    struck: Mapping[int, tuple[Struck, ...]] = field(default_factory=dict)
-    frozen_until_s: float | None = None
-
-    @property
-    def follows(self) -> bool:
-        """Whether the plan follows another one."""
-        return self.frozen_until_s is not None
-
-    def is_frozen(self, start_s: float) -> bool:
-        """Return whether a task that starts then may neither be added nor dropped."""
-        until_s = self.frozen_until_s
-        return until_s is not None and start_s < until_s - TIME_TOLERANCE_S
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Problem:
     """A compiled scenario.
@@ -390,7 +273,7 @@ class Problem:
     objective: Objective = field(default_factory=Objective)
     left_on_board: float | None = None
     pointing: Pointing | None = None
-    pinned: Pinned = Pinned()
+    pinned: Pinned = field(default_factory=Pinned)
     origin: Ints | None = None
     on_board: tuple[ImageOnBoard, ...] = ()
 

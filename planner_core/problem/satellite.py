@@ -5,16 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from planner_core.domain import Agility, Resources
+from planner_core.problem.columns import CONTACT, Floats, Ints
 from planner_core.problem.downlink import Downlinks
-from planner_core.problem.problem import (
-    CONTACT,
-    Floats,
-    Heading,
-    Ints,
-    Opportunities,
-    SatelliteProblem,
-    Sunlight,
-)
+from planner_core.problem.problem import Heading, Opportunities, SatelliteProblem, Sunlight
 from planner_core.problem.sun_turns import SunPath, sun_turns
 from planner_core.problem.transitions import Transitions, slews_of
 

@@ -16,13 +16,14 @@ from planner_core.problem.plan import Plan
 from planner_core.reasons.what_if import Change, what_if
 from service.answers.rebuilt import stored_plan
 from service.scenarios.background import Background
+from service.scenarios.canonical import sha256_of
 from service.scenarios.change_pointers import Places, pointing_into, pointing_into_relax
 from service.scenarios.freezing import FrozenScenario, freeze_file
 from service.scenarios.opportunities import Described
 from service.scenarios.pin_inputs import pinned_action, pins_in
 from service.scenarios.relaxing import relaxed_file
 from service.scenarios.scenario_limits import ScenarioLimits
-from service.scenarios.translate import read_file, scenario_from_file, sha256_of
+from service.scenarios.translate import read_file, scenario_from_file
 from service.wire.base import read
 from service.wire.changes import ChangeIn
 from service.wire.scenarios import ScenarioFile

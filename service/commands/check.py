@@ -17,7 +17,8 @@ from planner_core.referee.timeline import Timeline
 from service.answers.reading import READERS, Reading, plan_in
 from service.commands.scenario_files import read_object
 from service.commands.summary import table
-from service.scenarios.translate import canonical, scenario_from_content, sha256_of
+from service.scenarios.canonical import canonical, sha256_of
+from service.scenarios.translate import scenario_from_content
 from service.wire.instants import instant_text
 
 _AGREED = 1e-6

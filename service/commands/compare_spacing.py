@@ -16,7 +16,8 @@ from service.commands.scenario_files import read_object, require_folder
 from service.commands.solve import answer_of
 from service.jobs.plan_request import PlanRequest
 from service.jobs.solver_params import params_of, parse_params
-from service.scenarios.translate import canonical, quality_from, read_file, sha256_of
+from service.scenarios.canonical import canonical, sha256_of
+from service.scenarios.translate import quality_from, read_file
 
 SPACINGS_S: Final = (60.0, 30.0, 15.0)
 """Those that are tried unless others are named."""

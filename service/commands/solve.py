@@ -16,7 +16,7 @@ from service.commands.summary import summary
 from service.jobs.plan_job import run_plan_job
 from service.jobs.plan_request import PlanAnswer, PlanRequest
 from service.jobs.solver_params import params_of, parse_params
-from service.scenarios.translate import canonical, sha256_of
+from service.scenarios.canonical import canonical, sha256_of
 
 _LOOK_EVERY_S: Final = 0.05
 

@@ -21,15 +21,11 @@ from service.db.ids import new_id
 from service.db.rows import GroundStationRow, SatelliteRow, ScenarioRow, TargetCatalogRow, TargetRow
 from service.db.session import Database
 from service.problems.faults import faults_of_validation
+from service.scenarios.canonical import canonical_of_file, sha256_of
 from service.scenarios.frozen_forecasts import find_forecast, frozen_forecast
 from service.scenarios.pin_inputs import with_settled_pins
 from service.scenarios.scenario_limits import ScenarioLimits
-from service.scenarios.translate import (
-    canonical_of_file,
-    horizon_from,
-    scenario_from_file,
-    sha256_of,
-)
+from service.scenarios.translate import horizon_from, scenario_from_file
 from service.stores import outage_store, satellite_store
 from service.stores import scenario_store as store
 from service.wire.pins import PlacedOutage

@@ -1,18 +1,14 @@
 """JSON to domain types: the only module that knows both.
 
-A scenario's *content* is a self-contained scenario file (`ScenarioFile`). Its canonical form
-has every default filled in, instants in UTC with milliseconds, keys sorted and no name; its
-SHA-256 identifies the question.
+A scenario's *content* is a self-contained scenario file (`ScenarioFile`).
 """
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Any, Final, Protocol
+from typing import Any, Protocol
 
 from pydantic import ValidationError
 
@@ -70,22 +66,6 @@ def scenario_from_content(content: Mapping[str, Any]) -> Scenario:
     return scenario_from_file(read_file(content))
 
 
-def canonical(content: Mapping[str, Any]) -> str:
-    """Return the canonical form of a scenario file, as one line of JSON.
-
-    Raises
-    ------
-    InvalidScenario, InvalidElements
-        Where the file is not of its schema, or an orbit cannot be read.
-    """
-    return canonical_of_file(read_file(content))
-
-
-def sha256_of(canonical_text: str) -> str:
-    """Return the SHA-256 of a canonical form, in hexadecimal."""
-    return hashlib.sha256(canonical_text.encode()).hexdigest()
-
-
 def read_file(content: Mapping[str, Any]) -> ScenarioFile:
     """Return a scenario file that fits the schema: every id filled in, every orbit tidy.
 
@@ -127,111 +107,6 @@ def _with_ids(items: Sequence[FileSatellite | FileGroundStation]) -> list[object
         taken.add(own)
         named.append(item.model_copy(update={"id": own}))
     return named
-
-
-def canonical_of_file(file: ScenarioFile) -> str:
-    """Return the canonical form of a file that `read_file` has made."""
-    document = file.model_dump(mode="json", exclude={"name", "release"})
-    for satellite in document["satellites"]:
-        _without_unset(satellite, "tle", "omm", "oem")
-        if satellite["spacecraft"] not in (None, "paper", "paper_code"):
-            continue  # what it leaves out would be its type's
-        del satellite["spacecraft"]
-        _without_unset(satellite["sensor"], "sensor_type", "sun_exclusion_deg")
-        _without_unset(satellite["agility"], "sun_exclusion_deg")
-        if satellite["agility"]["slew_model"] == "rest":
-            del satellite["agility"]["slew_model"]
-        if isinstance(satellite["resources"], dict):
-            _without(satellite["resources"], **_YOUNGER)
-    for station in document["ground_stations"]:
-        _without(station, setup_s=0.0, downlink_gain=1.0)
-    for target in document["targets"]:
-        _without_unset(target, *_UNSET_OF_TARGETS)
-    _without_unset(document, "forecast")
-    if document["collect_alignment"] == "access":
-        del document["collect_alignment"]
-    _without_unset(document, "replan")
-    if "replan" in document:
-        _plain_replan(document["replan"])
-    _plain_objective(document)
-    for outage in document["outages"]:
-        _without_unset(outage, "id", "satellite_id", "station_id", "reason")
-    for state in document["states"]:
-        _plain_state(state)
-    for part in ("outages", "states"):
-        if not document[part]:
-            del document[part]
-    for part in ("pins", "quality"):
-        if not any(document[part].values()):
-            del document[part]
-    return json.dumps(document, sort_keys=True, separators=(",", ":"), allow_nan=False)
-
-
-def _plain_replan(replan: dict[str, Any]) -> None:
-    """Leave out what younger releases may say of a plan to go on from."""
-    for action in replan["base"]:
-        _without_unset(action, *tuple(action))
-    for promise in replan["promises"]:
-        if promise["deliver_by"] is None:
-            del promise["deliver_by"]
-    for flown in replan["flown"]:
-        _without_unset(flown, "target_id", "station_id", "mbit")
-    for state in replan["before"]:
-        _plain_state(state)
-    for part in ("flown", "before"):
-        if not replan[part]:
-            del replan[part]
-    _without(replan, elements="same")
-
-
-def _plain_state(state: dict[str, Any]) -> None:
-    """Leave out of a state what it does not say."""
-    _without_unset(state, "battery_fraction", "recorder_fraction", "attitude", "on_board")
-    for image in state.get("on_board", ()):
-        _without_unset(image, "mbit", "recorder_fraction", "worth")
-    if "attitude" in state:
-        _without_unset(state["attitude"], *tuple(state["attitude"]))
-
-
-def _plain_objective(document: dict[str, Any]) -> None:
-    """Leave out of the objective what it means without being said."""
-    objective = document["objective"]
-    if not objective["prefer"]:
-        del objective["prefer"]
-        if not _counts_delivery(objective):
-            del document["objective"]
-    elif not _counts_delivery(objective):
-        objective["half_life_s"] = None
-
-
-def _counts_delivery(objective: Mapping[str, Any]) -> bool:
-    """Whether images earn less than all when they are taken; a half-life is of what is left."""
-    return bool(objective["collected_share"] < 1.0)
-
-
-def _without_unset(part: dict[str, Any], *names: str) -> None:
-    """Leave out fields that are null: questions older than the field keep their hash."""
-    for name in names:
-        if part[name] is None:
-            del part[name]
-
-
-_UNSET_OF_TARGETS: Final = (
-    "catalog_id", "name", "release", "due", "sensor_type", "reward_half_life_s",
-)  # fmt: skip
-
-_YOUNGER: Final[Mapping[str, object]] = {
-    "sun_pointing": "free",
-    "panel_angle_deg": 180.0,
-    "idle_power_w": 0.0,
-}
-
-
-def _without(part: dict[str, Any], **plain: object) -> None:
-    """Leave out fields at these values, which questions older than the field had without it."""
-    for name, value in plain.items():
-        if part.get(name) == value:
-            del part[name]
 
 
 def scenario_from_file(file: ScenarioFile) -> Scenario:

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from service.commands import demo_mission
-from service.scenarios.translate import canonical
+from service.scenarios.canonical import canonical
 
 _PYTHON = os.environ.get("SLEWLINE_TEST_FLIGHT_PYTHON")
 pytestmark = pytest.mark.skipif(

@@ -17,7 +17,7 @@ from planner_core.certified.tuning import tuned
 from planner_core.domain import Agility
 from planner_core.precedence.relation import is_transitive
 from planner_core.problem import Problem
-from planner_core.problem.problem import Kept, Pinned
+from planner_core.problem.pinned import Kept, Pinned
 from planner_core.referee.replay import replay
 from planner_core.solvers.rule import Rule
 from tests.planner_core.flat_earth import flat_problem

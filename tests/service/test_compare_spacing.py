@@ -15,7 +15,7 @@ from service.commands.bodies import OK, WRONG_INPUT
 from service.commands.cli import main
 from service.commands.solve import answer_of
 from service.jobs.plan_request import PlanAnswer, PlanRequest
-from service.scenarios.translate import canonical
+from service.scenarios.canonical import canonical
 from tests.missions import drawn_targets, paper_mission
 
 A_QUARTER = {"start": "2019-01-01T00:00:00Z", "end": "2019-01-01T06:00:00Z"}

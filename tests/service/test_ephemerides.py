@@ -8,7 +8,8 @@ import httpx
 
 from planner_core.budget import Budget
 from planner_core.build import compute_opportunities
-from service.scenarios.translate import canonical, scenario_from_content, sha256_of
+from service.scenarios.canonical import canonical, sha256_of
+from service.scenarios.translate import scenario_from_content
 from tests.planner_core.orbits.test_oem import lines, states, xml_of
 from tests.service.conftest import Service
 from tests.service.factories import ground_station, post, satellite, send, target

@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 from planner_core.errors import InvalidScenario
+from service.scenarios.canonical import canonical, sha256_of
 from service.scenarios.frozen_forecasts import find_forecast
-from service.scenarios.translate import canonical, scenario_from_content, sha256_of
+from service.scenarios.translate import scenario_from_content
 from service.stores import forecast_store
 from tests.missions import drawn_targets, paper_mission
 from tests.service.conftest import Service

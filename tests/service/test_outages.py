@@ -11,7 +11,8 @@ from planner_core.budget import Budget
 from planner_core.build import build_problem, compute_opportunities
 from planner_core.errors import InvalidScenario
 from planner_core.problem import CONTACT
-from service.scenarios.translate import canonical, scenario_from_content
+from service.scenarios.canonical import canonical
+from service.scenarios.translate import scenario_from_content
 from service.wire.instants import instant_text
 from tests.missions import drawn_targets, paper_mission
 from tests.service.conftest import Service

@@ -8,7 +8,8 @@ from typing import Any
 import httpx
 import pytest
 
-from service.scenarios.translate import canonical, scenario_from_content, sha256_of
+from service.scenarios.canonical import canonical, sha256_of
+from service.scenarios.translate import scenario_from_content
 from service.wire.pins import OF_ACTIONS
 from service.wire.plans import PlanActionOut
 from service.wire.timelines import ActionOut

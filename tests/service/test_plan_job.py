@@ -17,7 +17,8 @@ from planner_core.certified.proofs.bound import Bound
 from planner_core.solvers.registry import SOLVERS
 from service.jobs.plan_job import run_plan_job
 from service.jobs.plan_request import Parcel, PlanAnswer, PlanRequest
-from service.scenarios.translate import canonical, scenario_from_content, sha256_of
+from service.scenarios.canonical import canonical, sha256_of
+from service.scenarios.translate import scenario_from_content
 from service.wire.timelines import ProofOut
 from tests import independent
 from tests.missions import Document, drawn_targets, paper_mission

@@ -16,8 +16,9 @@ from planner_core.build import compute_opportunities
 from planner_core.errors import InvalidScenario
 from planner_core.problem import Opportunities
 from service.db.rows import OpportunitySetRow, ScenarioRow
+from service.scenarios.canonical import canonical
 from service.scenarios.freezing import freeze_file
-from service.scenarios.translate import canonical, read_file, scenario_from_content
+from service.scenarios.translate import read_file, scenario_from_content
 from service.stores import opportunity_store
 from tests.service.conftest import Service
 from tests.service.factories import EPOCH, ground_station, post, satellite, target, tle

@@ -15,7 +15,7 @@ import pytest
 from service.commands import demo_mission
 from service.commands.bodies import OK, WRONG_INPUT
 from service.commands.cli import main
-from service.scenarios.translate import canonical, sha256_of
+from service.scenarios.canonical import canonical, sha256_of
 
 
 @pytest.fixture(autouse=True)

@@ -10,8 +10,9 @@ import pytest
 
 from planner_core.domain import Resources
 from planner_core.errors import InvalidScenario
+from service.scenarios.canonical import canonical
 from service.scenarios.stored_question import StoredQuestion
-from service.scenarios.translate import canonical, scenario_from_content
+from service.scenarios.translate import scenario_from_content
 from service.wire.satellites import WholeSatellite
 from service.wire.spacecraft_types import BUILT_IN, filled
 from tests.service.factories import post, satellite, send, target, tle

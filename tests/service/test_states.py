@@ -8,7 +8,8 @@ import json
 import pytest
 
 from planner_core.errors import InvalidScenario
-from service.scenarios.translate import canonical, scenario_from_content
+from service.scenarios.canonical import canonical
+from service.scenarios.translate import scenario_from_content
 from tests.missions import drawn_targets, paper_mission
 from tests.service.conftest import Service
 from tests.service.factories import post

@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 
 from planner_core.domain import Objective, Quality, Resources
 from planner_core.errors import InvalidScenario, PlannerError
-from service.scenarios.translate import canonical, read_file, scenario_from_content, sha256_of
+from service.scenarios.canonical import canonical, sha256_of
+from service.scenarios.translate import read_file, scenario_from_content
 from service.wire.base import MOST
 from tests.service import factories
 from tests.service.factories import ground_station, target, tle

@@ -23,7 +23,7 @@ from service.jobs.plan_job import run_plan_job
 from service.jobs.plan_request import PlanRequest
 from service.jobs.solver_params import params_of, parse_params
 from service.main import ROUTERS, create_app
-from service.scenarios.translate import canonical, sha256_of
+from service.scenarios.canonical import canonical, sha256_of
 from service.settings import Settings
 from service.wire import (
     base,

@@ -19,7 +19,7 @@ from service.client import Client
 from service.commands import demo_mission
 from service.commands.bodies import FAILED, OK, WRONG_INPUT
 from service.commands.cli import main
-from service.scenarios.translate import canonical, sha256_of
+from service.scenarios.canonical import canonical, sha256_of
 from tests.service.client.trouble import Answer, proxy_before
 
 ENDLESS = ["--solver", "mcts", "--param", "num_simulations=100000", "--time-s", "600"]

@@ -13,7 +13,7 @@ from planner_core.budget import Budget
 from service.jobs.plan_job import run_plan_job
 from service.jobs.plan_request import PlanRequest
 from service.main import create_app
-from service.scenarios.translate import canonical
+from service.scenarios.canonical import canonical
 from service.settings import Settings
 from tests.missions import drawn_targets, paper_mission
 

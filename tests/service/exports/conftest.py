@@ -16,7 +16,8 @@ from service.answers.answered import Answered
 from service.answers.blocks import Block, targets_text, timeline_text
 from service.db.ids import new_id
 from service.db.rows import JobResultRow, JobRow, ScenarioRow
-from service.scenarios.translate import canonical, scenario_from_content, sha256_of
+from service.scenarios.canonical import canonical, sha256_of
+from service.scenarios.translate import scenario_from_content
 from tests.missions import PAPER_ORBIT, Document, drawn_targets, paper_mission
 from tests.service.conftest import Service
 from tests.service.test_plan_job import run

@@ -18,7 +18,7 @@ from planner_core.orbits.ground_track import visibility_ring
 from service.answers.answered import Answered
 from service.exports import geojson
 from service.exports.antimeridian import area
-from service.scenarios.translate import canonical
+from service.scenarios.canonical import canonical
 from tests.missions import PAPER_ORBIT, Document
 from tests.service.exports.conftest import FINISHED_AT, Mission
 

@@ -15,7 +15,7 @@ from shapely.geometry import shape
 from planner_core.spreadsheets import unguarded
 from service.answers.answered import Answered
 from service.exports import calendar, czml, geojson, table
-from service.scenarios.translate import canonical
+from service.scenarios.canonical import canonical
 from tests.service.exports.conftest import FINISHED_AT, Mission, mission_file
 from tests.service.test_plan_job import run
 

@@ -24,7 +24,8 @@ from service.answers.rebuilt import view_of
 from service.commands.bodies import FAILED, OK, WRONG_INPUT
 from service.commands.cli import main
 from service.exports import table
-from service.scenarios.translate import canonical, scenario_from_content
+from service.scenarios.canonical import canonical
+from service.scenarios.translate import scenario_from_content
 from service.wire.base import read as read_wire
 from service.wire.timelines import TimelineOut
 from tests.missions import Document, drawn_targets, paper_mission

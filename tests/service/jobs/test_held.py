@@ -19,7 +19,7 @@ from planner_core.solvers.registry import Certified
 from service.jobs.held import HeldBlocks, make_folder, remove_folder
 from service.jobs.plan_job import run_plan_job
 from service.jobs.plan_request import Parcel, Parent, PlanAnswer, PlanRequest
-from service.scenarios.translate import canonical, sha256_of
+from service.scenarios.canonical import canonical, sha256_of
 from tests.missions import Document, drawn_targets, paper_mission
 
 

@@ -1,0 +1,111 @@
+"""What a scenario pins, and what is out, in terms of its problem."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from planner_core.problem.columns import CONTACT
+from planner_core.problem.slew import TIME_TOLERANCE_S
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Kept:
+    """A row that every plan must take, and the pin (JSON pointer) that says so."""
+
+    row: int
+    pointer: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Blocked:
+    """A span in which a satellite or a station may not do tasks of some kinds.
+
+    Attributes
+    ----------
+    satellite, station
+        Whose span it is: an index of the scenario's satellites, or of its stations.
+    pointer
+        The pin or the outage that says so.
+    """
+
+    start_s: float
+    end_s: float
+    kinds: frozenset[int]
+    pointer: str
+    satellite: int | None = None
+    station: int | None = None
+
+    @property
+    def is_outage(self) -> bool:
+        """Whether it is a fact that was reported, and not an operator's wish."""
+        return self.pointer.startswith("/outages/")
+
+    def concerns(self, satellite: int, kind: int, place: int) -> bool:
+        """Return whether such a task may not overlap the span."""
+        if kind not in self.kinds:
+            return False
+        if self.station is not None:
+            return kind == CONTACT and place == self.station
+        return satellite == self.satellite
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Struck:
+    """A collect that pins, outages or where its satellite looked at the start rule out.
+
+    Attributes
+    ----------
+    row
+        Of the scenario's table, which the problem no longer has.
+    kept
+        Rows of the problem that it cannot stand beside; none where it is ruled out itself.
+    why
+        A pin, an outage that it lies in, or that its satellite cannot turn to it in time from
+        where it looked at the start.
+    """
+
+    row: int
+    satellite: int
+    start_s: float
+    end_s: float
+    kept: tuple[int, ...] = ()
+    why: Literal["pin", "outage", "heading"] = "pin"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pinned:
+    """What the scenario pins, and what is out, in terms of the problem.
+
+    Attributes
+    ----------
+    blocked
+        Spans that pins block, and outages.
+    skipped
+        Rows that no plan may take, as long as they are in the table, and the pin that says so.
+    forbidden
+        Targets that no plan may collect.
+    struck
+        By target, the collects that were ruled out.
+    frozen_until_s
+        What starts before it is kept or not taken at all; None where the plan follows no other
+        one.
+    """
+
+    kept: tuple[Kept, ...] = ()
+    skipped: Mapping[int, str] = field(default_factory=dict)
+    blocked: tuple[Blocked, ...] = ()
+    forbidden: frozenset[int] = frozenset()
+    struck: Mapping[int, tuple[Struck, ...]] = field(default_factory=dict)
+    frozen_until_s: float | None = None
+
+    @property
+    def follows(self) -> bool:
+        """Whether the plan follows another one."""
+        return self.frozen_until_s is not None
+
+    def is_frozen(self, start_s: float) -> bool:
+        """Return whether a task that starts then may neither be added nor dropped."""
+        until_s = self.frozen_until_s
+        return until_s is not None and start_s < until_s - TIME_TOLERANCE_S
