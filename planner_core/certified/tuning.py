@@ -61,9 +61,8 @@ class Tuning:
     worth_a_step
         Share of a bound that a quick oracle must gain, for an exact one to be asked at all.
     levels_per_collect
-        Parts of a typical collect, in energy or worth, where tables are small.
-    levels_of_estimate
-        Parts of a typical collect, in energy, where multipliers are sought with turns to the sun.
+        Parts of a typical collect, in energy or worth, where tables are small; half as many where
+        energy is an estimate.
     fine, coarse
         Levels of the recorder that the smallest collect fills, where a proof counts and where many
         prices are tried.
@@ -159,7 +158,6 @@ class Tuning:
     worth_a_step: float = 0.005
     units_per_reward: int = 48
     levels_per_collect: int = 24
-    levels_of_estimate: int = 12
     fine: int = 8
     coarse: int = 2
     max_units: int = 2000

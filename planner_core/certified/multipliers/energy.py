@@ -34,7 +34,7 @@ class _Part(NamedTuple):
         # add up to 2 % of a fleet's plan. Multipliers from an estimate prove 0.25 % less
         # (docs/bounds.md), in half the time.
         if network.straight_give.any():
-            levels = energy_levels(network, TUNING.levels_of_estimate, "nearest")
+            levels = energy_levels(network, TUNING.levels_per_collect // 2, "nearest")
         else:
             levels = energy_levels(network, TUNING.levels_per_collect)
         num_targets = len(problem.target_ids)
