@@ -35,7 +35,6 @@ from planner_core.domain import (
     Resources,
     Satellite,
     Scenario,
-    Stability,
     Target,
 )
 from planner_core.pins import PinnedAction
@@ -58,11 +57,6 @@ _URGENT_REWARD: Final = 10.0
 _NEW: Final = 0.05  # of the targets, that come in at once
 _DRAWS: Final = 6  # of urgent requests
 FLEET: Final = (24, 10_000)
-FLEET_LIMIT_S: Final = 1.5
-FLEET_GAP: Final = 0.03
-"""The plan that is in force is within 2.8 % of its bound."""
-FLEET_STABILITY: Final = Stability(weight=0.3)
-"""At 0.03 the search goes on to improve the whole plan: 30 to 48 changes for 3 or 4 images more."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -218,13 +212,14 @@ def urgent_requests(files: fleet_missions.Files, number: int) -> Iterator[Asked]
     published = Certified().solve(problem, CpuBudget(SCRATCH_S, time.time() + 600.0), 0)
     earned = replay(problem, published.plan).reward
     before = PlanBefore(
-        scenario=scenario, opportunities=opportunities, bound=published.proven
+        scenario=scenario, opportunities=opportunities, bound=published.proven,
+        imaged=frozenset(
+            problem.target_ids[int(problem.opportunities.place[action.opportunity])]
+            for action in published.plan.actions
+        ),
     )  # fmt: skip
     freeze = scenario.horizon.start + (FREEZE - START)
-    replan = Replan(
-        base=base_of(scenario, problem, published.plan), freeze_until=freeze,
-        stability=FLEET_STABILITY,
-    )  # fmt: skip
+    replan = Replan(base=base_of(scenario, problem, published.plan), freeze_until=freeze)
     for target in whole.targets[num_targets:]:
         urgent = replace(target, reward=_URGENT_REWARD)
         asked = replace(scenario, targets=(*scenario.targets, urgent), replan=replan)
@@ -232,10 +227,10 @@ def urgent_requests(files: fleet_missions.Files, number: int) -> Iterator[Asked]
         table = opportunities_after(asked, before, Budget())
         clock.append(time.process_time())
         left = build_problem(asked, table, Budget())
-        question = question_of(asked, left)
+        question = question_of(asked, left, before.asked_by(asked))
         clock.append(time.process_time())
-        budget = CpuBudget(FLEET_LIMIT_S, time.time() + 60.0)
-        solution = solve_replan(question, Certified(gap=FLEET_GAP), budget, 0, before.prices)
+        budget = CpuBudget(LIMIT_S, time.time() + 60.0)
+        solution = solve_replan(question, Certified(), budget, 0, before.prices)
         clock.append(time.process_time())
         timeline = replay(left, solution.plan)
         assert timeline.is_valid, timeline.violations

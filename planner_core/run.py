@@ -117,7 +117,8 @@ def plan_scenario(
         found = solver.solve(relieved, search, seed)
         solution = flyable(own, relieved, found)
     else:
-        question = replace(question_of(scenario, problem), problem=own)
+        asked = None if before is None else before.asked_by(scenario)
+        question = replace(question_of(scenario, problem, asked), problem=own)
         prices = None if before is None else before.prices
         solution = replanned(question, relieved, solver, budget, seed, prices)
     if problem.continuous_starts:

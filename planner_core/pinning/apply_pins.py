@@ -8,15 +8,16 @@ What is left fits around all kept actions, and solvers need only take those (see
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import groupby
 
 import numpy as np
+import numpy.typing as npt
 
 from planner_core.errors import InvalidScenario
+from planner_core.pinning.beside import Beside, excluded_by_kept
 from planner_core.pinning.limits import check_limits
-from planner_core.precedence.relation import excluded_by
 from planner_core.problem import (
     ACCESS_FOUND,
     COLLECT,
@@ -28,12 +29,16 @@ from planner_core.problem import (
     Longs,
     Pinned,
     Problem,
-    Struck,
+    StruckCollects,
 )
 from planner_core.problem.first_turns import too_soon
 from planner_core.problem.on_board import imaged_before
 from planner_core.problem.restrict import restricted
 from planner_core.problem.slew import TIME_TOLERANCE_S
+from planner_core.problem.struck import HEADING, OUTAGE, PIN
+from planner_core.problem.transitions import may_follow_each
+
+Reasons = npt.NDArray[np.int8]
 
 
 def apply_pins(problem: Problem, pinned: Pinned) -> Problem:
@@ -46,35 +51,27 @@ def apply_pins(problem: Problem, pinned: Pinned) -> Problem:
         or recorder cannot bear one.
     """
     pinned = replace(pinned, kept=_without_repeats(pinned.kept))
-    _check_conflicts(problem, pinned)
     in_outage, is_too_soon = rows_in_outages(problem, pinned), too_soon(problem)
-    n = len(problem.opportunities)
-    beside = _kept_that_exclude(problem, pinned)
-    is_struck = _ruled_out(problem, pinned)
-    for _, excluded in beside:
-        is_struck[excluded] = True
-    whole = replace(problem, pinned=pinned)
+    is_struck = _ruled_out(problem, pinned, in_outage | is_too_soon)
+    _check_conflicts(problem, pinned, is_struck, is_too_soon)
+    beside = excluded_by_kept(problem, pinned.kept)
+    is_struck[beside.row] = True
     left = np.flatnonzero(~is_struck).astype(np.int32)
-    part = restricted(whole, left)
-    place = np.full(n, -1)
-    place[left] = np.arange(len(left))
-    keepers = [(int(place[kept.row]), excluded) for kept, excluded in beside]
+    part = restricted(replace(problem, pinned=pinned), left)
+    why = np.where(in_outage, OUTAGE, np.where(is_too_soon, HEADING, PIN)).astype(np.int8)
     part = replace(
         part,
         pinned=replace(
-            part.pinned,
-            skipped={},
-            struck=_struck(problem, is_struck, keepers, in_outage, is_too_soon),
+            part.pinned, skipped={}, struck=_struck(problem, pinned, is_struck, beside, why)
         ),
         target_access=_access_left(problem, part),
     )
-    facts, frozen, asked = in_outage | is_too_soon, [], []
-    for kept, excluded in beside:
-        if pinned.is_frozen(float(problem.opportunities.start_s[kept.row])):
-            facts[excluded] = True
-            frozen.append(kept)
-        else:
-            asked.append((kept, excluded))
+    start_s = problem.opportunities.start_s
+    is_frozen = np.array([pinned.is_frozen(start_s[kept.row]) for kept in pinned.kept], np.bool_)
+    facts = in_outage | is_too_soon
+    facts[beside.row[is_frozen[beside.position]]] = True
+    asked = [(pinned.kept[i], beside.of(i)) for i in np.flatnonzero(~is_frozen).tolist()]
+    frozen = [pinned.kept[i] for i in np.flatnonzero(is_frozen).tolist()]
     check_limits(problem, list(_pins_that_rule_out(problem, pinned)), asked, frozen, facts)
     return part
 
@@ -86,47 +83,64 @@ def _without_repeats(kept: Iterable[Kept]) -> tuple[Kept, ...]:
     return tuple(first.values())
 
 
-def _check_conflicts(problem: Problem, pinned: Pinned) -> None:
+def _check_conflicts(
+    problem: Problem, pinned: Pinned, is_ruled_out: Bools, is_too_soon: Bools
+) -> None:
     """Raise where a kept action is ruled out, or excludes another one."""
     table = problem.opportunities
-    ruled_out, is_too_soon = _ruled_out(problem, pinned), too_soon(problem)
     ordered = sorted(pinned.kept, key=lambda kept: kept.row)
+    rows = np.array([kept.row for kept in ordered], dtype=np.int64)
+    cannot_follow = _cannot_follow(problem, rows)
     promised: dict[int, Kept] = {}
     last: dict[int, Kept] = {}
-    for kept in ordered:
+    for position, kept in enumerate(ordered):
         if is_too_soon[kept.row]:
             raise _conflict(
                 kept, "the satellite cannot turn to it in time from where it looked at the start"
             )
-        if ruled_out[kept.row]:
+        if is_ruled_out[kept.row]:
             raise _conflict(kept, "another pin or an outage rules it out")
         satellite = int(table.satellite[kept.row])
-        before = last.get(satellite)
-        local = problem.local_row
-        transitions = problem.satellites[satellite].transitions
-        if before is not None and not transitions.allows(local[before.row], local[kept.row]):
+        if cannot_follow[position]:
             raise _conflict(
                 kept,
-                f"the satellite cannot turn to it in time from the action that {before.pointer} "
-                "keeps",
+                "the satellite cannot turn to it in time from the action that "
+                f"{last[satellite].pointer} keeps",
             )
         last[satellite] = kept
         if table.kind[kept.row] == COLLECT:
             other = promised.setdefault(int(table.place[kept.row]), kept)
             if other is not kept:
                 raise _conflict(kept, f"{other.pointer} keeps another image of the same target")
-    contacts = [kept for kept in ordered if table.kind[kept.row] == CONTACT]
-    for kept in contacts:
-        earlier = [
-            other
-            for other in contacts
-            if other is not kept
-            and table.place[other.row] == table.place[kept.row]
-            and table.start_s[other.row] <= table.start_s[kept.row]
-            and table.end_s[other.row] > table.start_s[kept.row] + TIME_TOLERANCE_S
-        ]
-        if len(earlier) >= problem.station_antennas[table.place[kept.row]]:
-            raise _conflict(kept, f"the station then serves what {earlier[0].pointer} keeps")
+    _check_antennas(problem, [kept for kept in ordered if table.kind[kept.row] == CONTACT])
+
+
+def _cannot_follow(problem: Problem, rows: Longs) -> Bools:
+    """Return which of these ascending rows cannot follow the one before of their satellite."""
+    found = np.zeros(len(rows), dtype=np.bool_)
+    for index, satellite in enumerate(problem.satellites):
+        own = np.flatnonzero(problem.opportunities.satellite[rows] == index)
+        local = problem.local_row[rows[own]].astype(np.int64)
+        found[own[1:]] = ~may_follow_each(satellite.transitions, local[:-1], local[1:])
+    return found
+
+
+def _check_antennas(problem: Problem, contacts: Sequence[Kept]) -> None:
+    """Raise where a station is to serve more satellites than it has antennas for."""
+    table = problem.opportunities
+    rows = np.array([kept.row for kept in contacts], dtype=np.int64)
+    place, start_s, end_s = table.place[rows], table.start_s[rows], table.end_s[rows]
+    for position, kept in enumerate(contacts):
+        is_earlier = (
+            (place == place[position])
+            & (start_s <= start_s[position])
+            & (end_s > start_s[position] + TIME_TOLERANCE_S)
+        )
+        is_earlier[position] = False
+        earlier = np.flatnonzero(is_earlier)
+        if len(earlier) >= problem.station_antennas[place[position]]:
+            why = f"the station then serves what {contacts[int(earlier[0])].pointer} keeps"
+            raise _conflict(kept, why)
 
 
 def _conflict(kept: Kept, why: str) -> InvalidScenario:
@@ -134,10 +148,16 @@ def _conflict(kept: Kept, why: str) -> InvalidScenario:
     return InvalidScenario("pins_conflict", detail, pointer=kept.pointer)
 
 
-def _ruled_out(problem: Problem, pinned: Pinned) -> Bools:
-    """Return the opportunities that are forbidden, skipped, blocked, out, too soon or no use."""
+def _ruled_out(problem: Problem, pinned: Pinned, facts: Bools) -> Bools:
+    """Return the opportunities that are forbidden, skipped, blocked, out, too soon or no use.
+
+    Parameters
+    ----------
+    facts
+        Those that are out or too soon. Shape ``(n,)``.
+    """
     table = problem.opportunities
-    is_out: Bools = rows_in_outages(problem, pinned) | too_soon(problem)
+    is_out = facts.copy()
     if pinned.frozen_until_s is not None:
         is_frozen = table.start_s < pinned.frozen_until_s - TIME_TOLERANCE_S
         is_frozen[[kept.row for kept in pinned.kept]] = False
@@ -185,74 +205,34 @@ def rows_in_outages(problem: Problem, pinned: Pinned) -> Bools:
     return is_out
 
 
-def _kept_that_exclude(problem: Problem, pinned: Pinned) -> list[tuple[Kept, Longs]]:
-    """Return for each kept action the opportunities that cannot stand beside it, ascending."""
-    table = problem.opportunities
-    contacts = np.array(
-        [kept.row for kept in pinned.kept if table.kind[kept.row] == CONTACT], dtype=np.int64
-    )
-    is_kept = np.zeros(len(table), dtype=np.bool_)
-    is_kept[[kept.row for kept in pinned.kept]] = True
-    found = []
-    for kept in pinned.kept:
-        satellite = problem.satellites[int(table.satellite[kept.row])]
-        beside = satellite.rows[excluded_by(satellite, int(problem.local_row[kept.row]))]
-        if table.kind[kept.row] == COLLECT:
-            others = problem.collects_of(int(table.place[kept.row])).astype(np.int64)
-        else:
-            others = np.flatnonzero(_without_antenna(problem, kept.row, contacts))
-        rows = np.union1d(beside.astype(np.int64), others)
-        found.append((kept, rows[~is_kept[rows]]))
-    return found
-
-
-def _without_antenna(problem: Problem, row: int, kept: Longs) -> Bools:
-    """Return the contacts that find no antenna where ``row`` and other ``kept`` ones run."""
-    table = problem.opportunities
-    station = table.place[row]
-    there = kept[table.place[kept] == station]
-    others = np.flatnonzero((table.kind == CONTACT) & (table.place == station))
-    excluded = np.zeros(len(table), dtype=np.bool_)
-    for other in others:
-        from_s = max(table.start_s[other], table.start_s[row])
-        to_s = min(table.end_s[other], table.end_s[row])
-        if to_s <= from_s + TIME_TOLERANCE_S:
-            continue
-        is_running = (table.start_s[there] <= from_s) & (
-            table.end_s[there] > from_s + TIME_TOLERANCE_S
-        )
-        excluded[other] = is_running.sum() >= problem.station_antennas[station]
-    return excluded
-
-
 def _struck(
-    problem: Problem,
-    is_struck: Bools,
-    keepers: list[tuple[int, Longs]],
-    in_outage: Bools,
-    is_too_soon: Bools,
-) -> dict[int, tuple[Struck, ...]]:
-    """Return the collects that are ruled out, by target."""
+    problem: Problem, pinned: Pinned, is_struck: Bools, beside: Beside, why: Reasons
+) -> StruckCollects:
+    """Return the collects that are ruled out."""
     table = problem.opportunities
-    beside: dict[int, list[int]] = {}
-    for kept, excluded in keepers:
-        for row in excluded.tolist():
-            beside.setdefault(row, []).append(kept)
-    found: dict[int, list[Struck]] = {}
-    for row in np.flatnonzero(is_struck & (table.kind == COLLECT)).tolist():
-        struck = Struck(
-            row=problem.scenario_row(row),
-            satellite=int(table.satellite[row]),
-            start_s=float(table.start_s[row]),
-            end_s=float(table.end_s[row]),
-            kept=tuple(beside.get(row, ())),
-            why="outage" if in_outage[row] else "heading" if is_too_soon[row] else "pin",
-        )
-        found.setdefault(int(table.place[row]), []).append(struck)
-    return {target: tuple(struck) for target, struck in found.items()}
+    rows = np.flatnonzero(is_struck & (table.kind == COLLECT))
+    rows = rows[np.argsort(table.place[rows], kind="stable")]
+    # What is struck for a kept action stands in one row or more of ``beside``, here by that row.
+    order = np.argsort(beside.row, kind="stable")
+    first = beside.row[order].searchsorted(rows)
+    count = beside.row[order].searchsorted(rows, side="right") - first
+    first_kept = np.concatenate([[0], np.cumsum(count)])
+    at = np.arange(first_kept[-1]) - np.repeat(first_kept[:-1] - first, count)
+    kept = np.array([one.row for one in pinned.kept], dtype=np.int64)
+    place = np.cumsum(~is_struck) - 1
+    return StruckCollects(
+        target=table.place[rows],
+        row=(rows if problem.origin is None else problem.origin[rows]).astype(np.int32),
+        satellite=table.satellite[rows],
+        start_s=table.start_s[rows],
+        end_s=table.end_s[rows],
+        why=why[rows],
+        kept=place[kept[beside.position[order[at]]]].astype(np.int32),
+        first_kept=first_kept,
+    )
 
 
-def _access_left(problem: Problem, part: Problem) -> np.ndarray:
+def _access_left(problem: Problem, part: Problem) -> Reasons:
     """Return why targets have no collect, pins included."""
     is_lost = (problem.target_access == ACCESS_FOUND) & (np.diff(part.target_opportunities[1]) == 0)
     return np.where(is_lost, RULED_OUT, problem.target_access).astype(np.int8)

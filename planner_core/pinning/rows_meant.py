@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import re
+from bisect import bisect_left
 from datetime import datetime
 from typing import NamedTuple
 
@@ -37,7 +39,7 @@ def rows_of_base(scenario: Scenario, table: Opportunities, replan: Replan) -> di
     keys = (table.satellite.astype(np.int64) * 2 + table.kind) * num_places + table.place
     order = np.argsort(keys, kind="stable")
     keys = keys[order]
-    found: dict[int, int] = {}
+    wanted, offsets_s = {}, {}
     for i, action in enumerate(replan.base):
         assert action.satellite_id is not None
         assert action.start is not None
@@ -48,12 +50,24 @@ def rows_of_base(scenario: Scenario, table: Opportunities, replan: Replan) -> di
             if action.target_id is not None
             else (CONTACT, stations[action.station_id or ""])
         )
-        start_s = scenario.horizon.offset_s(action.start)
-        key = (satellites[action.satellite_id] * 2 + kind) * num_places + place
-        rows = order[keys.searchsorted(key) : keys.searchsorted(key, "right")].tolist()
-        nearest = min(rows, key=lambda row: abs(table.start_s[row] - start_s), default=None)
-        if nearest is not None and abs(table.start_s[nearest] - start_s) <= replan.near_s:
-            found[i] = nearest
+        wanted[i] = (satellites[action.satellite_id] * 2 + kind) * num_places + place
+        offsets_s[i] = scenario.horizon.offset_s(action.start)
+    asked = np.array(list(wanted.values()), dtype=np.int64)
+    spans = zip(
+        wanted, keys.searchsorted(asked).tolist(), keys.searchsorted(asked, "right").tolist(),
+        strict=True,
+    )  # fmt: skip
+    # The opportunities of one satellite and place stand in order of start.
+    start_s = table.start_s[order].tolist()
+    found: dict[int, int] = {}
+    for i, low, high in spans:
+        after = bisect_left(start_s, offsets_s[i], low, high)
+        away_s = [
+            (abs(start_s[at] - offsets_s[i]), at) for at in (after - 1, after) if low <= at < high
+        ]
+        nearest_s, at = min(away_s, default=(math.inf, -1))
+        if nearest_s <= replan.near_s:
+            found[i] = int(order[at])
     return found
 
 

@@ -29,7 +29,7 @@ from planner_core.problem import (
     may_follow,
 )
 from planner_core.problem.slew import TIME_TOLERANCE_S, angle_between_deg, slew_s
-from planner_core.problem.transitions import near_spans
+from planner_core.problem.transitions import may_follow_each, near_spans
 
 
 class Precedence(NamedTuple):
@@ -55,6 +55,8 @@ class Precedence(NamedTuple):
 
 
 _tables: WeakKeyDictionary[SatelliteProblem, Precedence] = WeakKeyDictionary()
+_closures: WeakKeyDictionary[SatelliteProblem, Precedence] = WeakKeyDictionary()
+_is_transitive: WeakKeyDictionary[SatelliteProblem, bool] = WeakKeyDictionary()
 
 
 def direct_precedence(satellite: SatelliteProblem) -> Precedence:
@@ -73,14 +75,24 @@ def direct_precedence(satellite: SatelliteProblem) -> Precedence:
 
 def transitive_closure(satellite: SatelliteProblem) -> Precedence:
     """Return "b may follow a, directly or with tasks in between"; the same table if transitive."""
-    direct = direct_precedence(satellite)
-    if is_transitive_on(satellite):
-        return direct
-    return direct._replace(bits=_closure_bits(direct))
+    closure = _closures.get(satellite)
+    if closure is None:
+        closure = direct_precedence(satellite)
+        if not is_transitive_on(satellite):
+            closure = closure._replace(bits=_closure_bits(closure))
+        _closures[satellite] = closure
+    return closure
 
 
 def is_transitive_on(satellite: SatelliteProblem) -> bool:
     """Return whether the satellite gains by way of tasks nothing that it cannot reach directly."""
+    found = _is_transitive.get(satellite)
+    if found is None:
+        found = _is_transitive[satellite] = _gains_no_way(satellite)
+    return found
+
+
+def _gains_no_way(satellite: SatelliteProblem) -> bool:
     turning = turns_slower_than_it_tracks(satellite.transitions)
     if satellite.transitions.is_moving:
         # The time of a turn in motion is an upper value: any task might make up for that.
@@ -152,27 +164,46 @@ def are_comparable(precedence: Precedence, a: int, b: int) -> bool:
 
 def excluded_by(satellite: SatelliteProblem, row: int) -> Bools:
     """Return the tasks that cannot stand in one plan with a satellite's local ``row``."""
+    _, others = excluded_beside(satellite, np.array([row], dtype=np.int32))
+    excluded = np.zeros(len(satellite), dtype=np.bool_)
+    excluded[others] = True
+    return excluded
+
+
+def excluded_beside(satellite: SatelliteProblem, rows: Ints) -> tuple[Longs, Longs]:
+    """Return which tasks cannot stand in one plan with which of some local rows.
+
+    As pairs in order: the position of one in ``rows``, and the local row of the other.
+    """
+    begin, end = near_in_time(satellite, rows)
+    count = end - begin
+    position = np.repeat(np.arange(len(rows)), count)
+    first_of = np.cumsum(count) - count
+    other = np.arange(len(position)) - np.repeat(first_of - begin, count)
+    one = rows[position].astype(np.int64)
+    earlier, later = np.minimum(one, other), np.maximum(one, other)
     if is_transitive_on(satellite):
-        return _not_beside(satellite.transitions, row)
-    return _not_related(transitive_closure(satellite), row)
+        fits = may_follow_each(satellite.transitions, earlier, later)
+    else:
+        fits = _come_before(transitive_closure(satellite), earlier, later)
+    is_excluded = ~fits & (one != other)
+    return position[is_excluded], other[is_excluded]
+
+
+def near_in_time(satellite: SatelliteProblem, rows: Ints | Longs) -> tuple[Longs, Longs]:
+    """Return for each of some local rows the span of those that it may exclude: first, last + 1."""
+    _, far_from = near_spans(satellite.transitions)
+    # What begins before all turns to it must be over, and after all turns from it are, is free.
+    begin = np.maximum.accumulate(far_from).searchsorted(rows, side="right")
+    return begin, np.maximum(far_from[rows], rows + 1).astype(np.int64)
 
 
 @kernel
-def _not_beside(transitions: Transitions, row: int) -> Bools:
-    excluded = np.zeros(len(transitions.start_s), dtype=np.bool_)
-    for other in range(len(excluded)):
-        # Of two different rows only the later one may follow.
-        first, second = min(row, other), max(row, other)
-        excluded[other] = other != row and not may_follow(transitions, first, second)
-    return excluded
-
-
-@kernel
-def _not_related(precedence: Precedence, row: int) -> Bools:
-    excluded = np.zeros(len(precedence.near_from), dtype=np.bool_)
-    for other in range(len(excluded)):
-        excluded[other] = other != row and not are_comparable(precedence, row, other)
-    return excluded
+def _come_before(precedence: Precedence, first: Longs, second: Longs) -> Bools:
+    found = np.zeros(len(first), dtype=np.bool_)
+    for i in range(len(first)):
+        found[i] = first[i] != second[i] and comes_before(precedence, first[i], second[i])
+    return found
 
 
 @kernel

@@ -19,7 +19,7 @@ from planner_core.problem.columns import (
     Singles,
 )
 from planner_core.problem.downlink import Downlinks, PassRate, StationLinks
-from planner_core.problem.pinned import Blocked, Kept, Pinned, Struck
+from planner_core.problem.pinned import Blocked, Kept, Pinned
 from planner_core.problem.problem import (
     Heading,
     ImageOnBoard,
@@ -30,6 +30,7 @@ from planner_core.problem.problem import (
     line_of_sight,
 )
 from planner_core.problem.satellite import build_satellite_problem
+from planner_core.problem.struck import Struck, StruckCollects
 from planner_core.problem.transitions import Transitions, may_follow
 
 __all__ = [
@@ -61,6 +62,7 @@ __all__ = [
     "Singles",
     "StationLinks",
     "Struck",
+    "StruckCollects",
     "Sunlight",
     "Transitions",
     "build_satellite_problem",

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
 
 from planner_core.problem.columns import CONTACT
 from planner_core.problem.slew import TIME_TOLERANCE_S
+from planner_core.problem.struck import StruckCollects, nothing_struck
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,29 +52,6 @@ class Blocked:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Struck:
-    """A collect that pins, outages or where its satellite looked at the start rule out.
-
-    Attributes
-    ----------
-    row
-        Of the scenario's table, which the problem no longer has.
-    kept
-        Rows of the problem that it cannot stand beside; none where it is ruled out itself.
-    why
-        A pin, an outage that it lies in, or that its satellite cannot turn to it in time from
-        where it looked at the start.
-    """
-
-    row: int
-    satellite: int
-    start_s: float
-    end_s: float
-    kept: tuple[int, ...] = ()
-    why: Literal["pin", "outage", "heading"] = "pin"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Pinned:
     """What the scenario pins, and what is out, in terms of the problem.
 
@@ -87,7 +64,7 @@ class Pinned:
     forbidden
         Targets that no plan may collect.
     struck
-        By target, the collects that were ruled out.
+        The collects that were ruled out.
     frozen_until_s
         What starts before it is kept or not taken at all; None where the plan follows no other
         one.
@@ -97,7 +74,7 @@ class Pinned:
     skipped: Mapping[int, str] = field(default_factory=dict)
     blocked: tuple[Blocked, ...] = ()
     forbidden: frozenset[int] = frozenset()
-    struck: Mapping[int, tuple[Struck, ...]] = field(default_factory=dict)
+    struck: StruckCollects = field(default_factory=nothing_struck)
     frozen_until_s: float | None = None
 
     @property

@@ -57,16 +57,14 @@ def retimed(problem: Problem, rows: Ints, start_s: Floats) -> Retimed:
         problem, rows, start_s, end_s, is_own
     )
     part = Opportunities(**columns)
-    place = {int(row): at for at, row in enumerate(rows) if not is_own[at]}
+    place = np.full(len(table), -1, dtype=np.int64)
+    place[rows[~is_own]] = np.flatnonzero(~is_own)
     pinned = replace(
         problem.pinned,
-        kept=tuple(replace(k, row=place[k.row]) for k in problem.pinned.kept if k.row in place),
-        struck={
-            target: tuple(
-                replace(s, kept=tuple(place[row] for row in s.kept if row in place)) for s in struck
-            )
-            for target, struck in problem.pinned.struck.items()
-        },
+        kept=tuple(
+            replace(k, row=int(place[k.row])) for k in problem.pinned.kept if place[k.row] >= 0
+        ),
+        struck=problem.pinned.struck.placed(place),
     )
     made = with_table(
         problem, part, pinned=pinned, origin=rows, events=[None] * len(problem.satellites)

@@ -26,8 +26,10 @@ from planner_core.problem.slew import (
     slew_s,
 )
 
+Bools = npt.NDArray[np.bool_]
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int32]
+Longs = npt.NDArray[np.int64]
 Vector = tuple[float, float, float]
 
 CLEARLY: Final = 1e-7
@@ -177,6 +179,15 @@ def may_follow(transitions: Transitions, a: int, b: int) -> bool:
         slews.rate_deg_s,
         acceleration,
     )
+
+
+@kernel
+def may_follow_each(transitions: Transitions, a: Longs, b: Longs) -> Bools:
+    """Return of pairs of local rows whether the second may follow the first. Shape ``(k,)``."""
+    found = np.zeros(len(a), dtype=np.bool_)
+    for i in range(len(a)):
+        found[i] = may_follow(transitions, a[i], b[i])
+    return found
 
 
 def near_spans(transitions: Transitions) -> tuple[Ints, Ints]:

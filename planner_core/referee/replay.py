@@ -116,11 +116,13 @@ def _collected(
     Of equal ones the first is the best.
     """
     table = problem.opportunities
+    rows = np.array([action.opportunity for action in plan.actions], dtype=np.int64)
+    is_collect, place = (table.kind[rows] == COLLECT).tolist(), table.place[rows].tolist()
+    earned, image_down_s = worth.tolist(), down_s.tolist()
     images: dict[int, list[int]] = {}
-    for position in sorted(range(len(plan.actions)), key=lambda p: plan.actions[p]):
-        i = plan.actions[position].opportunity
-        if table.kind[i] == COLLECT and position not in blamed:
-            images.setdefault(int(table.place[i]), []).append(position)
+    for position in sorted(range(len(plan.actions)), key=plan.actions.__getitem__):
+        if is_collect[position] and position not in blamed:
+            images.setdefault(place[position], []).append(position)
     collected: dict[int, Collected] = {}
     duplicates = []
     on_board = {image.target for image in problem.on_board}
@@ -128,25 +130,25 @@ def _collected(
         if target in on_board:
             duplicates += [_has_been_imaged(problem, plan, position) for position in positions]
             continue
-        best = int(np.argmax(worth[positions]))
-        satellites = [int(table.satellite[plan.actions[p].opportunity]) for p in positions]
-        image_down_s = float(down_s[positions[best]])
-        is_down = not math.isnan(image_down_s)
+        best = max(positions, key=earned.__getitem__)
+        is_down = not math.isnan(image_down_s[best])
         collected[target] = Collected(
-            position=positions[best],
-            satellite=satellites[best],
-            worth=float(worth[positions[best]]),
-            delivered_s=image_down_s if is_down else None,
-            age_s=image_down_s - plan.actions[positions[best]].end_s if is_down else None,
+            position=best,
+            satellite=int(table.satellite[rows[best]]),
+            worth=earned[best],
+            delivered_s=image_down_s[best] if is_down else None,
+            age_s=image_down_s[best] - plan.actions[best].end_s if is_down else None,
         )
-        for order, position in enumerate(positions):
-            if order == best:
+        is_earlier = True
+        for position in positions:
+            if position == best:
+                is_earlier = False
                 continue
-            why = "is collected already" if order > best else "has a better image later"
+            why = "has a better image later" if is_earlier else "is collected already"
             duplicates.append(
-                Violation(code="duplicate", satellite=satellites[order], needed=1.0, available=2.0,
-                          at_s=plan.actions[position].start_s, blamed=(),
-                          detail=f"Target {problem.target_ids[target]} {why}.")
+                Violation(code="duplicate", satellite=int(table.satellite[rows[position]]),
+                          needed=1.0, available=2.0, at_s=plan.actions[position].start_s,
+                          blamed=(), detail=f"Target {problem.target_ids[target]} {why}.")
             )  # fmt: skip
     return collected, duplicates
 
@@ -206,11 +208,13 @@ def _satellite_timeline(
 ) -> SatelliteTimeline:
     table = problem.opportunities
     actions: list[JudgedAction] = []
+    own = [plan.actions[position].opportunity for position in positions]
+    are_contacts = (table.kind[own] == CONTACT).tolist()
+    worth, delivered_s = images.worth[positions].tolist(), images.delivered_s[positions].tolist()
     for order, position in enumerate(positions):
         action = plan.actions[position]
         level = profile.after[order] if profile else None
-        is_contact = table.kind[action.opportunity] == CONTACT
-        down_s = float(images.delivered_s[position])
+        is_contact, down_s = are_contacts[order], delivered_s[order]
         actions.append(
             JudgedAction(
                 mode="contact" if is_contact else "collect",
@@ -220,7 +224,7 @@ def _satellite_timeline(
                 position=position,
                 slew=slews[position],
                 reward=images.earned.get(position, 0.0),
-                worth=None if is_contact else float(images.worth[position]),
+                worth=None if is_contact else worth[order],
                 delivered_s=None if math.isnan(down_s) else down_s,
                 battery_end=level.battery if level else None,
                 recorder_end=level.recorder if level else None,

@@ -28,6 +28,29 @@ from planner_core.referee.timeline import Timeline
 _KEPT_VERDICTS: Final = 16  # plans of a fleet take megabytes each
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lost:
+    """An action of the base that is no longer offered: a collect of a target, or a contact."""
+
+    satellite: int
+    start_s: float
+    target: int | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class News:
+    """What tells a replan's problem from that of the plan before.
+
+    Attributes
+    ----------
+    targets
+        Those that are new, that earn otherwise, or that have lost an image.
+    """
+
+    targets: frozenset[int]
+    lost: tuple[Lost, ...] = ()
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Question:
     """What a search for a replan is given.
@@ -44,6 +67,11 @@ class Question:
         By target, when an image of it must be on the ground.
     on_board
         Images from before the horizon, which the problem itself leaves out.
+    news
+        What has happened, where that is all that tells the problem from the one before; None
+        where that is not known.
+    typical_worth
+        Of an image, by which kept actions count; the problem's own where it is None.
     """
 
     problem: Problem
@@ -53,6 +81,13 @@ class Question:
     stability: Stability
     deadline_s: Mapping[int, float] = field(default_factory=dict)
     on_board: tuple[ImageOnBoard, ...] = ()
+    news: News | None = None
+    typical_worth: float | None = None
+
+    @property
+    def typical(self) -> float:
+        """What a typical image earns."""
+        return self.problem.typical_worth if self.typical_worth is None else self.typical_worth
 
     @cached_property
     def bonus(self) -> Floats:
@@ -60,7 +95,7 @@ class Question:
         kind = self.problem.opportunities.kind[self.base]
         shares = np.where(kind == COLLECT, self.stability.weight, self.stability.contact_weight)
         bonus = np.zeros(len(self.problem.opportunities))
-        bonus[self.base] = shares * self.problem.typical_worth
+        bonus[self.base] = shares * self.typical
         return bonus
 
     @cached_property

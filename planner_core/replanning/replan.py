@@ -7,6 +7,7 @@ for is proven afterwards, on the problem as it is: the bound is of the reward al
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 from typing import Final
 
@@ -19,15 +20,16 @@ from planner_core.certified.lns.search import WindowSearch
 from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.proofs.lagrangian import lagrangian_bound
 from planner_core.certified.proofs.resource_bound import quick_bound
-from planner_core.domain import Scenario
+from planner_core.domain import Replan, Scenario
 from planner_core.errors import InvalidScenario
 from planner_core.pinning.rows_meant import rows_of_base
 from planner_core.problem import COLLECT, CONTACT, Problem
 from planner_core.problem.on_board import without_on_board
 from planner_core.problem.plan import Plan
 from planner_core.replanning.known import KnownPrices, bound_at
+from planner_core.replanning.nearby import nearby
 from planner_core.replanning.programs import fewest_changes, mixed
-from planner_core.replanning.question import Question
+from planner_core.replanning.question import Lost, News, Question
 from planner_core.replanning.repair import LIMITS, conflicts, repaired
 from planner_core.replanning.undo import parts_of, undone, value, within_share
 from planner_core.solvers.base import Solution, Solver
@@ -37,20 +39,38 @@ _LEAST_MOVES: Final = 600
 _SHARE: Final = 0.4  # of the time, for the search that counts changes
 _REST: Final = 0.8  # of what is left then, for the proof
 _EQUAL: Final = 1e-9
+_TRIES: Final = 8
+"""Of moves near what is new, each from the same start: of 16 urgent requests of reward 10 at
+24 x 10,000 the first try gained 8.2 on average, the best of four 8.6, the best of eight 8.9."""
 
 
-def question_of(scenario: Scenario, problem: Problem) -> Question:
-    """Return the replan of a scenario in terms of its problem."""
+def question_of(
+    scenario: Scenario, problem: Problem, asked: Collection[str] | None = None
+) -> Question:
+    """Return the replan of a scenario in terms of its problem.
+
+    Parameters
+    ----------
+    asked
+        Targets that are new, or worth otherwise, or open again, where nothing else than that and
+        what is out or pinned tells the scenario from that of the plan before; None where it does.
+    """
     replan = scenario.replan
     assert replan is not None
     freeze_s = scenario.horizon.offset_s(replan.freeze_until)
-    rows = set(rows_of_base(scenario, problem.opportunities, replan).values())
+    rows = rows_of_base(scenario, problem.opportunities, replan)
     later = [
         action
         for action in replan.base
         if action.start is not None and scenario.horizon.offset_s(action.start) >= freeze_s
     ]
     targets = {target.id: i for i, target in enumerate(scenario.targets)}
+    news = None
+    if asked is not None:
+        news = News(
+            targets=frozenset(targets[name] for name in asked),
+            lost=tuple(_lost_of(scenario, replan, targets, rows)),
+        )
     return Question(
         problem=without_on_board(problem),
         deadline_s={
@@ -59,11 +79,27 @@ def question_of(scenario: Scenario, problem: Problem) -> Question:
             if promise.deliver_by is not None
         },
         on_board=problem.on_board,
-        base=np.array(sorted(rows), dtype=np.int32),
+        base=np.array(sorted(set(rows.values())), dtype=np.int32),
         num_base=len(later),
         promised=tuple(targets[promise.target_id] for promise in replan.promises),
         stability=replan.stability,
+        news=news,
     )
+
+
+def _lost_of(
+    scenario: Scenario, replan: Replan, targets: Mapping[str, int], rows: Mapping[int, int]
+) -> Iterator[Lost]:
+    """Yield the actions of the base after the freeze that are no longer offered."""
+    satellites = {satellite.id: i for i, satellite in enumerate(scenario.satellites)}
+    for i, action in enumerate(replan.base):
+        if i in rows or action.start is None or action.start < replan.freeze_until:
+            continue
+        yield Lost(
+            satellite=satellites[action.satellite_id or ""],
+            start_s=scenario.horizon.offset_s(action.start),
+            target=None if action.target_id is None else targets[action.target_id],
+        )
 
 
 def solve_replan(
@@ -87,11 +123,12 @@ def solve_replan(
     """
     problem = question.problem
     first = budget.part(_SHARE)
-    plan = improved(question, first_plan(question, first), first, seed)
+    plan = _followed(question, first_plan(question, first), first, seed)
     best = Incumbent(problem, budget, getattr(solver, "gap", 0.0), plan)
     best.lower(_first_bound(problem, known, best.reward))
     best.report("kept")
-    if not best.is_done or not best.is_valid:
+    is_done = best.is_done or _is_no_more_open(question, known, best)
+    if not is_done or not best.is_valid:
         # Where plan and bound are apart another search may earn more, and proves how much.
         found = solver.solve(problem, budget.part(_REST, ignored), seed)
         if found.proven is not None:
@@ -100,6 +137,19 @@ def solve_replan(
     plan = within_share(question, plan, budget)
     require_promises(question, plan)
     return _solution(question, plan, best, budget)
+
+
+def _is_no_more_open(question: Question, known: KnownPrices | None, best: Incumbent) -> bool:
+    """Return whether plan and bound are no further apart than in the plan before.
+
+    Then what is left open is nothing that has happened, and no reason to plan all anew. Asked where
+    news is new targets alone: of what is lost nobody knows what it would earn.
+    """
+    news, problem = question.news, question.problem
+    if news is None or news.lost or known is None or problem.use_resources:
+        return False
+    before = question.judged(Plan.of(problem, question.base.tolist()).with_kept(problem)).reward
+    return best.bound.value - best.reward <= known.bound.value - before + _EQUAL
 
 
 def first_plan(question: Question, budget: Budget) -> Plan:
@@ -112,6 +162,8 @@ def first_plan(question: Question, budget: Budget) -> Plan:
         for v in question.judged(base).violations
         if v.code in LIMITS and not v.inherited
     }
+    if not question.judged(base).violations:
+        return with_promised(question, base)
     if broken:
         fewest = fewest_changes(question, sorted(broken), budget)
         if fewest is not None and question.may_fly(fewest.plan):
@@ -119,10 +171,34 @@ def first_plan(question: Question, budget: Budget) -> Plan:
     return with_promised(question, repaired(problem, question.base.tolist(), protected))
 
 
-def improved(question: Question, start: Plan, budget: Budget, seed: int) -> Plan:
-    """Return a plan whose worth, kept actions counted, is no less than that of ``start``."""
+def _followed(question: Question, start: Plan, budget: Budget, seed: int) -> Plan:
+    """Return a plan that is worth no less, changes counted: where news can touch it, if known."""
+    part = nearby(question, start)
+    if part is None:
+        return improved(question, start, budget, seed)
+    own = best = part.of(start)
+    for i in range(_TRIES):
+        if i > 0 and budget.is_spent():
+            break
+        best = _best(
+            part.question, best, improved(part.question, own, budget, seed + i, part.asked)
+        )
+    return _best(question, start, part.put_into(start, best))
+
+
+def improved(
+    question: Question, start: Plan, budget: Budget, seed: int, num_tasks: int | None = None
+) -> Plan:
+    """Return a plan whose worth, kept actions counted, is no less than that of ``start``.
+
+    Parameters
+    ----------
+    num_tasks
+        Opportunities that moves are made for; all by default.
+    """
     problem, searched = question.problem, question.searched
-    num_moves = int(max(_LEAST_MOVES, _MOVES_A_TASK * len(problem.opportunities)))
+    num_tasks = len(problem.opportunities) if num_tasks is None else num_tasks
+    num_moves = int(max(_LEAST_MOVES, _MOVES_A_TASK * num_tasks))
     windows: ResourceWindows | WindowSearch
     if problem.use_resources or problem.turns_in_motion:
         windows = ResourceWindows(searched, seed)

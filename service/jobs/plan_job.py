@@ -85,6 +85,7 @@ def _before(request: PlanRequest, held: HeldBlocks | None) -> PlanBefore | None:
         scenario=scenario_from_content(json.loads(parent.content)),
         opportunities=ScenarioOpportunities.from_bytes(block),
         bound=None if parent.bound is None else proofs.from_json(parent.bound),
+        imaged=parent.imaged,
     )
 
 

@@ -32,11 +32,14 @@ class Parent:
     ----------
     content, bound, opportunity_block
         As those of a request.
+    imaged
+        The targets that it images.
     """
 
     scenario_sha256: str
     content: str
     bound: str | None
+    imaged: frozenset[str]
     opportunity_block: Parcel = field(default_factory=lambda: Parcel(None))
 
 

@@ -22,7 +22,7 @@ from planner_core.budget import Progress
 from service.answers.blocks import proof_blocks
 from service.db.clock import utc_now
 from service.db.failures import why_unavailable
-from service.db.rows import JobRow, PlanRow, ScenarioRow, WorkerRow
+from service.db.rows import JobRow, PlanActionRow, PlanRow, ScenarioRow, WorkerRow
 from service.db.session import Database
 from service.jobs import lease
 from service.jobs.child import Answered, Ending, Refused, Stopped
@@ -326,10 +326,14 @@ def _parent(session: Session, job: JobRow, held_in: Path | None) -> Parent | Non
         return None
     sha256, content = found
     is_held = held_in is not None and HeldBlocks(held_in).holds(sha256)
+    imaged = sa.select(PlanActionRow.target_id).where(
+        PlanActionRow.plan_id == plan_id, PlanActionRow.target_id.is_not(None)
+    )
     return Parent(
         scenario_sha256=sha256,
         content=content,
         bound=bound_store.load(session, sha256),
+        imaged=frozenset(session.scalars(imaged)),
         opportunity_block=Parcel(None if is_held else opportunity_store.load(session, sha256)),
     )
 

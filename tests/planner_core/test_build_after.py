@@ -15,7 +15,8 @@ from benchmarks.missions import ORBIT, paper_scenario
 from planner_core.budget import Budget
 from planner_core.build import ScenarioOpportunities, compute_opportunities
 from planner_core.build_after import PlanBefore, opportunities_after
-from planner_core.domain import Horizon, Scenario, Target
+from planner_core.domain import Forecast, Horizon, Objective, Replan, Scenario, Target
+from planner_core.pins import PinnedAction
 from planner_core.problem import Opportunities
 from tests.examples import examples
 
@@ -87,3 +88,49 @@ def test_only_what_is_new_is_looked_for(monkeypatch: pytest.MonkeyPatch) -> None
         opportunities_after(longer, earlier, Budget()), compute_opportunities(longer, Budget())
     )
     assert computed == [1, 40]
+
+
+def base_of(scenario: Scenario) -> Replan:
+    """Return a replan after a plan of the first five targets."""
+    start = scenario.horizon.start
+    return Replan(
+        base=tuple(
+            PinnedAction(satellite_id=scenario.satellites[0].id, target_id=target.id, start=start)
+            for target in scenario.targets[:5]
+        ),
+        freeze_until=start,
+    )
+
+
+def test_what_is_asked_is_what_is_new_dearer_or_open_again() -> None:
+    whole = mission(40)
+    before = replace(whole, targets=whole.targets[1:])
+    imaged = frozenset(target.id for target in before.targets[:5])
+    earlier = PlanBefore(
+        scenario=before, opportunities=compute_opportunities(before, Budget()), imaged=imaged
+    )
+    replan = base_of(before)
+    again = replace(before, replan=replan)
+    assert earlier.asked_by(again) == frozenset()
+    assert earlier.asked_by(replace(whole, replan=replan)) == frozenset({whole.targets[0].id})
+    dearer = replace(before.targets[7], reward=9.0)
+    targets = (*before.targets[:7], dearer, *before.targets[8:])
+    assert earlier.asked_by(replace(again, targets=targets)) == frozenset({dearer.id})
+    less = replace(again, replan=replace(replan, base=replan.base[1:]))
+    assert earlier.asked_by(less) == frozenset({before.targets[0].id})
+
+
+def test_nothing_is_known_to_be_asked_where_more_has_changed() -> None:
+    before = mission(40)
+    found = compute_opportunities(before, Budget())
+    earlier = PlanBefore(scenario=before, opportunities=found, imaged=frozenset())
+    again = replace(before, replan=base_of(before))
+    assert earlier.asked_by(again) == frozenset()
+    assert earlier.asked_by(before) is None
+    assert replace(earlier, imaged=None).asked_by(again) is None
+    end = before.horizon.end + timedelta(hours=1)
+    longer = replace(again, horizon=Horizon(start=before.horizon.start, end=end))
+    assert earlier.asked_by(longer) is None
+    assert earlier.asked_by(replace(again, objective=Objective(collected_share=0.5))) is None
+    clouds = Forecast(default_clear_probability=0.5)
+    assert earlier.asked_by(replace(again, forecast=clouds)) is None

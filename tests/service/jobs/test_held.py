@@ -126,8 +126,9 @@ def test_cold_and_warm_workers_give_the_same_plan(
 
     asked = follower(document, answer)
     parent = Parent(
-        scenario_sha256=first.scenario_sha256, content=first.content, bound=answer.proof
-    )
+        scenario_sha256=first.scenario_sha256, content=first.content, bound=answer.proof,
+        imaged=imaged_by(answer),
+    )  # fmt: skip
     warm = run_plan_job(request(asked, parent=parent, held_in=str(folder)), Budget())
     assert computed == [num_targets, 1]
     stored = replace(parent, opportunity_block=Parcel(answer.opportunity_block))
@@ -142,6 +143,15 @@ def test_cold_and_warm_workers_give_the_same_plan(
     assert computed == [num_targets, 1, 1, num_targets]
     assert bare.reward == pytest.approx(warm.reward)
     assert bare.opportunity_block == warm.opportunity_block
+
+
+def imaged_by(answer: PlanAnswer) -> frozenset[str]:
+    return frozenset(
+        action["target_id"]
+        for satellite in json.loads(answer.timeline)["satellites"]
+        for action in satellite["actions"]
+        if action["mode"] == "collect"
+    )
 
 
 def plan_of(answer: PlanAnswer) -> list[tuple[str, str]]:
