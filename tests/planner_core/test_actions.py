@@ -139,7 +139,7 @@ def test_what_may_follow_a_task_is_the_same_when_it_is_remembered(
     seed: int, breadth: int, unimaged_only: bool
 ) -> None:
     problem = random_problem(
-        seed, num_collects=60, num_targets=30, num_offers=2, use_resources=False
+        seed, num_collects=30, num_targets=15, num_offers=2, use_resources=False
     )
     satellite = problem.satellites[0]
     m = len(satellite)

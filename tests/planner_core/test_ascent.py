@@ -72,7 +72,7 @@ def test_no_plan_of_a_fleet_beats_them(
     assert lagrangian_bound(problem, 0.0).value >= best - 1e-9
 
 
-@pytest.mark.parametrize("num_satellites", [2, 4, 8])
+@pytest.mark.parametrize("num_satellites", [2, 4, pytest.param(8, marks=pytest.mark.full_size)])
 def test_they_settle_near_the_best(num_satellites: int) -> None:
     for seed in range(6):
         problem = crowded(seed, num_satellites)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import replace
 from functools import partial
 from typing import Literal
@@ -35,6 +36,8 @@ SEEDS = st.integers(0, 10**6)
 STARVED = replace(TIGHT, battery_min_fraction=0.5, initial_battery_fraction=0.62)
 
 _problem = partial(varied_problem, scarce=STARVED)
+# Every plan of these is replayed in a third of the time.
+_small = partial(_problem, num_collects=6, num_contacts=3)
 
 
 @pytest.mark.parametrize("dynamics", ["physical", "paper"])
@@ -43,44 +46,50 @@ _problem = partial(varied_problem, scarce=STARVED)
 def test_delivered_is_the_best_of_all_plans(
     dynamics: Literal["physical", "paper"], seed: int, num_satellites: int, has_quality: bool
 ) -> None:
-    problem = _problem(seed, dynamics, num_satellites, num_contacts=3, has_quality=has_quality)
+    problem = _small(seed, dynamics, num_satellites, has_quality=has_quality)
     problem = with_objective(problem, Objective.delivered())
     encloses(problem, best_reward(problem))
 
 
-@examples(500)
+@examples(800)
 @given(
     seed=SEEDS,
     dynamics=st.sampled_from(["physical", "paper"]),
-    collected_share=st.floats(0.0, 0.95),
+    collected_share=st.one_of(st.sampled_from([0.1, 0.5, 0.9]), st.floats(0.0, 0.95)),
     half_life_s=st.one_of(st.none(), st.floats(60.0, 2000.0)),
+    num_satellites=st.integers(1, 2),
+    has_quality=st.booleans(),
 )
 def test_no_plan_beats_the_bound_whatever_delivery_counts(
     dynamics: Literal["physical", "paper"],
     seed: int,
     collected_share: float,
     half_life_s: float | None,
+    num_satellites: int,
+    has_quality: bool,
 ) -> None:
+    problem = _small(seed, dynamics, num_satellites, has_quality=has_quality)
     objective = Objective(collected_share=collected_share, half_life_s=half_life_s)
-    problem = with_objective(_problem(seed, dynamics, 1, num_contacts=3), objective)
+    problem = with_objective(problem, objective)
     encloses(problem, best_reward(problem))
 
 
+@functools.cache
+def _known(seed: int) -> tuple[Problem, float]:
+    """Return a problem of one satellite and its best reward."""
+    problem = _problem(seed, "physical" if seed % 2 else "paper", 1, num_contacts=3)
+    problem = with_objective(problem, Objective.delivered())
+    return problem, best_reward(problem)
+
+
 def test_small_problems_end_at_the_optimum() -> None:
-    reached = 0
-    for seed in range(40):
-        problem = _problem(seed, "physical" if seed % 2 else "paper", 1, num_contacts=3)
-        problem = with_objective(problem, Objective.delivered())
-        reached += encloses(problem, best_reward(problem))
-    assert reached >= 38
+    assert sum(encloses(*_known(seed)) for seed in range(40)) >= 38
 
 
 @pytest.mark.parametrize("seed", range(40))
 def test_highs_finds_the_same(seed: int) -> None:
-    problem = _problem(seed, "physical" if seed % 2 else "paper", 1, num_contacts=3)
-    problem = with_objective(problem, Objective.delivered())
+    problem, best = _known(seed)
     solution = Milp().solve(problem, Budget(), 0)
-    best = best_reward(problem)
     assert replay(problem, solution.plan).reward == pytest.approx(best)
     assert solution.bound == pytest.approx(best, abs=1e-4)
 
@@ -207,12 +216,12 @@ def test_a_share_for_images_on_board_bounds_every_plan(
     has_quality: bool,
     price: float,
 ) -> None:
+    """What `certified` makes of such prices is held by the property of all objectives."""
     problem = _problem(seed, dynamics, num_satellites, num_contacts=3, has_quality=has_quality)
     problem = with_objective(problem, Objective(collected_share=collected_share))
     best = best_reward(problem)
     for unit in (0.05, 0.25, 1.0):
         assert resource_value(problem, price * problem.best_worth, unit) >= best - 1e-9
-    encloses(problem, best)
 
 
 def test_what_stays_on_board_lowers_the_bound() -> None:

@@ -61,7 +61,9 @@ def test_no_plan_beats_any_prices(
     has_quality: bool,
     per_collect: int,
 ) -> None:
-    problem = _problem(seed, dynamics, num_satellites, num_contacts=3, has_quality=has_quality)
+    problem = _problem(
+        seed, dynamics, num_satellites, num_collects=6, num_contacts=3, has_quality=has_quality
+    )
     objective = Objective(collected_share=collected_share, half_life_s=half_life_s)
     problem = with_objective(problem, objective)
     best = best_reward(problem)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import replace
 from functools import partial
 from itertools import combinations
@@ -108,25 +109,27 @@ def test_every_aim_is_come_nearer_to(aim: Preference) -> None:
     assert gained >= total // 4
 
 
-def best_by_brute_force(problem: Problem, aim: Preference, reward: float) -> float:
-    """Return the least value of an aim of all plans of this reward."""
-    rows = range(len(problem.opportunities))
-    best = np.inf
-    for size in range(len(rows) + 1):
-        for chosen in combinations(rows, size):
-            view = View.of(problem, Plan.of(problem, chosen))
-            if view.timeline.is_valid and view.timeline.reward == reward:
-                best = min(best, value_of(view, aim))
-    return float(best)
+@functools.cache
+def all_best(seed: int) -> tuple[Problem, Plan, tuple[View, ...]]:
+    """Return a small problem, a plan that earns the most, and every plan that earns as much."""
+    problem = alike_problem(seed, num_satellites=1, num_targets=4)
+    plan = Milp().solve(problem, Budget(), 0).plan
+    reward, rows = replay(problem, plan).reward, range(len(problem.opportunities))
+    views = (
+        View.of(problem, Plan.of(problem, chosen))
+        for size in range(len(rows) + 1)
+        for chosen in combinations(rows, size)
+    )
+    best = (view for view in views if view.timeline.is_valid and view.timeline.reward == reward)
+    return problem, plan, tuple(best)
 
 
 @pytest.mark.parametrize("aim", AIMS)
 def test_small_plans_often_end_at_the_best(aim: Preference) -> None:
     reached = 0
     for seed in range(10):
-        problem = alike_problem(seed, num_satellites=1, num_targets=4)
-        plan = Milp().solve(problem, Budget(), 0).plan
-        best = best_by_brute_force(problem, aim, replay(problem, plan).reward)
+        problem, plan, views = all_best(seed)
+        best = min(value_of(view, aim) for view in views)
         value = value_of(polished_for(problem, plan, aim, 0), aim)
         assert value >= best - 1e-12
         reached += value <= best + 1e-9

@@ -204,5 +204,6 @@ def test_every_answer_is_declared_where_a_key_is_missing(guarded: Probed) -> Non
     guarded.probe(phases="fuzzing", examples=3)
 
 
+@pytest.mark.full_size
 def test_every_answer_is_declared_where_no_key_is_needed(own: Probed) -> None:
     own.probe("--exclude-checks", "ignored_auth", phases="examples,fuzzing", examples=3)
