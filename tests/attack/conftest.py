@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
+from functools import partial
 
 import httpx
 import psutil
@@ -56,34 +57,35 @@ class Program:
 StartProgram = Callable[..., AbstractContextManager[Program]]
 
 
+@contextmanager
+def running_program(jobs: Jobs, num_files: int = 0, **settings: object) -> Iterator[Program]:
+    """Run the program on the database of jobs, with some settings changed."""
+    url = jobs.settings.database_url
+    command = [sys.executable, "-m", "service", "api", "--port", "0", "--database-url", url]
+    given = {"require_keys": True} | settings
+    variables = {f"SLEWLINE_{name}".upper(): str(value) for name, value in given.items()}
+    with (jobs.folder / "api.log").open("ab") as log:
+        process = subprocess.Popen(
+            command,
+            env=os.environ | variables,
+            stdout=subprocess.PIPE,
+            stderr=log,
+            text=True,
+        )
+    if num_files:
+        resource.prlimit(process.pid, resource.RLIMIT_NOFILE, (num_files, num_files))
+    assert process.stdout is not None
+    try:
+        address = process.stdout.readline().split()[-1]
+        with httpx.Client(base_url=address, timeout=120) as client:
+            yield Program(door=Door(client=client, jobs=jobs), process=process)
+    finally:
+        process.terminate()
+        process.wait()
+        process.stdout.close()
+
+
 @pytest.fixture
 def program(jobs: Jobs) -> StartProgram:
     """Return what runs the program on the database of jobs, with some settings changed."""
-
-    @contextmanager
-    def run(num_files: int = 0, **settings: object) -> Iterator[Program]:
-        url = jobs.settings.database_url
-        command = [sys.executable, "-m", "service", "api", "--port", "0", "--database-url", url]
-        given = {"require_keys": True} | settings
-        variables = {f"SLEWLINE_{name}".upper(): str(value) for name, value in given.items()}
-        with (jobs.folder / "api.log").open("ab") as log:
-            process = subprocess.Popen(
-                command,
-                env=os.environ | variables,
-                stdout=subprocess.PIPE,
-                stderr=log,
-                text=True,
-            )
-        if num_files:
-            resource.prlimit(process.pid, resource.RLIMIT_NOFILE, (num_files, num_files))
-        assert process.stdout is not None
-        try:
-            address = process.stdout.readline().split()[-1]
-            with httpx.Client(base_url=address, timeout=120) as client:
-                yield Program(door=Door(client=client, jobs=jobs), process=process)
-        finally:
-            process.terminate()
-            process.wait()
-            process.stdout.close()
-
-    return run
+    return partial(running_program, jobs)

@@ -14,11 +14,17 @@ import pytest
 from service.api import body_limit
 from service.api.guard import MOST_OF_AN_OWNER
 from service.process.connections import LONGEST_HEAD
-from tests.attack.conftest import Door, Program, StartProgram
+from tests.attack.conftest import Door, Program, StartProgram, running_program
 from tests.patience import PATIENCE_S
+from tests.service.jobs.conftest import stored_jobs
 
 NUM = 1050
 NUM_FILES = 1024
+
+# Where connections must not reach the time limits of the idle, however slow the machine is:
+# files for 64 of them.
+FEW_FILES = 320
+FEW = 88
 
 
 @contextmanager
@@ -65,64 +71,73 @@ def assert_served(run: Program, key: dict[str, str]) -> None:
             assert httpx.get(address, headers=key, timeout=PATIENCE_S).status_code == 200
 
 
-def test_streams_of_one_owner_leave_room_for_others(program: StartProgram) -> None:
-    with program(num_files=NUM_FILES) as run:
-        greedy, other = run.door.key("submit", "greedy"), run.door.key("read", "other")
-        path = f"/v1/jobs/{run.door.submit(greedy)}/events"
-        with connected(run.door.client, NUM, head("GET", path, **greedy)) as streams:
-            statuses = Counter(map(status_of, streams))
-            assert statuses == {200: MOST_OF_AN_OWNER, 503: NUM - MOST_OF_AN_OWNER}
-            assert_served(run, other)
-        # Those that have gone leave their places to others.
-        with connected(run.door.client, 1, head("GET", path, **greedy)) as (again,):
-            assert status_of(again) == 200
+@pytest.fixture(scope="module")
+def crowded(template_url: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Program]:
+    """A program of few files, for all tests that leave it as it was."""
+    with (
+        stored_jobs(template_url, tmp_path_factory.mktemp("crowded")) as jobs,
+        running_program(jobs, NUM_FILES) as run,
+    ):
+        yield run
+
+
+def test_streams_of_one_owner_leave_room_for_others(crowded: Program) -> None:
+    door = crowded.door
+    greedy, other = door.key("submit", "streaming"), door.key("read", "other")
+    path = f"/v1/jobs/{door.submit(greedy)}/events"
+    with connected(door.client, NUM, head("GET", path, **greedy)) as streams:
+        statuses = Counter(map(status_of, streams))
+        assert statuses == {200: MOST_OF_AN_OWNER, 503: NUM - MOST_OF_AN_OWNER}
+        assert_served(crowded, other)
+    # Those that have gone leave their places to others.
+    with connected(door.client, 1, head("GET", path, **greedy)) as (again,):
+        assert status_of(again) == 200
 
 
 @pytest.mark.parametrize("text", ["", "GET /health/live HT", head("GET", "/")[:-2]])
-def test_half_sent_requests_leave_room_for_others(program: StartProgram, text: str) -> None:
-    with program(num_files=NUM_FILES) as run:
-        other = run.door.key("read", "other")
-        with connected(run.door.client, NUM, text) as silent:
-            assert_served(run, other)
-            assert all(map(is_closed, silent))
+def test_half_sent_requests_leave_room_for_others(crowded: Program, text: str) -> None:
+    other = crowded.door.key("read", "other")
+    with connected(crowded.door.client, NUM, text) as silent:
+        assert_served(crowded, other)
+        assert all(map(is_closed, silent))
 
 
 def test_who_was_served_keeps_a_connection_that_others_want(program: StartProgram) -> None:
     ask = head("GET", "/health/live")
     with (
-        program(num_files=NUM_FILES) as run,
+        program(num_files=FEW_FILES) as run,
         connected(run.door.client, 1, ask) as (regular,),
     ):
         assert status_of(regular) == 200
         while b"}" not in regular.recv(65_536):
             pass
-        with connected(run.door.client, NUM // 2, ask) as others:
+        with connected(run.door.client, FEW // 2, ask) as others:
             assert [status_of(one) for one in others] == [200] * len(others)
             regular.sendall(ask.encode())
             assert status_of(regular) == 200
             while b"}" not in regular.recv(65_536):
                 pass
-            with connected(run.door.client, NUM - len(others), "") as silent:
+            with connected(run.door.client, FEW - len(others), "") as silent:
                 assert is_closed(silent[0])
-            with connected(run.door.client, NUM - len(others), ask) as more:
+            with connected(run.door.client, FEW - len(others), ask) as more:
                 assert [status_of(one) for one in more] == [200] * len(more)
                 assert is_closed(others[0])
                 regular.sendall(ask.encode())
                 assert status_of(regular) == 200
 
 
-def test_half_sent_bodies_leave_room_for_others(program: StartProgram) -> None:
-    with program(num_files=NUM_FILES) as run:
-        greedy, other = run.door.key("submit", "greedy"), run.door.key("read", "other")
-        sent = {"Content_Type": "application/json", "Content_Length": "1000"}
-        with connected(run.door.client, NUM, head("POST", "/v1/jobs", **greedy, **sent) + "{"):
-            assert_served(run, other)
-        # Nobody reads on after a refusal, however long somebody goes on sending.
-        with connected(run.door.client, 1, head("POST", "/v1/jobs", **sent)) as (refused,):
-            assert status_of(refused) == 401
-            refused.settimeout(1.0)
-            with pytest.raises(ConnectionError):
-                send_for_ever(refused, b"{")
+def test_half_sent_bodies_leave_room_for_others(crowded: Program) -> None:
+    client = crowded.door.client
+    greedy, other = crowded.door.key("submit", "greedy"), crowded.door.key("read", "other")
+    sent = {"Content_Type": "application/json", "Content_Length": "1000"}
+    with connected(client, NUM, head("POST", "/v1/jobs", **greedy, **sent) + "{"):
+        assert_served(crowded, other)
+    # Nobody reads on after a refusal, however long somebody goes on sending.
+    with connected(client, 1, head("POST", "/v1/jobs", **sent)) as (refused,):
+        assert status_of(refused) == 401
+        refused.settimeout(1.0)
+        with pytest.raises(ConnectionError):
+            send_for_ever(refused, b"{")
 
 
 def send_for_ever(connection: socket.socket, piece: bytes) -> None:
@@ -136,8 +151,8 @@ def send_for_ever(connection: socket.socket, piece: bytes) -> None:
             pass
 
 
-def test_a_head_without_an_end_is_not_read(program: StartProgram) -> None:
-    with program() as run, connected(run.door.client, 1, "GET / HTTP/1.1\r\nX: ") as (endless,):
+def test_a_head_without_an_end_is_not_read(crowded: Program) -> None:
+    with connected(crowded.door.client, 1, "GET / HTTP/1.1\r\nX: ") as (endless,):
         endless.settimeout(0.1)
         with pytest.raises(ConnectionError):
             send_for_ever(endless, b"x" * LONGEST_HEAD)

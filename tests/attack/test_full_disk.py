@@ -10,9 +10,8 @@ import httpx
 import pytest
 import sqlalchemy as sa
 
-from service.main import create_app
 from tests.missions import PAPER_ORBIT, drawn_targets, paper_mission
-from tests.service.conftest import serve
+from tests.service.conftest import new_app, serve
 from tests.service.factories import ground_station, post, satellite, target, tle
 from tests.service.jobs.conftest import Jobs
 from tests.service.jobs.test_api import finish
@@ -113,7 +112,7 @@ def writes(client: httpx.Client, jobs: Jobs) -> dict[str, httpx.Request]:
 
 @pytest.mark.parametrize("broken", [locked, full])
 def test_every_write_is_done_wholly_or_503(jobs: Jobs, broken: Breaks) -> None:
-    app = create_app(jobs.settings, jobs.queue)
+    app = new_app(jobs.settings, jobs.queue)
     engine = app.state.database.engine
     with serve(app) as address, httpx.Client(base_url=address, timeout=120) as client:
         calls = writes(client, jobs)

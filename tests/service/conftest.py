@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import functools
 import shutil
 import threading
@@ -18,6 +19,7 @@ from fastapi import FastAPI
 
 from service.db.migrate import upgrade
 from service.db.session import Database
+from service.jobs.queue import JobQueue
 from service.main import create_app
 from service.scenarios.opportunities import OpportunityReader
 from service.settings import Settings
@@ -34,10 +36,18 @@ class Service:
     settings: Settings
 
 
+class _PromptServer(uvicorn.Server):
+    """Ends as soon as it is told to; others look every tenth of a second."""
+
+    async def main_loop(self) -> None:
+        while not await self.on_tick(0):
+            await asyncio.sleep(0.01)
+
+
 @contextmanager
 def serve(app: FastAPI) -> Iterator[str]:
     """Run an application in a thread; yield its address."""
-    server = uvicorn.Server(uvicorn.Config(app, port=0, log_level="critical"))
+    server = _PromptServer(uvicorn.Config(app, port=0, log_level="critical"))
     thread = threading.Thread(target=server.run)
     thread.start()
     while not server.started:
@@ -52,9 +62,25 @@ def serve(app: FastAPI) -> Iterator[str]:
 
 
 @functools.cache
+def _first_app() -> FastAPI:
+    return create_app(Settings(database_url="sqlite:///unused.db"))
+
+
+def new_app(settings: Settings, queue: JobQueue | None = None) -> FastAPI:
+    """Return the application with settings of its own, on routes that another one has prepared.
+
+    FastAPI prepares the routes of each application at its first call, for 0.3 s. They know
+    nothing of settings.
+    """
+    app = create_app(settings, queue)
+    app.router.routes[:] = _first_app().router.routes
+    return app
+
+
+@functools.cache
 def contract() -> Contract:
     """Return what the OpenAPI document promises; it is the same whatever the settings."""
-    return Contract(create_app(Settings(database_url="sqlite:///unused.db")).openapi())
+    return Contract(_first_app().openapi())
 
 
 def checked_client(address: str) -> httpx.Client:
@@ -81,7 +107,7 @@ def settings(tmp_path: Path, empty_database: Path) -> Settings:
 def running_app(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[FastAPI, str]]:
     """The application on a port of its own, for all tests; each gives it its own database."""
     unused = f"sqlite:///{tmp_path_factory.mktemp('unused') / 'unused.db'}"
-    app = create_app(Settings(database_url=unused, max_body_mb=4.0))
+    app = new_app(Settings(database_url=unused, max_body_mb=4.0))
     with serve(app) as address:
         yield app, address
 

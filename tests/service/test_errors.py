@@ -12,9 +12,8 @@ import pytest
 from planner_core.errors import InvalidElements
 from service.db.rows import WorkerRow
 from service.db.session import Database
-from service.main import create_app
 from service.settings import Settings
-from tests.service.conftest import Service, serve
+from tests.service.conftest import Service, new_app, serve
 from tests.service.factories import EPOCH, ground_station, satellite, target, tle
 from tests.service.problems import assert_problem
 
@@ -47,7 +46,7 @@ def test_a_query_parameter_given_twice_is_refused(client: httpx.Client) -> None:
 @pytest.fixture
 def broken(settings: Settings) -> Iterator[httpx.Client]:
     """The real application with two routes that fail."""
-    app = create_app(settings)
+    app = new_app(settings)
 
     @app.get("/bug")
     def bug() -> None:

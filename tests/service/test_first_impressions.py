@@ -16,10 +16,8 @@ from typing import Any, Final
 import httpx
 import pytest
 
-from service.main import create_app
-from service.settings import Settings
 from tests.missions import Document, drawn_targets
-from tests.service.conftest import Service
+from tests.service.conftest import Service, contract
 from tests.service.factories import EPOCH, ground_station, post, satellite, send, target, tle
 from tests.service.jobs.mission import Mission, running
 from tests.service.problems import assert_problem
@@ -245,7 +243,7 @@ def test_all_old_elements_are_named_with_the_setting_that_allows_them(service: S
 
 
 def test_the_document_names_things_as_people_do() -> None:
-    document = create_app(Settings(database_url="sqlite:///unused.db")).openapi()
+    document = contract().document
     operations = [
         operation
         for path in document["paths"].values()

@@ -10,10 +10,9 @@ from collections.abc import Iterator
 import httpx
 import pytest
 
-from service.main import create_app
 from service.settings import Settings
 from tests.service.access.conftest import MakeDoor
-from tests.service.conftest import serve
+from tests.service.conftest import new_app, serve
 from tests.service.factories import ground_station
 from tests.service.problems import assert_problem
 
@@ -34,7 +33,7 @@ def headers_of(response: httpx.Response) -> dict[str, str | None]:
 @pytest.fixture
 def client(settings: Settings) -> Iterator[httpx.Client]:
     """The real application with a route that fails."""
-    app = create_app(settings)
+    app = new_app(settings)
 
     @app.get("/bug")
     def bug() -> None:

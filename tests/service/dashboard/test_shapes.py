@@ -12,10 +12,9 @@ import pytest
 from planner_core.budget import Budget
 from service.jobs.plan_job import run_plan_job
 from service.jobs.plan_request import PlanRequest
-from service.main import create_app
 from service.scenarios.canonical import canonical
-from service.settings import Settings
 from tests.missions import drawn_targets, paper_mission
+from tests.service.conftest import contract
 
 TYPES = Path(__file__).resolve().parents[3] / "service" / "dashboard" / "static" / "types.js"
 # Of documents that the OpenAPI document leaves open: held against a real plan.
@@ -36,8 +35,8 @@ def typedefs() -> dict[str, set[str]]:
     return found
 
 
-def test_every_shape_of_the_scripts_is_one_of_the_service(settings: Settings) -> None:
-    schemas = create_app(settings).openapi()["components"]["schemas"]
+def test_every_shape_of_the_scripts_is_one_of_the_service() -> None:
+    schemas = contract().document["components"]["schemas"]
     declared = typedefs()
     from_openapi = set(declared) - OF_TIMELINE - OF_TARGETS - NOT_OURS
     assert len(from_openapi) > 10

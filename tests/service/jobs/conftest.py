@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
@@ -24,11 +25,10 @@ from service.db.rows import JobRow, ScenarioRow, WorkerRow
 from service.db.session import Database
 from service.jobs.queue import DbosQueue, migrate_queue
 from service.jobs.supervisor import environment_of
-from service.main import create_app
 from service.settings import Settings
 from tests.missions import Document
 from tests.patience import wait_until
-from tests.service.conftest import checked_client, serve
+from tests.service.conftest import checked_client, new_app, serve
 from tests.service.jobs.mission import Mission, running, small_mission
 from tests.service.jobs.work import WORK
 
@@ -178,11 +178,11 @@ def create_database(server_url: str, template: str) -> str:
     return sa.make_url(server_url).set(database=name).render_as_string(hide_password=False)
 
 
-@pytest.fixture
-def jobs(template_url: str, tmp_path: Path) -> Iterator[Jobs]:
-    """A database of its own, with one scenario and short leases."""
+@contextmanager
+def stored_jobs(template_url: str, folder: Path) -> Iterator[Jobs]:
+    """Yield a copy of the template in a folder, with one scenario and short leases."""
     settings = Settings(
-        database_url=_copy(template_url, tmp_path),
+        database_url=_copy(template_url, folder),
         lease_s=2.0,
         heartbeat_s=0.2,
         reconcile_s=0.2,
@@ -201,16 +201,23 @@ def jobs(template_url: str, tmp_path: Path) -> Iterator[Jobs]:
         database=database,
         queue=queue,
         scenario_id=scenario_id,
-        folder=tmp_path,
+        folder=folder,
     )
     queue.close()
     database.close()
 
 
 @pytest.fixture
+def jobs(template_url: str, tmp_path: Path) -> Iterator[Jobs]:
+    """A database of its own."""
+    with stored_jobs(template_url, tmp_path) as jobs:
+        yield jobs
+
+
+@pytest.fixture
 def client(jobs: Jobs) -> Iterator[httpx.Client]:
     """A client of a server that sends jobs to the queue, with nobody to run them."""
-    app = create_app(jobs.settings, jobs.queue)
+    app = new_app(jobs.settings, jobs.queue)
     with serve(app) as address, checked_client(address) as client:
         yield client
 

@@ -19,8 +19,7 @@ from service.jobs import lease
 from service.jobs.lease import Lease, Outcome
 from service.jobs.queue import DbosQueue
 from service.jobs.solver_params import params_of
-from service.main import create_app
-from tests.service.conftest import checked_client, serve
+from tests.service.conftest import checked_client, new_app, serve
 from tests.service.jobs.conftest import Jobs, Workers
 from tests.service.jobs.work import EMPTY
 from tests.service.problems import assert_problem
@@ -138,7 +137,7 @@ def test_a_wrong_job_is_refused_by_name_and_not_stored(
 
 def test_a_full_queue_takes_no_more(jobs: Jobs) -> None:
     settings = jobs.settings.model_copy(update={"max_queued": 2})
-    app = create_app(settings, jobs.queue)
+    app = new_app(settings, jobs.queue)
     with serve(app) as address, httpx.Client(base_url=address, timeout=60) as client:
         first = posted(client, jobs)
         posted(client, jobs)
@@ -190,7 +189,7 @@ def test_the_service_is_not_ready_without_its_queue(jobs: Jobs, workers: Workers
     workers.start()
     elsewhere = DbosQueue(f"sqlite:///{jobs.folder / 'unmigrated.db'}")
     for queue, status in ((jobs.queue, 200), (elsewhere, 503)):
-        app = create_app(jobs.settings, queue)
+        app = new_app(jobs.settings, queue)
         with serve(app) as address, checked_client(address) as client:
             assert client.get("/health/ready").status_code == status
     elsewhere.close()

@@ -10,8 +10,7 @@ import pytest
 from service.answers.blocks import blocks_of_timeline
 from service.answers.rendering import figures_of
 from service.jobs.lease import Outcome
-from service.main import create_app
-from tests.service.conftest import serve
+from tests.service.conftest import new_app, serve
 from tests.service.jobs.conftest import Jobs
 from tests.service.jobs.test_api import finish, start
 from tests.service.jobs.work import EMPTY
@@ -126,7 +125,7 @@ def test_one_wrong_run_refuses_the_whole(
 
 
 def test_a_comparison_has_room_in_the_queue_as_a_whole_or_not(jobs: Jobs) -> None:
-    app = create_app(jobs.settings.model_copy(update={"max_queued": 2}), jobs.queue)
+    app = new_app(jobs.settings.model_copy(update={"max_queued": 2}), jobs.queue)
     with serve(app) as address, httpx.Client(base_url=address, timeout=60) as client:
         assert_problem(compare(client, jobs), 503, "queue_full")
         assert client.get("/v1/jobs").json()["items"] == []

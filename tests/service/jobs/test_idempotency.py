@@ -12,8 +12,7 @@ import sqlalchemy as sa
 
 from service.db.clock import utc_now
 from service.db.rows import IdempotencyKeyRow, JobRow
-from service.main import create_app
-from tests.service.conftest import Service, serve
+from tests.service.conftest import Service, new_app, serve
 from tests.service.factories import ground_station, satellite, target, tle
 from tests.service.factories import post as post_to
 from tests.service.jobs.conftest import Jobs
@@ -104,7 +103,7 @@ def test_requests_with_one_key_at_the_same_moment_create_one_job(
 
 def test_a_refused_request_does_not_use_up_its_key(jobs: Jobs) -> None:
     settings = jobs.settings.model_copy(update={"max_queued": 1})
-    app = create_app(settings, jobs.queue)
+    app = new_app(settings, jobs.queue)
     with serve(app) as address, httpx.Client(base_url=address, timeout=60) as client:
         blocking = posted(client, jobs)
         assert_problem(send(client, jobs), 503, "queue_full")

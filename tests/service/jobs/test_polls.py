@@ -9,8 +9,7 @@ import httpx
 
 from service.db.session import Database
 from service.jobs import lease
-from service.main import create_app
-from tests.service.conftest import checked_client, serve
+from tests.service.conftest import checked_client, new_app, serve
 from tests.service.jobs.conftest import Jobs
 from tests.service.jobs.test_api import finish, posted, report, start
 from tests.service.problems import assert_problem
@@ -100,7 +99,7 @@ def test_polls_at_once_are_told_of_their_own_jobs(client: httpx.Client, jobs: Jo
 
 
 def test_polls_are_refused_as_by_the_routes_while_the_database_is_away(jobs: Jobs) -> None:
-    app = create_app(jobs.settings, jobs.queue)
+    app = new_app(jobs.settings, jobs.queue)
     at_hand = app.state.database
     # Where a folder stands no file can be opened.
     away = Database(f"sqlite:///{jobs.folder}")

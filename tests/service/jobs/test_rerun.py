@@ -6,8 +6,7 @@ import httpx
 import pytest
 
 from service.jobs.lease import Outcome
-from service.main import create_app
-from tests.service.conftest import serve
+from tests.service.conftest import new_app, serve
 from tests.service.jobs.conftest import Jobs
 from tests.service.jobs.test_api import finish, posted, start
 from tests.service.problems import assert_problem
@@ -57,7 +56,7 @@ def test_a_job_in_any_state_can_be_run_again(client: httpx.Client, jobs: Jobs, e
 
 
 def test_a_rerun_needs_a_job_and_room_in_the_queue(jobs: Jobs) -> None:
-    app = create_app(jobs.settings.model_copy(update={"max_queued": 1}), jobs.queue)
+    app = new_app(jobs.settings.model_copy(update={"max_queued": 1}), jobs.queue)
     with serve(app) as address, httpx.Client(base_url=address, timeout=60) as client:
         assert_problem(client.post("/v1/jobs/none/rerun"), 404, "not_found")
         first = posted(client, jobs)

@@ -15,8 +15,7 @@ from fastapi import FastAPI
 
 from service.db.failures import why_unavailable
 from service.db.rows import TargetCatalogRow, TargetRow
-from service.main import create_app
-from tests.service.conftest import Service, serve
+from tests.service.conftest import Service, new_app, serve
 from tests.service.jobs.conftest import SERVER_URL, Jobs, Workers
 from tests.service.jobs.unwritable import no_room_for, read_only_server, sqlite_pragma
 from tests.service.problems import assert_problem
@@ -26,7 +25,7 @@ MANY_TARGETS = [{"id": f"t{n}", "lat_deg": 0.0, "lon_deg": n / 100} for n in ran
 
 @pytest.fixture
 def app(jobs: Jobs) -> FastAPI:
-    return create_app(jobs.settings, jobs.queue)
+    return new_app(jobs.settings, jobs.queue)
 
 
 @pytest.fixture
