@@ -31,7 +31,7 @@ _problem = partial(varied_problem, scarce=STARVED)
 def test_bound_and_plan_enclose_the_optimum(
     dynamics: Literal["physical", "paper"], seed: int, num_satellites: int, has_quality: bool
 ) -> None:
-    problem = _problem(seed, dynamics, num_satellites, has_quality=has_quality)
+    problem = _problem(seed, dynamics, num_satellites, num_collects=6, has_quality=has_quality)
     encloses(problem, best_reward(problem))
 
 

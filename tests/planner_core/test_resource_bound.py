@@ -40,7 +40,7 @@ _problem = partial(varied_problem, scarce=BATTERY_ONLY)
 def test_no_plan_beats_the_bound(
     dynamics: Literal["physical", "paper"], seed: int, num_satellites: int, has_quality: bool
 ) -> None:
-    problem = _problem(seed, dynamics, num_satellites, has_quality=has_quality)
+    problem = _problem(seed, dynamics, num_satellites, num_collects=6, has_quality=has_quality)
     best = best_reward(problem)
     assert quick_bound(problem, reward=0.0).value >= best - 1e-9
     rng = np.random.default_rng(seed)
