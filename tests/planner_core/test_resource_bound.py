@@ -91,7 +91,7 @@ def test_the_stored_prices_prove_the_bound_again(seed: int) -> None:
 def test_a_price_of_data_changes_nothing_but_the_time(
     dynamics: Literal["physical", "paper"], seed: int, near: float | None
 ) -> None:
-    problem = _problem(seed, dynamics, num_collects=20, num_targets=15, num_contacts=4)
+    problem = _problem(seed, dynamics, num_collects=14, num_targets=10, num_contacts=4)
     num_rows = len(problem.opportunities)
     worth = np.random.default_rng(seed).integers(0, 30, num_rows).astype(np.int32)
     worth[problem.opportunities.kind == CONTACT] = 0
