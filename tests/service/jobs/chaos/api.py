@@ -65,7 +65,7 @@ class Api:
         is sent again.
         """
         while True:
-            known = self._until_answered("GET", "/v1/jobs", params={"label": body["label"]})
+            known = self.answered("GET", "/v1/jobs", params={"label": body["label"]})
             if known.json()["items"]:
                 return str(known.json()["items"][0]["id"])
             answer = self._try("POST", "/v1/jobs", json=body)
@@ -75,13 +75,14 @@ class Api:
 
     def cancel(self, job_id: str) -> None:
         """Cancel a job, however often it takes."""
-        answer = self._until_answered("POST", f"/v1/jobs/{job_id}/cancel")
+        answer = self.answered("POST", f"/v1/jobs/{job_id}/cancel")
         if answer.status_code != 202:
             # The answer to an earlier try was lost, but not what it did.
-            job = self._until_answered("GET", f"/v1/jobs/{job_id}").json()
+            job = self.answered("GET", f"/v1/jobs/{job_id}").json()
             assert job["state"] in ("cancelling", "cancelled"), job
 
-    def _until_answered(self, method: str, path: str, **options: Any) -> httpx.Response:
+    def answered(self, method: str, path: str, **options: Any) -> httpx.Response:
+        """Send a request until there is an answer."""
         while True:
             answer = self._try(method, path, **options)
             if answer is not None:

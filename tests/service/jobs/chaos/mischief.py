@@ -72,6 +72,12 @@ class Mischief:
         """SIGKILL, whether at work or frozen."""
         os.kill(self._some_worker(), signal.SIGKILL)
 
+    def kill_workers(self) -> None:
+        """SIGKILL all of them at once."""
+        for pid in self._workers.pids():
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+
     def freeze_worker(self) -> None:
         """SIGSTOP for longer than a lease, while other faults go on."""
         pid = self._busy_worker()
