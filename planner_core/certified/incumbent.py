@@ -34,9 +34,11 @@ def is_optimal(reward: float, bound: float, unit: float) -> bool:
     return bound < reward + max(unit, SAME * reward, LEAST_BOUND)
 
 
-def _in_its_best_form(problem: Problem, plan: Plan) -> tuple[Plan, Timeline]:
+def _in_its_best_form(
+    problem: Problem, plan: Plan, verdict: Timeline | None = None
+) -> tuple[Plan, Timeline]:
     """Return a plan without images that only take room and earn nothing, judged by the referee."""
-    timeline = replay(problem, plan)
+    timeline = verdict or replay(problem, plan)
     if not problem.counts_delivery or not timeline.is_valid:
         return plan, timeline
     earning = {image.position for image in timeline.collected.values() if image.worth > 0.0}
@@ -66,6 +68,8 @@ class Incumbent:
         What is known at first; by default what must be taken, and what all targets are worth.
     covers_starts
         Whether bounds hold for plans with continuous starts too, where the problem has such.
+    verdict
+        The referee's, of a plan with all that must be taken; asked for where it is not at hand.
 
     Attributes
     ----------
@@ -86,10 +90,12 @@ class Incumbent:
         bound: Bound | None = None,
         *,
         covers_starts: bool = False,
+        verdict: Timeline | None = None,
     ) -> None:
         self.problem, self.budget, self.gap = problem, budget, gap
         self.unit = reward_unit(problem)
-        self.plan, timeline = _in_its_best_form(problem, (plan or Plan()).with_kept(problem))
+        whole = (plan or Plan()).with_kept(problem)
+        self.plan, timeline = _in_its_best_form(problem, whole, verdict)
         self.is_valid, self.reward = timeline.is_valid, timeline.reward
         self.bound = bound or accessible(problem)
         self._is_proof = covers_starts or not problem.continuous_starts

@@ -33,7 +33,7 @@ class Nearby:
     rows
         Of the whole problem, for each row of the part.
     asked
-        How many of them are near what is new or lost.
+        How many opportunities new and lost targets have.
     """
 
     question: Question
@@ -70,9 +70,11 @@ def nearby(question: Question, plan: Plan) -> Nearby | None:
     table = problem.opportunities
     is_taken = np.zeros(len(table), dtype=np.bool_)
     is_taken[[action.opportunity for action in plan.actions]] = True
-    is_near = _near(question, news)
-    is_near[question.base] |= ~is_taken[question.base]
+    targets = [*news.targets, *(lost.target for lost in news.lost if lost.target is not None)]
     is_image = table.kind == COLLECT
+    is_asked = is_image & np.isin(table.place, targets)
+    is_near = _near(question, news, is_asked)
+    is_near[question.base] |= ~is_taken[question.base]
     imaged = np.unique(table.place[is_near & is_taken & is_image])
     is_offered = is_near | (is_image & np.isin(table.place, imaged))
     is_part = is_offered.copy()
@@ -100,16 +102,13 @@ def nearby(question: Question, plan: Plan) -> Nearby | None:
             news=None,
         ),
         rows=rows,
-        asked=int(is_near.sum()),
+        asked=int(is_asked.sum()),
     )
 
 
-def _near(question: Question, news: News) -> Bools:
-    """Return the opportunities near in time to what is new and what is lost."""
-    table = question.problem.opportunities
-    targets = [*news.targets, *(lost.target for lost in news.lost if lost.target is not None)]
-    is_asked = (table.kind == COLLECT) & np.isin(table.place, targets)
-    is_near = np.zeros(len(table), dtype=np.bool_)
+def _near(question: Question, news: News, is_asked: Bools) -> Bools:
+    """Return the opportunities near in time to what is asked for and what is lost."""
+    is_near = np.zeros(len(is_asked), dtype=np.bool_)
     for index, satellite in enumerate(question.problem.satellites):
         own = satellite.rows
         at_s = np.array(
