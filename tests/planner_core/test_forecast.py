@@ -7,7 +7,7 @@ from datetime import timedelta
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget
@@ -16,6 +16,7 @@ from planner_core.domain import Forecast, Quality, Scenario, SkySeries
 from planner_core.errors import InvalidScenario
 from planner_core.problem import COLLECT
 from planner_core.worth import clear_probability_of
+from tests.examples import examples
 from tests.planner_core.test_worth import scenario
 
 DAY_S = 86400.0
@@ -40,7 +41,7 @@ def forecast(number: int, seed: int = 0) -> Forecast:
     )
 
 
-@settings(max_examples=50, deadline=None)
+@examples(50)
 @given(st.integers(0, 10_000))
 def test_skies_are_linear_in_time(seed: int) -> None:
     draw = np.random.default_rng(seed)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from service.forecasts.fields import (
@@ -19,6 +19,7 @@ from service.forecasts.fields import (
     to_bytes,
     within,
 )
+from tests.examples import examples
 
 HOUR_MS = 3_600_000
 
@@ -48,7 +49,7 @@ def slowly(grid: Grid, time: int, lat_deg: float, lon_deg: float) -> float:
     return float(np.interp(lat_deg, grid.lat_deg, along))
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100)
 @given(
     st.integers(0, 10_000),
     st.lists(st.tuples(st.floats(-90, 90), st.floats(-180, 360)), min_size=1, max_size=20),
@@ -62,7 +63,7 @@ def test_values_are_bilinear_round_the_globe(seed: int, places: list[tuple[float
         assert values.tolist() == pytest.approx(expected, abs=1e-9)
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100)
 @given(st.integers(0, 10_000), st.floats(0.0, 60.0), st.floats(150.0, 210.0))
 def test_regions_may_lie_across_the_antimeridian(seed: int, lat: float, lon: float) -> None:
     grid = drawn_grid(seed, goes_round=False, lat_deg=(0.0, 60.0))
@@ -104,7 +105,7 @@ def test_missing_values_spoil_what_lies_beside_them_alone() -> None:
     assert skies.target.tolist() == [3, 4]
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100)
 @given(st.lists(st.integers(0, 50), min_size=1, unique=True), st.integers(0, 50), st.integers(0, 9))
 def test_a_span_keeps_what_interpolation_in_it_needs(
     times: list[int], start: int, length: int
