@@ -12,7 +12,10 @@ from dataclasses import dataclass, field
 from functools import reduce
 from typing import Any, Final
 
+from planner_core.certified.lns.search import WindowSearch
 from planner_core.certified.tuning import tune
+from planner_core.precedence.network import Network
+from planner_core.problem import Floats, Problem
 
 DRIVERS: Final = "planner_core.certified.drivers"
 NOTHING: Final = ""
@@ -90,6 +93,14 @@ class _Idle:
         """Do nothing."""
 
 
+def _without_urgency(
+    problem: Problem, seed: int, network: Network, preference: Floats, urgency: Floats
+) -> WindowSearch:
+    """Return a window search whose moves begin anywhere."""
+    del urgency
+    return WindowSearch(problem, seed, network, preference)
+
+
 def _off(module: str, name: str, value: Callable[..., Any] = _nothing) -> tuple[Patch, ...]:
     return (Patch(module=module, name=name, value=value),)
 
@@ -99,12 +110,21 @@ _RESOURCES: Final = {
 }  # fmt: skip
 _FLEET: Final = {"fleet-4x2000": 12.0, "fleet-2x500": 10.0}
 _STATIONS: Final = {"fleet-stations-4x2000": 60.0}
+_LARGE_FLEET: Final = {"fleet-24x10000": 60.0}
+_SMALL: Final = {"tight-150": 10.0, "tight-weights-300": 10.0, "physical-200": 10.0}
 
 STRATEGIES: Final[Mapping[str, Change]] = {
     "cuts after a fleet": Change(patches=_off(f"{DRIVERS}.fleet", "close_in"), families=_FLEET),
     "exhaust": Change(
-        patches=_off(f"{DRIVERS}.resource_steps", "ResourceSearch.exhaust"), families=_RESOURCES
+        patches=_off(f"{DRIVERS}.resource_steps", "ResourceSearch.exhaust"),
+        families=_RESOURCES | _SMALL,
     ),
+    "urgency": Change(
+        patches=_off(f"{DRIVERS}.fleet", "WindowSearch", _without_urgency),
+        families=_LARGE_FLEET,
+        num_draws=1,
+    ),
+    "preference": Change(tuning={"preference": 0.0}, families=_LARGE_FLEET, num_draws=1),
     "turns of windows and choices": Change(
         patches=_off(f"{DRIVERS}.resource_steps", "ResourceSearch.search"), families=_RESOURCES
     ),

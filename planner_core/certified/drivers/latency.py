@@ -20,7 +20,7 @@ from planner_core.certified.lns.choices import ChoiceSearch
 from planner_core.certified.lns.queue_plans import plan_with_queues
 from planner_core.certified.lns.resource_search import ResourceWindows
 from planner_core.certified.multipliers.latency import LatencyAscent
-from planner_core.certified.proofs.bound import rounded_bound
+from planner_core.certified.proofs.bound import Bound, rounded_bound
 from planner_core.certified.proofs.queues import queue_value
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import COLLECT, CONTACT, Floats, Ints, Kept, Problem
@@ -49,7 +49,7 @@ def close_in_on_the_ground(search: ResourceSearch, unit: float) -> None:
         offered = (*named, *reversed(ascent.contact_sets), own, *_near(best.problem, own, rng))
         contacts = next((one for one in offered if one not in tried), own)
         tried.add(contacts)
-        _plan_with(best, contacts, ascent.bound.prices, unit, search.seed + number)
+        _plan_with(best, contacts, ascent.prices, unit, search.seed + number)
         number += 1
         if number == 1 and any(named):
             _lower(best, ascent, TUNING.rounds // 2)
@@ -57,38 +57,47 @@ def close_in_on_the_ground(search: ResourceSearch, unit: float) -> None:
         num_idle = 0 if best.reward > before else num_idle + 1
         _lower(best, ascent, TUNING.several)
     if not best.is_done:
+        _lower(best, ascent, 0, is_last=True)
         _lower_by_queues(best, ascent, levels, best.reward)
 
 
-def _lower(best: Incumbent, ascent: LatencyAscent, num_rounds: int) -> None:
+def _lower(
+    best: Incumbent, ascent: LatencyAscent, num_rounds: int, *, is_last: bool = False
+) -> None:
     """Go on with the ascent for a while."""
     for _ in range(num_rounds):
         ascent.improve(1, _level(best, ascent), best.budget.stop)
-    value = rounded_bound(best.problem, ascent.bound.value, best.reward)
-    best.lower(replace(ascent.bound, value=value))
+    bound = ascent.bound(is_last=is_last)
+    best.lower(replace(bound, value=rounded_bound(best.problem, bound.value, best.reward)))
     best.report("prices")
 
 
 def _level(best: Incumbent, ascent: LatencyAscent) -> float:
     """Return what the best plan earns, or a value near the bound until a good one is known."""
-    return max(best.reward, (1.0 - TUNING.little) * ascent.bound.value)
+    return max(best.reward, (1.0 - TUNING.little) * ascent.value)
 
 
 def _lower_by_queues(
     best: Incumbent, ascent: LatencyAscent, per_collect: int, level: float
 ) -> tuple[int, ...]:
     """Let exact programmes of queues bound the plans; return the contacts of the best paths."""
-    bound = ascent.bound
-    assert bound.prices is not None
     value, rows = queue_value(
         best.problem,
-        bound.prices,
+        ascent.prices,
         per_collect,
         best.budget.stop,
-        contact_prices=bound.contact_prices,
+        contact_prices=ascent.contact_prices,
         level=level,
     )
-    best.lower(replace(bound, value=value, queue_levels=per_collect))
+    best.lower(
+        Bound(
+            value=value,
+            proof="dp",
+            prices=ascent.prices,
+            contact_prices=ascent.contact_prices,
+            queue_levels=per_collect,
+        )
+    )
     best.report("queues")
     return tuple(sorted(rows[best.problem.opportunities.kind[rows] == CONTACT].tolist()))
 
@@ -108,12 +117,11 @@ def _contacts_of(problem: Problem, plan: Plan) -> tuple[int, ...]:
 
 
 def _plan_with(
-    best: Incumbent, contacts: tuple[int, ...], prices: Floats | None, unit: float, seed: int
+    best: Incumbent, contacts: tuple[int, ...], prices: Floats, unit: float, seed: int
 ) -> None:
     """Look for plans that take these contacts, as far as stations can serve them."""
     problem, stop = best.problem, best.budget.stop
     served = _served(problem, contacts)
-    assert prices is not None
     plan = plan_with_queues(_taking(problem, served), prices, np.random.default_rng(seed), stop)
     is_known = plan is not None
     part = with_contacts(problem, served, plan)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner_core.certified.dp.energy_labels import EnergyLevels, energy_levels, most_by_energy
+from planner_core.certified.dp.energy_labels import EnergyLevels, levels_of_estimate, most_by_energy
 from planner_core.certified.dp.resource_network import Network, network_of
 from planner_core.certified.multipliers.ascent import Ascent, Steps
 from planner_core.certified.tuning import TUNING
@@ -30,13 +30,7 @@ class _Part(NamedTuple):
     @classmethod
     def of(cls, problem: Problem, satellite: SatelliteProblem) -> _Part:
         network = network_of(problem, satellite)
-        # With turns to the sun no two costs are alike: rounded in favour of the satellite they
-        # add up to 2 % of a fleet's plan. Multipliers from an estimate prove 0.25 % less
-        # (docs/bounds.md), in half the time.
-        if network.straight_give.any():
-            levels = energy_levels(network, TUNING.levels_per_collect // 2, "nearest")
-        else:
-            levels = energy_levels(network, TUNING.levels_per_collect)
+        levels = levels_of_estimate(network, TUNING.levels_per_collect)
         num_targets = len(problem.target_ids)
         target = np.where(satellite.kind == COLLECT, satellite.place, num_targets)
         return cls(

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from planner_core.certified.proofs.bound import Bound
-from planner_core.certified.proofs.latency import latency_relaxations
+from planner_core.certified.proofs.latency import latency_relaxations, latency_value
 from planner_core.certified.tolerances import SAME
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import CONTACT, Bytes, Floats, Problem
@@ -28,15 +28,15 @@ class LatencyAscent:
 
     Attributes
     ----------
-    bound
-        The least that was proven so far.
+    value
+        The least that was come to, an estimate where satellites turn to the sun.
     contact_sets
         The contacts of each answer, rows ascending, the latest last, each set once.
     """
 
     def __init__(self, problem: Problem, begin: Floats) -> None:
         self._problem = problem
-        self._satellites = latency_relaxations(problem)
+        self._satellites = latency_relaxations(problem, is_estimate=True)
         self._most = np.append(problem.best_worth, 0.0)
         self._is_contact = problem.opportunities.kind == CONTACT
         self._prices = np.zeros(len(begin) + 1)
@@ -45,9 +45,9 @@ class LatencyAscent:
         self._best = self._prices, self._tolls
         self._length, self._num_idle = 1.0, 0
         self.contact_sets: dict[tuple[int, ...], None] = {}
-        self.bound = Bound(
-            value=float(problem.best_worth.sum()), proof="lagrangian", prices=problem.best_worth
-        )
+        self.value = float(problem.best_worth.sum())
+        self._proven = Bound(value=self.value, proof="lagrangian", prices=problem.best_worth)
+        self._at_proof = self.value
         given = np.append(begin, 0.0)
         if self._value(given) < self._value(self._prices):
             self._prices = given
@@ -60,9 +60,45 @@ class LatencyAscent:
     def improve(self, num_rounds: int, level: float, stop: Bytes) -> None:
         """Go some rounds on towards a bound at ``level``, which a known plan earns."""
         for _ in range(num_rounds):
-            if stop[0] or self.is_settled or self.bound.value <= level:
+            if stop[0] or self.is_settled or self.value <= level:
                 return
             self._go_round(level, stop)
+
+    @property
+    def prices(self) -> Floats:
+        """The best prices of targets. Shape ``(num_targets,)``."""
+        prices, _ = self._best
+        return prices[:-1]
+
+    @property
+    def contact_prices(self) -> Floats:
+        """The best prices of contacts, by volume. Shape ``(num_contacts,)``."""
+        _, tolls = self._best
+        tolls = tolls.copy()
+        for one in self._satellites:
+            tolls[one.contacts] /= one.typical
+        by_volume: Floats = tolls[self._is_contact]
+        return by_volume
+
+    def bound(self, *, is_last: bool = True) -> Bound:
+        """Return the least that was proven so far.
+
+        With turns to the sun a proof takes as long as several rounds. Unless it is the last word
+        it waits until the estimate is lower by as much as makes a step worth while.
+        """
+        step = 0.0 if is_last else TUNING.worth_a_step * self._at_proof
+        if self.value < self._at_proof - step:
+            self._at_proof = value = self.value
+            if self._problem.turns_to_the_sun:
+                value = latency_value(self._problem, self.prices, self.contact_prices)
+            if value < self._proven.value:
+                self._proven = Bound(
+                    value=value,
+                    proof="dp",
+                    prices=self.prices,
+                    contact_prices=self.contact_prices,
+                )
+        return self._proven
 
     def _value(self, prices: Floats) -> float:
         """Return what prices of targets prove alone."""
@@ -95,14 +131,9 @@ class LatencyAscent:
 
     def _is_hopeful(self, value: float) -> bool:
         """Note what the prices of the moment prove; go back to better ones after a while."""
-        if value < self.bound.value * (1.0 - SAME):
+        if value < self.value * (1.0 - SAME):
             self._best, self._num_idle = (self._prices, self._tolls), 0
-            self.bound = Bound(
-                value=value,
-                proof="dp",
-                prices=self._prices[:-1],
-                contact_prices=self._by_volume(),
-            )
+            self.value = value
             return True
         self._num_idle += 1
         if self._num_idle < TUNING.patience:
@@ -111,19 +142,12 @@ class LatencyAscent:
         self._prices, self._tolls = self._best
         return False
 
-    def _by_volume(self) -> Floats:
-        tolls = self._tolls.copy()
-        for one in self._satellites:
-            tolls[one.contacts] /= one.typical
-        by_volume: Floats = tolls[self._is_contact]
-        return by_volume
-
     def _move(self, above: float, too_many: Floats, too_much: Floats) -> None:
         """Move all multipliers against what the answers take too much of."""
         too_many = np.where((self._prices <= 0.0) & (too_many < 0.0), 0.0, too_many)
         too_much = np.where((self._tolls <= 0.0) & (too_much < 0.0), 0.0, too_much)
         squares = sum(float(np.square(each).sum()) for each in (too_many, too_much))
-        above = min(above, TUNING.far_above * self.bound.value)
+        above = min(above, TUNING.far_above * self.value)
         step = self._length * above / squares if squares > 0.0 else 0.0
         self._prices = np.clip(self._prices + step * too_many, 0.0, self._most)
         self._tolls = np.maximum(self._tolls + step * too_much, 0.0)

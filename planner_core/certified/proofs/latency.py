@@ -26,7 +26,11 @@ import numpy as np
 from planner_core.bundles import bundle
 from planner_core.certified.dp.contact_layers import Layers, layers_of, most_by_contacts
 from planner_core.certified.dp.contact_pairs import most_by_pairs
-from planner_core.certified.dp.energy_labels import EnergyLevels, energy_levels
+from planner_core.certified.dp.energy_labels import (
+    EnergyLevels,
+    levels_of_estimate,
+    levels_of_proof,
+)
 from planner_core.certified.dp.resource_network import Network, network_of
 from planner_core.certified.signs import NEVER
 from planner_core.certified.tolerances import DOWN, DOWN_S
@@ -99,7 +103,9 @@ class LatencyRelaxation:
     terms: _Terms
 
     @classmethod
-    def of(cls, problem: Problem, satellite: SatelliteProblem) -> LatencyRelaxation:
+    def of(
+        cls, problem: Problem, satellite: SatelliteProblem, *, is_estimate: bool
+    ) -> LatencyRelaxation:
         """Return the relaxation of a satellite that has opportunities."""
         network, rows = network_of(problem, satellite), satellite.rows
         layers = layers_of(network)
@@ -108,6 +114,7 @@ class LatencyRelaxation:
         size = np.where(is_image, satellite.end_s - satellite.start_s, 0.0) * own.collect_fill_per_s
         on_board = problem.objective.collected_share * problem.worth_on_ground[rows]
         setup_s = problem.downlinks.stations.setup_s[satellite.place[layers.contact]]
+        levels = levels_of_estimate if is_estimate else levels_of_proof
         # There a path gains nothing by a task that is worth nothing, neither energy nor a turn.
         is_dear = own.sun_pointing == "free" and own.idle_drain_per_s == 0.0
         return cls(
@@ -117,7 +124,7 @@ class LatencyRelaxation:
             typical=(float(np.median(size[is_image])) if is_image.any() else 0.0) or 1.0,
             may_need_all=not (is_dear and is_transitive_on(satellite)),
             network=network,
-            levels=energy_levels(network, TUNING.levels_per_collect),
+            levels=levels(network, TUNING.levels_per_collect),
             layers=layers,
             terms=_Terms(
                 end_s=satellite.end_s,
@@ -217,10 +224,18 @@ def _weigh(
                 weight[layer, layers.contact[c]] = tolls[c] * terms.volume[c]
 
 
-def latency_relaxations(problem: Problem) -> tuple[LatencyRelaxation, ...]:
-    """Return the programmes of all satellites that have anything to do."""
+def latency_relaxations(
+    problem: Problem, *, is_estimate: bool = False
+) -> tuple[LatencyRelaxation, ...]:
+    """Return the programmes of all satellites that have anything to do.
+
+    Parameters
+    ----------
+    is_estimate
+        Whether energy may be rounded so that plans are lost, in a search for multipliers.
+    """
     return tuple(
-        LatencyRelaxation.of(problem, satellite)
+        LatencyRelaxation.of(problem, satellite, is_estimate=is_estimate)
         for satellite in problem.satellites
         if len(satellite)
     )

@@ -436,8 +436,9 @@ def _with_half_life(problem: Problem, best: Bound, reward: float) -> Bound:
     num_rounds = int(np.clip(num_rounds, TUNING.tries, TUNING.rounds))
     ascent = LatencyAscent(problem, best.prices)
     ascent.improve(num_rounds, reward, np.zeros(1, dtype=np.uint8))
-    value = rounded_bound(problem, ascent.bound.value, reward)
-    return replace(ascent.bound, value=value) if value < best.value else best
+    bound = ascent.bound()
+    value = rounded_bound(problem, bound.value, reward)
+    return replace(bound, value=value) if value < best.value else best
 
 
 def _battery_value(
