@@ -126,7 +126,9 @@ def test_no_plan_beats_any_prices(
     num_satellites: int,
     has_quality: bool,
 ) -> None:
-    problem = _problem(seed, dynamics, num_satellites, num_contacts=3, has_quality=has_quality)
+    problem = _problem(
+        seed, dynamics, num_satellites, num_collects=6, num_contacts=3, has_quality=has_quality
+    )
     objective = Objective(collected_share=collected_share, half_life_s=half_life_s)
     problem = with_objective(problem, objective)
     best = best_reward(problem)
@@ -147,7 +149,7 @@ def test_no_plan_beats_what_estimates_of_energy_lead_to(
     seed: int, num_satellites: int, half_life_s: float
 ) -> None:
     """With turns to the sun multipliers come from an estimate; what they prove does not."""
-    problem = sunny_problem(seed, num_satellites=num_satellites, num_contacts=3)
+    problem = sunny_problem(seed, num_satellites=num_satellites, num_collects=6, num_contacts=3)
     problem = with_objective(problem, Objective(collected_share=0.0, half_life_s=half_life_s))
     best = best_reward(problem)
     ascent = LatencyAscent(problem, np.zeros(len(problem.target_ids)))
@@ -162,7 +164,9 @@ def test_groups_of_contacts_bound_all_plans_too(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(contact_layers, "MAX_LAYERS", 2)
     rng = np.random.default_rng(0)
     for seed in range(60):
-        problem = _problem(seed, "physical" if seed % 2 else "paper", num_contacts=4)
+        problem = _problem(
+            seed, "physical" if seed % 2 else "paper", num_collects=6, num_contacts=4
+        )
         problem = with_objective(problem, Objective(collected_share=0.0, half_life_s=300.0))
         best = best_reward(problem)
         assert latency_value(problem, *prices_of(problem, rng)) >= best - 1e-9
