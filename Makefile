@@ -6,7 +6,7 @@ BIN := .venv/bin
 PRODUCT := .venv/.product
 TOOLS := .venv/.tools
 WARM := .venv/.warm
-KERNELS := $(shell grep -rlE '^@(kernel|borrowing|inlined|unbox)' planner_core --include=*.py)
+KERNELS := $(shell grep -rlE '^@(kernel|inner|borrowing|borrowing_inner|inlined|templated|unbox)' planner_core --include=*.py)
 LOCK := $(UV) pip compile --universal --python-version 3.11 --generate-hashes \
 	--no-emit-index-url
 PIP := $(BIN)/python -m pip -qq --disable-pip-version-check

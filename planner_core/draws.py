@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from planner_core.jit import borrowing
+from planner_core.jit import borrowing_inner
 
 Uint64s = npt.NDArray[np.uint64]
 
@@ -15,7 +15,7 @@ def draws_of(seed: int) -> Uint64s:
     return np.array([seed & 0xFFFF_FFFF_FFFF_FFFF], dtype=np.uint64)
 
 
-@borrowing
+@borrowing_inner
 def next_draw(state: Uint64s) -> float:
     """Return the next number in [0, 1) of a generator (splitmix64) that is ours alone."""
     state[0] += np.uint64(0x9E3779B97F4A7C15)

@@ -108,29 +108,7 @@ def plan_scenario(
     problem = build_problem(scenario, opportunities, preparation)
     clock.append(time.perf_counter())
     budget.report(Progress(phase="solve", fraction=0.0))
-    own = without_on_board(problem)
-    relieved = within_limits(own)
-    # A replan changes as little as it must; nothing else may ask for more changes.
-    aims = scenario.objective.prefer if scenario.replan is None else ()
-    if scenario.replan is None:
-        search = budget.part(_SEARCH) if aims else budget
-        found = solver.solve(relieved, search, seed)
-        solution = flyable(own, relieved, found)
-    else:
-        asked = None if before is None else before.asked_by(scenario)
-        question = replace(question_of(scenario, problem, asked), problem=own)
-        prices = None if before is None else before.prices
-        solution = replanned(question, relieved, solver, budget, seed, prices)
-    if problem.continuous_starts:
-        solution = with_own_starts(problem, solution, budget)
-    is_optimal = solution.termination is Termination.OPTIMAL
-    if problem.on_board or (scenario.replan is None and not is_optimal):
-        more = with_more_downlinks(problem, solution.plan, budget)
-        solution = replace(solution, plan=more)
-    effects: tuple[Effect, ...] = ()
-    if aims:
-        polish = polished(problem, solution.plan, aims, budget, seed)
-        solution, effects = replace(solution, plan=polish.plan), polish.effects
+    relieved, solution, effects = _search(scenario, problem, solver, budget, seed, before)
     clock.append(time.perf_counter())
     budget.report(Progress(phase="verify", fraction=0.0))
     timeline = replay(problem, solution.plan)
@@ -171,6 +149,41 @@ def plan_scenario(
         runtime_s=Runtime(access=access, compile=compile_, solve=solve, verify=verify),
         effects=effects,
     )
+
+
+def _search(
+    scenario: Scenario,
+    problem: Problem,
+    solver: Solver,
+    budget: Budget,
+    seed: int,
+    before: PlanBefore | None,
+) -> tuple[Problem, Solution, tuple[Effect, ...]]:
+    """Return what was searched, the plan as it is to be flown, and what preferences cost."""
+    own = without_on_board(problem)
+    relieved = within_limits(own)
+    # A replan changes as little as it must; nothing else may ask for more changes.
+    aims = scenario.objective.prefer if scenario.replan is None else ()
+    if scenario.replan is None:
+        search = budget.part(_SEARCH) if aims else budget
+        found = solver.solve(relieved, search, seed)
+        solution = flyable(own, relieved, found)
+    else:
+        asked = None if before is None else before.asked_by(scenario)
+        question = replace(question_of(scenario, problem, asked), problem=own)
+        prices = None if before is None else before.prices
+        solution = replanned(question, relieved, solver, budget, seed, prices)
+    if problem.continuous_starts:
+        solution = with_own_starts(problem, solution, budget)
+    is_optimal = solution.termination is Termination.OPTIMAL
+    if problem.on_board or (scenario.replan is None and not is_optimal):
+        more = with_more_downlinks(problem, solution.plan, budget)
+        solution = replace(solution, plan=more)
+    effects: tuple[Effect, ...] = ()
+    if aims:
+        polish = polished(problem, solution.plan, aims, budget, seed)
+        solution, effects = replace(solution, plan=polish.plan), polish.effects
+    return relieved, solution, effects
 
 
 def _best_bound(

@@ -72,6 +72,42 @@ class Scenario:
 
     def __post_init__(self) -> None:
         require(len(self.satellites) > 0, "satellites", "at least one is needed")
+        self._check_starts()
+        # The authors' events forgo or charge whole spans: there is no time to turn in them.
+        require(
+            not self.use_resources
+            or self.dynamics == "physical"
+            or all(s.resources.knows_free_charge_alone for s in self.satellites),
+            "dynamics",
+            "paper knows neither turns to the sun nor idle_power_w: use sun_pointing free without",
+        )
+        if self.use_resources:
+            self._check_downlinks()
+        self._check_ids()
+        if self.forecast is not None:
+            check_coverage(self.forecast, self.horizon, self.targets)
+        satellite_ids = {s.id for s in self.satellites}
+        station_ids = {g.id for g in self.ground_stations}
+        self.pins.check(
+            satellite_ids,
+            {t.id for t in self.targets},
+            station_ids,
+            has_contacts=self.use_resources,
+        )
+        for position, outage in enumerate(self.outages):
+            outage.check(f"/outages/{position}", satellite_ids, station_ids)
+        target_ids = {t.id for t in self.targets}
+        check_states(self.states, self.satellites, target_ids, station_ids, self.horizon)
+        if self.replan is not None:
+            require(
+                not self.continuous_starts,
+                "continuous_starts",
+                "a plan to go on from has opportunities at fixed starts",
+            )
+            self.replan.check(satellite_ids, target_ids, station_ids)
+
+    def _check_starts(self) -> None:
+        """Refuse starts of collects that other fields say nothing of."""
         require(
             self.collect_spacing_s is None or self.collect_spacing_s > 0,
             "collect_spacing_s",
@@ -101,16 +137,8 @@ class Scenario:
             "how fast lines of sight move is known at the starts of opportunities only: "
             "use collect_spacing_s with slew_model moving",
         )
-        # The authors' events forgo or charge whole spans: there is no time to turn in them.
-        require(
-            not self.use_resources
-            or self.dynamics == "physical"
-            or all(s.resources.knows_free_charge_alone for s in self.satellites),
-            "dynamics",
-            "paper knows neither turns to the sun nor idle_power_w: use sun_pointing free without",
-        )
-        if self.use_resources:
-            self._check_downlinks()
+
+    def _check_ids(self) -> None:
         for what, ids in (
             ("satellite", [s.id for s in self.satellites]),
             ("target", [t.id for t in self.targets]),
@@ -124,27 +152,6 @@ class Scenario:
                     f"The {what} id {value!r} appears twice.",
                     pointer=f"/{what}s/{position}/id",
                 )
-        if self.forecast is not None:
-            check_coverage(self.forecast, self.horizon, self.targets)
-        satellite_ids = {s.id for s in self.satellites}
-        station_ids = {g.id for g in self.ground_stations}
-        self.pins.check(
-            satellite_ids,
-            {t.id for t in self.targets},
-            station_ids,
-            has_contacts=self.use_resources,
-        )
-        for position, outage in enumerate(self.outages):
-            outage.check(f"/outages/{position}", satellite_ids, station_ids)
-        target_ids = {t.id for t in self.targets}
-        check_states(self.states, self.satellites, target_ids, station_ids, self.horizon)
-        if self.replan is not None:
-            require(
-                not self.continuous_starts,
-                "continuous_starts",
-                "a plan to go on from has opportunities at fixed starts",
-            )
-            self.replan.check(satellite_ids, target_ids, station_ids)
 
     def _check_downlinks(self) -> None:
         """Refuse passes in which telemetry may fill the recorder faster than it is emptied.

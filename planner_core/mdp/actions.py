@@ -5,7 +5,7 @@ The readable model and the compiled search loops share it.
 
 from __future__ import annotations
 
-from planner_core.jit import borrowing, inlined
+from planner_core.jit import borrowing, borrowing_inner, inlined
 from planner_core.mdp.track import (
     STRICT,
     Track,
@@ -20,7 +20,7 @@ from planner_core.problem import (
 )
 
 
-@inlined
+@borrowing
 def next_action(
     track: Track,
     last: int,
@@ -117,7 +117,7 @@ def _is_charged(
     return min(1.0, battery + charge_per_s * max(0.0, charge_s)) - cost > least
 
 
-@borrowing
+@borrowing_inner
 def _first_charged(
     charge_top_s: Floats,
     charge_from_s: float,

@@ -17,7 +17,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from planner_core.jit import kernel
+from planner_core.jit import inner, kernel
 from planner_core.orbits.frames import EARTH_RADIUS_M
 
 Floats = npt.NDArray[np.float64]
@@ -44,7 +44,7 @@ _PRECISION_S: Final = 1e-7
 _NO_TURN: Final = -1.0
 
 
-@kernel
+@inner
 def _at(cubic: Floats, column: int, t: float) -> Vector:
     i, j, k = column, column + 1, column + 2
     return (
@@ -54,7 +54,7 @@ def _at(cubic: Floats, column: int, t: float) -> Vector:
     )
 
 
-@kernel
+@inner
 def _rate(cubic: Floats, column: int, t: float) -> Vector:
     i, j, k = column, column + 1, column + 2
     return (
@@ -64,7 +64,7 @@ def _rate(cubic: Floats, column: int, t: float) -> Vector:
     )
 
 
-@kernel
+@inner
 def _rate_of_rate(cubic: Floats, column: int, t: float) -> Vector:
     i, j, k = column, column + 1, column + 2
     return (
@@ -74,12 +74,12 @@ def _rate_of_rate(cubic: Floats, column: int, t: float) -> Vector:
     )
 
 
-@kernel
+@inner
 def _dot(a: Vector, b: Vector) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@kernel
+@inner
 def _cross(a: Vector, b: Vector) -> Vector:
     return (
         a[1] * b[2] - a[2] * b[1],
@@ -88,7 +88,7 @@ def _cross(a: Vector, b: Vector) -> Vector:
     )
 
 
-@kernel
+@inner
 def limit_value(limit: Limit, cubic: Floats, place: Floats, t: float) -> Value:
     """Return g and its rate at ``t`` seconds after the interval's start.
 
@@ -145,7 +145,7 @@ def limit_value(limit: Limit, cubic: Floats, place: Floats, t: float) -> Value:
     return g, g_rate
 
 
-@kernel
+@inner
 def _root(
     limit: Limit, cubic: Floats, place: Floats, a: float, b: float, g_a: float, g_b: float
 ) -> float:
@@ -166,7 +166,7 @@ def _root(
     return t
 
 
-@kernel
+@inner
 def _turn(
     limit: Limit, cubic: Floats, place: Floats, a: float, b: float, at_a: Value, at_b: Value
 ) -> float:

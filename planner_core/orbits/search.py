@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from planner_core.jit import kernel
+from planner_core.jit import inner, kernel
 from planner_core.orbits.crossings import crossings, limit_value
 
 Floats = npt.NDArray[np.float64]
@@ -68,13 +68,14 @@ def find_windows(
             room = 2 * (found + num_own)
             place = np.concatenate((place, np.empty(room - len(place), dtype=np.int32)))
             windows = np.concatenate((windows, np.empty((room - len(windows), 2))))
-        place[found : found + num_own] = p
-        windows[found : found + num_own] = own[:num_own]
-        found += num_own
+        for i in range(num_own):
+            place[found] = p
+            windows[found, 0], windows[found, 1] = own[i, 0], own[i, 1]
+            found += 1
     return place[:found], windows[:found]
 
 
-@kernel
+@inner
 def _windows_of_place(
     track: Floats,
     step_s: float,
@@ -125,7 +126,7 @@ def _windows_of_place(
     return found
 
 
-@kernel
+@inner
 def _events_of_interval(
     k: int,
     cubic: Floats,

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from planner_core.errors import InvalidScenario
-from planner_core.jit import kernel
+from planner_core.jit import inner, kernel
 from planner_core.mdp.track import (
     NO_TASK,
     STRICT,
@@ -35,6 +35,7 @@ from planner_core.problem import (
 )
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
+from planner_core.sorting import stable_order
 
 # After each task; of more, neighbours count as one that is as good as each.
 _MAX_STATES: Final = 200
@@ -175,7 +176,7 @@ def _has_way(track: Track, precedence: Precedence) -> bool:
     return False
 
 
-@kernel
+@inner
 def _lasts(track: Track, last: int, recorder: float) -> bool:
     """Return whether the recorder has room for the telemetry to the end."""
     data_from_s = track.data_from_s[last] if last >= 0 else 0.0
@@ -190,7 +191,7 @@ def _keep_best(found: Floats, battery: Floats, recorder: Floats) -> int:
     Where there are too many, some next to each other become one that has the best of them all.
     """
     num_best = 0
-    by_recorder = found[np.argsort(found[:, 1])]
+    by_recorder = found[stable_order(found[:, 1].copy())]
     for i in range(len(by_recorder)):
         if num_best == 0 or by_recorder[i, 0] > by_recorder[num_best - 1, 0]:
             by_recorder[num_best] = by_recorder[i]

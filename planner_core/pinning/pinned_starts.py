@@ -145,8 +145,7 @@ def _add_beside(problem: Problem, action: Action, rows: list[int], starts: list[
         pointing.paths[satellite],
         pointing.targets_m,
         agile_of(agility.slew_rate_deg_s, agility.acceleration_deg_s2, agility.settle_s),
-        action.start_s,
-        action.end_s,
+        (action.start_s, action.end_s),
         line_of_sight(problem, row, action.start_s),
         line_of_sight(problem, row, action.end_s),
         table.place[others],
@@ -165,8 +164,7 @@ def _beside(
     path: Path,
     targets_m: Floats,
     agile: Agile,
-    start_s: float,
-    end_s: float,
+    task_s: tuple[float, float],
     looks: Vector,
     looked: Vector,
     target: Ints,
@@ -176,8 +174,10 @@ def _beside(
 ) -> tuple[Floats, Floats]:
     """Return the latest start of each access before a task, and the earliest after it.
 
+    ``task_s`` is when the task begins and ends, ``looks`` and ``looked`` where the satellite does.
     Not finite where the task is not in the way of some start of the access.
     """
+    start_s, end_s = task_s
     before, after = np.full(len(target), -np.inf), np.full(len(target), np.inf)
     around_s = 360.0 / agile.rate_deg_s + agile.settle_s
     for c in range(len(target)):

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from planner_core.bundles import bundle
-from planner_core.jit import borrowing, kernel
+from planner_core.jit import borrowing_inner, kernel
 from planner_core.precedence.network import part_ends
 from planner_core.precedence.relation import (
     Precedence,
@@ -59,7 +59,7 @@ def covering_arcs(precedence: Precedence, later: Ints | None = None) -> Arcs:
     return _covering(precedence, np.full(m, -1, dtype=np.int32) if later is None else later)
 
 
-@borrowing
+@borrowing_inner
 def _bits_at(words: Words, bit: int) -> np.uint64:
     """Return the 64 bits that begin with a given one."""
     at, into = bit >> 6, np.uint64(bit & 63)
@@ -69,7 +69,7 @@ def _bits_at(words: Words, bit: int) -> np.uint64:
     return found
 
 
-@borrowing
+@borrowing_inner
 def _add_followers(
     near_from: Ints, offset: Longs, words: Words, c: int, begin: int, end: int, covered: Words
 ) -> None:
@@ -141,7 +141,7 @@ def _covering(precedence: Precedence, later: Ints) -> Arcs:
     return Arcs(first, to[:count].copy())
 
 
-@borrowing
+@borrowing_inner
 def _trailing_zeros(lowest: np.uint64) -> int:
     """Return which bit is set, of a word in which one is."""
     at = 0

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner_core.jit import borrowing, kernel
+from planner_core.jit import borrowing_inner, inner, kernel
 from planner_core.precedence.arcs import Arcs, Words, covering_arcs
 from planner_core.precedence.relation import Precedence, direct_precedence, is_transitive_on
-from planner_core.problem import Floats, Ints, SatelliteProblem
+from planner_core.problem import Floats, Ints, Longs, SatelliteProblem
 
 
 def heaviest_chain(satellite: SatelliteProblem, weight: Floats) -> list[int]:
@@ -34,7 +34,8 @@ def chain_with_history(satellite: SatelliteProblem, weight: Floats, place: Ints)
     if is_transitive_on(satellite):
         _, task = longest_path_with_history(weight, place, covering_arcs(direct), before)
     else:
-        _, task = longest_chain_with_history(weight, place, direct, before)
+        by_far = np.argsort(direct.far_from, kind="stable")
+        _, task = longest_chain_with_history(weight, place, direct, by_far, before)
     return _chain_to(task, before)
 
 
@@ -47,7 +48,7 @@ def _chain_to(task: int, before: Ints) -> list[int]:
     return chain[::-1]
 
 
-@kernel
+@inner
 def _no_history(weight: Floats, place: Ints) -> Words:
     """Return an empty set of places for each task."""
     num_words = 0
@@ -57,14 +58,14 @@ def _no_history(weight: Floats, place: Ints) -> Words:
     return np.zeros((len(weight), num_words), dtype=np.uint64)
 
 
-@borrowing
+@borrowing_inner
 def _holds(history: Words, task: int, place: int) -> bool:
     if place < 0:
         return False
     return bool(history[task, place >> 6] & (np.uint64(1) << np.uint64(place & 63)))
 
 
-@borrowing
+@borrowing_inner
 def _note(history: Words, task: int, place: int) -> None:
     if place >= 0:
         history[task, place >> 6] |= np.uint64(1) << np.uint64(place & 63)
@@ -126,9 +127,12 @@ def longest_path_with_history(
 
 @kernel
 def longest_chain_with_history(
-    weight: Floats, place: Ints, precedence: Precedence, before: Ints
+    weight: Floats, place: Ints, precedence: Precedence, by_far: Longs, before: Ints
 ) -> tuple[float, int]:
-    """Return what ``longest_path_with_history`` does, on the table of all pairs."""
+    """Return what ``longest_path_with_history`` does, on the table of all pairs.
+
+    ``by_far`` has the tasks in order of ``far_from``.
+    """
     near_from, far_from, offset, bits = precedence
     m = len(weight)
     history = _no_history(weight, place)
@@ -136,11 +140,10 @@ def longest_chain_with_history(
     # Tasks by falling weight of their chains, among those that everything from here may follow.
     far = np.empty(m, dtype=np.int32)
     num_far, next_far = 0, 0
-    in_order_of_far = np.argsort(far_from, kind="mergesort")
     best, best_task = 0.0, -1
     for b in range(m):
-        while next_far < m and far_from[in_order_of_far[next_far]] <= b:
-            a = in_order_of_far[next_far]
+        while next_far < m and far_from[by_far[next_far]] <= b:
+            a = by_far[next_far]
             next_far += 1
             if weight[a] <= 0.0:
                 continue

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from planner_core.bundles import bundle
-from planner_core.jit import borrowing, kernel
+from planner_core.jit import borrowing, borrowing_inner, kernel
 from planner_core.precedence.time_windows import Spans, View
 from planner_core.problem import (
     Bytes,
@@ -24,6 +24,7 @@ from planner_core.problem import (
 )
 from planner_core.problem.pointing import earliest_start_s, needed_s, sight
 from planner_core.problem.slew import slew_s
+from planner_core.sorting import first_not_below
 
 Singles = npt.NDArray[np.float32]
 
@@ -77,7 +78,7 @@ def arrivals_of(spans: Spans, view: View, width_s: float, stop: Bytes | None = N
     return Arrivals(width_s, first_cell, first_arc, to, after_s, slope)
 
 
-@borrowing
+@borrowing_inner
 def cell_of(arrivals: Arrivals, spans: Spans, task: int, start_s: float) -> int:
     """Return the cell that a start of a task falls into."""
     k = int((start_s - spans.open_s[task]) / arrivals.width_s)
@@ -85,7 +86,7 @@ def cell_of(arrivals: Arrivals, spans: Spans, task: int, start_s: float) -> int:
     return int(min(max(first + k, first), end - 1))
 
 
-@borrowing
+@borrowing_inner
 def edge_s(arrivals: Arrivals, spans: Spans, task: int, cell: int) -> float:
     """Return the left edge of a task's cell."""
     return float(spans.open_s[task] + (cell - arrivals.first_cell[task]) * arrivals.width_s)
@@ -131,7 +132,7 @@ def _tabulate(
             first_arc[first_cell[a] :] = count
             break
         from_s = spans.open_s[a] + spans.length_s[a] + agile.settle_s
-        low = np.searchsorted(spans.open_s, from_s - longest_s)
+        low = first_not_below(spans.open_s, from_s - longest_s)
         high = low
         for cell in range(first_cell[a], first_cell[a + 1]):
             edge = spans.open_s[a] + (cell - first_cell[a]) * width_s
@@ -185,7 +186,7 @@ def _tabulate(
     return first_arc, to[:count].copy(), after_s[:count].copy(), slope[:count].copy()
 
 
-@borrowing
+@borrowing_inner
 def _is_covered(
     spans: Spans,
     view: View,

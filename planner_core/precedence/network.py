@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from planner_core.bundles import bundle
-from planner_core.jit import borrowing, kernel
+from planner_core.jit import borrowing_inner, inner, kernel
 from planner_core.precedence.relation import turns_slower_than_it_tracks
 from planner_core.precedence.skyline import (
     Skyline,
@@ -120,7 +120,7 @@ def part_ends(transitions: Transitions) -> Longs:
     return ends[np.append(transitions.start_s[1:], np.inf)[: len(ends)] >= free_s]
 
 
-@borrowing
+@borrowing_inner
 def slews_in(network: Network, part: int) -> Slews:
     """Return how the satellite of a part turns; only for kernels that borrow, as this one does."""
     of = network.satellite[part]
@@ -156,7 +156,7 @@ def heaviest_paths(
     return total
 
 
-@kernel
+@inner
 def heaviest_path(
     network: Network, part: int, weight: Floats, value: Floats, previous: Ints
 ) -> tuple[float, int]:
@@ -168,7 +168,7 @@ def heaviest_path(
     return _scan(network, part, weight, value, previous, sky, False, False)
 
 
-@borrowing
+@borrowing_inner
 def _scan(
     network: Network, part: int, weight: Floats, value: Floats, previous: Ints, sky: Skyline,
     is_backward: bool, is_every: bool,

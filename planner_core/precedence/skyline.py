@@ -21,7 +21,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from planner_core.jit import borrowing, kernel
+from planner_core.jit import borrowing, borrowing_inner, kernel
 from planner_core.problem import Floats, Ints
 from planner_core.problem.slew import TIME_TOLERANCE_S
 from planner_core.problem.transitions import CLEARLY, Slews, Vector, turns_within
@@ -62,7 +62,7 @@ def skyline_for(num_labels: int) -> Skyline:
     return Skyline(np.empty((num_labels, 5)), np.empty(num_labels, dtype=np.int32), next_label)
 
 
-@borrowing
+@borrowing_inner
 def clear(sky: Skyline) -> None:
     """Forget all labels."""
     sky.next[0] = NO_LABEL
@@ -74,19 +74,19 @@ def value_of(sky: Skyline, at: int) -> float:
     return sky.label[at, _VALUE] if at >= 0 else 0.0
 
 
-@borrowing
+@borrowing_inner
 def top_label(sky: Skyline) -> int:
     """Return the label worth most; ``NO_LABEL`` if there is none."""
     return int(sky.next[0])
 
 
-@borrowing
+@borrowing_inner
 def next_label(sky: Skyline, at: int) -> int:
     """Return the label that stands after one, worth no more; ``NO_LABEL`` after the last."""
     return int(sky.next[at + 1])
 
 
-@borrowing
+@borrowing_inner
 def is_as_good(sky: Skyline, at: int, end_s: float, looked: Vector, slews: Slews) -> bool:
     """Return whether whatever follows a new label may follow another one that stands before it."""
     label = sky.label
@@ -99,7 +99,7 @@ def is_as_good(sky: Skyline, at: int, end_s: float, looked: Vector, slews: Slews
     return bool(cosine >= least + CLEARLY)
 
 
-@borrowing
+@borrowing_inner
 def insert(
     sky: Skyline, count: int, before: int, value: float, end_s: float, looked: Vector, node: int
 ) -> None:
@@ -111,7 +111,7 @@ def insert(
     sky.next[count + 1], sky.next[before + 1] = sky.next[before + 1], count
 
 
-@borrowing
+@borrowing_inner
 def enter(
     sky: Skyline, count: int, value: float, end_s: float, looked: Vector, node: int, slews: Slews
 ) -> int:
@@ -128,7 +128,7 @@ def enter(
     return count + 1
 
 
-@borrowing
+@borrowing_inner
 def reaches(sky: Skyline, at: int, start_s: float, looks: Vector, slews: Slews) -> bool:
     """Return whether a task that starts then and looks there may follow a label's."""
     label = sky.label
@@ -136,7 +136,7 @@ def reaches(sky: Skyline, at: int, start_s: float, looks: Vector, slews: Slews) 
     return turns_within(slews, room_s, (label[at, _X], label[at, _Y], label[at, _Z]), looks)
 
 
-@borrowing
+@borrowing_inner
 def best_ahead(sky: Skyline, start_s: float, looks: Vector, slews: Slews) -> int:
     """Return the label worth most that a task may follow; ``NO_LABEL`` if there is none.
 

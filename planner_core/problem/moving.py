@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from planner_core.jit import borrowing, kernel
+from planner_core.jit import borrowing, borrowing_inner, kernel
 from planner_core.problem.slew import angle_between_deg
 
 Vector = tuple[float, float, float]
@@ -89,7 +89,7 @@ def turns_in(
     return False
 
 
-@borrowing
+@borrowing_inner
 def _secant(step: Vector, before: Vector) -> float:
     """Return how much of the last change to take back, so that the next step is least.
 
@@ -125,7 +125,7 @@ def moving_turn_s(
     return high_s
 
 
-@borrowing
+@borrowing_inner
 def _distance(u: Vector, v: Vector) -> float:
     x, y, z = u[0] - v[0], u[1] - v[1], u[2] - v[2]
     return math.sqrt(x * x + y * y + z * z)

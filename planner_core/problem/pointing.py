@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from planner_core.bundles import bundle
-from planner_core.jit import borrowing, kernel
+from planner_core.jit import borrowing, borrowing_inner, kernel
 from planner_core.problem.slew import (
     INSTANT,
     TIME_TOLERANCE_S,
@@ -71,7 +71,7 @@ class Agile(NamedTuple):
     settle_s: float
 
 
-@borrowing
+@borrowing_inner
 def position_m(path: Path, t_s: float) -> Vector:
     """Return the Earth-fixed position: the cubic between the nodes around an instant."""
     k = min(max(int(t_s / path.step_s), 0), len(path.nodes) - 2)

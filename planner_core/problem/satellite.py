@@ -34,12 +34,8 @@ def build_satellite_problem(
         ``event_s`` and ``event``, where there are more of them than opportunities.
     """
     rows = np.flatnonzero(opportunities.satellite == index).astype(np.int32)
-    start_s, end_s = opportunities.start_s[rows], opportunities.end_s[rows]
-    looks = np.ascontiguousarray(opportunities.los_start[rows])
-    looked = np.ascontiguousarray(opportunities.los_end[rows])
-    own = rows if agility.tracks else rows[:0]
-    moves = opportunities.los_rate_start[own].astype(np.float64)
-    moved = opportunities.los_rate_end[own].astype(np.float64)
+    transitions = _transitions(opportunities, rows, agility)
+    start_s, end_s = transitions.start_s, transitions.end_s
     is_contact = opportunities.kind[rows] == CONTACT
     contacts = rows[is_contact]
     volume = np.zeros(len(rows))
@@ -60,18 +56,7 @@ def build_satellite_problem(
         place=opportunities.place[rows],
         start_s=start_s,
         end_s=end_s,
-        transitions=Transitions(
-            start_s=start_s,
-            end_s=end_s,
-            looks=looks,
-            looked=looked,
-            moves=moves,
-            moved=moved,
-            slews=slews_of(agility),
-            acceleration_deg_s2=float(agility.acceleration_deg_s2 or 0.0)
-            if agility.tracks
-            else 0.0,
-        ),
+        transitions=transitions,
         sunlight=sunlight,
         event_s=start_s if events is None else events[0],
         event=np.arange(len(rows), dtype=np.int32) if events is None else events[1],
@@ -82,11 +67,27 @@ def build_satellite_problem(
             sun,
             start_s=start_s,
             end_s=end_s,
-            looks=looks,
-            looked=looked,
-            moves=moves,
-            moved=moved,
+            looks=transitions.looks,
+            looked=transitions.looked,
+            moves=transitions.moves,
+            moved=transitions.moved,
         ),
         volume=volume,
         heading=heading,
+    )
+
+
+def _transitions(opportunities: Opportunities, rows: Ints, agility: Agility) -> Transitions:
+    """Return how a satellite turns from one of its tasks to the next."""
+    own = rows if agility.tracks else rows[:0]
+    acceleration_deg_s2 = agility.acceleration_deg_s2 if agility.tracks else None
+    return Transitions(
+        start_s=opportunities.start_s[rows],
+        end_s=opportunities.end_s[rows],
+        looks=np.ascontiguousarray(opportunities.los_start[rows]),
+        looked=np.ascontiguousarray(opportunities.los_end[rows]),
+        moves=opportunities.los_rate_start[own].astype(np.float64),
+        moved=opportunities.los_rate_end[own].astype(np.float64),
+        slews=slews_of(agility),
+        acceleration_deg_s2=float(acceleration_deg_s2 or 0.0),
     )

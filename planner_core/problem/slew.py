@@ -7,7 +7,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from planner_core.jit import inlined, kernel
+from planner_core.jit import inlined, inner, kernel
 
 Floats = npt.NDArray[np.float64]
 Vector = Floats | tuple[float, float, float]
@@ -19,7 +19,7 @@ INSTANT = 0.0
 """Acceleration value that means "no limit" inside kernels."""
 
 
-@inlined  # of arrays and of tuples
+@inlined
 def angle_between_deg(u: Vector, v: Vector) -> float:
     """Return the angle between two unit vectors; exact for small and for straight angles."""
     cx = u[1] * v[2] - u[2] * v[1]
@@ -60,7 +60,7 @@ def slew_s(angle_deg: float, rate_deg_s: float, acceleration_deg_s2: float) -> f
     return angle_deg / rate_deg_s + rate_deg_s / acceleration_deg_s2
 
 
-@kernel
+@inner
 def reach_deg(room_s: float, rate_deg_s: float, acceleration_deg_s2: float) -> float:
     """Return the largest angle, up to 180 degrees, that can be turned through in some time.
 

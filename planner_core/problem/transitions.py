@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from planner_core.bundles import bundle
 from planner_core.domain import Agility
-from planner_core.jit import borrowing, kernel
+from planner_core.jit import borrowing, borrowing_inner, kernel
 from planner_core.problem.moving import longest_turn_s, rotation_deg, turns_in
 from planner_core.problem.slew import (
     INSTANT,
@@ -130,7 +130,7 @@ def _least_cosines(rate_deg_s: float, acceleration_deg_s2: float, per_s: float) 
     return cosines
 
 
-@borrowing
+@borrowing_inner
 def turns_within(slews: Slews, room_s: float, looked: Vector, looks: Vector) -> bool:
     """Return whether the satellite turns from one line of sight to another in some time.
 

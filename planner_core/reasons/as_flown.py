@@ -28,6 +28,7 @@ from planner_core.problem.pointing import (
 )
 from planner_core.problem.retimed import Retimed, offered, with_starts
 from planner_core.reasons.reason import Reason
+from planner_core.sorting import first_not_below
 
 
 def as_flown(problem: Problem, plan: Plan, targets: Longs) -> tuple[Retimed, Plan]:
@@ -101,7 +102,7 @@ def _first_starts(
     """Return, access by access, its first start after each task around it."""
     access, found = [np.int32(0) for _ in range(0)], [0.0 for _ in range(0)]
     for c in range(len(target)):
-        i = np.searchsorted(start_s, open_s[c])
+        i = first_not_below(start_s, open_s[c])
         while i > 0 and end_s[i - 1] > open_s[c] - 180.0 / agile.rate_deg_s:
             i -= 1
         i -= 1

@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from planner_core.jit import borrowing
+from planner_core.jit import borrowing, borrowing_inner
 from planner_core.mdp.track import (
     NO_TASK,
     STRICT,
@@ -118,7 +118,7 @@ def _displace_each(
             dropped[c, drops[i]] = is_needed
 
 
-@borrowing
+@borrowing_inner
 def _first_break(
     track: Track, plan: Sequence, dropped: Bools, c: int, row: int, at: int, begin: int, end: int
 ) -> tuple[int, int]:
@@ -155,7 +155,7 @@ def _first_break(
     return -1, FITS
 
 
-@borrowing
+@borrowing_inner
 def _least(
     track: Track, plan: Sequence, dropped: Bools, c: int, row: int, at: int, until: int
 ) -> int:
@@ -172,7 +172,7 @@ def _least(
     return found
 
 
-@borrowing
+@borrowing_inner
 def _may_stand(
     track: Track,
     plan: Sequence,

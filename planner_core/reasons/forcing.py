@@ -17,7 +17,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from planner_core.bundles import bundle
-from planner_core.jit import borrowing, inlined, kernel
+from planner_core.jit import borrowing, inlined, inner, kernel
 from planner_core.mdp.track import (
     NO_TASK,
     STRICT,
@@ -312,10 +312,13 @@ def waited(track: Track, last: int, until_s: float) -> float:
 
 @inlined
 def _angle_deg(los_end: Floats, a: int, los_start: Floats, b: int) -> float:
-    return angle_between_deg(los_end[a], los_start[b])
+    return angle_between_deg(
+        (los_end[a, 0], los_end[a, 1], los_end[a, 2]),
+        (los_start[b, 0], los_start[b, 1], los_start[b, 2]),
+    )
 
 
-@kernel
+@inner
 def _rate_for(angle_deg: float, available_s: float, acceleration_deg_s2: float) -> float:
     """Return a rate, in whole thousandths, that turns through an angle in time."""
     if available_s <= 0.0:

@@ -89,25 +89,36 @@ class Rules(NamedTuple):
     contact_above: float
 
 
+@bundle
+class Search(NamedTuple):
+    """What a search looks at and changes while it runs.
+
+    Attributes
+    ----------
+    worth
+        Of each task. Shape ``(m,)``.
+    collected
+        1 for targets that are imaged already. Shape ``(num_targets,)``.
+    chosen
+        Room for the tasks of A(s) at each depth. Shape ``(depth * breadth,)``.
+    """
+
+    track: Track
+    guidance: Guidance
+    rules: Rules
+    worth: Floats
+    collected: Bytes
+    chosen: Ints
+    stop: Bytes
+
+
 @borrowing
 def _select_action(
-    track: Track,
-    guidance: Guidance,
-    rules: Rules,
-    worth: Floats,
-    collected: Bytes,
-    chosen: Ints,
-    stop: Bytes,
-    cursor: int,
-    last: int,
-    battery: float,
-    recorder: float,
-    depth: int,
+    search: Search, cursor: int, last: int, battery: float, recorder: float, depth: int
 ) -> tuple[int, float, int]:
-    """Return the best action, its value, and the first row of A(s); see ``select_action``.
-
-    ``chosen`` is room for the tasks of A(s) at each depth; shape ``(depth * breadth,)``.
-    """
+    """Return the best action, its value, and the first row of A(s); see ``select_action``."""
+    track, guidance, rules = search.track, search.guidance, search.rules
+    worth, collected, chosen = search.worth, search.collected, search.chosen
     m = len(track.start_s)
     best, v_best, first = NOTHING, -np.inf, m
     if depth == 0:
@@ -120,7 +131,7 @@ def _select_action(
             track, last, row + 1, battery, recorder, rules.is_hard, collected,
             rules.unimaged_only, rules.contact_above,
         )  # fmt: skip
-        if row == m or stop[0]:
+        if row == m or search.stop[0]:
             break
         if is_repeated(track, chosen, begin, end, row):
             continue
@@ -146,9 +157,8 @@ def _select_action(
             if is_new:
                 collected[place] = 1
             a_next, v_next, first_next = _select_action(
-                track, guidance, rules, worth, collected, chosen,
-                stop, row, row, battery_after, recorder_after, depth - 1,
-            )  # fmt: skip
+                search, row, row, battery_after, recorder_after, depth - 1
+            )
             if is_new:
                 collected[place] = 0
             if rules.is_discounted_by_next and a_next != NOTHING:
@@ -165,9 +175,8 @@ def _select_action(
         v = guidance.sunpoint_reward_per_s * waited_s
         if depth > 1:
             a_next, v_next, first_next = _select_action(
-                track, guidance, rules, worth, collected, chosen,
-                stop, first, last, battery, recorder, depth - 1,
-            )  # fmt: skip
+                search, first, last, battery, recorder, depth - 1
+            )
             if rules.is_discounted_by_next and a_next != NOTHING:
                 row_next = first_next if a_next == WAIT else a_next
                 waited_s = track.start_s[row_next] - now_s
@@ -336,13 +345,11 @@ class ForwardSearch:
             contact_above=self.contact_above_fraction,
         )
         chosen = np.empty(self.depth * breadth, dtype=np.int32)
+        search = Search(track, guidance, rules, worth, collected, chosen, budget.stop)
         taken: list[int] = []
         reward = 0.0
         while not budget.is_spent():
-            action, _, first = _select_action(
-                track, guidance, rules, worth, collected, chosen, budget.stop,
-                cursor, last, battery, recorder, self.depth,
-            )  # fmt: skip
+            action, _, first = _select_action(search, cursor, last, battery, recorder, self.depth)
             # A search that was stopped half way has not compared all its actions.
             if action == NOTHING or budget.is_spent():
                 break

@@ -9,7 +9,6 @@ import numpy as np
 
 from planner_core.budget import Budget
 from planner_core.certified.lns.search import polished
-from planner_core.draws import draws_of
 from planner_core.mdp.model import (
     IMAGE_NEEDS,
     WAIT,
@@ -27,9 +26,8 @@ from planner_core.solvers.base import (
     Outlook,
     Solution,
 )
-from planner_core.solvers.mcts_choices import Rules
-from planner_core.solvers.mcts_simulate import Path, Step, search, sunpoint_instead
-from planner_core.solvers.mcts_successors import no_successors
+from planner_core.solvers.mcts_choices import Rules, step_for
+from planner_core.solvers.mcts_simulate import search, sunpoint_instead
 from planner_core.solvers.mcts_tree import (
     UNSEEN,
     Tree,
@@ -219,9 +217,9 @@ class Mcts:
             solution = with_choices(problem, solution, budget, seed)
         return polished(problem, solution, self.window_moves_per_task, budget)
 
-    def _plan_turn(self, turn: Turn, worth: Floats, budget: Budget, seed: int) -> list[int]:
-        track, collected = turn.track, turn.collected
-        guidance = Guidance(
+    @property
+    def _guidance(self) -> Guidance:
+        return Guidance(
             gamma=self.gamma,
             contact_reward_per_s=self.contact_reward_per_s,
             sunpoint_reward_per_s=self.sunpoint_reward_per_s,
@@ -229,7 +227,10 @@ class Mcts:
             is_contact_by_wait=self.contact_counts == "wait",
             image_needs=IMAGE_NEEDS.index(self.image_needs),
         )
-        rules = Rules(
+
+    @property
+    def _rules(self) -> Rules:
+        return Rules(
             depth=self.depth,
             breadth=self.breadth + (self.breadth_counts == "one_more"),
             exploration=self.exploration,
@@ -241,6 +242,10 @@ class Mcts:
             is_max_backup=self.backup == "max",
             contact_above=self.contact_above_fraction,
         )
+
+    def _plan_turn(self, turn: Turn, worth: Floats, budget: Budget, seed: int) -> list[int]:
+        track, collected = turn.track, turn.collected
+        guidance, rules = self._guidance, self._rules
         # A state stays in the tree for at most ``depth`` steps, so no more ever hang together.
         # Where that is more than memory should hold, the rest is sampled by rollouts alone.
         num_nodes = min(
@@ -251,23 +256,7 @@ class Mcts:
         trees = [empty_tree(num_nodes, num_edges) for _ in range(2)]
         tree, spare = trees
         new_node(tree, NO_TASK, NO_TASK, track.battery_start, track.recorder_start)
-        # Without resources alone A(s) hangs on the last task only.
-        successors = no_successors(
-            0 if track.use_resources else len(track.start_s), collected.copy()
-        )
-        random = draws_of(seed)
-        path = Path(
-            edge=np.empty(self.depth, dtype=np.int32),
-            action=np.empty(self.depth, dtype=np.int32),
-            image=np.empty(self.depth, dtype=np.int32),
-            reward=np.empty(self.depth),
-            discount=np.empty(self.depth),
-            options=np.empty(rules.breadth + 1, dtype=np.int32),
-        )
-        step = Step(
-            track, rules, guidance, successors, worth, collected, random, path,
-            best=np.full(1, -np.inf), best_actions=np.full(self.depth, NO_TASK, dtype=np.int32),
-        )  # fmt: skip
+        step = step_for(track, rules, guidance, worth, collected, seed)
         taken: list[int] = []
         reward = 0.0
         while not budget.is_spent():
@@ -289,7 +278,7 @@ class Mcts:
                     and not collected[place]
                     and (self.image_needs == "nothing" or counts_as_made(track, guidance, *levels))
                 ):
-                    collected[place] = successors.imaged[place] = 1
+                    collected[place] = step.successors.imaged[place] = 1
                     reward += float(worth[action])
             step.best[0] = -np.inf
             copy_branch(tree, spare, child)

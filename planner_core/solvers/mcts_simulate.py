@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import Final
 
-from planner_core.bundles import bundle
-from planner_core.draws import Uint64s
-from planner_core.jit import borrowing
+from planner_core.jit import borrowing, borrowing_inner
 from planner_core.mdp.actions import may_wait
 from planner_core.mdp.model import (
     WAIT,
-    Guidance,
     counts_as_made,
     task_reward,
 )
-from planner_core.mdp.track import Track, take
-from planner_core.problem import Bytes, Floats, Ints
+from planner_core.mdp.track import take
+from planner_core.problem import Bytes
 from planner_core.solvers.mcts_choices import (
-    Rules,
+    Step,
     expand,
     greedy_action,
     random_action,
 )
-from planner_core.solvers.mcts_successors import Successors
 from planner_core.solvers.mcts_tree import (
     ROLLED_OUT,
     UNSEEN,
@@ -37,48 +33,10 @@ ROOT: Final = 0
 """The node of the state that a step begins with."""
 
 
-@bundle
-class Path(NamedTuple):
-    """Room for one simulation; shape ``(depth,)``, ``options`` of ``(breadth + 1,)``."""
-
-    edge: Ints
-    action: Ints
-    image: Ints
-    reward: Floats
-    discount: Floats
-    options: Ints
-
-
-@bundle
-class Step(NamedTuple):
-    """What the simulations of one step look at, beside the tree, and what they leave.
-
-    Attributes
-    ----------
-    worth
-        Of each task. Shape ``(m,)``.
-    collected
-        Targets that are imaged already. Shape ``(num_targets,)``.
-    best, best_actions
-        The greatest return so far, and the sequence that earned it. Shape ``(1,)``, ``(depth,)``.
-    """
-
-    track: Track
-    rules: Rules
-    guidance: Guidance
-    successors: Successors
-    worth: Floats
-    collected: Bytes
-    random: Uint64s
-    path: Path
-    best: Floats
-    best_actions: Ints
-
-
-@borrowing
+@borrowing_inner
 def _simulate(tree: Tree, step: Step) -> None:
     """SIMULATE and ROLLOUT from the root; keeps the sequence of greatest return in ``best``."""
-    track, rules, guidance, successors = step.track, step.rules, step.guidance, step.successors
+    track, rules, guidance = step.track, step.rules, step.guidance
     worth, collected, path = step.worth, step.collected, step.path
     m = len(track.start_s)
     depth = rules.depth
@@ -96,23 +54,17 @@ def _simulate(tree: Tree, step: Step) -> None:
             if node != ROOT and not has_room(tree, rules.breadth):
                 is_rollout = True
             elif is_met:
-                expand(tree, track, rules, guidance, successors, collected, node)
+                expand(tree, step, node)
             else:
                 tree.first_edge[node] = ROLLED_OUT
                 is_rollout = True
         discount = 0.0
         if is_rollout:
             if rules.is_greedy:
-                action, discount = greedy_action(
-                    track, rules, guidance, successors, collected,
-                    cursor, last, battery, recorder,
-                )  # fmt: skip
+                action, discount = greedy_action(step, cursor, last, battery, recorder)
                 first = action
             else:
-                action, first = random_action(
-                    track, rules, guidance, successors, collected, step.random, path.options,
-                    cursor, last, battery, recorder,
-                )  # fmt: skip
+                action, first = random_action(step, cursor, last, battery, recorder)
             if action == m:
                 break
         else:

@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from planner_core.bundles import bundle
-from planner_core.jit import borrowing, inlined
+from planner_core.jit import borrowing_inner, inlined
 from planner_core.mdp.actions import is_repeated, next_action
 from planner_core.mdp.track import Track
 from planner_core.problem import Bytes, Floats, Ints
@@ -56,7 +56,7 @@ def no_successors(num_rows: int, imaged: Bytes) -> Successors:
     )
 
 
-@borrowing
+@borrowing_inner
 def _find(
     successors: Successors, track: Track, gamma: float, unimaged_only: bool, last: int
 ) -> None:

@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from planner_core.bundles import bundle
-from planner_core.jit import borrowing, kernel
+from planner_core.jit import borrowing, borrowing_inner, kernel
 from planner_core.problem import Floats, Ints
 
 UNSEEN: Final = -1
@@ -56,7 +56,7 @@ def new_node(tree: Tree, cursor: int, last: int, battery: float, recorder: float
     return node
 
 
-@borrowing
+@borrowing_inner
 def new_edge(tree: Tree, node: int, action: int) -> None:
     """Add an action at the end of those of ``node``, with N = Q = 0."""
     edge = tree.used[1]
@@ -68,7 +68,7 @@ def new_edge(tree: Tree, node: int, action: int) -> None:
     tree.value[edge] = 0.0
 
 
-@borrowing
+@borrowing_inner
 def has_room(tree: Tree, breadth: int) -> bool:
     """Return whether a state below the root may be added or expanded.
 
@@ -79,7 +79,7 @@ def has_room(tree: Tree, breadth: int) -> bool:
     return nodes_left >= breadth + 3 and actions_left >= 2 * (breadth + 2)
 
 
-@borrowing
+@borrowing_inner
 def choose(tree: Tree, node: int, exploration: float) -> int:
     """Line 11: the edge of greatest upper confidence; one that was never tried comes first."""
     first = int(tree.first_edge[node])

@@ -28,8 +28,7 @@ from planner_core.problem import (
 )
 from planner_core.referee.replay import replay
 from planner_core.solvers.base import Solver
-from planner_core.solvers.mcts_choices import Rules, expand, greedy_action
-from planner_core.solvers.mcts_successors import no_successors
+from planner_core.solvers.mcts_choices import Rules, expand, greedy_action, step_for
 from planner_core.solvers.mcts_tree import empty_tree, new_node
 from planner_core.solvers.registry import (
     ForwardSearch,
@@ -150,23 +149,24 @@ def test_what_may_follow_a_task_is_the_same_when_it_is_remembered(
         is_per_decision=False, is_literal=False, is_greedy=True, is_max_backup=True,
         contact_above=0.0,
     )  # fmt: skip
-    successors = no_successors(m, np.zeros(len(problem.target_ids), dtype=np.uint8))
+    nothing = np.zeros(len(problem.target_ids), dtype=np.uint8)
+    remembered = step_for(track, rules, GUIDANCE, problem.worth[satellite.rows], nothing, 0)
+    successors = remembered.successors
     for _ in range(40):
         # The plan takes a target now and then, and a simulation some more of them.
         successors.imaged[rng.integers(len(successors.imaged))] = 1
         collected = successors.imaged | (rng.random(len(successors.imaged)) < 0.3)
         last = int(rng.integers(-1, m // 2))
         cursor = last if rng.integers(4) else int(rng.integers(last, m))
-        row, discount = greedy_action(
-            track, rules, GUIDANCE, successors, collected, cursor, last, 0.0, 0.0
-        )
+        step = remembered._replace(collected=collected)
+        row, discount = greedy_action(step, cursor, last, 0.0, 0.0)
         assert row == naive_select_action(track, collected, True, True, 0.0, cursor, last, 0.0, 0.0)
         if discount != 0.0:
             since_s = track.start_s[last] if last >= 0 else 0.0
             assert discount == pytest.approx(GUIDANCE.gamma ** (track.start_s[row] - since_s))
         tree = empty_tree(1, breadth + 1)
         new_node(tree, cursor, last, 0.0, 0.0)
-        expand(tree, track, rules, GUIDANCE, successors, collected, 0)
+        expand(tree, step, 0)
         expected: list[int] = []
         seen: set[int] = set()
         for b in range(cursor + 1, m):

@@ -1,4 +1,4 @@
-"""The engine stays small: its constants, its functions and its kernels are counted."""
+"""The engine stays small: its constants are counted."""
 
 from __future__ import annotations
 
@@ -18,32 +18,8 @@ MODULES: Final = {str(path.relative_to(ENGINE)): path for path in sorted(ENGINE.
 NUMBERS: Final = {"signs.py", "sizes.py", "tolerances.py", "tuning.py"}
 """Modules whose business is numbers."""
 
-_KERNELS: Final = {"kernel", "borrowing", "inlined"}
 _MOST_CONSTANTS: Final = 60
-_MOST_LINES, _MOST_LINES_OF_A_KERNEL, _MOST_ARGUMENTS = 60, 100, 10
 _ALLOWED: Final = {"VERSION"}  # of documents
-_LARGER: Final = {
-    "dp/forward_labels.py most_value": (101, 11),
-    "dp/forward_labels.py _take": (100, 13),
-    "dp/start_labels.py _insert": (100, 11),
-    "lns/resource_labels.py _extend": (100, 11),
-}
-"""Lines and arguments of kernels that are larger still: they may not grow, and none may join."""
-
-
-def lines_of(function: ast.FunctionDef, source: list[str]) -> int:
-    """Return how many lines of code a function has: neither docstring, comments nor blank ones."""
-    first, last = function.lineno, function.end_lineno or function.lineno
-    docstring = range(0)
-    if ast.get_docstring(function) is not None:
-        docstring = range(function.body[0].lineno, (function.body[0].end_lineno or 0) + 1)
-    code = (source[at - 1].strip() for at in range(first, last + 1) if at not in docstring)
-    return sum(1 for line in code if line and not line.startswith("#"))
-
-
-def is_kernel(function: ast.FunctionDef) -> bool:
-    """Return whether a function is compiled."""
-    return any(ast.unparse(each) in _KERNELS for each in function.decorator_list)
 
 
 def numbers_named_in(tree: ast.Module) -> Iterator[str]:
@@ -92,19 +68,3 @@ def test_every_constant_is_read() -> None:
 def test_numbers_that_steer_stand_in_the_tuning_alone(module: str) -> None:
     tree = ast.parse(MODULES[module].read_text(encoding="utf-8"))
     assert set(numbers_named_in(tree)) <= _ALLOWED
-
-
-@pytest.mark.parametrize("module", MODULES)
-def test_functions_are_short_and_kernels_take_few_arguments(module: str) -> None:
-    text = MODULES[module].read_text(encoding="utf-8")
-    source = text.splitlines()
-    for function in ast.walk(ast.parse(text)):
-        if not isinstance(function, ast.FunctionDef):
-            continue
-        most, most_arguments = _MOST_LINES, None
-        if is_kernel(function):
-            usual = (_MOST_LINES_OF_A_KERNEL, _MOST_ARGUMENTS)
-            most, most_arguments = _LARGER.get(f"{module} {function.name}", usual)
-        assert lines_of(function, source) <= most, function.name
-        arguments = len(function.args.args) + len(function.args.kwonlyargs)
-        assert most_arguments is None or arguments <= most_arguments, function.name

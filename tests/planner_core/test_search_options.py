@@ -17,8 +17,7 @@ from planner_core.mdp.track import Track, compile_track
 from planner_core.problem import COLLECT, CONTACT, Problem
 from planner_core.referee.replay import replay
 from planner_core.solvers.base import Solver
-from planner_core.solvers.mcts_choices import Rules, expand
-from planner_core.solvers.mcts_successors import no_successors
+from planner_core.solvers.mcts_choices import Rules, expand, step_for
 from planner_core.solvers.mcts_tree import empty_tree, new_node
 from planner_core.solvers.registry import ForwardSearch, Mcts, Rule
 from tests.examples import examples
@@ -66,7 +65,7 @@ def test_the_actions_of_a_state_are_of_different_accesses_in_model_and_tree(
         contact_above=contact_above,
     )  # fmt: skip
     imaged = np.zeros(len(problem.target_ids), dtype=np.uint8)
-    successors = no_successors(len(problem.opportunities), imaged)
+    step = step_for(track, rules, model.guidance, problem.worth, imaged, 0)
     while actions := model.actions(state, breadth):
         tasks = [row for row in actions if row != WAIT]
         accesses = problem.opportunities.access[problem.satellites[0].rows[tasks]]
@@ -75,7 +74,7 @@ def test_the_actions_of_a_state_are_of_different_accesses_in_model_and_tree(
         collected[list(state.collected)] = 1
         tree = empty_tree(1, breadth + 1)
         new_node(tree, state.cursor, state.last, state.battery, state.recorder)
-        expand(tree, track, rules, model.guidance, successors, collected, 0)
+        expand(tree, step._replace(collected=collected), 0)
         assert tree.action[: tree.num_edges[0]].tolist() == actions
         state = model.step(state, tasks[-1], tasks[0]).state
 

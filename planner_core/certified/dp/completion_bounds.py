@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from planner_core.certified.dp.resource_network import Network
-from planner_core.jit import inlined, kernel
+from planner_core.jit import inner, kernel
 from planner_core.problem import Ints, Singles
 
 
@@ -34,7 +34,8 @@ def least_energy(network: Network, weight: Ints, top: int) -> tuple[Singles, Sin
     reached = np.zeros(m, dtype=np.int64)
     for k in range(m - 1, -1, -1):
         own = after[k]
-        own[:] = idle[network.idle_from[k]]
+        for x in range(top + 1):
+            own[x] = idle[network.idle_from[k], x]
         furthest = reach[network.idle_from[k]]
         for at in range(network.near_first[k], network.near_first[k + 1]):
             j = network.near_rows[at]
@@ -53,7 +54,7 @@ def least_energy(network: Network, weight: Ints, top: int) -> tuple[Singles, Sin
     return idle, after
 
 
-@inlined
+@inner
 def _lower_by_taking(
     network: Network, row: int, weight: int, give: float, after: Singles, values: Singles
 ) -> None:

@@ -26,7 +26,7 @@ from planner_core.certified.dp.energy_labels import (
 from planner_core.certified.dp.resource_network import Network
 from planner_core.certified.signs import NEVER
 from planner_core.certified.sizes import MAX_LAYERS
-from planner_core.jit import kernel
+from planner_core.jit import inner, kernel
 from planner_core.problem import Floats, Ints, Longs
 
 
@@ -116,7 +116,7 @@ def most_by_contacts(
     return best, *_path_to(network, levels, layers, weight, tables, last)
 
 
-@kernel
+@inner
 def fill_layer(
     network: Network,
     levels: EnergyLevels,
@@ -145,18 +145,20 @@ def fill_layer(
         if number >= 0 and layers.group[k] != layer:
             # It ends an earlier layer, and begins this one.
             num_own[k] = tables.num_at_contact[number]
-            own[k, : num_own[k]] = tables.at_contact[number, : num_own[k]]
+            for x in range(num_own[k]):
+                own[k, x] = tables.at_contact[number, x]
         else:
             num_own[k] = _take(network, levels, k, weight[layer, k], idle, base, own, num_own)
         if number >= 0 and layers.group[k] == layer:
             tables.num_at_contact[number] = num_own[k]
-            tables.at_contact[number, : num_own[k]] = own[k, : num_own[k]]
+            for x in range(num_own[k]):
+                tables.at_contact[number, x] = own[k, x]
         if num_own[k] > 0 and own[k, 0] > best:
             best, last = own[k, 0], k
     return best, last
 
 
-@kernel
+@inner
 def _take(
     network: Network,
     levels: EnergyLevels,
@@ -182,11 +184,12 @@ def _take(
     values[:low] = values[low]
     while high > 0 and values[high - 1] == -np.inf:
         high -= 1
-    values[:high] += weight
+    for x in range(high):
+        values[x] += weight
     return int(high)
 
 
-@kernel
+@inner
 def _path_to(
     network: Network,
     levels: EnergyLevels,

@@ -16,7 +16,7 @@ from planner_core.certified.dp.contact_layers import Layers, Tables, fill_layer
 from planner_core.certified.dp.energy_labels import EnergyLevels
 from planner_core.certified.dp.resource_network import Network
 from planner_core.certified.signs import NEVER
-from planner_core.jit import inlined, kernel
+from planner_core.jit import inlined, inner, kernel
 from planner_core.problem import Floats
 
 
@@ -89,7 +89,7 @@ def most_by_pairs(network: Network, levels: EnergyLevels, layers: Layers, weight
     return most
 
 
-@kernel
+@inner
 def _fill_backward(
     network: Network,
     levels: EnergyLevels,
@@ -108,7 +108,8 @@ def _fill_backward(
         number, after, following = layers.number[k], completions.after[k], completions.following[k]
         later = network.idle_from[k]
         if number == layer:
-            after[:] = completions.best[number]
+            for x in range(width):
+                after[x] = completions.best[number, x]
         elif later < m:
             _raise_from(
                 after, completions.following[later], levels.lowest[k] - levels.lowest[later]
@@ -137,7 +138,7 @@ def _raise_from(values: Floats, others: Floats, up: int) -> None:
         values[x] = max(values[x], others[min(x + up, last)])
 
 
-@kernel
+@inner
 def _extend_backward(
     network: Network, levels: EnergyLevels, k: int, weight: float, completions: _Completions
 ) -> None:

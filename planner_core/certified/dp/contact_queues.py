@@ -24,7 +24,7 @@ from planner_core.certified.dp.resource_network import Network
 from planner_core.certified.signs import ANYWHERE, AT_START, UNREACHED_UNITS
 from planner_core.certified.sizes import MAX_QUEUE_ENTRIES
 from planner_core.certified.tolerances import LEVEL
-from planner_core.jit import inlined, kernel
+from planner_core.jit import inlined, inner, kernel
 from planner_core.problem import Bytes, Floats, Ints
 
 
@@ -173,7 +173,7 @@ def _listed(q: Queues, top: int, level: int, promised: int) -> int:
     return int(level + (promised - 1) * (q.data.num_levels - top))
 
 
-@kernel
+@inner
 def _fill(q: Queues, layer: int, source: int, tables: _Tables) -> tuple[int, int, int]:
     """Fill the tables of a layer with paths from one contact, from the start, or from any.
 
@@ -228,27 +228,30 @@ def _fill(q: Queues, layer: int, source: int, tables: _Tables) -> tuple[int, int
     return best, last, level
 
 
-@kernel
+@inner
 def _begin_with(q: Queues, tables: _Tables, k: int, number: int, layer: int) -> None:
     """Go on in a layer from the contact that ended an earlier one."""
     table, states = tables.own[k % len(tables.own)], tables.at_contact[number]
     tables.low[k], tables.high[k] = 0, q.data.num_levels - 1
     promised = min(layer - number, q.num_classes)
     for y in range(q.data.num_levels):
-        table[y] = np.maximum(states[0, y], states[promised, y])
+        for x in range(table.shape[1]):
+            table[y, x] = max(states[0, y, x], states[promised, y, x])
 
 
-@kernel
+@inner
 def _spread(q: Queues, tables: _Tables, k: int, top: int) -> None:
     """List the higher levels of a table once for each promise."""
     table, beyond = tables.own[k % len(tables.own)], q.data.num_levels - top
     for promised in range(2, q.num_classes + 1):
         first = _listed(q, top, top, promised)
-        table[first : first + beyond] = table[top : top + beyond]
+        for y in range(beyond):
+            for x in range(table.shape[1]):
+                table[first + y, x] = table[top + y, x]
         tables.high[k] = first + beyond - 1
 
 
-@kernel
+@inner
 def _stretch(q: Queues, layer: int, source: int) -> tuple[int, int]:
     """Return the tasks of a layer that paths from a contact, or from any, may take."""
     end = q.contact[layer] + 1 if layer < len(q.contact) else len(q.number)
@@ -256,7 +259,7 @@ def _stretch(q: Queues, layer: int, source: int) -> tuple[int, int]:
     return (q.contact[source] if source >= 0 else begin), end
 
 
-@kernel
+@inner
 def _earn(q: Queues, k: int, layer: int, earned: Ints) -> bool:
     """Fill in the units that a task adds by the level of data after it, and say whether any may.
 
@@ -278,7 +281,7 @@ def _earn(q: Queues, k: int, layer: int, earned: Ints) -> bool:
     return is_any
 
 
-@kernel
+@inner
 def _down_s(q: Queues, layer: int, promised: int, amount: float) -> float:
     """Return when so much of a queue may be down; infinite for never."""
     if layer == len(q.contact):
@@ -312,7 +315,7 @@ def _later_down_s(q: Queues, after: int, at: int) -> float:
     return earliest_s
 
 
-@kernel
+@inner
 def _take(
     q: Queues,
     k: int,
@@ -358,11 +361,12 @@ def _take(
                     _raise(tables, k, target, before, least, most, up)
     for y in range(low[k], high[k] + 1):
         table[y, :least] = table[y, least]
-        table[y, :most] += 0 if is_end else earned[y]
+        for x in range(most):
+            table[y, x] += 0 if is_end else earned[y]
         table[y, most:] = UNREACHED_UNITS
 
 
-@inlined
+@inner
 def _raise(tables: _Tables, k: int, to: int, before: Ints, least: int, most: int, up: int) -> None:
     """Extend paths at one level by a task, to another level."""
     table, low, high = tables.own[k % len(tables.own)], tables.low, tables.high
@@ -383,7 +387,7 @@ def _level_after(data: DataLevels, k: int, level: int) -> int:
     return int(max(data.floor[k], level + data.gain[k], 0))
 
 
-@kernel
+@inner
 def _path_to(q: Queues, tables: _Tables, units: int, last: int, level: int) -> Ints:
     """Return the rows of a path in the last layer, worked out backward.
 
@@ -418,7 +422,7 @@ def _path_to(q: Queues, tables: _Tables, units: int, last: int, level: int) -> I
     return rows[:length][::-1].copy()
 
 
-@kernel
+@inner
 def _look_back(q: Queues, tables: _Tables, layer: int, source: int, at: Ints) -> None:
     """Say where a contact that a layer began with is listed in its own."""
     level, _ = _level_of(q, _top_of(q, layer), at[1])
@@ -436,7 +440,7 @@ def _value_at(q: Queues, tables: _Tables, k: int, listed: int, energy: int) -> i
     return int(tables.own[k % len(tables.own), listed, x])
 
 
-@kernel
+@inner
 def _trace(
     q: Queues, layer: int, source: int, tables: _Tables, at: Ints, rows: Ints, length: int
 ) -> int:

@@ -23,7 +23,7 @@ import numpy.typing as npt
 from planner_core.bundles import bundle
 from planner_core.certified.signs import NOWHERE
 from planner_core.certified.sizes import MEMORY_BITS
-from planner_core.jit import borrowing, kernel
+from planner_core.jit import borrowing, borrowing_inner, kernel
 from planner_core.precedence.arcs import ArcNetwork, arc_network_of
 from planner_core.problem import (
     COLLECT,
@@ -169,7 +169,7 @@ def labels_for(network: ArcNetwork, memory: Memory) -> Labels:
     )
 
 
-@borrowing
+@borrowing_inner
 def label_part(
     network: ArcNetwork, memory: Memory, weight: Floats, labels: Labels, part: int
 ) -> tuple[float, int]:
@@ -284,7 +284,7 @@ def label_part(
     return best_end, best_at
 
 
-@borrowing
+@borrowing_inner
 def _pass_on(
     labels: Labels, to: int, value: float, at: int, low: np.uint64, high: np.uint64
 ) -> None:
@@ -298,7 +298,7 @@ def _pass_on(
     labels.far_low[to], labels.far_high[to] = low, high
 
 
-@borrowing
+@borrowing_inner
 def _merged(
     value: float, at: int, low: np.uint64, high: np.uint64,
     other: float, other_at: int, other_low: np.uint64, other_high: np.uint64, bit_weight: Floats,
@@ -314,7 +314,7 @@ def _merged(
     return value, at, low, high
 
 
-@borrowing
+@borrowing_inner
 def _begun(start_bit: Ints, first: int, last: int) -> tuple[np.uint64, np.uint64]:
     """Return the bits of groups that began one after another."""
     low, high = np.uint64(0), np.uint64(0)
@@ -327,7 +327,7 @@ def _begun(start_bit: Ints, first: int, last: int) -> tuple[np.uint64, np.uint64
     return low, high
 
 
-@borrowing
+@borrowing_inner
 def _weight_of(low: np.uint64, high: np.uint64, bit_weight: Floats) -> float:
     """Return what a set of targets is worth."""
     total = 0.0

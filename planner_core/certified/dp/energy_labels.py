@@ -17,7 +17,7 @@ from planner_core.bundles import bundle
 from planner_core.certified.dp.resource_network import Network
 from planner_core.certified.sizes import MAX_ENERGY_LEVELS
 from planner_core.certified.tolerances import LEVEL
-from planner_core.jit import inlined, kernel
+from planner_core.jit import inlined, inner, kernel, templated
 from planner_core.problem import Floats, Ints, Longs
 
 Rounding = Literal["optimistic", "pessimistic", "nearest"]
@@ -186,14 +186,15 @@ def most_by_energy(
         values[:low] = values[low]
         while high > 0 and values[high - 1] == -np.inf:
             high -= 1
-        values[:high] += weight[k]
+        for x in range(high):
+            values[x] += weight[k]
         num_own[k] = high
         if high > 0 and own[k, 0] > best:
             best, last = own[k, 0], k
     return best, _path_to(network, levels, weight, own, num_own, last)
 
 
-@inlined
+@templated
 def sink(idle: Floats | Ints, levels: int) -> None:
     """Let the lowest level be so much lower: whoever has more energy has that much as well."""
     if levels > 0:
@@ -205,7 +206,7 @@ def sink(idle: Floats | Ints, levels: int) -> None:
             idle[x] = lowest
 
 
-@inlined
+@templated
 def raise_to(values: Floats | Ints, others: Floats | Ints, up: int) -> None:
     """Raise values to those of a table that begins ``up`` levels higher, or lower."""
     if len(others) == 0:
@@ -219,7 +220,7 @@ def raise_to(values: Floats | Ints, others: Floats | Ints, up: int) -> None:
         values[begin + x] = max(values[begin + x], others[skipped + x])
 
 
-@kernel
+@inner
 def _path_to(
     network: Network, levels: EnergyLevels, weight: Floats, own: Floats, num_own: Longs, last: int
 ) -> Ints:

@@ -10,11 +10,12 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from planner_core.bundles import bundle
 from planner_core.certified.dp.data_levels import DataLevels
 from planner_core.certified.dp.resource_network import Network, give_between, may_be_next
 from planner_core.certified.signs import STOPPED, UNREACHED
 from planner_core.certified.tuning import TUNING
-from planner_core.jit import inlined, kernel
+from planner_core.jit import borrowing_inner, inlined, inner, kernel
 from planner_core.problem import (
     Bytes,
     Floats,
@@ -38,32 +39,62 @@ class Labels(NamedTuple):
     energy: Floats
 
 
+@bundle
+class Goal(NamedTuple):
+    """What a path must gain at least, which tells labels that need no further look.
+
+    Attributes
+    ----------
+    units
+        That gain.
+    idle, after
+        What ``least_energy`` answered for at least as much: labels that cannot reach the goal
+        are dropped.
+    credit
+        How much less than the weights count there can be left to gain from each data level,
+        where data is priced there. Shape ``(num_levels,)``.
+    """
+
+    units: int
+    idle: Singles
+    after: Singles
+    credit: Ints
+
+
+class Reached(NamedTuple):
+    """The most energy with each data level and whole value, after one task or idle by now.
+
+    Attributes
+    ----------
+    energy
+        Values from ``first`` on. Shape ``(num_levels, num_values)``.
+    low, high
+        The lowest and the highest value there is at each level. Shape ``(num_levels,)``.
+    """
+
+    energy: Floats
+    first: int
+    low: Ints
+    high: Ints
+
+
 @kernel
 def most_value(
     network: Network,
     levels: DataLevels,
     weight: Ints,
-    idle_need: Singles,
-    after_need: Singles,
-    credit: Ints,
     end_cost: Ints,
+    goal: Goal,
     top: int,
-    goal: int,
     keeps_labels: bool,
     stop: Bytes,
 ) -> tuple[int, Labels]:
-    """Return the most value of any path, ``UNREACHED`` if that is below ``goal``, or ``STOPPED``.
+    """Return the most value of any path, ``UNREACHED`` if below the goal, or ``STOPPED``.
 
     Parameters
     ----------
     weight
         Whole worth of each task, not negative. Shape ``(m,)``.
-    idle_need, after_need
-        What ``least_energy`` answered for at least ``goal``: labels that cannot reach the goal
-        are dropped.
-    credit
-        How much less than these weights count there can be left to gain from each data level,
-        where data is priced there. Shape ``(num_levels,)``.
     end_cost
         What a path that ends at each data level gains less, not falling. Shape ``(num_levels,)``.
     top
@@ -71,112 +102,138 @@ def most_value(
     keeps_labels
         Whether to answer the labels as well, for ``path_of``; none otherwise.
     """
-    m = len(weight)
-    none = -np.inf
-    num_levels = levels.num_levels
-    idle = np.full((num_levels, top + 1), none)
+    m, num_levels = len(weight), levels.num_levels
     low = np.full(num_levels, top + 1, dtype=np.int32)
     high = np.full(num_levels, -1, dtype=np.int32)
+    energy = np.full((num_levels, top + 1), -np.inf)
     if levels.start < num_levels:
-        idle[levels.start, 0] = network.energy_start
+        energy[levels.start, 0] = network.energy_start
         low[levels.start], high[levels.start] = 0, 0
-    labels = [np.empty((0, 0)) for _ in range(m)]
+    idle = Reached(energy, 0, low, high)
+    energies = _none_yet(m)
     first_value = np.zeros(m, dtype=np.int64)
     own_low = np.full((m, num_levels), top + 1, dtype=np.int32)
     own_high = np.full((m, num_levels), -1, dtype=np.int32)
     best_so_far = np.empty(top + 1)
-    kept_first = np.zeros(m + 1, dtype=np.int64)
     capacity = 1024 if keeps_labels else 0
-    kept_value = np.empty(capacity, dtype=np.int32)
-    kept_level = np.empty(capacity, dtype=np.int32)
-    kept_energy = np.empty(capacity)
-    num_kept = 0
+    kept = Labels(
+        np.zeros(m + 1, dtype=np.int64),
+        np.empty(capacity, dtype=np.int32),
+        np.empty(capacity, dtype=np.int32),
+        np.empty(capacity),
+    )
     merged = 0
     for k in range(m):
         if stop[0]:
-            return STOPPED, Labels(kept_first, kept_value, kept_level, kept_energy)
+            return STOPPED, kept
         while merged < m and network.idle_from[network.by_idle[merged]] <= k:
             i = network.by_idle[merged]
-            _merge(labels[i], first_value[i], own_low[i], own_high[i], idle, low, high)
-            labels[i] = np.empty((0, 0))
+            _merge(Reached(energies[i], first_value[i], own_low[i], own_high[i]), idle)
+            energies[i] = np.empty((0, 0))
             merged += 1
         if k % _TIDY_EVERY == 0:
-            _tidy(idle, 0, low, high, idle_need[k], credit, goal, best_so_far)
-        kept_first[k + 1] = num_kept
-        # The values that any label of this task can have.
-        before, gained = levels.before[k], weight[k]
-        lowest, highest = top + 1, -1
-        for y in range(min(before + 1, num_levels)):
-            if low[y] <= high[y]:
-                lowest, highest = min(lowest, low[y]), max(highest, high[y])
-        for at in range(network.straight_first[k], network.straight_first[k + 1]):
-            i = network.straight_rows[at]
-            for y in range(min(before + 1, num_levels)):
-                if own_low[i, y] <= own_high[i, y]:
-                    lowest = min(lowest, own_low[i, y])
-                    highest = max(highest, own_high[i, y])
-        if lowest > highest or lowest + gained > top:
+            _tidy(idle, goal.idle[k], goal, best_so_far)
+        kept.first[k + 1] = kept.first[k]
+        lowest, highest = _span_of(network, levels, k, low, high, own_low, own_high)
+        lowest, highest = lowest + weight[k], min(top, highest + weight[k])
+        if lowest > highest:
             if network.is_kept[k]:
-                _forget(k, top, idle, low, high, own_low, own_high)
+                _forget(k, top, idle, own_low, own_high)
             continue
-        lowest, highest = lowest + gained, min(top, highest + gained)
-        own = np.full((num_levels, highest - lowest + 1), none)
-        labels[k], first_value[k] = own, lowest
-        _take(
-            network, levels, k, gained, 0.0, idle, 0, low, high,
-            own, lowest, own_low[k], own_high[k],
-        )  # fmt: skip
+        energy = np.full((num_levels, highest - lowest + 1), -np.inf)
+        energies[k], first_value[k] = energy, lowest
+        own = Reached(energy, lowest, own_low[k], own_high[k])
+        _take(network, levels, k, weight[k], 0.0, idle, own)
         for at in range(network.straight_first[k], network.straight_first[k + 1]):
             i = network.straight_rows[at]
-            _take(
-                network, levels, k, gained, network.straight_give[at],
-                labels[i], first_value[i], own_low[i], own_high[i],
-                own, lowest, own_low[k], own_high[k],
-            )  # fmt: skip
-        _tidy(own, lowest, own_low[k], own_high[k], after_need[k], credit, goal, best_so_far)
+            before = Reached(energies[i], first_value[i], own_low[i], own_high[i])
+            _take(network, levels, k, weight[k], network.straight_give[at], before, own)
+        _tidy(own, goal.after[k], goal, best_so_far)
         if network.is_kept[k]:
-            _forget(k, top, idle, low, high, own_low, own_high)
-        if not keeps_labels:
-            continue
-        for y in range(num_levels):
-            if num_kept + top + 1 > capacity:
-                capacity = 2 * capacity + top + 1
-                kept_value = _longer(kept_value, capacity)
-                kept_level = _longer(kept_level, capacity)
-                kept_energy = _longer(kept_energy, capacity)
-            for v in range(own_low[k, y], own_high[k, y] + 1):
-                if own[y, v - lowest] > none:
-                    kept_value[num_kept], kept_level[num_kept] = v, y
-                    kept_energy[num_kept] = own[y, v - lowest]
-                    num_kept += 1
-        kept_first[k + 1] = num_kept
+            _forget(k, top, idle, own_low, own_high)
+        if keeps_labels:
+            kept = _kept(kept, k, own)
     while merged < m:
         i = network.by_idle[merged]
-        _merge(labels[i], first_value[i], own_low[i], own_high[i], idle, low, high)
+        _merge(Reached(energies[i], first_value[i], own_low[i], own_high[i]), idle)
         merged += 1
     best = UNREACHED
     for y in range(min(levels.end + 1, num_levels)):
-        for v in range(max(goal + end_cost[y], low[y]), high[y] + 1):
-            if idle[y, v] > none:
+        for v in range(max(goal.units + end_cost[y], low[y]), high[y] + 1):
+            if idle.energy[y, v] > -np.inf:
                 best = max(best, v - end_cost[y])
-    return best, Labels(kept_first, kept_value, kept_level, kept_energy)
+    return best, kept
 
 
-@kernel
-def _forget(
-    k: int, top: int, idle: Floats, low: Ints, high: Ints, own_low: Ints, own_high: Ints
-) -> None:
+@inner
+def _none_yet(num_tasks: int) -> list[Floats]:
+    """Return room for the energies after each task.
+
+    A comprehension among named tuples would have Numba make the tuples' arrays twice.
+    """
+    return [np.empty((0, 0)) for _ in range(num_tasks)]
+
+
+@borrowing_inner
+def _span_of(
+    network: Network,
+    levels: DataLevels,
+    row: int,
+    low: Ints,
+    high: Ints,
+    own_low: Ints,
+    own_high: Ints,
+) -> tuple[int, int]:
+    """Return the lowest and the highest value of a label that a task may extend."""
+    none = np.iinfo(np.int32).max
+    lowest, highest = none, -none
+    for y in range(min(levels.before[row] + 1, levels.num_levels)):
+        if low[y] <= high[y]:
+            lowest, highest = min(lowest, low[y]), max(highest, high[y])
+    for at in range(network.straight_first[row], network.straight_first[row + 1]):
+        i = network.straight_rows[at]
+        for y in range(min(levels.before[row] + 1, levels.num_levels)):
+            if own_low[i, y] <= own_high[i, y]:
+                lowest = min(lowest, own_low[i, y])
+                highest = max(highest, own_high[i, y])
+    return lowest, highest
+
+
+@inner
+def _kept(kept: Labels, row: int, own: Reached) -> Labels:
+    """Return the labels with those of one more task behind them."""
+    at = kept.first[row + 1]
+    needed = at + own.energy.size
+    if needed > len(kept.value):
+        kept = _longer(kept, at, 2 * needed)
+    for y in range(len(own.low)):
+        for v in range(own.low[y], own.high[y] + 1):
+            if own.energy[y, v - own.first] > -np.inf:
+                kept.value[at], kept.level[at] = v, y
+                kept.energy[at] = own.energy[y, v - own.first]
+                at += 1
+    kept.first[row + 1] = at
+    return kept
+
+
+@inner
+def _longer(labels: Labels, count: int, capacity: int) -> Labels:
+    """Return the first labels with room for more behind them."""
+    value = np.empty(capacity, dtype=np.int32)
+    level = np.empty(capacity, dtype=np.int32)
+    energy = np.empty(capacity)
+    for at in range(count):
+        value[at], level[at] = labels.value[at], labels.level[at]
+        energy[at] = labels.energy[at]
+    return Labels(labels.first, value, level, energy)
+
+
+@inner
+def _forget(k: int, top: int, idle: Reached, own_low: Ints, own_high: Ints) -> None:
     """Drop all labels of paths that do not take row ``k``, where that one must be taken."""
-    idle[:] = -np.inf
-    low[:], high[:] = top + 1, -1
+    idle.energy[:] = -np.inf
+    idle.low[:], idle.high[:] = top + 1, -1
     own_low[:k], own_high[:k] = top + 1, -1
-
-
-@inlined  # of integers and of floats
-def _longer(values: np.ndarray, length: int) -> np.ndarray:
-    longer = np.empty(length, dtype=values.dtype)
-    longer[: len(values)] = values
-    return longer
 
 
 @kernel
@@ -253,78 +310,57 @@ def _leads_to(
     )
 
 
-@inlined
+@inner
 def _take(
     network: Network,
     levels: DataLevels,
     row: int,
     gained: int,
     give: float,
-    source: Floats,
-    source_first: int,
-    source_low: Ints,
-    source_high: Ints,
-    own: Floats,
-    own_first: int,
-    own_low: Ints,
-    own_high: Ints,
+    source: Reached,
+    own: Reached,
 ) -> None:
     """Extend all labels of a source by one task; ``give`` is what the way to it gives back."""
     cap, cost = network.energy_cap[row], network.energy_cost[row]
     floor = network.energy_floor[row]
-    most = own_first + own.shape[1] - 1
+    most = own.first + own.energy.shape[1] - 1
     for y in range(min(levels.before[row] + 1, levels.num_levels)):
-        if source_low[y] > source_high[y]:
+        if source.low[y] > source.high[y]:
             continue
         to = max(levels.floor[row], y + levels.gain[row], 0)
         if to > levels.after[row] or to >= levels.num_levels:
             continue
-        low, high = source_low[y], min(source_high[y], most - gained)
+        low, high = source.low[y], min(source.high[y], most - gained)
         if low > high:
             continue
-        before = source[y, low - source_first : high - source_first + 1]
-        after = own[to, low + gained - own_first : high + gained - own_first + 1]
+        before = source.energy[y, low - source.first : high - source.first + 1]
+        after = own.energy[to, low + gained - own.first : high + gained - own.first + 1]
         for v in range(len(before)):
             left = min(before[v] + give, cap) - cost
             left = left if left >= floor else -np.inf
             after[v] = max(after[v], left)
-        own_low[to] = min(own_low[to], low + gained)
-        own_high[to] = max(own_high[to], high + gained)
+        own.low[to] = min(own.low[to], low + gained)
+        own.high[to] = max(own.high[to], high + gained)
 
 
-@inlined
-def _merge(
-    source: Floats,
-    source_first: int,
-    source_low: Ints,
-    source_high: Ints,
-    idle: Floats,
-    low: Ints,
-    high: Ints,
-) -> None:
+@inner
+def _merge(source: Reached, idle: Reached) -> None:
     """Let the labels of a task idle."""
-    for y in range(len(low)):
-        if source_low[y] > source_high[y]:
+    for y in range(len(idle.low)):
+        low, high = source.low[y], source.high[y]
+        if low > high:
             continue
-        before = source[y, source_low[y] - source_first : source_high[y] - source_first + 1]
-        after = idle[y, source_low[y] : source_high[y] + 1]
+        before = source.energy[y, low - source.first : high - source.first + 1]
+        after = idle.energy[y, low : high + 1]
         for v in range(len(before)):
             after[v] = max(after[v], before[v])
-        low[y], high[y] = min(low[y], source_low[y]), max(high[y], source_high[y])
+        idle.low[y], idle.high[y] = min(idle.low[y], low), max(idle.high[y], high)
 
 
-@inlined
-def _tidy(
-    labels: Floats,
-    first: int,
-    low: Ints,
-    high: Ints,
-    need: Singles,
-    credit: Ints,
-    goal: int,
-    best_so_far: Floats,
-) -> None:
+@inner
+def _tidy(labels: Reached, need: Singles, goal: Goal, best_so_far: Floats) -> None:
     """Drop what cannot reach the goal, and what has less energy than a label with less data."""
+    low, high = labels.low, labels.high
     lowest, highest = len(best_so_far), -1
     for y in range(len(low)):
         if low[y] <= high[y]:
@@ -333,10 +369,10 @@ def _tidy(
     for y in range(len(low)):
         if low[y] > high[y]:
             continue
-        values = labels[y, low[y] - first : high[y] - first + 1]
+        values = labels.energy[y, low[y] - labels.first : high[y] - labels.first + 1]
         best = best_so_far[low[y] : high[y] + 1]
         # What the first value still wants; more than the table holds is out of reach.
-        wanted = goal - credit[y] - low[y]
+        wanted = goal.units - goal.credit[y] - low[y]
         lost = min(len(values), max(0, wanted + 1 - len(need)))
         short = min(len(values), max(0, wanted))
         values[:lost] = -np.inf

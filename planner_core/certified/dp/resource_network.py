@@ -231,14 +231,42 @@ def give_between(network: Network, i: int, k: int) -> float:
     return 0.0
 
 
-@kernel
 def part_of(network: Network, rows: Ints) -> Network:
     """Return the network of some rows only, ascending; levels stay those of the whole."""
+    idle_from = np.searchsorted(rows, network.idle_from[rows]).astype(np.int32)
+    near_first, near_rows, near_give = _arcs_among(network, rows)
+    straight_first, straight_rows = reversed_arcs(Arcs(near_first, near_rows))
+    of_rows = {
+        name: getattr(network, name)[rows]
+        for name in (
+            "place", "is_contact", "is_kept", "energy_from", "energy_to", "energy_cap",
+            "energy_cost", "energy_floor", "data_gain", "data_floor", "data_before", "data_after",
+            "delivered",
+        )
+    }  # fmt: skip
+    return network._replace(
+        idle_from=idle_from,
+        by_idle=np.argsort(idle_from, kind="stable").astype(np.int32),
+        near_first=near_first,
+        near_rows=near_rows,
+        near_give=near_give,
+        straight_first=straight_first,
+        straight_rows=straight_rows,
+        # Arcs stand in order of the earlier row, and so they do among those to one later row.
+        straight_give=near_give[np.argsort(near_rows, kind="stable")],
+        **of_rows,
+    )
+
+
+@kernel
+def _arcs_among(network: Network, rows: Ints) -> tuple[Longs, Ints, Floats]:
+    """Return the arcs among some rows, and what they give back."""
     m = len(rows)
-    new_row = np.full(len(network.place), -1, dtype=np.int32)
+    new_row = np.empty(len(network.place), dtype=np.int32)
+    for row in range(len(new_row)):
+        new_row[row] = -1
     for new in range(m):
         new_row[rows[new]] = new
-    idle_from = np.searchsorted(rows, network.idle_from[rows]).astype(np.int32)
     first = np.zeros(m + 1, dtype=np.int64)
     near_rows = np.empty(len(network.near_rows), dtype=np.int32)
     near_give = np.empty(len(network.near_rows))
@@ -252,39 +280,4 @@ def part_of(network: Network, rows: Ints) -> Network:
                 near_give[num_arcs] = network.near_give[at]
                 num_arcs += 1
         first[new + 1] = num_arcs
-    near_rows, near_give = near_rows[:num_arcs].copy(), near_give[:num_arcs].copy()
-    straight_first, straight_rows = reversed_arcs(Arcs(first, near_rows))
-    straight_give = np.empty(num_arcs)
-    filled = straight_first[:-1].copy()
-    for new in range(m):
-        for at in range(first[new], first[new + 1]):
-            j = near_rows[at]
-            straight_give[filled[j]] = near_give[at]
-            filled[j] += 1
-    return Network(
-        network.place[rows],
-        network.is_contact[rows],
-        network.is_kept[rows],
-        idle_from,
-        np.argsort(idle_from, kind="mergesort").astype(np.int32),
-        first,
-        near_rows,
-        near_give,
-        straight_first,
-        straight_rows,
-        straight_give,
-        network.energy_from[rows],
-        network.energy_to[rows],
-        network.energy_cap[rows],
-        network.energy_cost[rows],
-        network.energy_floor[rows],
-        network.data_gain[rows],
-        network.data_floor[rows],
-        network.data_before[rows],
-        network.data_after[rows],
-        network.delivered[rows],
-        network.energy_start,
-        network.data_start,
-        network.data_end,
-        network.must_deliver,
-    )
+    return first, near_rows[:num_arcs].copy(), near_give[:num_arcs].copy()

@@ -29,7 +29,7 @@ from planner_core.bundles import bundle
 from planner_core.certified.sizes import OPENING_LEVELS
 from planner_core.certified.tolerances import EARLIER_S
 from planner_core.certified.tuning import TUNING
-from planner_core.jit import borrowing, kernel
+from planner_core.jit import borrowing, borrowing_inner, kernel
 from planner_core.precedence.earliest_starts import (
     EARLY_S,
     Arrivals,
@@ -270,13 +270,13 @@ def heaviest(
     best = -1
     for i in range(len(weight)):
         heaviest_task = max(heaviest_task, weight[i])
-    per_second = weight.mean() / _PER_TASK_S
+    scale = heaviest_task, weight.mean() / _PER_TASK_S
     for cell in range(len(cells.order)):
         labels.used[cell] = 0
     for task in range(len(weight)):
         if cells.is_first[task]:
             _insert(
-                cells, labels, most, heaviest_task, per_second, arrivals.first_cell[task],
+                cells, labels, most, scale, arrivals.first_cell[task],
                 weight[task], spans.open_s[task], cells.bit[task], -1, True,
             )  # fmt: skip
     next_open = 0
@@ -319,13 +319,13 @@ def heaviest(
                         is_paid = mask & bit == _NONE
                         worth = value + weight[other] if is_paid else value
                 _insert(
-                    cells, labels, most, heaviest_task, per_second, into,
+                    cells, labels, most, scale, into,
                     worth, then_s, mask | bit, slot, is_paid,
                 )  # fmt: skip
     return top, best
 
 
-@borrowing
+@borrowing_inner
 def _not_after_s(cells: Cells, end_s: float, looked: Vector, task: int, guess_s: float) -> float:
     """Return an instant that the earliest start of a task after another is not before.
 
@@ -346,7 +346,7 @@ def _not_after_s(cells: Cells, end_s: float, looked: Vector, task: int, guess_s:
     return exact_s - EARLY_S
 
 
-@borrowing
+@borrowing_inner
 def _left_open(cells: Cells, mask: np.uint64, from_s: float, into: int, other: int) -> np.uint64:
     """Return what a chain still remembers at the right edge of the cell it goes into."""
     if mask == _NONE:
@@ -369,12 +369,12 @@ def _left_open(cells: Cells, mask: np.uint64, from_s: float, into: int, other: i
     return left
 
 
-@borrowing
+@borrowing_inner
 def _place_of(bit: np.uint64) -> int:
     return int(_PLACE_OF_BIT[(bit * _DE_BRUIJN) >> _SHIFT])
 
 
-@borrowing
+@borrowing_inner
 def _is_as_good(
     cells: Cells,
     labels: Labels,
@@ -401,7 +401,7 @@ def _is_as_good(
     return slack >= 0.0
 
 
-@borrowing
+@borrowing_inner
 def _is_covered(
     cells: Cells,
     labels: Labels,
@@ -421,13 +421,12 @@ def _is_covered(
     return False
 
 
-@borrowing
+@borrowing_inner
 def _insert(
     cells: Cells,
     labels: Labels,
     most: int,
-    heaviest_task: float,
-    per_second: float,
+    scale: tuple[float, float],
     cell: int,
     value: float,
     start_s: float,
@@ -435,6 +434,11 @@ def _insert(
     parent: int,
     is_paid: bool,
 ) -> None:
+    """Add a label to a cell, unless others are as good.
+
+    ``scale`` is the worth of the heaviest task, and about what a second is worth.
+    """
+    heaviest_task, per_second = scale
     if _is_covered(cells, labels, most, heaviest_task, cell, value, start_s, mask):
         return
     base = cell * most

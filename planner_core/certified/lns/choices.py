@@ -14,7 +14,7 @@ import numpy as np
 
 from planner_core.certified.dp.completion_bounds import least_energy
 from planner_core.certified.dp.data_levels import DataLevels, data_levels, levels_of_part
-from planner_core.certified.dp.forward_labels import most_value, path_of
+from planner_core.certified.dp.forward_labels import Goal, most_value, path_of
 from planner_core.certified.dp.resource_network import Network, part_of, strict_network_of
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import (
@@ -90,9 +90,8 @@ class SatelliteChoices:
             return -1, nothing
         idle, after = idle[:, : top + 1].copy(), after[:, : top + 1].copy()
         credit = np.zeros(levels.num_levels, dtype=np.int32)
-        value, labels = most_value(
-            network, levels, weight, idle, after, credit, credit, top, max(goal, 0), True, stop
-        )
+        wanted = Goal(max(goal, 0), idle, after, credit)
+        value, labels = most_value(network, levels, weight, credit, wanted, top, True, stop)
         if value < 0:
             return -1, nothing
         return value, rows[path_of(network, levels, weight, credit, labels, value)]

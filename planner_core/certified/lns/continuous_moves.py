@@ -26,7 +26,7 @@ from planner_core.certified.signs import FIXED, FREE, NOWHERE
 from planner_core.certified.sizes import ROUTE_BUCKETS, ROUTE_LABELS, ROUTE_TASKS
 from planner_core.certified.tuning import TUNING
 from planner_core.draws import Uint64s, next_draw
-from planner_core.jit import borrowing
+from planner_core.jit import borrowing, borrowing_inner
 from planner_core.precedence.earliest_starts import Arrivals, cell_of, edge_s
 from planner_core.precedence.time_windows import Spans, View
 from planner_core.problem import Bytes, Floats, Ints
@@ -149,7 +149,7 @@ def make_moves(
         _replan(search, first, min(first + size, route.size[0]))
 
 
-@borrowing
+@borrowing_inner
 def _replan(
     search: RouteSearch,
     first: int,
@@ -193,7 +193,7 @@ def _replan(
     return True
 
 
-@borrowing
+@borrowing_inner
 def _time_chain(
     spans: Spans, view: View, route: Route, scratch: Scratch, first: int, end: int, size: int
 ) -> bool:
@@ -213,7 +213,7 @@ def _time_chain(
     return True
 
 
-@borrowing
+@borrowing_inner
 def _put_in(
     spans: Spans, view: View, route: Route, scratch: Scratch, first: int, end: int, size: int
 ) -> None:
@@ -237,7 +237,7 @@ def _put_in(
     update_late(spans, view, route, first + size - 1, first - 1)
 
 
-@borrowing
+@borrowing_inner
 def _best_chain(
     search: RouteSearch,
     first: int,
@@ -287,7 +287,7 @@ def _best_chain(
     return best
 
 
-@borrowing
+@borrowing_inner
 def _extend(
     search: RouteSearch, count: int, task: int, start_s: float, parent: int, within_s: Within
 ) -> int:
@@ -305,7 +305,7 @@ def _extend(
     return count
 
 
-@borrowing
+@borrowing_inner
 def _offer(
     search: RouteSearch, count: int, task: int, start_s: float, parent: int, within_s: Within
 ) -> int:

@@ -12,12 +12,12 @@ from planner_core.certified.lns.route import (
     update_late,
 )
 from planner_core.certified.signs import FREE
-from planner_core.jit import borrowing, kernel
+from planner_core.jit import borrowing, borrowing_inner, kernel
 from planner_core.precedence.time_windows import Spans, View
 from planner_core.problem import Bools, Bytes, Ints
 
 
-@borrowing
+@borrowing_inner
 def first_near(route: Route, instant_s: float) -> int:
     """Return the first task that may still start at an instant or later."""
     low, high = 0, route.size[0]
@@ -30,7 +30,7 @@ def first_near(route: Route, instant_s: float) -> int:
     return low
 
 
-@borrowing
+@borrowing_inner
 def fits_at(spans: Spans, view: View, route: Route, task: int, p: int) -> float:
     """Return the earliest start of a task before position ``p``; infinite where it cannot be.
 
@@ -70,7 +70,7 @@ def insert_each(
                 break
 
 
-@borrowing
+@borrowing_inner
 def _put_in(spans: Spans, view: View, route: Route, task: int, p: int, start_s: float) -> None:
     for q in range(route.size[0], p, -1):
         route.task[q] = route.task[q - 1]

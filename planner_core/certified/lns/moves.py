@@ -20,7 +20,7 @@ from planner_core.certified.sizes import WINDOW_NODES, WINDOW_WORDS
 from planner_core.certified.tolerances import SLIGHT
 from planner_core.certified.tuning import TUNING
 from planner_core.draws import Uint64s, next_draw
-from planner_core.jit import borrowing
+from planner_core.jit import borrowing, borrowing_inner
 from planner_core.precedence.network import Network, slews_in
 from planner_core.precedence.skyline import (
     NO_LABEL,
@@ -199,23 +199,23 @@ def make_moves(
             _replace(ground, taken, room, low, high, last)
 
 
-@borrowing
+@borrowing_inner
 def _looks(network: Network, node: int) -> Vector:
     return network.looks[node, 0], network.looks[node, 1], network.looks[node, 2]
 
 
-@borrowing
+@borrowing_inner
 def _looked(network: Network, node: int) -> Vector:
     return network.looked[node, 0], network.looked[node, 1], network.looked[node, 2]
 
 
-@borrowing
+@borrowing_inner
 def _follows(network: Network, slews: Slews, a: int, b: int) -> bool:
     room_s = network.start_s[b] - network.end_s[a] - slews.settle_s + TIME_TOLERANCE_S
     return turns_within(slews, room_s, _looked(network, a), _looks(network, b))
 
 
-@borrowing
+@borrowing_inner
 def _pivot(ground: Ground, taken: Taken, offered: Bools, draws: Uint64s) -> int:
     """Return a node at random, mostly one of a target that is not imaged."""
     n = len(ground.network.place)
@@ -231,7 +231,7 @@ def _pivot(ground: Ground, taken: Taken, offered: Bools, draws: Uint64s) -> int:
     return pivot
 
 
-@borrowing
+@borrowing_inner
 def _part_of(ground: Ground, node: int) -> int:
     low, high = 0, len(ground.network.first) - 1
     while high - low > 1:
@@ -243,7 +243,7 @@ def _part_of(ground: Ground, node: int) -> int:
     return low
 
 
-@borrowing
+@borrowing_inner
 def _window(taken: Taken, pivot: int, begin: int, end: int, draws: Uint64s) -> tuple[int, int]:
     """Return the nodes between two tasks of the plan, a few tasks apart, around the pivot."""
     num_tasks = _FEWEST_TASKS + int(next_draw(draws) * (_MOST_TASKS - _FEWEST_TASKS + 1))
@@ -267,7 +267,7 @@ def _window(taken: Taken, pivot: int, begin: int, end: int, draws: Uint64s) -> t
     return low, high
 
 
-@borrowing
+@borrowing_inner
 def _weigh(
     ground: Ground, taken: Taken, offered: Bools, room: Room, low: int, high: int, draws: Uint64s
 ) -> int:
@@ -311,7 +311,7 @@ def _weigh(
     return (count + 63) >> 6
 
 
-@borrowing
+@borrowing_inner
 def _heaviest(
     ground: Ground, room: Room, num_words: int,
     part: int, ends: tuple[int, int], low: int, high: int,
@@ -358,7 +358,7 @@ def _heaviest(
     return at
 
 
-@borrowing
+@borrowing_inner
 def _wait(network: Network, room: Room, low: int, k: int, entered: int, num_waiting: int) -> None:
     """Put a node among those that wait, in order of end."""
     at = num_waiting
@@ -368,7 +368,7 @@ def _wait(network: Network, room: Room, low: int, k: int, entered: int, num_wait
     room.waiting[at] = k
 
 
-@borrowing
+@borrowing_inner
 def _enter(
     network: Network, room: Room, slews: Slews, low: int, k: int, count: int, num_words: int
 ) -> int:
@@ -391,7 +391,7 @@ def _enter(
     return count + 1
 
 
-@borrowing
+@borrowing_inner
 def _is_subset(words: npt.NDArray[np.uint64], one: int, other: int, num_words: int) -> bool:
     more = _EMPTY
     for i in range(num_words):
@@ -399,7 +399,7 @@ def _is_subset(words: npt.NDArray[np.uint64], one: int, other: int, num_words: i
     return bool(more == _EMPTY)
 
 
-@borrowing
+@borrowing_inner
 def _best_without(
     network: Network, room: Room, slews: Slews, node: int, number: int, num_words: int
 ) -> int:
@@ -417,7 +417,7 @@ def _best_without(
     return at
 
 
-@borrowing
+@borrowing_inner
 def _replace(ground: Ground, taken: Taken, room: Room, low: int, high: int, last: int) -> None:
     """Let a chain take the place of what is in the window, unless the plan is worth less then."""
     num_new, worth = 0, 0.0
@@ -466,21 +466,21 @@ def _replace(ground: Ground, taken: Taken, room: Room, low: int, high: int, last
             return
 
 
-@borrowing
+@borrowing_inner
 def _take(ground: Ground, taken: Taken, node: int) -> None:
     taken.is_taken[node] = True
     if taken.holder[ground.network.place[node]] == FREE:
         taken.holder[ground.network.place[node]] = node
 
 
-@borrowing
+@borrowing_inner
 def _let_go(ground: Ground, taken: Taken, node: int) -> None:
     taken.is_taken[node] = False
     if taken.holder[ground.network.place[node]] == node:
         taken.holder[ground.network.place[node]] = FREE
 
 
-@borrowing
+@borrowing_inner
 def _is_sound_around(ground: Ground, taken: Taken, node: int) -> bool:
     """Return whether the tasks around one that was let go can do without it."""
     part = _part_of(ground, node)

@@ -15,7 +15,7 @@ from planner_core.bundles import bundle
 from planner_core.certified.dp.resource_network import Network, give_between, may_be_next
 from planner_core.certified.signs import AT_START, NEVER, NOWHERE
 from planner_core.certified.sizes import LABELS_PER_TASK, RESOURCE_WINDOW_NODES
-from planner_core.jit import borrowing
+from planner_core.jit import borrowing_inner
 from planner_core.problem import (
     Bools,
     Floats,
@@ -147,7 +147,7 @@ def room_for(num_targets: int) -> Room:
     )
 
 
-@borrowing
+@borrowing_inner
 def best_label(
     ground: Ground, room: Room, left: int, low: int, high: int, right: int,
     energy: float, data: float, need: float, bears: float,
@@ -197,21 +197,21 @@ def best_label(
         count = 0
         for i in range(num_idle):
             count = _extend(
-                ground, room, low, k, begin, count, 0.0,
+                ground, room, low, k, begin, count,
                 room.idle_value[i], room.idle_energy[i], room.idle_data[i], room.idle_label[i],
             )  # fmt: skip
         for arc in range(network.straight_first[k], network.straight_first[k + 1]):
             i, give = network.straight_rows[arc], network.straight_give[arc]
             if i == left and not starts_open:
                 count = _extend(
-                    ground, room, low, k, begin, count, give, 0.0, energy, data, AT_START
+                    ground, room, low, k, begin, count, 0.0, energy + give, data, AT_START
                 )
             elif i >= earliest:
                 first = (i - low) * LABELS_PER_TASK
                 for label in range(first, first + room.num_labels[i - low]):
                     count = _extend(
-                        ground, room, low, k, begin, count, give,
-                        room.value[label], room.energy[label], room.data[label], label,
+                        ground, room, low, k, begin, count,
+                        room.value[label], room.energy[label] + give, room.data[label], label,
                     )  # fmt: skip
         room.num_labels[at] = count
         if network.is_kept[k]:
@@ -234,19 +234,19 @@ def best_label(
     return best_label
 
 
-@borrowing
+@borrowing_inner
 def _extend(
-    ground: Ground, room: Room, low: int, k: int, begin: int, count: int, give: float,
+    ground: Ground, room: Room, low: int, k: int, begin: int, count: int,
     value: float, energy: float, data: float, label: int,
 ) -> int:  # fmt: skip
     """Take a task after a label; return how many labels the task has then.
 
-    ``give`` is what the way to it gives back.
+    ``energy`` is what is left on arrival, with what the way gives back.
     """
     network = ground.network
     if data > network.data_before[k]:
         return count
-    energy = min(energy + give, network.energy_cap[k]) - network.energy_cost[k]
+    energy = min(energy, network.energy_cap[k]) - network.energy_cost[k]
     data = max(network.data_floor[k], data + network.data_gain[k])
     if energy < network.energy_floor[k] or data > network.data_after[k]:
         return count
@@ -263,7 +263,7 @@ def _extend(
     )  # fmt: skip
 
 
-@borrowing
+@borrowing_inner
 def _keep(
     values: Floats, energies: Floats, datas: Floats, sources: Ints, begin: int, count: int,
     value: float, energy: float, data: float, source: int,

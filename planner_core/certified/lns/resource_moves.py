@@ -19,7 +19,7 @@ from planner_core.certified.sizes import LABELS_PER_TASK, RESOURCE_WINDOW_NODES
 from planner_core.certified.tolerances import ROUNDING, SLIGHT, STAYS
 from planner_core.certified.tuning import TUNING
 from planner_core.draws import Uint64s, next_draw
-from planner_core.jit import borrowing
+from planner_core.jit import borrowing, borrowing_inner
 from planner_core.problem import Bytes
 
 _FEWEST_TASKS, _MOST_TASKS = TUNING.window_tasks
@@ -57,7 +57,7 @@ def make_moves(
             _replace(ground, taken, room, low, high, last)
 
 
-@borrowing
+@borrowing_inner
 def _pivot(ground: Ground, taken: Taken, draws: Uint64s) -> int:
     """Return a task at random, mostly one of a target that is not imaged."""
     m = len(ground.rows)
@@ -71,7 +71,7 @@ def _pivot(ground: Ground, taken: Taken, draws: Uint64s) -> int:
     return pivot
 
 
-@borrowing
+@borrowing_inner
 def _window(ground: Ground, taken: Taken, pivot: int, draws: Uint64s) -> tuple[int, int]:
     """Return the tasks between two of the plan, a few apart, around the pivot."""
     num_tasks = _FEWEST_TASKS + int(next_draw(draws) * (_MOST_TASKS - _FEWEST_TASKS + 1))
@@ -96,7 +96,7 @@ def _window(ground: Ground, taken: Taken, pivot: int, draws: Uint64s) -> tuple[i
     return low, high
 
 
-@borrowing
+@borrowing_inner
 def _state_after(ground: Ground, taken: Taken, last: int) -> tuple[float, float, bool]:
     """Return energy and data after the plan's tasks up to one, and whether limits are kept."""
     network = ground.network
@@ -116,7 +116,7 @@ def _state_after(ground: Ground, taken: Taken, last: int) -> tuple[float, float,
     return energy, data, True
 
 
-@borrowing
+@borrowing_inner
 def _data_end(ground: Ground, taken: Taken, high: int) -> float:
     """Return the most data that may be left at the end, where tasks from ``high`` on stay.
 
@@ -134,7 +134,7 @@ def _data_end(ground: Ground, taken: Taken, high: int) -> float:
     return float(network.data_end)
 
 
-@borrowing
+@borrowing_inner
 def _wanted_before(
     ground: Ground, taken: Taken, first: int, data_end: float
 ) -> tuple[float, float]:
@@ -158,7 +158,7 @@ def _wanted_before(
     return need, bears
 
 
-@borrowing
+@borrowing_inner
 def _weigh(ground: Ground, taken: Taken, room: Room, low: int, high: int, draws: Uint64s) -> None:
     """Say what each task of a window adds to a path, and which targets come up repeatedly.
 
@@ -195,7 +195,7 @@ def _weigh(ground: Ground, taken: Taken, room: Room, low: int, high: int, draws:
             room.gain[at] = max(room.gain[at], 0.0)
 
 
-@borrowing
+@borrowing_inner
 def _weigh_liking(
     ground: Ground, taken: Taken, room: Room, low: int, high: int, draws: Uint64s
 ) -> None:
@@ -233,7 +233,7 @@ def _weigh_liking(
             room.gain[at] = max(room.gain[at], 0.0)
 
 
-@borrowing
+@borrowing_inner
 def _replace(ground: Ground, taken: Taken, room: Room, low: int, high: int, last: int) -> None:
     """Let a path take the place of what is in the window, unless the plan is worth less then."""
     place = ground.target

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner_core.bundles import bundle
-from planner_core.jit import borrowing
+from planner_core.jit import borrowing, borrowing_inner
 from planner_core.precedence.time_windows import Spans, View
 from planner_core.problem import Floats, Ints
 from planner_core.problem.pointing import earliest_start_s, latest_start_s, sight
@@ -46,7 +46,7 @@ def empty_route(room: int) -> Route:
     )
 
 
-@borrowing
+@borrowing_inner
 def early_after(spans: Spans, view: View, before: int, start_s: float, task: int) -> float:
     """Return the earliest start of a task after another one, or of all (``before`` of -1)."""
     if before < 0:
@@ -59,7 +59,7 @@ def early_after(spans: Spans, view: View, before: int, start_s: float, task: int
     )  # fmt: skip
 
 
-@borrowing
+@borrowing_inner
 def late_before(spans: Spans, view: View, task: int, after: int, start_s: float) -> float:
     """Return the latest start of a task before another one, or of all (``after`` of -1)."""
     if after < 0:
@@ -119,7 +119,7 @@ def remove(spans: Spans, view: View, route: Route, p: int) -> None:
     update_late(spans, view, route, p - 1, p - 1)
 
 
-@borrowing
+@borrowing_inner
 def position_of(route: Route, task: int, begin: int, end: int) -> int:
     """Return where a task stands outside the positions ``begin`` up to ``end``; -1 for nowhere."""
     for p in range(route.size[0]):

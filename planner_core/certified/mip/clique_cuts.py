@@ -10,9 +10,10 @@ import numpy as np
 
 from planner_core.certified.sizes import CLIQUE_STEPS
 from planner_core.certified.tolerances import CLIQUE_BROKEN
-from planner_core.jit import kernel
+from planner_core.jit import borrowing_inner, inner, kernel
 from planner_core.precedence.relation import Precedence, are_comparable, comes_before
 from planner_core.problem import Floats, Ints, Longs
+from planner_core.sorting import stable_order
 
 
 @kernel
@@ -33,7 +34,7 @@ def excluding_pairs(precedence: Precedence) -> tuple[Ints, Ints]:
     return first, second
 
 
-@kernel
+@inner
 def _first_near(precedence: Precedence) -> Ints:
     """Return the first row from which each row could be unrelated."""
     m = len(precedence.near_from)
@@ -77,7 +78,7 @@ def antichain_cover(precedence: Precedence) -> tuple[Longs, Ints]:
     return np.array(offsets), np.array(members)
 
 
-@kernel
+@inner
 def _extend(precedence: Precedence, clique: Ints, size: int, from_row: int, to_row: int) -> int:
     """Add every row of the range that excludes all members; return the new size."""
     for row in range(from_row, to_row):
@@ -112,32 +113,34 @@ def violated_antichains(precedence: Precedence, taken: Floats) -> tuple[Longs, I
     for row in range(m):
         if taken[row] <= CLIQUE_BROKEN or taken[row] >= 1.0 - CLIQUE_BROKEN:
             continue
-        near = np.arange(row + 1, max(row + 1, precedence.far_from[row])).astype(np.int32)
-        wanted = near[taken[near] > CLIQUE_BROKEN]
-        size, total = _heaviest_antichain(precedence, taken, row, wanted, clique)
+        size, total = _heaviest_antichain(precedence, taken, row, clique)
         if total <= 1.0 + CLIQUE_BROKEN:
             continue
         size = _extend(precedence, clique, size, first_near[row], precedence.far_from[row])
-        for member in np.sort(clique[:size]):
-            members.append(member)
+        _sort(clique[:size])
+        for i in range(size):
+            members.append(clique[i])
         offsets.append(np.int64(len(members)))
     return np.array(offsets), np.array(members)
 
 
-@kernel
+@inner
 def _heaviest_antichain(
-    precedence: Precedence, taken: Floats, row: int, wanted: Ints, clique: Ints
+    precedence: Precedence, taken: Floats, row: int, clique: Ints
 ) -> tuple[int, float]:
-    """Fill ``clique`` with ``row`` and the heaviest antichain of ``wanted`` beside it.
+    """Fill ``clique`` with ``row`` and the heaviest antichain of taken tasks beside it.
 
     Depth first over the candidates by falling weight, with the sum of what remains as the
     bound; cut short where that would take long, for a good antichain is enough.
     """
-    excluded = np.array(
-        [not are_comparable(precedence, row, other) for other in wanted], dtype=np.bool_
-    )
-    others = wanted[excluded]
-    others = others[np.argsort(-taken[others], kind="mergesort")]
+    others = np.empty(max(0, precedence.far_from[row] - row - 1), dtype=np.int32)
+    falling = np.empty(len(others))
+    num_others = 0
+    for other in range(row + 1, precedence.far_from[row]):
+        if taken[other] > CLIQUE_BROKEN and not are_comparable(precedence, row, other):
+            others[num_others], falling[num_others] = other, -taken[other]
+            num_others += 1
+    others = others[stable_order(falling[:num_others])]
     k = len(others)
     # What follows each candidate, at each depth: the candidates that are still free.
     free = np.zeros((k + 1, k), dtype=np.bool_)
@@ -176,6 +179,16 @@ def _heaviest_antichain(
         at[depth + 1] = i + 1
         depth += 1
     return best_size, best
+
+
+@borrowing_inner
+def _sort(values: Ints) -> None:
+    for i in range(1, len(values)):
+        value, at = values[i], i
+        while at > 0 and values[at - 1] > value:
+            values[at] = values[at - 1]
+            at -= 1
+        values[at] = value
 
 
 @kernel

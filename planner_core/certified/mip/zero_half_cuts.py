@@ -14,8 +14,9 @@ import numpy as np
 from planner_core.certified.tolerances import TAKEN, WHOLE, ZERO_HALF_BROKEN
 from planner_core.certified.tuning import TUNING
 from planner_core.draws import Uint64s, next_draw
-from planner_core.jit import kernel
+from planner_core.jit import inner, kernel
 from planner_core.problem import Floats, Ints, Longs
+from planner_core.sorting import stable_order
 
 _NOISE: Final = TUNING.disturbance
 
@@ -27,7 +28,7 @@ class Sets(NamedTuple):
     members: Ints
 
 
-@kernel
+@inner
 def _tight_sets(sets: Sets, taken: Floats, column_of: Ints) -> tuple[Ints, Floats]:
     """Return the sets that hold fractional tasks and leave little room, and that room."""
     own = np.empty(len(sets.offsets) - 1, dtype=np.int32)
@@ -55,7 +56,7 @@ def odd_sets(sets: Sets, taken: Floats, draws: Uint64s) -> Sets:
     one = np.uint64(1)
     fractional = np.flatnonzero((taken > WHOLE) & (taken < 1.0 - WHOLE))
     noise = np.array([_NOISE * next_draw(draws) for _ in range(len(fractional))])
-    fractional = fractional[np.argsort(-taken[fractional] - noise)]
+    fractional = fractional[stable_order(-taken[fractional] - noise)]
     column_of = np.full(len(taken), -1, dtype=np.int32)
     for i in range(len(fractional)):
         column_of[fractional[i]] = i
@@ -133,7 +134,7 @@ def deepest(
     shared = np.zeros(len(taken), dtype=np.int32)
     found = np.empty(max_cuts, dtype=np.int32)
     m = 0
-    for cut in np.argsort(-depth, kind="mergesort"):
+    for cut in stable_order(-depth):
         if m == max_cuts or depth[cut] < TAKEN:
             break
         picked = chosen.members[chosen.offsets[cut] : chosen.offsets[cut + 1]]

@@ -17,7 +17,7 @@ import numpy as np
 
 from planner_core.certified.dp.completion_bounds import least_energy
 from planner_core.certified.dp.data_levels import DataLevels, data_levels
-from planner_core.certified.dp.forward_labels import most_value, path_of
+from planner_core.certified.dp.forward_labels import Goal, most_value, path_of
 from planner_core.certified.dp.resource_network import Network, network_of
 from planner_core.certified.multipliers.latency import LatencyAscent
 from planner_core.certified.proofs.bound import Bound, rounded_bound
@@ -235,10 +235,10 @@ class SatelliteRelaxation:
         while goal >= least:
             # Labels that cannot reach the goal are dropped: the higher, the quicker.
             goal = max(least, goal - step, 0)
+            wanted = Goal(goal, needs.idle, needs.after, needs.credit)
             most, labels = most_value(
-                self.network, levels, weight, needs.idle, needs.after, needs.credit, end_cost,
-                top, goal, keeps_path, stop,
-            )  # fmt: skip
+                self.network, levels, weight, end_cost, wanted, top, keeps_path, stop
+            )
             if most == STOPPED:
                 return STOPPED, None
             if most != UNREACHED:
