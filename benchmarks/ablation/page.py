@@ -30,7 +30,8 @@ A strategy earns its place where, without it, the gap grows by more than 0.2 per
 some family, or the time to some gap by more than 10 %. One image is 0.1 to 0.3 points, and the
 last image a matter of luck: the time to 0 % differs by a factor of two from seed to seed, so a
 verdict on that column alone takes more than two draws. What was not missed is gone from the
-engine since; its rows stay, with the revision that still had it.
+engine since; its rows stay, with the revision that still had it. `exhaust` shows on smaller
+missions only: of 240 drawn as the tests draw them all were closed with it, 222 without.
 """
 
 
