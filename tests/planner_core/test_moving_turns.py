@@ -20,6 +20,8 @@ from planner_core.problem import may_follow
 from planner_core.problem.moving import longest_turn_s, moving_turn_s, rotation_deg, turns_in
 from planner_core.problem.plan import Plan
 from planner_core.problem.slew import slew_s
+from planner_core.problem.sun_turns import sun_turns
+from planner_core.referee.idle_time import idle_spans
 from planner_core.referee.replay import replay
 from planner_core.solvers.registry import SOLVERS, Certified, Milp
 from tests.examples import examples
@@ -88,6 +90,31 @@ def test_pairs_and_referee_agree(seed: int) -> None:
             timeline = replay(problem, Plan.of(problem, (int(own.rows[a]), int(own.rows[b]))))
             fits = all(v.code not in ("slew", "overlap") for v in timeline.violations)
             assert fits == bool(may_follow(own.transitions, a, b))
+
+
+@examples(50)
+@given(seed=SEEDS)
+def test_turns_to_the_sun_and_back_are_those_of_the_referee(seed: int) -> None:
+    """Lines of sight move to any side here: the turn back meets them in motion."""
+    problem = sunny_problem(seed, is_moving=True, num_contacts=0)
+    rng = np.random.default_rng(seed)
+    n = len(problem.opportunities)
+    rates = {name: rng.uniform(-0.5, 0.5, (n, 3)) for name in ("los_rate_start", "los_rate_end")}
+    table = replace(problem.opportunities, **rates)
+    own = problem.satellites[0]
+    turns = sun_turns(
+        own.resources, own.agility, own.sun, start_s=own.start_s, end_s=own.end_s,
+        looks=table.los_start[own.rows], looked=table.los_end[own.rows],
+        moves=table.los_rate_start[own.rows], moved=table.los_rate_end[own.rows],
+    )  # fmt: skip
+    problem = replace(problem, opportunities=table)
+    for k, row in enumerate(own.rows.tolist()):
+        spans = idle_spans(problem, own, Plan.of(problem, (row,)).actions)
+        before = [span.turn_back_s for span in spans if span.end_s <= own.start_s[k]]
+        after = [span.turn_to_s for span in spans if span.start_s >= own.end_s[k]]
+        assert before == pytest.approx([turns.back_s[k]] * len(before))
+        assert after == pytest.approx([turns.out_s[k]] * len(after))
+        assert after
 
 
 @pytest.mark.parametrize("name", SOLVERS)
