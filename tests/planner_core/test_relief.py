@@ -60,6 +60,19 @@ def test_an_image_that_fills_it_further_is_to_blame() -> None:
     assert set(timeline.collected) == {1}
 
 
+@pytest.mark.parametrize("code", ["battery", "recorder"])
+def test_an_image_without_energy_or_room_is_to_blame_though_no_level_moves(code: str) -> None:
+    """An empty battery cannot fall, nor a full recorder rise: what is asked of them is broken."""
+    battery, recorder = (0.0, 0.0) if code == "battery" else (0.9, 1.0)
+    worn = replace(TIGHT, initial_battery_fraction=battery, initial_recorder_fraction=recorder)
+    image = Task(kind=COLLECT, place=0, start_s=0.0, end_s=10.0)
+    problem = make_problem([image], num_targets=1, resources=worn)
+    timeline = replay(problem, Plan.of(problem, [0]))
+    (broken,) = timeline.violations
+    assert (broken.code, broken.blamed, broken.inherited) == (code, (0,), False)
+    assert replay(problem, Plan(())).validity == "inherited"
+
+
 def test_a_recorder_that_fills_again_is_not_inherited() -> None:
     again = Task(kind=COLLECT, place=0, start_s=500.0, end_s=600.0)
     problem = make_problem([*TASKS, again], num_targets=2, resources=FULL)

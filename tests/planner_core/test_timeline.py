@@ -92,6 +92,7 @@ def test_overlap_is_seen_past_a_short_task_inside_a_long_one() -> None:
     )
     timeline = judge(problem, 0, 1, 2)
     assert codes(timeline) == ["overlap", "overlap"]
+    assert [(v.needed, v.available) for v in timeline.violations] == [(0.0, -180.0), (0.0, -100.0)]
     assert timeline.reward == 0.0
 
 
@@ -259,3 +260,7 @@ def test_the_plan_hash_tells_plans_apart_and_ignores_the_order_of_actions() -> N
     plan = Plan.of(problem, [0, 1])
     assert plan_sha256(problem, plan) == plan_sha256(problem, Plan(plan.actions[::-1]))
     assert plan_sha256(problem, plan) != plan_sha256(problem, Plan.of(problem, [0]))
+    # 1.001 s are 1000.9999999999999 ms in floating point, and a thousand and one in a plan.
+    plan, later, earlier = (Plan((Action(s, s + 30.0, 0),)) for s in (1.001, 1.0014, 1.0))
+    assert plan_sha256(problem, plan) == plan_sha256(problem, later)
+    assert plan_sha256(problem, plan) != plan_sha256(problem, earlier)
