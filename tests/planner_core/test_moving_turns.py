@@ -98,14 +98,18 @@ def test_turns_to_the_sun_and_back_are_those_of_the_referee(seed: int) -> None:
     """Lines of sight move to any side here: the turn back meets them in motion."""
     problem = sunny_problem(seed, is_moving=True, num_contacts=0)
     rng = np.random.default_rng(seed)
-    n = len(problem.opportunities)
-    rates = {name: rng.uniform(-0.5, 0.5, (n, 3)) for name in ("los_rate_start", "los_rate_end")}
-    table = replace(problem.opportunities, **rates)
+    shape = len(problem.opportunities), 3
+    table = replace(
+        problem.opportunities,
+        los_rate_start=rng.uniform(-0.5, 0.5, shape).astype(np.float32),
+        los_rate_end=rng.uniform(-0.5, 0.5, shape).astype(np.float32),
+    )
     own = problem.satellites[0]
     turns = sun_turns(
         own.resources, own.agility, own.sun, start_s=own.start_s, end_s=own.end_s,
         looks=table.los_start[own.rows], looked=table.los_end[own.rows],
-        moves=table.los_rate_start[own.rows], moved=table.los_rate_end[own.rows],
+        moves=table.los_rate_start[own.rows].astype(np.float64),
+        moved=table.los_rate_end[own.rows].astype(np.float64),
     )  # fmt: skip
     problem = replace(problem, opportunities=table)
     for k, row in enumerate(own.rows.tolist()):
