@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import numpy as np
+
 from planner_core.problem import Problem, SatelliteProblem
 from planner_core.problem.plan import Action
 from planner_core.problem.slew import TIME_TOLERANCE_S
-from planner_core.problem.sun_turns import sun_turn_s
+from planner_core.problem.sun_turns import sun_turn_s, sun_turns
 from planner_core.referee.sight import looked, looks, moving_deg_s
 
 
@@ -46,35 +48,44 @@ def idle_spans(
     The satellite begins the horizon with its panels at the sun where it is not known to look
     elsewhere.
     """
-
-    def turn_s(action: Action | None, is_end: bool) -> float:
-        if action is None or satellite.resources.sun_pointing == "free":
-            return 0.0
-        t_s = action.end_s if is_end else action.start_s
-        line_of_sight = looked(problem, action) if is_end else looks(problem, action)
-        r, agility = satellite.resources, satellite.agility
-        x, y, z = moving_deg_s(problem, action, is_end=is_end)
-        # The turn back is the turn to the sun, backward in time.
-        rate = (x, y, z) if is_end else (-x, -y, -z)
-        return sun_turn_s(r, agility, satellite.sun, line_of_sight, t_s, rate)
-
+    out_s, back_s = _turns_s(problem, satellite, actions)
     spans = []
-    before: Action | None = None
-    free_from_s = 0.0
-    for after in (*actions, None):
+    free_from_s, turn_to_s = 0.0, _first_turn_s(satellite)
+    for after, turn, turn_back_s in zip(
+        (*actions, None), (*out_s, 0.0), (*back_s, 0.0), strict=True
+    ):
         until_s = problem.horizon_s if after is None else after.start_s
         if until_s > free_from_s + TIME_TOLERANCE_S:
-            turn_to_s, turn_back_s = turn_s(before, True), turn_s(after, False)
-            if before is None:
-                turn_to_s = _first_turn_s(satellite)
             sun_from_s = free_from_s + turn_to_s
             sun_until_s = max(sun_from_s, until_s - turn_back_s)
             spans.append(
                 Idle(free_from_s, until_s, sun_from_s, sun_until_s, turn_to_s, turn_back_s)
             )
         if after is not None and after.end_s > free_from_s:
-            free_from_s, before = after.end_s, after
+            free_from_s, turn_to_s = after.end_s, turn
     return tuple(spans)
+
+
+def _turns_s(
+    problem: Problem, satellite: SatelliteProblem, actions: Sequence[Action]
+) -> tuple[list[float], list[float]]:
+    """Return the turn from each action to the sun, and the one from there to it."""
+    r = satellite.resources
+    if r.sun_pointing == "free" or not actions:
+        nothing = [0.0] * len(actions)
+        return nothing, nothing
+    turns = sun_turns(
+        r,
+        satellite.agility,
+        satellite.sun,
+        start_s=np.array([action.start_s for action in actions]),
+        end_s=np.array([action.end_s for action in actions]),
+        looks=np.array([looks(problem, action) for action in actions]),
+        looked=np.array([looked(problem, action) for action in actions]),
+        moves=np.array([moving_deg_s(problem, action, is_end=False) for action in actions]),
+        moved=np.array([moving_deg_s(problem, action, is_end=True) for action in actions]),
+    )
+    return turns.out_s.tolist(), turns.back_s.tolist()
 
 
 def _first_turn_s(satellite: SatelliteProblem) -> float:

@@ -75,67 +75,67 @@ def _integrate_physical(
     Panels charge in sunlight during the part of each idle span that is spent at the sun;
     turns and waiting charge nothing.
     """
-    r = satellite.resources
-    horizon_s = problem.horizon_s
-    kind = problem.opportunities.kind
-
-    def clip(t_s: float) -> float:
-        return min(max(t_s, 0.0), horizon_s)
-
-    change: dict[float, list[int]] = {0.0: [0] * 4, horizon_s: [0] * 4}
-
-    flows: dict[float, list[tuple[float, float]]] = {}
-
-    def note(start_s: float, end_s: float, column: int) -> None:
-        change.setdefault(clip(start_s), [0] * 4)[column] += 1
-        change.setdefault(clip(end_s), [0] * 4)[column] -= 1
-
-    for action in actions:
-        is_contact = kind[action.opportunity] == CONTACT
-        note(action.start_s, action.end_s, 1 if is_contact else 0)
-        if is_contact:
-            for from_s, to_s, per_s in flow(problem, satellite, action):
-                if from_s < horizon_s:
-                    change.setdefault(clip(from_s), [0] * 4)
-                    change.setdefault(clip(to_s), [0] * 4)
-                    flows.setdefault(clip(from_s), []).append((clip(to_s), per_s))
-    for enter_s, exit_s in zip(satellite.sunlight.enter_s, satellite.sunlight.exit_s, strict=True):
-        note(float(enter_s), float(exit_s), 2)
+    r, horizon_s = satellite.resources, problem.horizon_s
+    rows = np.array([action.opportunity for action in actions], dtype=np.int64)
+    is_contact = problem.opportunities.kind[rows] == CONTACT
     idle = idle_spans(problem, satellite, actions)
-    for span in idle:
-        note(span.sun_from_s, span.sun_until_s, 3)
+    contacts = itertools.compress(actions, is_contact.tolist())
+    pieces = np.array([p for a in contacts for p in flow(problem, satellite, a)]).reshape(-1, 3)
+    tasks, flows, sunlit, at_sun = (
+        np.clip(np.array(spans, dtype=np.float64).reshape(-1, 2), 0.0, horizon_s)
+        for spans in (
+            [(action.start_s, action.end_s) for action in actions],
+            pieces[:, :2],
+            np.column_stack((satellite.sunlight.enter_s, satellite.sunlight.exit_s)),
+            [(span.sun_from_s, span.sun_until_s) for span in idle],
+        )
+    )
+    ends = (tasks.ravel(), flows.ravel(), sunlit.ravel(), at_sun.ravel())
+    times = np.unique(np.concatenate(((0.0, horizon_s), *ends)))
+    num_collects = _under_way(times, tasks[~is_contact])
+    num_contacts = _under_way(times, tasks[is_contact])
+    is_charging = (_under_way(times, sunlit) > 0) & (_under_way(times, at_sun) > 0)
+    power = np.where(
+        num_collects + num_contacts > 0,
+        -num_collects * r.collect_drain_per_s - num_contacts * r.contact_drain_per_s,
+        np.where(is_charging, r.sunpoint_charge_per_s, 0.0),
+    )
+    power -= r.idle_drain_per_s
+    fill = r.telemetry_per_s + num_collects * r.collect_fill_per_s
+    drain = _under_way(times, flows, pieces[:, 2])
 
     point = Point(0.0, r.initial_battery_fraction, r.initial_recorder_fraction,
                   r.initial_recorder_fraction, 0.0)  # fmt: skip
-    points = [point]
-    at = {0.0: point}
-    collects = contacts = sunlit = at_sun = 0
-    flowing: list[tuple[float, float]] = []
-    times = sorted(change)
-    for t_s, until_s in itertools.pairwise(times):
-        collects += change[t_s][0]
-        contacts += change[t_s][1]
-        sunlit += change[t_s][2]
-        at_sun += change[t_s][3]
-        if collects or contacts:
-            power = -collects * r.collect_drain_per_s - contacts * r.contact_drain_per_s
-        else:
-            power = r.sunpoint_charge_per_s if sunlit and at_sun else 0.0
-        power -= r.idle_drain_per_s
-        fill = r.telemetry_per_s + collects * r.collect_fill_per_s
-        flowing = [f for f in flowing if f[0] > t_s] + flows.get(t_s, [])
-        drain = sum(per_s for _, per_s in flowing)
+    points, at = [point], [point]
+    for until_s, *rates in zip(
+        times[1:].tolist(), power.tolist(), fill.tolist(), drain.tolist(), strict=True
+    ):
         while point.time_s < until_s:
-            point = _advance(point, until_s, power, fill, drain)
+            point = _advance(point, until_s, *rates)
             points.append(point)
-        at[until_s] = point
+        at.append(point)
+    starts, stops = np.searchsorted(times, tasks).T.tolist()
     return Profile(
         points=tuple(points),
-        before=tuple(at[clip(a.start_s)] for a in actions),
-        after=tuple(at[clip(a.end_s)] for a in actions),
+        before=tuple(at[start] for start in starts),
+        after=tuple(at[stop] for stop in stops),
         idle=idle,
-        sun_end=tuple(at[clip(span.sun_until_s)] for span in idle),
+        sun_end=tuple(at[stop] for stop in np.searchsorted(times, at_sun[:, 1]).tolist()),
     )
+
+
+def _under_way(times: Floats, spans: Floats, weights: Floats | None = None) -> Floats:
+    """Return how many spans, or what sum of their weights, cover each piece between two times.
+
+    All ends of spans are among the times. Only what covers a piece is summed: a difference of
+    running sums would leave roundings where there is nothing.
+    """
+    first, last = np.searchsorted(times, spans).T
+    num_pieces = last - first
+    whole = np.arange(num_pieces.sum()) - np.repeat(np.cumsum(num_pieces) - num_pieces, num_pieces)
+    covered = np.repeat(first, num_pieces) + whole
+    weight = None if weights is None else np.repeat(weights, num_pieces)
+    return np.bincount(covered, weight, minlength=len(times) - 1).astype(np.float64)
 
 
 def _advance(point: Point, until_s: float, power: float, fill: float, drain: float) -> Point:
