@@ -13,7 +13,9 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
+from planner_core.jit import inlined, kernel
 from planner_core.problem import (
     CONTACT,
     Floats,
@@ -25,6 +27,9 @@ from planner_core.referee.contact_flow import flow
 from planner_core.referee.idle_time import Idle, idle_spans
 
 _SAME: Final = 1e-9  # of a capacity
+_STATES_IN_PIECE: Final = 6  # at most two end stops, each reached in one step or two
+
+_State = tuple[float, float, float, float, float]
 
 
 class Point(NamedTuple):
@@ -104,23 +109,18 @@ def _integrate_physical(
     fill = r.telemetry_per_s + num_collects * r.collect_fill_per_s
     drain = _under_way(times, flows, pieces[:, 2])
 
-    point = Point(0.0, r.initial_battery_fraction, r.initial_recorder_fraction,
-                  r.initial_recorder_fraction, 0.0)  # fmt: skip
-    points, at = [point], [point]
-    for until_s, *rates in zip(
-        times[1:].tolist(), power.tolist(), fill.tolist(), drain.tolist(), strict=True
-    ):
-        while point.time_s < until_s:
-            point = _advance(point, until_s, *rates)
-            points.append(point)
-        at.append(point)
-    starts, stops = np.searchsorted(times, tasks).T.tolist()
+    held = r.initial_recorder_fraction
+    first = (0.0, r.initial_battery_fraction, held, held, 0.0)
+    states, at = states_under(times, power, fill, drain, first)
+    points = tuple(map(Point._make, states.tolist()))
+    starts, stops = at[np.searchsorted(times, tasks).T].tolist()
+    sun_ends = at[np.searchsorted(times, at_sun[:, 1])].tolist()
     return Profile(
-        points=tuple(points),
-        before=tuple(at[start] for start in starts),
-        after=tuple(at[stop] for stop in stops),
+        points=points,
+        before=tuple(points[start] for start in starts),
+        after=tuple(points[stop] for stop in stops),
         idle=idle,
-        sun_end=tuple(at[stop] for stop in np.searchsorted(times, at_sun[:, 1]).tolist()),
+        sun_end=tuple(points[end] for end in sun_ends),
     )
 
 
@@ -138,29 +138,48 @@ def _under_way(times: Floats, spans: Floats, weights: Floats | None = None) -> F
     return np.bincount(covered, weight, minlength=len(times) - 1).astype(np.float64)
 
 
-def _advance(point: Point, until_s: float, power: float, fill: float, drain: float) -> Point:
+@kernel
+def states_under(
+    times: Floats, power: Floats, fill: Floats, drain: Floats, first: _State
+) -> tuple[Floats, npt.NDArray[np.int64]]:
+    """Return the states under the rates of each piece, and which of them stands at each time."""
+    states = np.empty((_STATES_IN_PIECE * len(times), 5))
+    at = np.empty(len(times), dtype=np.int64)
+    states[0] = first
+    num_states, at[0] = 1, 0
+    point = first
+    for piece in range(len(times) - 1):
+        while point[0] < times[piece + 1]:
+            point = advance(point, times[piece + 1], power[piece], fill[piece], drain[piece])
+            states[num_states] = point
+            num_states += 1
+        at[piece + 1] = num_states - 1
+    return states[:num_states], at
+
+
+@inlined
+def advance(point: _State, until_s: float, power: float, fill: float, drain: float) -> _State:
     """Return the state at ``until_s``, or earlier where battery or recorder reach an end stop."""
-    if (power > 0 and point.battery >= 1.0) or (power < 0 and point.battery <= 0.0):
+    time_s, battery, recorder, recorded, removed = point
+    if (power > 0 and battery >= 1.0) or (power < 0 and battery <= 0.0):
         power = 0.0
     net = fill - drain
-    if (net > 0 and point.recorder >= 1.0) or (net < 0 and point.recorder <= 0.0):
+    if (net > 0 and recorder >= 1.0) or (net < 0 and recorder <= 0.0):
         net = 0.0
-    dt = until_s - point.time_s
+    dt = until_s - time_s
     stop_s = until_s
-    for value, rate in ((point.battery, power), (point.recorder, net)):
+    for value, rate in ((battery, power), (recorder, net)):
         if rate != 0.0:
             to_stop_s = ((1.0 if rate > 0 else 0.0) - value) / rate
             # The last bit of rounding must not leave an endless row of tiny pieces.
             if to_stop_s < dt - 1e-9:
                 dt = max(to_stop_s, 1e-9)
-                stop_s = point.time_s + dt
-    battery = min(max(point.battery + power * dt, 0.0), 1.0)
-    recorder = min(max(point.recorder + net * dt, 0.0), 1.0)
+                stop_s = time_s + dt
+    battery = min(max(battery + power * dt, 0.0), 1.0)
+    kept = min(max(recorder + net * dt, 0.0), 1.0)
     # What did not stay in the recorder was taken down (or, when it is full, lost).
-    removed = fill * dt - (recorder - point.recorder) if drain > 0 else 0.0
-    return Point(
-        stop_s, battery, recorder, point.recorded + fill * dt, point.removed + max(removed, 0.0)
-    )
+    taken = fill * dt - (kept - recorder) if drain > 0 else 0.0
+    return stop_s, battery, kept, recorded + fill * dt, removed + max(taken, 0.0)
 
 
 def _integrate_events(

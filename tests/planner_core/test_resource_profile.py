@@ -1,0 +1,50 @@
+"""The referee's integration: compiled, and step by step as it is written."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from planner_core.referee.resource_profile import advance, states_under
+from tests.examples import examples
+
+_PER_S = st.sampled_from([0.0, 1e-9, 1e-4, 0.03, 0.5])
+_LEVEL = st.sampled_from([0.0, 1e-17, 0.3, 0.999, 1.0 - 2**-53, 1.0])
+
+
+@examples(200)
+@given(
+    spans_s=st.lists(st.floats(1e-6, 1e4), max_size=8),
+    rates=st.lists(st.tuples(_PER_S, _PER_S, _PER_S, st.booleans()), min_size=8, max_size=8),
+    battery=_LEVEL,
+    recorder=_LEVEL,
+)
+def test_compiled_states_are_those_of_the_steps(
+    spans_s: list[float],
+    rates: list[tuple[float, float, float, bool]],
+    battery: float,
+    recorder: float,
+) -> None:
+    times = np.cumsum([0.0, *spans_s])
+    table = np.array(
+        [(-power if drains else power, fill, drain) for power, fill, drain, drains in rates]
+    )[: len(spans_s)].copy(order="F")
+    first = (0.0, battery, recorder, recorder, 0.0)
+    point, states, at = first, [first], [0]
+    for until_s, (power, fill, drain) in zip(times[1:], table, strict=True):
+        while point[0] < until_s:
+            point = advance(point, until_s, power, fill, drain)
+            states.append(point)
+        at.append(len(states) - 1)
+
+    found, found_at = states_under(times, table[:, 0], table[:, 1], table[:, 2], first)
+
+    np.testing.assert_allclose(found, states, rtol=1e-12, atol=1e-15)
+    np.testing.assert_array_equal(found_at, at)
+    assert found[:, 0].tolist() == sorted(found[:, 0])
+    assert (found[:, 1:3] >= 0.0).all()
+    assert (found[:, 1:3] <= 1.0).all()
+    # What was recorded is on the ground, on board or lost where the recorder was full.
+    lost = found[-1, 3] - found[-1, 4] - found[-1, 2]
+    assert lost >= -1e-9 * max(1.0, found[-1, 3])
