@@ -27,9 +27,20 @@ def compiled_kernels() -> list[Any]:
 def stored_signatures() -> dict[str, list[str]]:
     """Return with which arguments each of these is compiled on disk, by its full name."""
     return {
-        f"{each.py_func.__module__}.{each.py_func.__qualname__}": each._cache.signatures()
+        f"{each.py_func.__module__}.{each.py_func.__qualname__}": [
+            str(signature) for signature in each._cache.signatures()
+        ]
         for each in _DISPATCHERS
     }
+
+
+def load_stored() -> None:
+    """Load from disk all that Python calls of the modules imported by now."""
+    for each in _DISPATCHERS:
+        if _is_for_kernels(each):
+            continue  # it is part of those that call it
+        for signature in each._cache.signatures():
+            each.compile(signature)
 
 
 def all_stamps() -> str:
@@ -99,11 +110,15 @@ def _once(function: F, **options: bool) -> F:
                 cache.let_others()
 
     dispatcher.compile = compile_once
-    if options.get("no_cpython_wrapper"):
+    if _is_for_kernels(dispatcher):
         dispatcher._insert = lambda *_: None  # Python finds no compiled version
         dispatcher._compile_for_args = lambda *_, **__: function
     _DISPATCHERS.append(dispatcher)
     return cast(F, dispatcher)
+
+
+def _is_for_kernels(dispatcher: Any) -> bool:
+    return bool(dispatcher.targetoptions.get("no_cpython_wrapper"))
 
 
 @contextmanager

@@ -95,10 +95,10 @@ class SharedCache(FunctionCache):
             found = super().load_overload(signature, target_context)
         return found
 
-    def signatures(self) -> list[str]:
-        """Return with which arguments the kernel is on disk."""
+    def signatures(self) -> list[Any]:
+        """Return with which arguments the kernel is on disk, as Numba's types."""
         self._take_stamp()
-        return [str(signature) for signature, *_ in self._cache_file._load_index()]
+        return [signature for signature, *_ in self._cache_file._load_index()]
 
     def let_others(self) -> None:
         """Let processes go on that wait for this kernel."""

@@ -12,12 +12,12 @@ from planner_core.budget import Budget, Progress, Termination
 from planner_core.build import ScenarioOpportunities, build_problem, compute_opportunities
 from planner_core.build_after import PlanBefore, opportunities_after
 from planner_core.certified.drivers.continuous import with_own_starts
+from planner_core.certified.lns.downlinks import with_more_downlinks
 from planner_core.certified.proofs import continuous
 from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.proofs.lagrangian import lagrangian_bound
 from planner_core.certified.proofs.resource_bound import quick_bound
 from planner_core.domain import Scenario
-from planner_core.preferences.downlinks import with_more_downlinks
 from planner_core.preferences.polish import Effect, polished
 from planner_core.problem import Problem
 from planner_core.problem.on_board import most_on_board, without_on_board

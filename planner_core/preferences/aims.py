@@ -3,54 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from functools import cached_property
 from statistics import fmean
 from typing import Final
 
 import numpy as np
 
 from planner_core.domain import Preference
-from planner_core.problem import COLLECT, CONTACT, Floats, Ints, Problem
-from planner_core.problem.plan import Action, Plan
-from planner_core.referee.replay import replay
-from planner_core.referee.timeline import Timeline
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class View:
-    """A plan as the referee sees it."""
-
-    problem: Problem
-    plan: Plan
-    timeline: Timeline
-
-    @classmethod
-    def of(cls, problem: Problem, plan: Plan) -> View:
-        """Return the plan, judged."""
-        return cls(problem=problem, plan=plan, timeline=replay(problem, plan))
-
-    @cached_property
-    def images(self) -> list[Action]:
-        """The collects that count, one of each target."""
-        return [self.plan.actions[image.position] for image in self.timeline.collected.values()]
-
-    @cached_property
-    def image_rows(self) -> Ints:
-        """Their opportunities."""
-        return np.array([image.opportunity for image in self.images], dtype=np.int32)
-
-    @cached_property
-    def contacts(self) -> list[Action]:
-        """The contacts of all satellites."""
-        kind = self.problem.opportunities.kind
-        return [action for action in self.plan.actions if kind[action.opportunity] == CONTACT]
-
-    @cached_property
-    def images_by_satellite(self) -> Ints:
-        """How many images each satellite takes. Shape ``(num_satellites,)``."""
-        own = self.problem.opportunities.satellite[self.image_rows]
-        return np.bincount(own, minlength=len(self.problem.satellites)).astype(np.int32)
+from planner_core.problem import COLLECT, Floats
+from planner_core.referee.view import View
 
 
 def value_of(view: View, aim: Preference) -> float:

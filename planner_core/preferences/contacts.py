@@ -1,100 +1,11 @@
-"""Contacts added, so that images come down sooner, and contacts that nothing needs taken away."""
+"""Contacts that nothing needs, taken away."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from typing import Final
-
-import numpy as np
-
 from planner_core.budget import Budget
-from planner_core.preferences.aims import View
-from planner_core.problem import CONTACT, Ints, SatelliteProblem
+from planner_core.certified.lns.downlinks import Accepts
 from planner_core.problem.plan import Plan
-from planner_core.problem.slew import TIME_TOLERANCE_S
-from planner_core.replanning.repair import conflicts
-
-_MOST_TRIED: Final = 8  # contacts of one gap
-
-Accepts = Callable[[View], bool]
-"""Whether a plan costs no worth, and comes nearer to the aim."""
-
-
-def with_contacts(view: View, accepts: Accepts, budget: Budget) -> View:
-    """Return the plan with contacts that bring images down sooner, one a gap at a time."""
-    while not budget.is_spent():
-        trial = _settled(view, _best_of_gaps(view), budget)
-        if trial is None or not accepts(trial):
-            return view
-        view = trial
-    return view
-
-
-def _settled(view: View, rows: list[int], budget: Budget) -> View | None:
-    """Return the plan with as many of these contacts as break nothing; None where none does."""
-    problem = view.problem
-    table = problem.opportunities
-    while rows and not budget.is_spent():
-        plan = Plan(tuple(sorted((*view.plan.actions, *Plan.of(problem, rows).actions))))
-        trial = View.of(problem, plan)
-        broken = [v for v in trial.timeline.violations if v.code != "duplicate"]
-        if trial.timeline.is_valid:
-            return trial
-        gone = set[int]()
-        for violation in broken:
-            own = [row for row in rows if table.satellite[row] == violation.satellite]
-            before = [r for r in own if table.start_s[r] <= violation.at_s + TIME_TOLERANCE_S]
-            # The last one before it, and all at once where none is: the search must end.
-            gone |= set(sorted(before)[-1:] or own)
-        rows = [row for row in rows if row not in gone] if gone else []
-    return None
-
-
-def _best_of_gaps(view: View) -> list[int]:
-    """Return, of each gap between contacts, the contact that fits and gains most time."""
-    table = view.problem.opportunities
-    taken = np.array([action.opportunity for action in view.plan.actions], dtype=np.int32)
-    is_contact = table.kind[taken] == CONTACT
-    chosen = list[int]()
-    for index, satellite in enumerate(view.problem.satellites):
-        is_own = table.satellite[taken] == index
-        # Tasks of others matter where they hold an antenna.
-        beside = taken[is_own | is_contact].tolist()
-        for rows in _by_gap(view, satellite, taken[is_own]):
-            for row in rows:
-                if not conflicts(view.problem, row, [*beside, *chosen]):
-                    chosen.append(row)
-                    break
-    return chosen
-
-
-def _by_gap(view: View, satellite: SatelliteProblem, taken: Ints) -> Iterator[list[int]]:
-    """Yield contacts that are not taken, by the taken one they follow, those that gain most first.
-
-    What one gains is the time that it saves images which wait for the next contact.
-    """
-    problem = view.problem
-    table, local = problem.opportunities, problem.local_row
-    contacts = taken[table.kind[taken] == CONTACT]
-    free = np.flatnonzero(satellite.kind == CONTACT)
-    free = free[~np.isin(free, local[contacts])]
-    taken_s, free_s = np.sort(table.start_s[contacts]), satellite.start_s[free]
-    images = view.image_rows[np.isin(view.image_rows, taken)]
-    index = problem.satellites.index(satellite)
-    on_board_s = [
-        min(0.0, one.collected_s)
-        for one in problem.on_board
-        if one.satellite == index and one.is_waiting
-    ]
-    ends_s = np.sort(np.append(table.end_s[images], on_board_s))
-    gap = np.searchsorted(taken_s, free_s, side="right")
-    last_s, next_s = np.append(-np.inf, taken_s)[gap], np.append(taken_s, problem.horizon_s)[gap]
-    num_waiting = np.searchsorted(ends_s, free_s) - np.searchsorted(ends_s, last_s)
-    saved_s = num_waiting * (next_s - free_s)
-    for one in np.unique(gap[num_waiting > 0]):
-        within = np.flatnonzero((gap == one) & (num_waiting > 0))
-        best_first = within[np.argsort(-saved_s[within], kind="stable")][:_MOST_TRIED]
-        yield satellite.rows[free[best_first]].tolist()
+from planner_core.referee.view import View
 
 
 def without_contacts(view: View, accepts: Accepts, budget: Budget) -> View:

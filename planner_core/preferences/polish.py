@@ -14,12 +14,14 @@ from typing import Final
 
 from planner_core.budget import Budget
 from planner_core.certified.drivers.latency import worth_with
+from planner_core.certified.lns.downlinks import Accepts, with_contacts
 from planner_core.certified.lns.resource_search import ResourceWindows
 from planner_core.domain import Preference
-from planner_core.preferences.aims import View, figure_of, liking_of, value_of
-from planner_core.preferences.contacts import Accepts, with_contacts, without_contacts
+from planner_core.preferences.aims import figure_of, liking_of, value_of
+from planner_core.preferences.contacts import without_contacts
 from planner_core.problem import Floats, Problem
 from planner_core.problem.plan import Plan
+from planner_core.referee.view import View
 
 _MOVES_AN_IMAGE: Final = 8
 _FIRST_MOVES: Final = 10  # on each satellite: the first gain most

@@ -16,6 +16,7 @@ import numpy as np
 
 from planner_core.budget import Budget, Termination
 from planner_core.pinning.limits import can_keep
+from planner_core.precedence.conflicts import conflicts
 from planner_core.problem import CONTACT, Problem, SatelliteProblem
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
@@ -23,7 +24,7 @@ from planner_core.referee.resource_profile import Point, integrate
 from planner_core.referee.unavoidable import beyond_from_s
 from planner_core.replanning.known import KnownPrices
 from planner_core.replanning.question import Question
-from planner_core.replanning.repair import conflicts, repaired
+from planner_core.replanning.repair import repaired
 from planner_core.replanning.replan import (
     differences,
     require_promises,

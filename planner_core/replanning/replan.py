@@ -23,6 +23,7 @@ from planner_core.certified.proofs.resource_bound import quick_bound
 from planner_core.domain import Replan, Scenario
 from planner_core.errors import InvalidScenario
 from planner_core.pinning.rows_meant import rows_of_base
+from planner_core.precedence.conflicts import conflicts
 from planner_core.problem import COLLECT, CONTACT, Problem
 from planner_core.problem.on_board import without_on_board
 from planner_core.problem.plan import Plan
@@ -30,7 +31,7 @@ from planner_core.replanning.known import KnownPrices, bound_at
 from planner_core.replanning.nearby import nearby
 from planner_core.replanning.programs import fewest_changes, mixed
 from planner_core.replanning.question import Lost, News, Question
-from planner_core.replanning.repair import LIMITS, conflicts, repaired
+from planner_core.replanning.repair import LIMITS, repaired
 from planner_core.replanning.undo import parts_of, undone, value, within_share
 from planner_core.solvers.base import Solution, Solver
 

@@ -11,10 +11,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from planner_core.budget import Budget
+from planner_core.precedence.conflicts import conflicts
 from planner_core.problem import COLLECT
 from planner_core.problem.plan import Plan
 from planner_core.replanning.question import Question
-from planner_core.replanning.repair import conflicts
 
 _EQUAL = 1e-9
 

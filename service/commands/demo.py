@@ -56,7 +56,7 @@ def run_demo(settings: Settings, *, folder: Path, keep_serving: bool = False) ->
         Where there are no plans to judge.
     """
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    warm.make_ready(warm.ESSENTIAL)
+    warm.make_ready(warm.DEMONSTRATION)
     folder.mkdir(parents=True, exist_ok=True)
     port = settings.port if keep_serving else 0
     with _service(port, settings.workers, folder / "service.log") as url:

@@ -1,9 +1,9 @@
 """Compile the kernels before they are needed, and load them, so that no job pays for it.
 
 ``python -m service.jobs.warm`` fills the cache of compiled kernels on disk. Each part plans a
-tiny mission that needs some of them; the essential ones are those that a mission of one satellite
-may need without free starts and half-lives, the demonstration's among them: a search in which
-kernels are compiled has less time for its plan.
+tiny mission that needs some of them, since a search in which kernels are compiled has less time
+for its plan. The first parts are those that a demonstration needs, a spacecraft that can be flown
+and every solver.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ from planner_core.domain import (
     mean_elements,
 )
 from planner_core.errors import InvalidScenario
-from planner_core.jit import all_stamps
+from planner_core.jit import all_stamps, load_stored
 from planner_core.kernel_cache import kernel_folder
 from planner_core.pins import BlockedInterval, PinnedAction, Pins
 from planner_core.precedence.arcs import arc_network_of
@@ -74,9 +74,12 @@ def main() -> None:
 
 
 def warm_up() -> None:
-    """Run in this process what is compiled or at once needed, so that it is loaded."""
-    for part in PARTS if _is_ready(PARTS) else ESSENTIAL:
-        PARTS[part]()
+    """Load in this process what is compiled; where nothing is, compile what a first job needs."""
+    if _is_ready(PARTS) or _is_ready(DEMONSTRATION):
+        load_stored()
+        return
+    for run in DEMONSTRATION.values():
+        run()
 
 
 def make_ready(parts: Iterable[str]) -> None:
@@ -127,7 +130,7 @@ def _is_ready(parts: Iterable[str]) -> bool:
 
 def _marker(parts: Iterable[str]) -> Path:
     """Return the file that tells which kernels were compiled when some parts were."""
-    name = "all" if set(parts) == set(PARTS) else "essential"
+    name = "all" if set(parts) == set(PARTS) else "demonstration"
     return kernel_folder() / f"{name}.ready"
 
 
@@ -152,6 +155,21 @@ def _over_the_globe(*, is_worn: bool = False) -> Scenario:
     return _mission(points, use_resources=True, is_worn=is_worn)
 
 
+def _flown() -> Scenario:
+    """Return a mission with turns in motion, to the sun and back, and contacts in parts."""
+    globe = _over_the_globe()
+    (plain,) = globe.satellites
+    agility = Agility(slew_rate_deg_s=2.0, acceleration_deg_s2=0.2, slew_model="moving")
+    down_per_s = plain.resources.downlink_per_s
+    resources = replace(
+        plain.resources,
+        sun_pointing="slew",
+        eclipse_aware=True,
+        downlink_by_elevation=((0.0, down_per_s), (90.0, 2.0 * down_per_s)),
+    )
+    return replace(globe, satellites=(replace(plain, agility=agility, resources=resources),))
+
+
 def _crowd(num_targets: int = 120, *, use_resources: bool = False) -> Scenario:
     """Return targets near the pole, in each other's way: proofs need all there is."""
     random = np.random.default_rng(0)
@@ -168,7 +186,7 @@ def _few() -> Scenario:
 
 def _judge() -> None:
     """Plan by the rule; the referee, the reasons and the quick bound come with it."""
-    _plan(_over_the_globe(), Rule())
+    _plan(_flown(), Rule())
 
 
 def _judge_worn() -> None:
@@ -184,9 +202,16 @@ def _search(solver: str) -> Callable[[], None]:
     """Return the search of a solver alone: what judges its plan is warmed once, by the rule."""
 
     def search() -> None:
-        SOLVERS[solver]().solve(_built(_over_the_globe()), Budget(), 0)
+        SOLVERS[solver]().solve(_built(_flown()), Budget(), 0)
 
     return search
+
+
+def _plain() -> None:
+    """Plan with turns from rest to rest, and charge whenever there is nothing else to do."""
+    plain = _over_the_globe()
+    _plan(plain, Rule(), ForwardSearch(), Graph(path="longest"))
+    Certified().solve(_built(plain), Budget(), 0)
 
 
 def _free() -> None:
@@ -255,30 +280,20 @@ def _slow() -> None:
         excluded_by(each.satellites[0], 0)
 
 
-def _flown() -> None:
-    """Plan with turns in motion, to the sun and back."""
-    globe = _over_the_globe()
-    (plain,) = globe.satellites
-    agility = Agility(slew_rate_deg_s=2.0, acceleration_deg_s2=0.2, slew_model="moving")
-    resources = replace(plain.resources, sun_pointing="slew", eclipse_aware=True)
-    flown = replace(plain, agility=agility, resources=resources)
-    _plan(replace(globe, satellites=(flown,)), Rule(), ForwardSearch(), Graph(path="longest"))
-
-
-ESSENTIAL: Final[dict[str, Callable[[], None]]] = {
+DEMONSTRATION: Final[dict[str, Callable[[], None]]] = {
     # Judging and the tree search take longest; two processes begin with one each.
     "rule": _judge,
     **{name: _search(name) for name in ("mcts", "certified", "milp", "forward_search", "graph")},
-    "worn": _judge_worn,
-    # What spacecraft that can be flown and searches of some length need on top of that.
-    "flown": _flown,
+    # What searches of some length need on top of that.
     "shortage": _shortage,
+}
+PARTS: Final[dict[str, Callable[[], None]]] = {
+    **DEMONSTRATION,
+    "plain": _plain,
+    "worn": _judge_worn,
     "free": _free,
     "spaced": _spaced,
     "slow": _slow,
-}
-PARTS: Final[dict[str, Callable[[], None]]] = {
-    **ESSENTIAL,
     "continuous": _continuous,
     "continuous with resources": _continuous_with_resources,
     "late": _late,

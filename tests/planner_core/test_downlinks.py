@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget
+from planner_core.certified.lns.downlinks import with_more_downlinks
 from planner_core.domain import Dynamics, Objective
-from planner_core.preferences.downlinks import with_more_downlinks
 from planner_core.problem import CONTACT
 from planner_core.problem.delivery import with_objective
 from planner_core.problem.plan import Plan

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 from planner_core import run
 from planner_core.budget import Budget, Termination
+from planner_core.certified.lns.downlinks import with_more_downlinks
 from planner_core.certified.proofs.documents import from_json, is_proven, to_json
 from planner_core.certified.proofs.resource_bound import quick_bound
 from planner_core.domain import (
@@ -29,7 +30,6 @@ from planner_core.domain import (
 )
 from planner_core.errors import InvalidScenario
 from planner_core.pinning.apply_pins import apply_pins
-from planner_core.preferences.downlinks import with_more_downlinks
 from planner_core.problem import COLLECT, CONTACT, ImageOnBoard, Pinned, Problem
 from planner_core.problem.delivery import with_objective
 from planner_core.problem.on_board import most_on_board, with_on_board, without_on_board

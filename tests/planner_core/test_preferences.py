@@ -16,12 +16,13 @@ from hypothesis import strategies as st
 from planner_core.budget import Budget
 from planner_core.domain import Objective, Preference
 from planner_core.errors import InvalidScenario
-from planner_core.preferences.aims import View, figure_of, liking_of, value_of
+from planner_core.preferences.aims import figure_of, liking_of, value_of
 from planner_core.preferences.polish import polished
 from planner_core.problem import Problem, Singles
 from planner_core.problem.delivery import with_objective
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
+from planner_core.referee.view import View
 from planner_core.solvers.milp import Milp
 from planner_core.solvers.registry import SOLVERS
 from planner_core.solvers.rule import Rule

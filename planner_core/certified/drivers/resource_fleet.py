@@ -65,7 +65,7 @@ def _take_turns(
     for turn in work:
         turn.result()
     pool.learn(turns.ended, turns.plan)
-    is_better = [search.best.offer(plan) for plan in (turns.plan, pool.plan)]
+    is_better = [search.offer(plan) for plan in (turns.plan, pool.plan)]
     search.best.report("plans")
     return any(is_better)
 

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -18,6 +19,12 @@ print(json.dumps(stored_signatures()))
 """
 
 
+_COMPILE_FIRST = """
+from service.jobs import warm
+warm.make_ready(warm.DEMONSTRATION)
+"""
+
+
 def _run(*arguments: str, folder: Path) -> str:
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder)}
     return subprocess.run(
@@ -25,28 +32,45 @@ def _run(*arguments: str, folder: Path) -> str:
     ).stdout
 
 
+@dataclass(frozen=True, slots=True)
+class Compiled:
+    """What is on disk after each step, by kernel, and what the last one said."""
+
+    first: dict[str, list[str]]
+    demonstrated: dict[str, list[str]]
+    whole: dict[str, list[str]]
+    said: str
+
+
 @pytest.fixture(scope="module")
-def said_and_signatures(
-    tmp_path_factory: pytest.TempPathFactory,
-) -> tuple[str, dict[str, list[str]]]:
+def compiled(tmp_path_factory: pytest.TempPathFactory) -> Compiled:
     folder = tmp_path_factory.mktemp("kernels")
+
+    def stored() -> dict[str, list[str]]:
+        found: dict[str, list[str]] = json.loads(_run("-c", _ASK, folder=folder))
+        return found
+
+    _run("-c", _COMPILE_FIRST, folder=folder)
+    first = stored()
+    _run("-m", "service", "demo", "--out", str(tmp_path_factory.mktemp("demo")), folder=folder)
+    demonstrated = stored()
     said = _run("-m", "service.jobs.warm", folder=folder)
-    return said, json.loads(_run("-c", _ASK, folder=folder))
+    return Compiled(first=first, demonstrated=demonstrated, whole=stored(), said=said)
 
 
 @pytest.mark.full_size
-def test_every_kernel_is_compiled_by_the_warm_up(
-    said_and_signatures: tuple[str, dict[str, list[str]]],
-) -> None:
-    said, signatures = said_and_signatures
-    assert "Compiling" in said
-    assert [name for name, kinds in signatures.items() if not kinds] == []
+def test_the_demonstration_compiles_nothing_in_its_searches(compiled: Compiled) -> None:
+    assert compiled.demonstrated == compiled.first
+    assert sum(map(len, compiled.first.values())) < sum(map(len, compiled.whole.values()))
 
 
 @pytest.mark.full_size
-def test_no_kernel_is_compiled_twice(
-    said_and_signatures: tuple[str, dict[str, list[str]]],
-) -> None:
-    _, signatures = said_and_signatures
-    assert len(signatures) > 100
-    assert {name: kinds for name, kinds in signatures.items() if len(kinds) > 1} == {}
+def test_every_kernel_is_compiled_by_the_warm_up(compiled: Compiled) -> None:
+    assert "Compiling" in compiled.said
+    assert [name for name, kinds in compiled.whole.items() if not kinds] == []
+
+
+@pytest.mark.full_size
+def test_no_kernel_is_compiled_twice(compiled: Compiled) -> None:
+    assert len(compiled.whole) > 100
+    assert {name: kinds for name, kinds in compiled.whole.items() if len(kinds) > 1} == {}
