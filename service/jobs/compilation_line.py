@@ -7,7 +7,7 @@ import sys
 import time
 from typing import Final, TextIO
 
-from planner_core.jit import compiled_kernels
+from planner_core.jit import compiled_kernels, stored_signatures
 
 _EVERY_S: Final = 10.0  # where lines cannot be overwritten
 _TOO_FEW: Final = 0.1  # share of the kernels from which no time can be told yet
@@ -17,15 +17,23 @@ class CompilationLine:
     """Counts kernels by their source lines, which is about what they take to compile.
 
     Nothing is printed before the first kernel: where all are on disk, there is nothing to tell.
+
+    Parameters
+    ----------
+    share
+        How much of the lines of all kernels is to be compiled, or is on disk already.
     """
 
-    def __init__(self, began_s: float, out: TextIO = sys.stdout) -> None:
+    def __init__(self, began_s: float, share: float = 1.0, out: TextIO = sys.stdout) -> None:
         self._began_s, self._shown_s, self._out = began_s, 0.0, out
-        self._left = {
+        num_lines = {
             kernel.py_func.__qualname__: len(inspect.getsourcelines(kernel.py_func)[0])
             for kernel in compiled_kernels()
         }
-        self._total = sum(self._left.values())
+        is_stored = {name.rpartition(".")[2]: bool(on) for name, on in stored_signatures().items()}
+        self._left = {name: num for name, num in num_lines.items() if not is_stored[name]}
+        stored = sum(num_lines.values()) - sum(self._left.values())
+        self._total = max(1.0, share * sum(num_lines.values()) - stored)
         self._done = 0
         self._is_open = False
 
