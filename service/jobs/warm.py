@@ -85,8 +85,8 @@ def warm_up() -> None:
 def make_ready(parts: Iterable[str]) -> None:
     """Compile all parts, or the demonstration's, in as many processes as there are cores.
 
-    It tells how far it is. Parts are taken in their order. Processes that come upon the same kernel share it: one
-    compiles, the others wait for that one alone.
+    It tells how far it is. Parts are taken in their order. Processes that come upon the same
+    kernel share it: one compiles, the others wait for that one alone.
     """
     parts = list(parts)
     if _is_ready(parts):

@@ -27,7 +27,7 @@ def solve_with_resources(problem: Problem, budget: Budget, seed: int, gap: float
     """Return the best plan of a problem with resources, and its proof."""
     best = Incumbent(problem, budget, gap)
     search = ResourceSearch(best, seed)
-    search.best.offer(Rule().solve(problem, Budget(), seed).plan)
+    search.offer(Rule().solve(problem, Budget(), seed).plan)
     if len(problem.opportunities) == 0:
         return search.best.solution()
     has_half_life = problem.counts_delivery and problem.objective.half_life_s is not None
