@@ -14,6 +14,7 @@ one, on a worker that holds the plan, and what each step takes.
 from __future__ import annotations
 
 import argparse
+import math
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -163,7 +164,7 @@ def measure(name: str, scenario: Scenario, known: KnownPrices | None, *, is_brie
     changed = question.changed(solution.plan) / question.num_base
     told = f"| {name} | {timeline.reward:g} / {solution.bound:g} | {changed:.1%} | {forced:.1%} "
     if is_brief:
-        return f"{told}| | {cpu_s:.2f} | | | |"
+        return f"{told}| {_least(question)} | {cpu_s:.2f} | | | |"
     began = time.process_time()
     scratch = Certified().solve(problem, CpuBudget(SCRATCH_S, time.time() + 300.0), 0)
     scratch_s = time.process_time() - began
@@ -181,7 +182,7 @@ def _least(question: Question) -> str:
     found = None
     if problem.use_resources:
         budget = CpuBudget(SCRATCH_S, time.time() + 300.0)
-        found = fewest_changes(question, range(len(problem.satellites)), budget)
+        found = fewest_changes(question, range(len(problem.satellites)), budget, math.inf)
     if found is None or not found.is_proven:
         return "-"
     is_image = problem.opportunities.kind[question.base] == COLLECT
@@ -262,7 +263,7 @@ def main() -> None:
     parser.add_argument("missions", nargs="*", choices=[*MISSIONS, []], default=[])
     parser.add_argument("--fleet", nargs=2, type=Path, metavar=("SPACECRAFT", "CITIES"))
     parser.add_argument("--requests", type=int, default=100, help="of a fleet")
-    parser.add_argument("--brief", action="store_true", help="replans alone")
+    parser.add_argument("--brief", action="store_true", help="nothing from scratch")
     options = parser.parse_args()
     if options.fleet:
         spacecraft, cities = options.fleet

@@ -44,7 +44,12 @@ class Fewest:
     is_proven: bool
 
 
-def fewest_changes(question: Question, satellites: Sequence[int], budget: Budget) -> Fewest | None:
+def fewest_changes(
+    question: Question,
+    satellites: Sequence[int],
+    budget: Budget,
+    most_pairs: float = _MOST_PAIRS,
+) -> Fewest | None:
     """Return the plan that keeps most images of the base, contacts being free.
 
     Nothing but the base and contacts can help to keep the base: images in their place are left to
@@ -54,6 +59,8 @@ def fewest_changes(question: Question, satellites: Sequence[int], budget: Budget
     ----------
     satellites
         Those whose part of the base may change; what the others do is left alone.
+    most_pairs
+        Of tasks near each other: for a program that is larger the answer is None.
     """
     problem = question.problem
     table = problem.opportunities
@@ -69,7 +76,7 @@ def fewest_changes(question: Question, satellites: Sequence[int], budget: Budget
     is_offered &= np.isin(table.satellite, satellites)
     rows = np.flatnonzero(is_offered).astype(np.int32)
     part = restricted(_counting(question, is_base), rows)
-    if num_near_pairs(part) > _MOST_PAIRS:
+    if num_near_pairs(part) > most_pairs:
         return None
     found = Milp().solve(part, budget.part(report=ignored), 0)
     found_rows = {int(rows[action.opportunity]) for action in found.plan.actions}

@@ -27,6 +27,7 @@ from planner_core.precedence.conflicts import conflicts
 from planner_core.problem import COLLECT, CONTACT, Problem
 from planner_core.problem.on_board import without_on_board
 from planner_core.problem.plan import Plan
+from planner_core.replanning.days import can_replan_days, with_days_replanned
 from planner_core.replanning.known import KnownPrices, bound_at
 from planner_core.replanning.nearby import nearby
 from planner_core.replanning.programs import fewest_changes, mixed
@@ -37,7 +38,8 @@ from planner_core.solvers.base import Solution, Solver
 
 _MOVES_A_TASK: Final = 0.3
 _LEAST_MOVES: Final = 600
-_SHARE: Final = 0.4  # of the time, for the search that counts changes
+_SHARE: Final = 0.4  # of the time, for the first plan, and of what is left for moves from there
+_DAYS: Final = 0.4  # of what is left then, for the one that does not
 _REST: Final = 0.8  # of what is left then, for the proof
 _EQUAL: Final = 1e-9
 _TRIES: Final = 8
@@ -124,13 +126,19 @@ def solve_replan(
         ``promise_not_kept``: no plan was found that images a promised target.
     """
     problem = question.problem
-    first = budget.part(_SHARE)
-    plan = _followed(question, first_plan(question, first), first, seed).with_kept(problem)
+    start = first_plan(question, budget.part(_SHARE))
+    # A time of their own: where the first plan takes a program, moves are what still betters it.
+    plan = _followed(question, start, budget.part(_SHARE), seed).with_kept(problem)
     gap, verdict = getattr(solver, "gap", 0.0), question.judged(plan)
     best = Incumbent(problem, budget, gap, plan, verdict=verdict)
     best.lower(_first_bound(problem, known, best.reward))
     best.report("kept")
     is_done = best.is_done or _is_no_more_open(question, known, best)
+    if not is_done and can_replan_days(problem):
+        other = with_days_replanned(best, budget.part(_DAYS, ignored), seed)
+        plan = _better_of(question, plan, other, budget, seed)
+        best.offer(plan)
+        is_done = best.is_done
     if not is_done or not best.is_valid:
         # Where plan and bound are apart another search may earn more, and proves how much.
         found = solver.solve(problem, budget.part(_REST, ignored), seed)

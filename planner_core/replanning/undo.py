@@ -7,8 +7,11 @@ where the referee finds the plan as valid and its worth, changes counted, no les
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+
+import numpy as np
 
 from planner_core.budget import Budget
 from planner_core.precedence.conflicts import conflicts
@@ -70,8 +73,9 @@ def undone(question: Question, plan: Plan, budget: Budget) -> Plan:
         for part in parts_of(question, plan):
             if budget.is_spent():
                 return plan
-            trial = without(question, plan, part)
-            if trial is not None and value(question, trial) >= value(question, plan) - _EQUAL:
+            least = value(question, plan) - _EQUAL
+            trial = without(question, plan, part, least)
+            if trial is not None and value(question, trial) >= least:
                 plan, is_better = trial, True
     return plan
 
@@ -96,13 +100,20 @@ def within_share(question: Question, plan: Plan, budget: Budget) -> Plan:
     return plan
 
 
-def without(question: Question, plan: Plan, part: Part) -> Plan | None:
-    """Return the plan without a part of its difference; None where that breaks something."""
+def without(question: Question, plan: Plan, part: Part, least: float = -math.inf) -> Plan | None:
+    """Return the plan without a part of its difference.
+
+    None where that breaks something, or where what is taken cannot be worth ``least``: of 102 parts
+    of a good plan the referee need see a few only.
+    """
     problem = question.problem
     if any(row in problem.kept_rows for row in part.added):
         return None
     taken = {action.opportunity for action in plan.actions}
     trial = Plan.of(problem, (taken - part.added) | part.removed)
+    rows = np.array([action.opportunity for action in trial.actions], dtype=np.int32)
+    if problem.worth_of(rows) + question.stable_worth(trial) < least:
+        return None
     if len(question.missing(trial)) > len(question.missing(plan)):
         return None
     return trial if question.may_fly(trial) else None

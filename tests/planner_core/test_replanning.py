@@ -21,7 +21,7 @@ from planner_core.referee.replay import replay
 from planner_core.replanning.known import KnownPrices, bound_at, prices_of
 from planner_core.replanning.programs import fewest_changes
 from planner_core.replanning.question import Question
-from planner_core.replanning.replan import solve_replan
+from planner_core.replanning.replan import first_plan, improved, solve_replan
 from planner_core.replanning.undo import parts_of, value, within_share, without
 from planner_core.solvers.registry import Certified, Rule
 from tests.examples import examples
@@ -186,6 +186,40 @@ def test_no_part_of_the_difference_gains_nothing(seed: int, use_resources: bool)
         assert trial is None or value(question, trial) < value(question, plan)
 
 
+@examples(60)
+@given(seed=SEEDS, use_resources=st.booleans())
+def test_what_is_not_asked_of_the_referee_could_not_be_worth_enough(
+    seed: int, use_resources: bool
+) -> None:
+    happened = event_at_random(seed, use_resources=use_resources, size=2)
+    if happened is None:
+        return
+    question = replace(happened.question, promised=())
+    plan = Rule().solve(question.problem, Budget(), 0).plan
+    least = value(question, plan)
+    for part in parts_of(question, plan):
+        trial = without(question, plan, part)
+        asked = without(question, plan, part, least)
+        assert asked in (trial, None)
+        if trial is not None and asked is None:
+            assert value(question, trial) < least
+            event("not asked")
+
+
+def test_a_whole_day_finds_what_moves_near_the_plan_do_not() -> None:
+    """One of 60 small ones; in operation it is most (``replanning.days``)."""
+    happened = event_at_random(22, use_resources=True, size=6)
+    assert happened is not None
+    question = replace(happened.question, promised=())
+    problem = question.problem
+    near = improved(question, first_plan(question, Budget()), Budget(), 0)
+    # The solver is one that finds nothing more.
+    found = solve_replan(question, Rule(), Budget(), 0).plan
+    assert replay(problem, found).is_valid
+    assert replay(problem, found).reward > replay(problem, near).reward
+    assert value(question, found) > value(question, near)
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_changes_stay_within_their_share_where_they_can(seed: int) -> None:
     free = event_at_random(seed, use_resources=False, size=3)
@@ -325,6 +359,29 @@ def test_prices_without_multipliers_are_nothing_known() -> None:
         bound=Bound(value=1.0, proof="lagrangian", prices=np.zeros(1)), target_ids=("a", "b")
     )
     assert of_fewer.on(whole) is None
+
+
+@pytest.mark.parametrize("use_resources", [True, False])
+def test_what_comes_in_has_the_price_of_its_like_where_energy_is_short(use_resources: bool) -> None:
+    whole = random_problem(0, use_resources=use_resources, num_targets=9, num_collects=12)
+    usual = whole.typical_worth
+    is_last = whole.opportunities.place == 8
+    dear = replace(
+        whole, worth=np.where(is_last & (whole.opportunities.kind == COLLECT), 3 * usual, usual)
+    )
+    known = KnownPrices(
+        bound=Bound(value=1.0, proof="dp", prices=np.array([0.0, 0.1, 0.7]) * usual, unit=usual),
+        target_ids=whole.target_ids[:3],
+    )
+    found = known.on(dear)
+    assert found is not None
+    assert found.prices is not None
+    left = np.maximum(0.0, dear.best_worth - 0.5 * dear.typical_worth)
+    expected = np.array([0.0, 0.1 * usual, 0.7 * usual, *left[3:]])
+    if use_resources:
+        expected[3:8] = np.minimum(0.1 * usual, left[3:8])
+    assert expected[8] > 2 * usual
+    assert found.prices == pytest.approx(np.minimum(expected, dear.best_worth))
 
 
 def test_replans_one_after_the_other_do_not_count_in_ever_smaller_units() -> None:
