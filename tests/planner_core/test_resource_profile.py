@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner_core.referee.resource_profile import advance, states_under
+from planner_core.referee.resource_profile import advance, integrate, states_under
 from tests.examples import examples
+from tests.planner_core.problems import random_problem
 
 _PER_S = st.sampled_from([0.0, 1e-9, 1e-4, 0.03, 0.5])
 _LEVEL = st.sampled_from([0.0, 1e-17, 0.3, 0.999, 1.0 - 2**-53, 1.0])
@@ -48,3 +51,24 @@ def test_compiled_states_are_those_of_the_steps(
     # What was recorded is on the ground, on board or lost where the recorder was full.
     lost = found[-1, 3] - found[-1, 4] - found[-1, 2]
     assert lost >= -1e-9 * max(1.0, found[-1, 3])
+
+
+def test_levels_at_the_start_may_be_whole_numbers() -> None:
+    problem = random_problem(0, use_resources=True)
+    (satellite, *others) = problem.satellites
+    r = satellite.resources
+    whole, real = (
+        replace(
+            problem,
+            satellites=(
+                replace(
+                    satellite,
+                    resources=replace(r, initial_battery_fraction=b, initial_recorder_fraction=d),
+                ),
+                *others,
+            ),
+        )
+        for b, d in ((1, 0), (1.0, 0.0))
+    )
+    profiles = [integrate(p, p.satellites[0], ()) for p in (whole, real)]
+    assert profiles[0] == profiles[1]
