@@ -27,7 +27,7 @@ from planner_core.precedence.conflicts import conflicts
 from planner_core.problem import COLLECT, CONTACT, Problem
 from planner_core.problem.on_board import without_on_board
 from planner_core.problem.plan import Plan
-from planner_core.replanning.days import can_replan_days, with_days_replanned
+from planner_core.replanning.days import has_days, with_days_replanned
 from planner_core.replanning.known import KnownPrices, bound_at
 from planner_core.replanning.nearby import nearby
 from planner_core.replanning.programs import fewest_changes, mixed
@@ -134,8 +134,9 @@ def solve_replan(
     best.lower(_first_bound(problem, known, best.reward))
     best.report("kept")
     is_done = best.is_done or _is_no_more_open(question, known, best)
-    if not is_done and can_replan_days(problem):
-        other = with_days_replanned(best, budget.part(_DAYS, ignored), seed)
+    if not is_done and has_days(problem):
+        touched = _touched(question)
+        other = with_days_replanned(best, touched, budget.part(_DAYS, ignored), seed)
         plan = _better_of(question, plan, other, budget, seed)
         best.offer(plan)
         is_done = best.is_done
@@ -163,16 +164,25 @@ def _is_no_more_open(question: Question, known: KnownPrices | None, best: Incumb
     return best.bound.value - best.reward <= known.bound.value - before + _EQUAL
 
 
+def _touched(question: Question) -> list[int]:
+    """Return the satellites that something keeps from what they had, or that it leads too far."""
+    outages = {one.satellite for one in question.problem.pinned.blocked}
+    return sorted(_broken(question) | {one for one in outages if one is not None})
+
+
+def _broken(question: Question) -> set[int]:
+    """Return the satellites that the base, as far as it is left, leads beyond a limit."""
+    base = Plan.of(question.problem, question.base.tolist()).with_kept(question.problem)
+    violations = question.judged(base).violations
+    return {v.satellite for v in violations if v.code in LIMITS and not v.inherited}
+
+
 def first_plan(question: Question, budget: Budget) -> Plan:
     """Return the base with what is promised, changed as little as limits demand."""
     problem = question.problem
     protected = set(np.flatnonzero(question.is_promised).tolist())
     base = Plan.of(problem, question.base.tolist()).with_kept(problem)
-    broken = {
-        v.satellite
-        for v in question.judged(base).violations
-        if v.code in LIMITS and not v.inherited
-    }
+    broken = _broken(question)
     if not question.judged(base).violations:
         return with_promised(question, base)
     if broken:

@@ -10,6 +10,7 @@ from hypothesis import event, given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget
+from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.proofs.resource_bound import quick_bound
 from planner_core.domain import Stability
@@ -18,6 +19,7 @@ from planner_core.pinning.apply_pins import apply_pins
 from planner_core.problem import COLLECT, CONTACT, Blocked, Kept, Pinned, Problem
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
+from planner_core.replanning import days
 from planner_core.replanning.known import KnownPrices, bound_at, prices_of
 from planner_core.replanning.programs import fewest_changes
 from planner_core.replanning.question import Question
@@ -218,6 +220,33 @@ def test_a_whole_day_finds_what_moves_near_the_plan_do_not() -> None:
     assert replay(problem, found).is_valid
     assert replay(problem, found).reward > replay(problem, near).reward
     assert value(question, found) > value(question, near)
+
+
+def test_where_all_is_too_much_a_day_is_replanned_beside_the_others(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    num_better = 0
+    for seed in range(40):
+        whole = random_problem(
+            seed, use_resources=True, num_satellites=2, num_targets=30, num_collects=48,
+            num_contacts=3, num_stations=1,
+        )  # fmt: skip
+        monkeypatch.setattr(days, "_MOST_TASKS", len(whole.opportunities) - 1)
+        best = Incumbent(whole, Budget(), 0.0, Rule().solve(whole, Budget(), 0).plan)
+        if not best.is_valid:
+            continue
+        found = days.with_days_replanned(best, [1], Budget(), 0)
+        timeline = replay(whole, found)
+        assert timeline.is_valid
+        assert timeline.reward >= best.reward
+        first, second = (
+            {a.opportunity for a in p.actions if whole.opportunities.satellite[a.opportunity] == 0}
+            for p in (best.plan, found)
+        )
+        assert first == second
+        assert days.with_days_replanned(best, [], Budget(), 0) == best.plan
+        num_better += timeline.reward > best.reward
+    assert num_better > 5
 
 
 @pytest.mark.parametrize("seed", range(8))
