@@ -38,7 +38,7 @@ def _in_its_best_form(
     problem: Problem, plan: Plan, verdict: Timeline | None = None
 ) -> tuple[Plan, Timeline]:
     """Return a plan without images that only take room and earn nothing, judged by the referee."""
-    timeline = verdict or replay(problem, plan)
+    timeline = verdict or replay(problem, plan, in_detail=False)
     if not problem.counts_delivery or not timeline.is_valid:
         return plan, timeline
     earning = {image.position for image in timeline.collected.values() if image.worth > 0.0}
@@ -51,7 +51,7 @@ def _in_its_best_form(
     if len(actions) == len(plan.actions):
         return plan, timeline
     freed = Plan(actions)
-    judged = replay(problem, freed)
+    judged = replay(problem, freed, in_detail=False)
     # A slow satellite may turn by way of an image that earns nothing.
     is_better = judged.is_valid and judged.reward >= timeline.reward
     return (freed, judged) if is_better else (plan, timeline)

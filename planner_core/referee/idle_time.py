@@ -11,7 +11,7 @@ from planner_core.problem import Problem, SatelliteProblem
 from planner_core.problem.plan import Action
 from planner_core.problem.slew import TIME_TOLERANCE_S
 from planner_core.problem.sun_turns import sun_turn_s, sun_turns
-from planner_core.referee.sight import looked, looks, moving_deg_s
+from planner_core.referee.sight import lines_of_sight
 
 
 class Idle(NamedTuple):
@@ -74,16 +74,18 @@ def _turns_s(
     if r.sun_pointing == "free" or not actions:
         nothing = [0.0] * len(actions)
         return nothing, nothing
+    at_start, moves = lines_of_sight(problem, actions, is_end=False)
+    at_end, moved = lines_of_sight(problem, actions, is_end=True)
     turns = sun_turns(
         r,
         satellite.agility,
         satellite.sun,
         start_s=np.array([action.start_s for action in actions]),
         end_s=np.array([action.end_s for action in actions]),
-        looks=np.array([looks(problem, action) for action in actions]),
-        looked=np.array([looked(problem, action) for action in actions]),
-        moves=np.array([moving_deg_s(problem, action, is_end=False) for action in actions]),
-        moved=np.array([moving_deg_s(problem, action, is_end=True) for action in actions]),
+        looks=at_start,
+        looked=at_end,
+        moves=moves,
+        moved=moved,
     )
     return turns.out_s.tolist(), turns.back_s.tolist()
 

@@ -56,8 +56,14 @@ def plan_sha256(problem: Problem, plan: Plan) -> str:
     return hashlib.sha256(json.dumps(content, separators=(",", ":")).encode()).hexdigest()
 
 
-def replay(problem: Problem, plan: Plan) -> Timeline:
-    """Return the timeline of a plan: its reward, resources and every violation."""
+def replay(problem: Problem, plan: Plan, *, in_detail: bool = True) -> Timeline:
+    """Return the timeline of a plan: its reward, resources and every violation.
+
+    Parameters
+    ----------
+    in_detail
+        Whether actions and curves are listed by satellite; a search needs the verdict alone.
+    """
     by_satellite: list[list[int]] = [[] for _ in problem.satellites]
     for position, action in enumerate(plan.actions):
         by_satellite[problem.opportunities.satellite[action.opportunity]].append(position)
@@ -96,6 +102,7 @@ def replay(problem: Problem, plan: Plan) -> Timeline:
                 problem, plan, positions, slews, _Images(earned, worth, down_s), profile
             )
             for positions, profile in zip(by_satellite, profiles, strict=True)
+            if in_detail
         ),
         violations=tuple(sorted(violations, key=lambda v: (v.at_s, v.satellite, v.code))),
         reward=math.fsum((*earned.values(), *(image.earned for image in brought_down))),

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from planner_core.problem import COLLECT, CONTACT, Problem
 from planner_core.problem.plan import Action, Plan
 from planner_core.problem.slew import TIME_TOLERANCE_S
-from planner_core.referee.sight import turn_between, turn_from_start
+from planner_core.referee.sight import turn_from_start, turns_between
 from planner_core.referee.timeline import Slew, Violation, ViolationCode
 
 
@@ -53,8 +53,9 @@ def turns(
     slews: dict[int, Slew | None] = {}
     previous: Action | None = None
     busy_until: Action | None = None
-    for position in positions:
-        action = plan.actions[position]
+    actions = [plan.actions[position] for position in positions]
+    between = [(0.0, 0.0), *turns_between(problem, index, actions)][: len(actions)]
+    for position, action, (angle_deg, needed_s) in zip(positions, actions, between, strict=True):
         slews[position] = first = _first_slew(problem, index, action)
         if first is not None and first.available_s < first.needed_s - TIME_TOLERANCE_S:
             detail = (
@@ -67,7 +68,6 @@ def turns(
                           blamed=(position,))
             )  # fmt: skip
         if previous is not None and busy_until is not None:
-            angle_deg, needed_s = turn_between(problem, index, previous, action)
             available_s = action.start_s - previous.end_s
             slews[position] = Slew(angle_deg=angle_deg, needed_s=needed_s, available_s=available_s)
             gap_s = action.start_s - busy_until.end_s

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
+
 import numpy as np
 
-from planner_core.problem import Problem, line_of_sight
+from planner_core.jit import kernel
+from planner_core.problem import Floats, Problem, line_of_sight
 from planner_core.problem.moving import moving_turn_s, rotation_deg, turns_in
 from planner_core.problem.plan import Action
 from planner_core.problem.slew import (
@@ -19,55 +23,87 @@ from planner_core.problem.sun_turns import angle_to_sun_deg, sun_turn_s
 _Triple = tuple[float, float, float]
 
 
-def looks(problem: Problem, action: Action) -> Vector:
-    """Return the line of sight at an action's start."""
-    table, i = problem.opportunities, action.opportunity
-    if abs(action.start_s - table.start_s[i]) <= TIME_TOLERANCE_S:
-        return np.asarray(table.los_start[i])
-    return line_of_sight(problem, i, action.start_s)
-
-
-def looked(problem: Problem, action: Action) -> Vector:
-    """Return the line of sight at an action's end."""
-    table, i = problem.opportunities, action.opportunity
-    if abs(action.end_s - table.end_s[i]) <= TIME_TOLERANCE_S:
-        return np.asarray(table.los_end[i])
-    return line_of_sight(problem, i, action.end_s)
-
-
-def moving_deg_s(problem: Problem, action: Action, *, is_end: bool) -> _Triple:
-    """Return how the line of sight moves at an action's start or end, for turns in motion."""
+def lines_of_sight(
+    problem: Problem, actions: Sequence[Action], *, is_end: bool
+) -> tuple[Floats, Floats]:
+    """Return lines of sight at starts or ends of actions, and how they move; ``(n, 3)`` each."""
     table = problem.opportunities
-    rates = table.los_rate_end if is_end else table.los_rate_start
-    return _triple(rates[action.opportunity])
+    rows = np.array([action.opportunity for action in actions], dtype=np.int64)
+    if is_end:
+        at_s, known_s = [action.end_s for action in actions], table.end_s[rows]
+        lines, rates = table.los_end[rows], table.los_rate_end[rows]
+    else:
+        at_s, known_s = [action.start_s for action in actions], table.start_s[rows]
+        lines, rates = table.los_start[rows], table.los_rate_start[rows]
+    lines = lines.astype(np.float64)
+    for own in np.flatnonzero(np.abs(np.array(at_s) - known_s) > TIME_TOLERANCE_S).tolist():
+        lines[own] = line_of_sight(problem, int(rows[own]), at_s[own])
+    return lines, rates.astype(np.float64)
 
 
-def turn_between(
-    problem: Problem, index: int, before: Action, after: Action
-) -> tuple[float, float]:
-    """Return angle (deg) and time (s, settling included) of a satellite's turn between tasks."""
+def turns_between(
+    problem: Problem, index: int, actions: Sequence[Action]
+) -> list[tuple[float, float]]:
+    """Return angle (deg) and time (s, settling included) of a satellite's turns, one after another.
+
+    Parameters
+    ----------
+    actions
+        Of the satellite, in order: a turn leads from each to the next.
+    """
+    if len(actions) < 2:
+        return []
     agility = problem.satellites[index].agility
-    u, v = looked(problem, before), looks(problem, after)
-    angle_deg = angle_between_deg(u, v)
+    lines_from, moved = lines_of_sight(problem, actions[:-1], is_end=True)
+    lines_to, moves = lines_of_sight(problem, actions[1:], is_end=False)
     if not agility.tracks:
-        acceleration = agility.acceleration_deg_s2 or INSTANT
-        return angle_deg, slew_s(
-            angle_deg, agility.slew_rate_deg_s, acceleration
-        ) + agility.settle_s
-    turn = rotation_deg(_triple(u), _triple(v))
-    rates = (
-        moving_deg_s(problem, before, is_end=True),
-        moving_deg_s(problem, after, is_end=False),
+        moved = moves = moves[:0]
+    angles_deg, needed_s = _turns(
+        lines_from,
+        lines_to,
+        moved,
+        moves,
+        np.array([b.start_s - a.end_s for a, b in itertools.pairwise(actions)]),
+        float(agility.settle_s),
+        float(agility.slew_rate_deg_s),
+        float(agility.acceleration_deg_s2 or INSTANT),
     )
-    limits = float(agility.slew_rate_deg_s), float(agility.acceleration_deg_s2 or INSTANT)
-    needed_s = moving_turn_s(turn, *rates, *limits) + agility.settle_s
-    available_s = after.start_s - before.end_s
-    if needed_s > available_s and turns_in(
-        available_s - agility.settle_s + TIME_TOLERANCE_S, turn, *rates, *limits
-    ):
-        # The least time is known to a microsecond or so; what fits, fits.
-        needed_s = available_s
-    return angle_deg, needed_s
+    return list(zip(angles_deg.tolist(), needed_s.tolist(), strict=True))
+
+
+@kernel
+def _turns(
+    lines_from: Floats,
+    lines_to: Floats,
+    rates_from: Floats,
+    rates_to: Floats,
+    available_s: Floats,
+    settle_s: float,
+    rate_deg_s: float,
+    acceleration_deg_s2: float,
+) -> tuple[Floats, Floats]:
+    """Return angles and times of turns; without rates at their ends from rest to rest."""
+    angles_deg, needed_s = np.empty(len(lines_from)), np.empty(len(lines_from))
+    for i in range(len(lines_from)):
+        u = lines_from[i, 0], lines_from[i, 1], lines_from[i, 2]
+        v = lines_to[i, 0], lines_to[i, 1], lines_to[i, 2]
+        angles_deg[i] = angle_between_deg(u, v)
+        if len(rates_from) == 0:
+            turn_s = slew_s(angles_deg[i], rate_deg_s, acceleration_deg_s2)
+            needed_s[i] = turn_s + settle_s
+            continue
+        turn = rotation_deg(u, v)
+        rate_from = rates_from[i, 0], rates_from[i, 1], rates_from[i, 2]
+        rate_to = rates_to[i, 0], rates_to[i, 1], rates_to[i, 2]
+        turn_s = moving_turn_s(turn, rate_from, rate_to, rate_deg_s, acceleration_deg_s2)
+        needed_s[i] = turn_s + settle_s
+        room_s = available_s[i] - settle_s + TIME_TOLERANCE_S
+        if needed_s[i] > available_s[i] and turns_in(
+            room_s, turn, rate_from, rate_to, rate_deg_s, acceleration_deg_s2
+        ):
+            # The least time is known to a microsecond or so; what fits, fits.
+            needed_s[i] = available_s[i]
+    return angles_deg, needed_s
 
 
 def turn_from_start(problem: Problem, index: int, action: Action) -> tuple[float, float] | None:
@@ -79,7 +115,8 @@ def turn_from_start(problem: Problem, index: int, action: Action) -> tuple[float
     heading, agility = satellite.heading, satellite.agility
     if heading is None:
         return None
-    v, moving = looks(problem, action), moving_deg_s(problem, action, is_end=False)
+    lines, rates = lines_of_sight(problem, [action], is_end=False)
+    v, moving = lines[0], _triple(rates[0])
     if heading.line_of_sight is None:
         x, y, z = moving
         # The turn to the sun, backward in time.
