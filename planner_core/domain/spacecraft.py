@@ -287,6 +287,10 @@ class Resources:
             require(getattr(self, name) >= 0, name, "must be 0 or more")
         require(0 <= self.panel_angle_deg <= 180, "panel_angle_deg", "must be between 0 and 180")
         check_downlink(self.downlink_by_elevation)
+        for name in (*names, *rates, "panel_angle_deg"):
+            # A whole number is of another type to a kernel and has it compiled anew. One that calls
+            # itself ends the process when Numba loads it from disk in that form.
+            object.__setattr__(self, name, float(getattr(self, name)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

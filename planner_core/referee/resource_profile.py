@@ -109,9 +109,8 @@ def _integrate_physical(
     fill = r.telemetry_per_s + num_collects * r.collect_fill_per_s
     drain = _under_way(times, flows, pieces[:, 2])
 
-    # Whole numbers would be types of their own to the kernel.
-    held = float(r.initial_recorder_fraction)
-    first = (0.0, float(r.initial_battery_fraction), held, held, 0.0)
+    held = r.initial_recorder_fraction
+    first = (0.0, r.initial_battery_fraction, held, held, 0.0)
     states, at = states_under(times, power, fill, drain, first)
     points = tuple(map(Point._make, states.tolist()))
     starts, stops = at[np.searchsorted(times, tasks).T].tolist()

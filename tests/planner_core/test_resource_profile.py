@@ -8,6 +8,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
+from planner_core.mdp.track import compile_track
 from planner_core.referee.resource_profile import advance, integrate, states_under
 from tests.examples import examples
 from tests.planner_core.problems import random_problem
@@ -72,3 +73,9 @@ def test_levels_at_the_start_may_be_whole_numbers() -> None:
     )
     profiles = [integrate(p, p.satellites[0], ()) for p in (whole, real)]
     assert profiles[0] == profiles[1]
+    # Kernels are compiled for what they are given: of the same types once.
+    tracks = [
+        compile_track(p, p.satellites[0], np.zeros(len(p.satellites[0]), dtype=np.uint8))
+        for p in (whole, real)
+    ]
+    assert [type(v) for v in tracks[0]] == [type(v) for v in tracks[1]]
