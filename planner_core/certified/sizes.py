@@ -10,6 +10,9 @@ from typing import Final
 MAX_CELLS: Final = 36_000_000
 """Of one satellite's table over tasks and units of worth."""
 
+MAX_STEPS: Final = 500_000_000
+"""Of a satellite's near pairs times units of worth, in a bound that is to be quick: seconds."""
+
 MAX_PAIRS: Final = 8_000_000
 """Of tasks near each other in a program, of about 100 bytes each; followers in tables of starts."""
 

@@ -11,7 +11,9 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from planner_core.certified.proofs import resource_bound
 from planner_core.certified.proofs.documents import is_proven
+from planner_core.certified.proofs.lagrangian import lagrangian_bound
 from planner_core.certified.proofs.resource_bound import quick_bound, relaxations, resource_value
 from planner_core.problem import CONTACT
 from tests.examples import examples
@@ -74,6 +76,16 @@ def test_it_lies_far_below_what_agility_allows_where_energy_is_short() -> None:
         1, num_collects=40, num_targets=40, num_contacts=0, use_resources=False
     )
     assert quick_bound(problem, 0.0).value < 0.7 * quick_bound(starved, 0.0).value
+
+
+def test_it_is_that_of_agility_where_near_pairs_take_too_long(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    problem = random_problem(1, num_collects=40, num_targets=40, num_contacts=0)
+    assert quick_bound(problem, 0.0).proof == "dp"
+    monkeypatch.setattr(resource_bound, "MAX_STEPS", 0)
+    bound = quick_bound(problem, 0.0)
+    assert (bound.proof, bound.value) == ("lagrangian", lagrangian_bound(problem, 0.0).value)
 
 
 @examples(30)

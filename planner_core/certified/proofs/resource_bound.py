@@ -24,7 +24,7 @@ from planner_core.certified.proofs.bound import Bound, rounded_bound
 from planner_core.certified.proofs.lagrangian import lagrangian_bound
 from planner_core.certified.proofs.shares import Shares
 from planner_core.certified.signs import STOPPED, UNREACHED
-from planner_core.certified.sizes import MAX_CELLS
+from planner_core.certified.sizes import MAX_CELLS, MAX_STEPS
 from planner_core.certified.tolerances import ROUNDING
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import (
@@ -74,6 +74,13 @@ class SatelliteRelaxation:
         return cls(
             satellite=satellite, network=network, levels=levels, classes=classes, shares=shares
         )
+
+    @property
+    def num_near_steps(self) -> int:
+        """How many pairs of tasks near each other are looked at for each unit of worth."""
+        # With shares by the battery alone as well, as often as it takes to halve all instants.
+        passes = 1 if self.shares is None else 1 + len(self.shares.since_s).bit_length()
+        return passes * len(self.network.near_rows)
 
     def with_data_price(self, num_images: int) -> SatelliteRelaxation:
         """Return the same with the price of data at which the battery alone allows least.
@@ -159,8 +166,9 @@ class SatelliteRelaxation:
             goal = int(
                 TUNING.first_goal * _Needs.of(self.network, self.levels, weight, 0.0, near).top
             )
-        # By the battery alone smaller units take next to no time.
-        finer = max(1, min(shares.finer(unit), MAX_CELLS // max(1, goal * len(weight))))
+        # By the battery alone smaller units take next to no time, unless near pairs are many.
+        num_cells = goal * (len(weight) + len(self.network.near_rows))
+        finer = max(1, min(shares.finer(unit), MAX_CELLS // max(1, num_cells)))
 
         def before(since: int) -> int:
             own = shares.weights_before(weight, unit, since, finer)
@@ -414,6 +422,9 @@ def quick_bound(problem: Problem, reward: float) -> Bound:
         return best
     stop = np.zeros(1, dtype=np.uint8)
     unit = _unit(problem, satellites, best.value)
+    num_units = best.value / unit / len(satellites)
+    if num_units * max(satellite.num_near_steps for satellite in satellites) > MAX_STEPS:
+        return best
     start = np.zeros(1) if best.prices is None else best.prices
     offered = [leaving_whole_units(problem, share * start, unit) for share in TUNING.price_shares]
     if is_plain:
