@@ -174,9 +174,9 @@ def test_reasons_replay_what_promises_most_and_no_more_than_allowed(
     plan = Rule().solve(problem, Budget(), 0).plan
     replayed: list[Plan] = []
 
-    def noted(of: Problem, trial: Plan) -> Timeline:
+    def noted(of: Problem, trial: Plan, *, in_detail: bool) -> Timeline:
         replayed.append(trial)
-        return replay(of, trial)
+        return replay(of, trial, in_detail=in_detail)
 
     monkeypatch.setattr(delivery, "replay", noted)
     outcomes = explain(problem, plan, replay(problem, plan))
