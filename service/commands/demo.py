@@ -23,7 +23,7 @@ from service.settings import Settings
 
 Json = dict[str, Any]
 
-SEARCH_TIME_S: Final = 5.0
+SEARCH_TIME_S: Final = 10.0
 _ACTIVE: Final = ("queued", "running", "cancelling")
 _HOLD_S: Final = 10
 _READY: Final = "Slewline is ready at "
