@@ -36,6 +36,18 @@ def require(condition: bool, where: str, message: str) -> None:
         raise InvalidScenario("value_out_of_range", f"{where}: {message}", pointer="/" + where)
 
 
+def make_real(owner: object, *names: str) -> None:
+    """Make whole numbers of a frozen object real ones.
+
+    They are of another type to a kernel and have it compiled anew. One that calls itself ends the
+    process when Numba loads it from disk in that form.
+    """
+    for name in names:
+        value = getattr(owner, name)
+        if value is not None:
+            object.__setattr__(owner, name, float(value))
+
+
 def require_finite(owner: object, *names: str) -> None:
     """Check that these fields are finite numbers, or None."""
     for name in names:

@@ -14,6 +14,7 @@ from planner_core.domain.checks import (
     check_light,
     check_sensor_type,
     check_sun_exclusion,
+    make_real,
     require,
     require_finite,
 )
@@ -102,6 +103,7 @@ class Agility:
             "slew_model",
             "moving needs an acceleration_deg_s2",
         )
+        make_real(self, "slew_rate_deg_s", "acceleration_deg_s2", "settle_s")
 
     @property
     def tracks(self) -> bool:
@@ -287,10 +289,7 @@ class Resources:
             require(getattr(self, name) >= 0, name, "must be 0 or more")
         require(0 <= self.panel_angle_deg <= 180, "panel_angle_deg", "must be between 0 and 180")
         check_downlink(self.downlink_by_elevation)
-        for name in (*names, *rates, "panel_angle_deg"):
-            # A whole number is of another type to a kernel and has it compiled anew. One that calls
-            # itself ends the process when Numba loads it from disk in that form.
-            object.__setattr__(self, name, float(getattr(self, name)))
+        make_real(self, *names, *rates, "panel_angle_deg")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -198,3 +198,10 @@ def test_turns_in_motion_need_an_acceleration_and_starts_that_are_known() -> Non
     with pytest.raises(InvalidScenario, match="collect_spacing_s") as refused:
         replace(_scenario(MOVING), continuous_starts=True)
     assert refused.value.fault.pointer == "/continuous_starts"
+
+
+def test_whole_numbers_of_an_agility_are_real_ones() -> None:
+    agility = Agility(slew_rate_deg_s=2, acceleration_deg_s2=1, settle_s=5, slew_model="moving")
+    for name in ("slew_rate_deg_s", "acceleration_deg_s2", "settle_s"):
+        assert isinstance(getattr(agility, name), float)
+    assert Agility(slew_rate_deg_s=1).acceleration_deg_s2 is None
