@@ -30,8 +30,8 @@ class CompilationLine:
             kernel.py_func.__qualname__: len(inspect.getsourcelines(kernel.py_func)[0])
             for kernel in compiled_kernels()
         }
-        is_stored = {name.rpartition(".")[2]: bool(on) for name, on in stored_signatures().items()}
-        self._left = {name: num for name, num in num_lines.items() if not is_stored[name]}
+        stored_names = {name.rpartition(".")[2] for name, on in stored_signatures().items() if on}
+        self._left = {name: num for name, num in num_lines.items() if name not in stored_names}
         stored = sum(num_lines.values()) - sum(self._left.values())
         self._total = max(1.0, share * sum(num_lines.values()) - stored)
         self._done = 0

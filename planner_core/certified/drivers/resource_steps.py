@@ -44,6 +44,7 @@ class ResourceSearch:
         self._priced = np.inf  # the bound before it was rounded
         self._one = self.problem.typical_worth
         self._agility_decides = False
+        self._brought_down: set[Plan] = set()  # what was tried with further contacts
 
     @property
     def is_shared(self) -> bool:
@@ -121,6 +122,9 @@ class ResourceSearch:
         seconds, and 172.3 without (177.6 and 171.7 after five).
         """
         is_better = self.best.offer(plan)
+        if plan in self._brought_down:
+            return is_better
+        self._brought_down.add(plan)
         more = with_more_downlinks(self.problem, plan, self.budget)
         return (more is not plan and self.best.offer(more)) or is_better
 
