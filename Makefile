@@ -69,13 +69,13 @@ demo: $(PRODUCT)
 serve: $(PRODUCT)
 	@$(BIN)/slewline demo --serve
 
-# A process for each core, each with a module at a time; see docs/testing.md.
+# Two processes for each core, each with a module at a time; see docs/testing.md.
 test: check
-	$(BIN)/python -m pytest -n logical --durations=25 $(if $(filter full,$(SLEWLINE_TEST_PROFILE)),-m "")
+	$(BIN)/python -m pytest -n auto --durations=25 $(if $(filter full,$(SLEWLINE_TEST_PROFILE)),-m "")
 
 # The property tests with new examples, all that each asks for.
 explore: setup
-	SLEWLINE_TEST_PROFILE=explore $(BIN)/python -m pytest -n logical -m hypothesis
+	SLEWLINE_TEST_PROFILE=explore $(BIN)/python -m pytest -n auto -m hypothesis
 
 # On a SQLite file, then on a PostgreSQL server that is killed as well.
 chaos: export SLEWLINE_TEST_CHAOS_JOBS ?= 500

@@ -2,110 +2,156 @@
 
 Its memory is watched. When it holds too much it is ended, with all that it was doing, and
 a new one begins: the API beside it goes on.
+
+A keeper between the two is forked from the API before anything is opened and any thread begins,
+and forks each of these processes: they find everything imported.
 """
 
 from __future__ import annotations
 
-import argparse
+import gc
 import logging
 import os
 import signal
 import socket
-import subprocess
-import sys
 import tempfile
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import suppress
+from multiprocessing import get_context
+from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
 from pathlib import Path
-from typing import Final
+from types import TracebackType
+from typing import Any, Final, Self
 
 import psutil
 import uvicorn
 
-from service.jobs.parent import die_with_parent
 from service.jobs.queue import DbosQueue
-from service.jobs.supervisor import environment_of
 from service.main import create_app
 from service.process.logs import STDERR, configure_logging
+from service.process.parent import be_called, die_with_parent
 from service.process.tracing import start_tracing
 from service.settings import Settings
 
 log = logging.getLogger(__name__)
 
+_FORK: Final = get_context("fork")
 _LOOK_EVERY_S: Final = 0.1
 _STOP_WITHIN_S: Final = 5.0
 _NICENESS: Final = 10
 
 
-@contextmanager
-def running_heavy(settings: Settings) -> Iterator[str]:
-    """Keep such a process running; yield the socket file at which it listens."""
-    stopping = threading.Event()
-    # A folder of our own: nobody else may reach a server that believes whatever caller is named.
-    with tempfile.TemporaryDirectory(prefix="slewline-") as folder:
-        path = str(Path(folder) / "heavy")
+class HeavyProcess:
+    """Keeps such a process running.
+
+    Make one before any thread begins, ``start`` it when the database is ready, and use it in a
+    ``with`` block, which ends it.
+
+    Attributes
+    ----------
+    path
+        The socket file at which it listens.
+    """
+
+    def __init__(self, settings: Settings) -> None:
+        # A folder of our own: nobody else may reach who believes whatever caller is named.
+        self._folder = tempfile.TemporaryDirectory(prefix="slewline-")
+        self.path = str(Path(self._folder.name) / "heavy")
         with socket.socket(socket.AF_UNIX) as listener:
-            listener.bind(path)
+            listener.bind(self.path)
             listener.listen(128)
-            watch = threading.Thread(target=_keep, args=(settings, listener, stopping), daemon=True)
-            watch.start()
-            try:
-                yield path
-            finally:
-                stopping.set()
-                watch.join()
+            theirs, self._line = _FORK.Pipe(duplex=False)
+            gc.freeze()
+            self._keeper = _FORK.Process(
+                target=_keep, args=(settings, listener, theirs, self._line)
+            )
+            self._keeper.start()
+        theirs.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._line.close()
+        self._keeper.join()
+        self._folder.cleanup()
+
+    def start(self) -> None:
+        """Let it begin."""
+        with suppress(BrokenPipeError):
+            self._line.send(None)
+
+    def is_kept(self) -> bool:
+        """Return whether its keeper is alive, without which no new one would begin."""
+        return self._keeper.is_alive()
 
 
-def _keep(settings: Settings, listener: socket.socket, stopping: threading.Event) -> None:
-    # Requests wait in the listener while there is no process.
-    number = listener.fileno()
-    command = [sys.executable, "-m", "service.heavy"]
-    command += ["--fd", str(number), "--parent", str(os.getpid())]
-    environment = os.environ | environment_of(settings)
-    while not stopping.is_set():
-        process = subprocess.Popen(  # noqa: S603 - our own command
-            command, env=environment, stdout=STDERR, pass_fds=[number], start_new_session=True
-        )
-        while process.poll() is None and not stopping.wait(_LOOK_EVERY_S):
-            if (held_mb := _held_mb(process.pid)) > settings.heavy_memory_mb:
-                log.warning("the process for heavy work held %.0f MB and is ended", held_mb)
-                process.kill()
-        if stopping.is_set():
-            process.terminate()
-        else:
-            log.warning("the process for heavy work ended with status %s", process.wait())
-            stopping.wait(_LOOK_EVERY_S)
+def _keep(
+    settings: Settings,
+    listener: socket.socket,
+    line: Connection[Any, Any],
+    other_end: Connection[Any, Any],
+) -> None:
+    """Keep one running from the first word on the line until the line is closed."""
+    other_end.close()
+    be_called("slewline-keeper")
+    # In a session of its own, so that Ctrl-C reaches the API alone; what a library prints must
+    # not be taken for words of the service.
+    os.setsid()
+    os.dup2(STDERR, 1)
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, signal.SIG_DFL)
     try:
-        process.wait(_STOP_WITHIN_S)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()
+        line.recv()
+    except EOFError:
+        return
+    configure_logging()
+    # Requests wait in the listener while there is no process.
+    while True:
+        process = _FORK.Process(target=_serve, args=(settings, listener))
+        process.start()
+        if not _watch(process, line, settings.heavy_memory_mb):
+            return
+        log.warning("the process for heavy work ended with status %s", process.exitcode)
+        wait([line], _LOOK_EVERY_S)
 
 
-def _held_mb(pid: int) -> float:
+def _watch(process: BaseProcess, line: Connection[Any, Any], most_mb: float) -> bool:
+    """Return True when the process has ended, or end it and return False as the line closes."""
+    while process.is_alive():
+        if line in wait([line, process.sentinel], _LOOK_EVERY_S):
+            process.terminate()
+            process.join(_STOP_WITHIN_S)
+            process.kill()
+            process.join()
+            return False
+        if (held_mb := _held_mb(process.pid)) > most_mb:
+            log.warning("the process for heavy work held %.0f MB and is ended", held_mb)
+            process.kill()
+            process.join()
+    return True
+
+
+def _held_mb(pid: int | None) -> float:
     try:
         return float(psutil.Process(pid).memory_info().rss) / 1e6
     except psutil.NoSuchProcess:
         return 0.0
 
 
-def main() -> None:
-    """Serve on an inherited socket until SIGTERM, or until the parent is gone."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--fd", type=int, required=True)
-    parser.add_argument("--parent", type=int, required=True)
-    options = parser.parse_args()
+def _serve(settings: Settings, listener: socket.socket) -> None:
+    """Serve on a socket until SIGTERM, or until the parent is gone."""
     die_with_parent(signal.SIGTERM)
-    if os.getppid() != options.parent:
-        return  # it ended while this process began
+    be_called("slewline-heavy")
     os.nice(_NICENESS)  # whatever is light goes first
-    settings = Settings()
-    configure_logging()
     provider = start_tracing(settings, "api")
     queue = DbosQueue(settings.database_url, settings.database_timeout_s)
     app = create_app(settings, queue, is_heavy=True)
-    listener = socket.socket(fileno=options.fd)
     config = uvicorn.Config(
         app, log_config=None, access_log=False, server_header=False, date_header=False
     )
@@ -113,7 +159,3 @@ def main() -> None:
     queue.close()
     if provider is not None:
         provider.shutdown()
-
-
-if __name__ == "__main__":
-    main()

@@ -16,7 +16,7 @@ import uvicorn
 from service.access import key_store
 from service.db.migrate import upgrade
 from service.db.session import Database
-from service.heavy import running_heavy
+from service.heavy import HeavyProcess
 from service.jobs.queue import DbosQueue, migrate_queue
 from service.jobs.supervisor import Supervisor
 from service.main import create_app
@@ -102,24 +102,29 @@ def serve(settings: Settings, *, with_workers: bool) -> int:
     stop = StopRequest()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stop.ask())
-    require_key(settings)
     allow_connections()
     with ExitStack() as stack:
+        heavy = stack.enter_context(HeavyProcess(settings))
+        require_key(settings)
         listener = stack.enter_context(listen(settings.host, settings.port))
         configure_logging()
         stack.enter_context(_traced(settings))
         prepare_database(settings)
-        heavy = stack.enter_context(running_heavy(settings))
-        api = stack.enter_context(_running_api(settings, listener, heavy))
+        heavy.start()
+        api = stack.enter_context(_running_api(settings, listener, heavy.path))
         health = "live"
         if with_workers and settings.workers:
             stack.enter_context(_running_workers(settings))
             health = "ready"
         url = address_of(listener)
-        if _wait_for(f"{url}/health/{health}", lambda: stop.is_asked() or not api.is_alive()):
+
+        def is_over() -> bool:
+            return stop.is_asked() or not api.is_alive() or not heavy.is_kept()
+
+        if _wait_for(f"{url}/health/{health}", is_over):
             print(f"Slewline is ready at {url}", flush=True)
-        while api.is_alive() and not stop.wait(_LOOK_EVERY_S):
-            pass
+        while not is_over():
+            stop.wait(_LOOK_EVERY_S)
     return 0 if stop.is_asked() else 1
 
 

@@ -71,6 +71,11 @@ class _ByModule(LoadScopeScheduling):  # type: ignore[misc]  # it has no types
         return _TOGETHER.get(module, module)
 
 
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
+    """Return how many processes ``-n auto`` means: half of them wait for programs they started."""
+    return 2 * (os.cpu_count() or 1)
+
+
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> _ByModule:
     """Hand modules out in the order in which they were found."""
     config.option.loadscopereorder = False

@@ -20,8 +20,8 @@ from typing import Any, Final, cast
 
 from planner_core.budget import Budget, Progress
 from planner_core.errors import Cancelled, PlannerError
-from service.jobs.parent import die_with_parent
 from service.jobs.plan_request import PlanAnswer, PlanRequest
+from service.process.parent import die_with_parent
 
 log = logging.getLogger(__name__)
 

@@ -50,7 +50,8 @@ class Program:
     @property
     def heavy(self) -> psutil.Process:
         """The process that does what is heavy."""
-        (process,) = psutil.Process(self.process.pid).children()
+        (keeper,) = psutil.Process(self.process.pid).children()
+        (process,) = keeper.children()
         return process
 
 

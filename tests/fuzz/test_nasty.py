@@ -17,7 +17,7 @@ from tests.fuzz.parsers import PARSERS
 Sizes = tuple[int, int]
 
 SIZES: Final = [
-    (400_000, 80_000_000),
+    (200_000, 50_000_000),
     pytest.param((2_000_000, 250_000_000), marks=pytest.mark.full_size),
 ]
 """Of a file, and of the memory that it may take: a good hundred bytes for each of the file.

@@ -54,12 +54,12 @@ NEAR = {"certified": {"gap": 0.05}, "milp": {"gap": 0.05, "cut_rounds": 5}}
 
 QUALITY = {"off_nadir_deg": [[0, 1], [30, 0.95], [50, 0.8]]}
 CHOSEN = [
-    *(pytest.param(solver, NEAR.get(solver, {}), id=solver) for solver in sorted(SOLVERS)),
-    *(pytest.param(s, {}, id=f"{s} to the end", marks=pytest.mark.full_size) for s in NEAR),
+    *(pytest.param(110, s, NEAR.get(s, {}), id=s) for s in sorted(SOLVERS)),
+    *(pytest.param(150, s, {}, id=f"{s} to the end", marks=pytest.mark.full_size) for s in NEAR),
 ]
 
 
-@pytest.mark.parametrize(("solver", "params"), CHOSEN)
+@pytest.mark.parametrize(("num_targets", "solver", "params"), CHOSEN)
 @pytest.mark.parametrize(
     "flags",
     [
@@ -70,9 +70,9 @@ CHOSEN = [
     ids=str,
 )  # fmt: skip
 def test_timelines_pass_an_independent_check(
-    solver: str, params: dict[str, Any], flags: dict[str, Any]
+    num_targets: int, solver: str, params: dict[str, Any], flags: dict[str, Any]
 ) -> None:
-    scenario = paper_mission(drawn_targets(150), **flags)
+    scenario = paper_mission(drawn_targets(num_targets), **flags)
     answer = run(scenario, solver, **params)
     timeline = json.loads(answer.timeline)
     file = json.loads(canonical(scenario))
@@ -226,11 +226,11 @@ def test_the_stored_proof_proves_the_bound(
 @pytest.mark.parametrize("continuous_starts", [False, True])
 def test_the_proof_with_a_half_life_knows_contacts(continuous_starts: bool) -> None:
     scenario = paper_mission(
-        drawn_targets(120),
+        drawn_targets(60),
         objective={"collected_share": 0.0, "half_life_s": 10_800},
         continuous_starts=continuous_starts,
     )
-    answer = run(scenario, "certified")
+    answer = run(scenario, "certified", gap=0.2)
     assert answer.proof is not None
     document = ProofOut.model_validate_json(answer.proof)
     has_contacts = document.contact_prices is not None or document.queue_levels is not None

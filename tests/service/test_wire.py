@@ -172,15 +172,17 @@ def test_a_shape_without_one_of_its_fields_can_no_longer_be_written(
             narrower(**document)
 
 
-@pytest.mark.parametrize("solver", ["rule", "milp"])
-def test_real_answers_hold_nothing_that_is_not_declared(solver: str) -> None:
+@pytest.mark.parametrize(("solver", "params"), [("rule", {}), ("milp", {"gap": 0.05})])
+def test_real_answers_hold_nothing_that_is_not_declared(
+    solver: str, params: dict[str, float]
+) -> None:
     content = canonical(small_mission())
     request = PlanRequest(
         job_id="j1",
         scenario_sha256=sha256_of(content),
         content=content,
         solver=solver,
-        params=params_of(parse_params(solver_class(solver), {})),
+        params=params_of(parse_params(solver_class(solver), params)),
         seed=0,
         limits={},
     )

@@ -1,4 +1,4 @@
-"""Ending with one's parent process."""
+"""What a process is called, and ending with one's parent process."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import sys
 from typing import Final
 
 _PR_SET_PDEATHSIG: Final = 1
+_PR_SET_NAME: Final = 15
 
 
 def die_with_parent(number: signal.Signals) -> None:
@@ -19,3 +20,12 @@ def die_with_parent(number: signal.Signals) -> None:
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, number)
     if os.getppid() != parent:
         os.kill(os.getpid(), number)
+
+
+def be_called(name: str) -> None:
+    """Take a name of at most 15 bytes, for ``ps -o comm`` and ``top``; only Linux can do it.
+
+    A forked process has the command line of the one that it was forked from.
+    """
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_NAME, name.encode())
