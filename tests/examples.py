@@ -2,7 +2,7 @@
 
 ``full`` tries all that a test asks for, ``quick`` a fifth of them, and both the same ones in each
 run, so that a change is not refused for what it has not touched. ``explore`` draws as many as
-``full``, anew in each run. ``SLEWLINE_TEST_PROFILE`` chooses.
+``full``, anew in each run, and ``thorough`` ten times as many. ``SLEWLINE_TEST_PROFILE`` chooses.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from hypothesis import HealthCheck, settings
 settings.register_profile(
     "explore", max_examples=100, deadline=None, suppress_health_check=[HealthCheck.too_slow]
 )
+settings.register_profile("thorough", settings.get_profile("explore"), max_examples=1000)
 settings.register_profile("full", settings.get_profile("explore"), derandomize=True)
 settings.register_profile("quick", settings.get_profile("full"), max_examples=20)
 

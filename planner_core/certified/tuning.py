@@ -107,8 +107,9 @@ class Tuning:
     near
         Share of a reward that a task may cost and yet be in the best plans.
     room, tight
-        Of a typical target: with less room above the plan the next image is hard to find; two
-        values so near are the same.
+        Of a typical target: with less room than ``room`` above the plan the next image is hard to
+        find, and is looked for when multipliers get no lower; two values within ``tight`` are the
+        same.
     open_tasks
         Of a program with fixed contacts, and of one replanned day, at first.
     more
@@ -182,7 +183,7 @@ class Tuning:
     disturbance: float = 0.3
 
     near: float = 0.2
-    room: float = 0.5
+    room: float = 1.5
     tight: float = 0.05
     open_tasks: int = 1000
     more: float = 1.5

@@ -269,7 +269,7 @@ def _classes(
 ) -> tuple[DataLevels, ...]:
     """Return the levels with the last image in each span; see ``SatelliteRelaxation``.
 
-    A span is as long as telemetry takes to fill a part of the smallest image.
+    A span is as long as telemetry takes to fill half of the smallest image.
     """
     if not network.must_deliver:
         return (levels,)
@@ -278,7 +278,7 @@ def _classes(
     telemetry_per_s = satellite.resources.telemetry_per_s
     length_s = np.inf
     if telemetry_per_s > 0.0 and is_image.any():
-        length_s = TUNING.room * float(network.data_gain[is_image].min()) / telemetry_per_s
+        length_s = 0.5 * float(network.data_gain[is_image].min()) / telemetry_per_s
     is_shut = (network.is_contact == 0) & ~is_image & ~network.is_kept
     classes = []
     while is_free.any():
