@@ -14,6 +14,7 @@ from service.answers.blocks import (
     contents_of,
     head_in,
     items_in,
+    rest_in,
     satellite_in,
     target_blocks,
 )
@@ -29,10 +30,11 @@ _CHUNK = 1 << 16
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Satellite:
-    """Id and name, and the blocks of its actions."""
+    """Id and name, and the blocks of its actions and of what stands behind them."""
 
     about: Document
     entries: list[Entry]
+    rest: list[Entry]
 
 
 class Answered:
@@ -70,9 +72,11 @@ class Answered:
         for entry in known:
             if entry.kind == "satellite":
                 about = satellite_in(names[entry.position])
-                self._satellites.append(_Satellite(about=about, entries=[]))
+                self._satellites.append(_Satellite(about=about, entries=[], rest=[]))
             elif entry.kind == "actions":
                 self._satellites[-1].entries.append(entry)
+            elif entry.kind == "rest":
+                self._satellites[-1].rest.append(entry)
 
     @classmethod
     def of(cls, timeline: str, targets: str, content: str, finished_at: datetime) -> Answered:
@@ -102,6 +106,14 @@ class Answered:
         for number, satellite in enumerate(self._satellites):
             for action in self.actions_of(number):
                 yield satellite.about, action
+
+    def each_image_on_board(self) -> Iterator[Document]:
+        """Yield what became of each image that was on board at the start."""
+        began_with = {one.satellite_id for one in self.question.states if one.on_board}
+        for satellite in self._satellites:
+            if satellite.about["id"] in began_with:
+                text = "".join(text for _, text in self._texts(satellite.rest))
+                yield from rest_in(text).get("on_board", ())
 
     def each_target(self) -> Iterator[Document]:
         """Yield every target with its outcome."""

@@ -165,6 +165,12 @@ def satellite_in(text: str) -> Document:
     return _object(f"{text.removeprefix(_BETWEEN)}]}}", "actions")
 
 
+def rest_in(text: str) -> Document:
+    """Return what the ``rest`` of a satellite says, from its texts in one."""
+    rest: Document = json.loads("{" + text.removeprefix("], ")) if text != "]}" else {}
+    return rest
+
+
 def items_in(text: str) -> list[Document]:
     """Return the items of ``actions`` or ``targets``."""
     items: list[Document] = json.loads(f"[{text.removeprefix(_BETWEEN)}]")

@@ -25,6 +25,7 @@ _CLASS_KM = 10.0
 _OF_IMAGES = ("quality", "clear_probability")  # from 0 to 1
 _SHARE: Final = 10_000
 _UNKNOWN: Final = 65_535
+_NEVER: Final = 2**32 - 1
 _MILLISECOND: Final = timedelta(milliseconds=1)
 
 
@@ -74,6 +75,7 @@ def _point(lon_deg: float, lat_deg: float) -> Document:
 def _targets(answered: Answered) -> Iterator[Document]:
     spans = _Spans(answered)
     names = {satellite["id"]: satellite["name"] for satellite in answered.satellites}
+    before = {one["target_id"]: one["delivered_at"] for one in answered.each_image_on_board()}
     for target, told in zip(answered.question.each_target(), answered.each_target(), strict=True):
         start, end = spans.of(told["action_id"])
         reason = told["reason"]
@@ -93,14 +95,16 @@ def _targets(answered: Answered) -> Iterator[Document]:
                 "satellite_name": names.get(told["satellite_id"]),
                 "start": start,
                 "end": end,
+                "delivered_at": before.get(target.id) or spans.delivered(told["action_id"]),
                 "reward": target.reward,
+                "worth": told.get("worth"),
                 **spans.image_of(told["action_id"]),
             },
         )
 
 
 class _Spans:
-    """When each action begins and ends, and how good its image is.
+    """When each action begins and ends, how good its image is, and when it is on the ground.
 
     As small numbers alone, for there may be very many: milliseconds from the horizon's start, and
     shares in ten thousandths.
@@ -110,11 +114,12 @@ class _Spans:
         self._start = answered.question.horizon.start
         self._spans = spans = array("I")
         self._images = images = array("H")
+        self._delivered = delivered = array("I")
         # Action ids count through all satellites: a1, a2, ...
         for _, action in answered.each_action():
-            for name in ("start", "end"):
-                moment = datetime.fromisoformat(action[name])
-                spans.append((moment - self._start) // _MILLISECOND)
+            spans.extend(self._ms(action[name]) for name in ("start", "end"))
+            down = action.get("delivered_at")
+            delivered.append(_NEVER if down is None else self._ms(down))
             # Answers of the first release say nothing of it.
             values = (action.get(name) for name in _OF_IMAGES)
             images.extend(_UNKNOWN if v is None else round(v * _SHARE) for v in values)
@@ -124,8 +129,21 @@ class _Spans:
         if action_id is None:
             return None, None
         at = 2 * (int(action_id.removeprefix("a")) - 1)
-        start, end = (self._start + ms * _MILLISECOND for ms in self._spans[at : at + 2])
-        return instant_text(start), instant_text(end)
+        start, end = map(self._text, self._spans[at : at + 2])
+        return start, end
+
+    def delivered(self, action_id: str | None) -> str | None:
+        """Return when the image of an action is on the ground, None for never."""
+        if action_id is None:
+            return None
+        ms = self._delivered[int(action_id.removeprefix("a")) - 1]
+        return None if ms == _NEVER else self._text(ms)
+
+    def _ms(self, instant: str) -> int:
+        return (datetime.fromisoformat(instant) - self._start) // _MILLISECOND
+
+    def _text(self, ms: int) -> str:
+        return instant_text(self._start + ms * _MILLISECOND)
 
     def image_of(self, action_id: str | None) -> Document:
         """Return how good the image of an action is; null where nothing is known of it."""

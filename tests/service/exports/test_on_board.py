@@ -83,8 +83,26 @@ def test_a_map_shows_their_targets_as_downlinked(
         assert shown["outcome"] == "downlinked"
         assert shown["satellite_id"] == SATELLITE
         assert shown["reason"] is None
+        assert shown["delivered_at"] == old[target_id]["delivered_at"]
         # No action of this plan took them.
         assert (shown["action_id"], shown["start"], shown["quality"]) == (None, None, None)
+
+
+def test_a_map_says_when_each_image_is_on_the_ground(followed: Mission) -> None:
+    told = {
+        action["target_id"]: (action["delivered_at"], action["worth"])
+        for satellite in followed.document["satellites"]
+        for action in satellite["actions"]
+        if action["mode"] == "collect" and action["reward"]
+    }
+    features = json.loads(written(followed, "geojson"))["features"]
+    shown = {
+        f["properties"]["target_id"]: (f["properties"]["delivered_at"], f["properties"]["worth"])
+        for f in features
+        if f["properties"]["kind"] == "target"
+    }
+    assert any(down is not None for down, _ in told.values())
+    assert told.items() <= shown.items()
 
 
 def test_moving_maps_calendars_and_open_mct_have_the_contacts(followed: Mission) -> None:
