@@ -3,8 +3,9 @@
 Its memory is watched. When it holds too much it is ended, with all that it was doing, and
 a new one begins: the API beside it goes on.
 
-A keeper between the two is forked from the API before anything is opened and any thread begins,
-and forks each of these processes: they find everything imported.
+A fork server between the two is itself forked from the API before anything is opened and any
+thread begins. It watches the heavy process and forks a new one whenever one has ended: each finds
+everything imported. The fork server of ``multiprocessing`` would import it all once more.
 """
 
 from __future__ import annotations
@@ -20,8 +21,7 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Final, Self
+from typing import Any, Final
 
 import psutil
 import uvicorn
@@ -29,7 +29,7 @@ import uvicorn
 from service.jobs.queue import DbosQueue
 from service.main import create_app
 from service.process.logs import STDERR, configure_logging
-from service.process.parent import be_called, die_with_parent
+from service.process.parent import die_with_parent, name_this_process
 from service.process.tracing import start_tracing
 from service.settings import Settings
 
@@ -44,8 +44,7 @@ _NICENESS: Final = 10
 class HeavyProcess:
     """Keeps such a process running.
 
-    Make one before any thread begins, ``start`` it when the database is ready, and use it in a
-    ``with`` block, which ends it.
+    Make one before any thread begins, ``start`` it when the database is ready, and ``close`` it.
 
     Attributes
     ----------
@@ -60,47 +59,40 @@ class HeavyProcess:
         with socket.socket(socket.AF_UNIX) as listener:
             listener.bind(self.path)
             listener.listen(128)
-            theirs, self._line = _FORK.Pipe(duplex=False)
+            theirs, self._pipe = _FORK.Pipe(duplex=False)
             # What is there now is never collected, so that its pages stay common: 90 MB less.
             gc.freeze()
-            self._keeper = _FORK.Process(
-                target=_keep, args=(settings, listener, theirs, self._line)
+            self._fork_server = _FORK.Process(
+                target=_keep_running, args=(settings, listener, theirs, self._pipe)
             )
-            self._keeper.start()
+            self._fork_server.start()
         theirs.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._line.close()
-        self._keeper.join()
-        self._folder.cleanup()
 
     def start(self) -> None:
         """Let it begin."""
         with suppress(BrokenPipeError):
-            self._line.send(None)
+            self._pipe.send(None)
 
-    def is_kept(self) -> bool:
-        """Return whether its keeper is alive, without which no new one would begin."""
-        return self._keeper.is_alive()
+    def is_watched(self) -> bool:
+        """Return whether the fork server is alive, without which no new one would begin."""
+        return self._fork_server.is_alive()
+
+    def close(self) -> None:
+        """End it, and the fork server."""
+        self._pipe.close()
+        self._fork_server.join()
+        self._folder.cleanup()
 
 
-def _keep(
+def _keep_running(
     settings: Settings,
     listener: socket.socket,
-    line: Connection[Any, Any],
+    pipe: Connection[Any, Any],
     other_end: Connection[Any, Any],
 ) -> None:
-    """Keep one running from the first word on the line until the line is closed."""
+    """Keep one running from the first message in the pipe until the pipe is closed."""
     other_end.close()
-    be_called("slewline-keeper")
+    name_this_process("slewline-fork")
     # In a session of its own, so that Ctrl-C reaches the API alone; what a library prints must
     # not be taken for words of the service.
     os.setsid()
@@ -108,7 +100,7 @@ def _keep(
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, signal.SIG_DFL)
     try:
-        line.recv()
+        pipe.recv()
     except EOFError:
         return
     configure_logging()
@@ -116,16 +108,16 @@ def _keep(
     while True:
         process = _FORK.Process(target=_serve, args=(settings, listener))
         process.start()
-        if not _watch(process, line, settings.heavy_memory_mb):
+        if not _watch(process, pipe, settings.heavy_memory_mb):
             return
         log.warning("the process for heavy work ended with status %s", process.exitcode)
-        wait([line], _LOOK_EVERY_S)
+        wait([pipe], _LOOK_EVERY_S)
 
 
-def _watch(process: BaseProcess, line: Connection[Any, Any], most_mb: float) -> bool:
-    """Return True when the process has ended, or end it and return False as the line closes."""
+def _watch(process: BaseProcess, pipe: Connection[Any, Any], most_mb: float) -> bool:
+    """Return True when the process has ended, or end it and return False as the pipe closes."""
     while process.is_alive():
-        if line in wait([line, process.sentinel], _LOOK_EVERY_S):
+        if pipe in wait([pipe, process.sentinel], _LOOK_EVERY_S):
             process.terminate()
             process.join(_STOP_WITHIN_S)
             process.kill()
@@ -148,7 +140,7 @@ def _held_mb(pid: int | None) -> float:
 def _serve(settings: Settings, listener: socket.socket) -> None:
     """Serve on a socket until SIGTERM, or until the parent is gone."""
     die_with_parent(signal.SIGTERM)
-    be_called("slewline-heavy")
+    name_this_process("slewline-heavy")
     os.nice(_NICENESS)  # whatever is light goes first
     provider = start_tracing(settings, "api")
     queue = DbosQueue(settings.database_url, settings.database_timeout_s)

@@ -104,7 +104,8 @@ def serve(settings: Settings, *, with_workers: bool) -> int:
         signal.signal(number, lambda *_: stop.ask())
     allow_connections()
     with ExitStack() as stack:
-        heavy = stack.enter_context(HeavyProcess(settings))
+        heavy = HeavyProcess(settings)
+        stack.callback(heavy.close)
         require_key(settings)
         listener = stack.enter_context(listen(settings.host, settings.port))
         configure_logging()
@@ -119,7 +120,7 @@ def serve(settings: Settings, *, with_workers: bool) -> int:
         url = address_of(listener)
 
         def is_over() -> bool:
-            return stop.is_asked() or not api.is_alive() or not heavy.is_kept()
+            return stop.is_asked() or not api.is_alive() or not heavy.is_watched()
 
         if _wait_for(f"{url}/health/{health}", is_over):
             print(f"Slewline is ready at {url}", flush=True)

@@ -72,7 +72,7 @@ class _ByModule(LoadScopeScheduling):  # type: ignore[misc]  # it has no types
 
 
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
-    """Return how many processes ``-n auto`` means: half of them wait for programs they started."""
+    """Return two for each core: many tests wait for programs that they have started."""
     return 2 * (os.cpu_count() or 1)
 
 

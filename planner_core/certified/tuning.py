@@ -108,8 +108,9 @@ class Tuning:
         Share of a reward that a task may cost and yet be in the best plans.
     room, tight
         Of a typical target: with less room than ``room`` above the plan the next image is hard to
-        find, and is looked for when multipliers get no lower; two values within ``tight`` are the
-        same.
+        find, and is looked for when multipliers get no lower (with half a target, 500 targets and
+        turns to the sun: 26 CPU s for nothing, 1.25 % after 20 s instead of 0.42); two values
+        within ``tight`` are the same.
     open_tasks
         Of a program with fixed contacts, and of one replanned day, at first.
     more

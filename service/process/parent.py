@@ -1,4 +1,4 @@
-"""What a process is called, and ending with one's parent process."""
+"""A process's name, and its end with its parent's."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ def die_with_parent(number: signal.Signals) -> None:
         os.kill(os.getpid(), number)
 
 
-def be_called(name: str) -> None:
-    """Take a name of at most 15 bytes, for ``ps -o comm`` and ``top``; only Linux can do it.
+def name_this_process(name: str) -> None:
+    """Set the name that ``ps -o comm`` and ``top`` show, of at most 15 bytes; only on Linux.
 
     A forked process has the command line of the one that it was forked from.
     """

@@ -50,8 +50,8 @@ class Program:
     @property
     def heavy(self) -> psutil.Process:
         """The process that does what is heavy."""
-        (keeper,) = psutil.Process(self.process.pid).children()
-        (process,) = keeper.children()
+        (fork_server,) = psutil.Process(self.process.pid).children()
+        (process,) = fork_server.children()
         return process
 
 

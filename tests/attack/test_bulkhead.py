@@ -153,8 +153,8 @@ def test_a_process_that_holds_too_much_is_ended_and_the_api_goes_on(program: Sta
         assert_problem(answer, 503, "too_heavy")
         assert int(answer.headers["retry-after"]) > 0
         assert run.door.client.get("/v1/me", headers=key).status_code == 200
-        (keeper,) = api.children()
-        wait_until(lambda: [p.pid for p in keeper.children()] not in ([], [first]))
+        (fork_server,) = api.children()
+        wait_until(lambda: [p.pid for p in fork_server.children()] not in ([], [first]))
         assert scenario(run, key, 1)
         assert api.memory_info().rss / 1e6 < before_mb + 100
 

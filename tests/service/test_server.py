@@ -45,16 +45,16 @@ def test_the_body_of_an_answer_does_not_wait_for_the_acknowledgement_of_its_head
             assert connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY) == 1
 
 
-def test_api_alone_runs_no_worker_and_ends_without_its_keeper(tmp_path: Path) -> None:
+def test_api_alone_runs_no_worker_and_ends_without_its_fork_server(tmp_path: Path) -> None:
     with serving(tmp_path, "api") as (process, line):
         url = line.split()[-1]
         assert httpx.get(f"{url}/health/live").status_code == 200
         assert httpx.get(f"{url}/health/ready").status_code == 503
-        (keeper,) = psutil.Process(process.pid).children()
-        (heavy,) = keeper.children()
-        assert (keeper.name(), heavy.name()) == ("slewline-keeper", "slewline-heavy")
+        (fork_server,) = psutil.Process(process.pid).children()
+        (heavy,) = fork_server.children()
+        assert (fork_server.name(), heavy.name()) == ("slewline-fork", "slewline-heavy")
         # Nobody would start a new heavy process: whoever supervises the service shall.
-        keeper.kill()
+        fork_server.kill()
         assert process.wait(PATIENCE_S) == 1
         _, alive = psutil.wait_procs([heavy], timeout=PATIENCE_S)
         assert alive == []

@@ -278,6 +278,7 @@ def _classes(
     telemetry_per_s = satellite.resources.telemetry_per_s
     length_s = np.inf
     if telemetry_per_s > 0.0 and is_image.any():
+        # Any length is a bound: shorter ones lose less of it to telemetry, and make more classes.
         length_s = 0.5 * float(network.data_gain[is_image].min()) / telemetry_per_s
     is_shut = (network.is_contact == 0) & ~is_image & ~network.is_kept
     classes = []
