@@ -2,9 +2,10 @@
 
 Prints for each mission and event what a replan of ``LIMIT_S`` CPU seconds came to: reward and bound
 after the freeze, the share of the plan's later actions that it moved or removed, what of that was
-lost whatever is planned, and the least that any valid plan changes, where that is proven. Beside
-it what solver ``certified`` makes of the same problem from scratch. Access and compilation are not
-counted. One run each, on one core, after a warm-up on a small mission.
+lost whatever is planned, and the least that any valid plan changes, and any that earns as much,
+where that is proven. Beside it what solver ``certified`` makes of the same problem from scratch.
+Access and compilation are not counted. One run each, on one core, after a warm-up on a small
+mission.
 
 ``python -m benchmarks.replan one`` or ``four`` picks the mission. ``--fleet SPACECRAFT CITIES`` is
 the mission of ``benchmarks.fleet`` with 24 satellites and 10,000 targets: urgent requests one by
@@ -58,6 +59,7 @@ _URGENT_REWARD: Final = 10.0
 _NEW: Final = 0.05  # of the targets, that come in at once
 _DRAWS: Final = 6  # of urgent requests
 FLEET: Final = (24, 10_000)
+_ROUNDING: Final = 1e-6
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -163,14 +165,15 @@ def measure(name: str, scenario: Scenario, known: KnownPrices | None, *, is_brie
     forced = (question.num_base - still) / question.num_base
     changed = question.changed(solution.plan) / question.num_base
     told = f"| {name} | {timeline.reward:g} / {solution.bound:g} | {changed:.1%} | {forced:.1%} "
+    least = f"{_least(question)}, {_least_earning(question, timeline.reward)}"
     if is_brief:
-        return f"{told}| {_least(question)} | {cpu_s:.2f} | | | |"
+        return f"{told}| {least} | {cpu_s:.2f} | | | |"
     began = time.process_time()
     scratch = Certified().solve(problem, CpuBudget(SCRATCH_S, time.time() + 300.0), 0)
     scratch_s = time.process_time() - began
     anew = question.changed(scratch.plan) / question.num_base
     return (
-        f"{told}| {_least(question)} "
+        f"{told}| {least} "
         f"| {cpu_s:.2f} | {replay(problem, scratch.plan).reward:g} / {scratch.bound:g} "
         f"| {anew:.0%} | {scratch_s:.1f} |"
     )
@@ -185,10 +188,30 @@ def _least(question: Question) -> str:
         found = fewest_changes(question, range(len(problem.satellites)), budget, math.inf)
     if found is None or not found.is_proven:
         return "-"
+    return _share_changed(question, found.num_kept)
+
+
+def _least_earning(question: Question, reward: float) -> str:
+    """Return the least share that a plan changes which earns that, by the bound of both together.
+
+    Every image kept counts ``stability.weight`` there, so that the bound and what is earned leave
+    room for so many of them.
+    """
+    if not question.problem.use_resources or question.promised:
+        return "-"
+    budget = CpuBudget(SCRATCH_S, time.time() + 300.0)
+    bound = Certified(gap=0.0).solve(question.searched, budget, 0).bound
+    a_kept_image = question.stability.weight * question.typical
+    return _share_changed(question, math.floor((bound - reward) / a_kept_image + _ROUNDING))
+
+
+def _share_changed(question: Question, num_kept: int) -> str:
+    """Return the share of the base that is changed where so many of its images are kept."""
+    problem = question.problem
     is_image = problem.opportunities.kind[question.base] == COLLECT
     start_s = problem.opportunities.start_s
     still = sum(not problem.pinned.is_frozen(start_s[row]) for row in question.base)
-    least = question.num_base - still + int(is_image.sum()) - found.num_kept
+    least = question.num_base - still + max(0, int(is_image.sum()) - num_kept)
     return f"{least / question.num_base:.1%}"
 
 

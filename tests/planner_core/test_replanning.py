@@ -347,6 +347,20 @@ def test_the_fewest_changes_are_what_brute_force_finds(seed: int) -> None:
     event(f"shed: {int((is_base & is_image).sum()) - found.num_kept}")
 
 
+@pytest.mark.parametrize("seed", [31, 65, 75, 110, 140, 162, 176, 185, 196, 223, 317, 351])
+def test_where_the_plan_breaks_a_limit_no_plan_counts_more(seed: int) -> None:
+    """What is earned and what is kept, by brute force; contacts count nothing when kept."""
+    stability = replace(BETA, contact_weight=0.0)
+    happened = event_at_random(seed, use_resources=True, stability=stability)
+    assert happened is not None
+    question = replace(happened.question, promised=())
+    assert question.judged(Plan.of(question.problem, question.base.tolist())).violations
+    best = best_plan(question.searched)
+    assert best is not None
+    plan = solve_replan(question, Certified(), Budget(), 0).plan
+    assert value(question, plan) == pytest.approx(value(question, best), abs=1e-6)
+
+
 @examples(60)
 @given(seed=SEEDS, use_resources=st.booleans(), has_prices=st.booleans())
 def test_the_multipliers_of_the_plan_before_prove_a_bound(
