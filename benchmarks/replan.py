@@ -201,6 +201,7 @@ def _least_earning(question: Question, reward: float) -> str:
         return "-"
     budget = CpuBudget(SCRATCH_S, time.time() + 300.0)
     bound = Certified(gap=0.0).solve(question.searched, budget, 0).bound
+    assert bound is not None
     a_kept_image = question.stability.weight * question.typical
     return _share_changed(question, math.floor((bound - reward) / a_kept_image + _ROUNDING))
 

@@ -11,11 +11,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from benchmarks.clouds.forecast import forecast_of
 from benchmarks.clouds.weather import Floats, Places, Weather, position_km
 from benchmarks.missions import paper_scenario
 from planner_core.budget import Budget
 from planner_core.build import ScenarioOpportunities, build_problem, compute_opportunities
-from planner_core.domain import Forecast, Scenario, SkySeries
+from planner_core.domain import Scenario
 from planner_core.problem import Problem
 from planner_core.referee.replay import replay
 from planner_core.solvers.registry import Certified
@@ -23,23 +24,6 @@ from planner_core.solvers.registry import Certified
 _SKIES = 10_000
 _WEATHER_SEED = 20_000
 _SKIES_SEED = 30_000
-_HOURS = np.arange(25.0)
-
-
-def forecast_of(scenario: Scenario, weather: Weather) -> Forecast:
-    """Return what a forecast says of every target, hour by hour."""
-    lat_deg = np.array([target.lat_deg for target in scenario.targets])
-    at_km = position_km(lat_deg, np.array([target.lon_deg for target in scenario.targets]))
-    hourly = [
-        weather.clear_probability(Places(at_km, lat_deg, np.full(len(lat_deg), hour)))
-        for hour in _HOURS
-    ]
-    series = SkySeries(
-        target=np.arange(len(lat_deg)),
-        time_s=3600.0 * _HOURS,
-        clear_probability=np.column_stack(hourly),
-    )
-    return Forecast(series=(series,))
 
 
 def clear_images(problem: Problem, scenario: Scenario, rows: list[int], weather: Weather) -> Floats:

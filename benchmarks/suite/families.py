@@ -9,11 +9,14 @@ from typing import Final
 
 import numpy as np
 
+from benchmarks.clouds.forecast import forecast_of
+from benchmarks.clouds.weather import Weather
 from benchmarks.missions import paper_scenario
 from planner_core.domain import (
     Agility,
     Dynamics,
     Horizon,
+    Objective,
     OrbitElements,
     Resources,
     Satellite,
@@ -25,8 +28,14 @@ _FLEET_START: Final = datetime(2020, 1, 1, tzinfo=UTC)
 _TARGETS_PER_TOWN: Final = 10
 _TOWN_SPREAD_DEG: Final = 3.0
 _HIGHEST_TOWN_LAT_DEG: Final = 60.0
+_COLLECTED: Final = Objective.collected()
+_DELIVERED: Final = Objective.delivered()
 _WARM_UP_DRAW: Final = 99
 _WARM_UP_TARGETS: Final = 100
+
+
+def _halved_in(half_life_h: float) -> Objective:
+    return Objective(collected_share=0.0, half_life_s=3600.0 * half_life_h)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,6 +55,10 @@ class Family:
         Whether rewards are drawn from 1 to 10, and not all 1.
     has_tight_battery
         Whether images cost twice and sunlight gives half of what the paper's spacecraft has.
+    objective
+        What an image is worth; all worth what they are when they are taken where it says nothing.
+    has_forecast
+        Whether it is worth that by the chance of a clear sky (``benchmarks.clouds``).
     """
 
     num_targets: int
@@ -58,6 +71,8 @@ class Family:
     continuous_starts: bool = False
     has_random_rewards: bool = False
     has_tight_battery: bool = False
+    objective: Objective = _COLLECTED
+    has_forecast: bool = False
 
 
 FAMILIES: Final[Mapping[str, Family]] = {
@@ -108,6 +123,33 @@ FAMILIES: Final[Mapping[str, Family]] = {
         num_targets=300, budget_s=10.0, quick_budget_s=5.0, dynamics="physical",
         has_random_rewards=True, has_tight_battery=True,
     ),
+    "delivered-paper-500": Family(
+        num_targets=500, budget_s=20.0, quick_budget_s=10.0, dynamics="paper", objective=_DELIVERED
+    ),
+    "delivered-1000": Family(
+        num_targets=1000, budget_s=10.0, quick_budget_s=5.0, dynamics="physical",
+        objective=_DELIVERED,
+    ),
+    "half-life-3h-1000": Family(
+        num_targets=1000, budget_s=10.0, quick_budget_s=8.0, dynamics="physical",
+        objective=_halved_in(3.0),
+    ),
+    "half-life-12h-1000": Family(
+        num_targets=1000, budget_s=10.0, quick_budget_s=10.0, dynamics="physical",
+        objective=_halved_in(12.0),
+    ),
+    "delivered-fleet-4x2000": Family(
+        num_satellites=4, num_targets=2000, budget_s=60.0, quick_budget_s=None, dynamics="physical",
+        objective=_DELIVERED,
+    ),
+    "clouds-1000": Family(
+        num_targets=1000, budget_s=20.0, quick_budget_s=10.0, dynamics="physical",
+        has_forecast=True,
+    ),
+    "clouds-fleet-4x2000": Family(
+        num_satellites=4, num_targets=2000, budget_s=60.0, quick_budget_s=None, dynamics="physical",
+        has_forecast=True,
+    ),
 }  # fmt: skip
 
 
@@ -134,8 +176,11 @@ def scenario_of(family: Family, draw: int) -> Scenario:
         )
     if family.has_tight_battery:
         scenario = replace(scenario, satellites=tuple(map(_tight, scenario.satellites)))
+    if family.has_forecast:
+        scenario = replace(scenario, forecast=forecast_of(scenario, Weather(draw)))
     return replace(
         scenario,
+        objective=family.objective,
         collect_spacing_s=family.spacing_s,
         continuous_starts=family.continuous_starts,
     )

@@ -86,7 +86,9 @@ class ProgramSearch:
             yield from self._improve_best(program, beside, sets)
             if self._pool.reward == before:
                 yield TUNING.steps_beside
-                sets = [self._draw(group, beside) for _ in range(TUNING.several)]
+                sets = []
+                while len(sets) < TUNING.several and not self._budget.is_spent():
+                    sets.append(self._draw(group, beside))
                 yield from self._improve_best(program, beside, sets)
             if self._pool.reward == before:
                 self._offered_per_task = min(TUNING.more * self._offered_per_task, TUNING.several)
@@ -176,6 +178,8 @@ class ProgramSearch:
             satellite = relaxation.satellite
             if not group[table.satellite[satellite.rows[0]]]:
                 continue
+            if self._budget.is_spent():
+                return ()
             is_shut = blocked_rows(self._problem, satellite, taken + drawn) != 0
             _, path = relaxation.without(is_shut).most(
                 worth, self._unit, 0, self._budget.stop, keeps_path=True
