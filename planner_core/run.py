@@ -12,7 +12,7 @@ from planner_core.budget import Budget, Progress, Termination
 from planner_core.build import ScenarioOpportunities, build_problem, compute_opportunities
 from planner_core.build_after import PlanBefore, opportunities_after
 from planner_core.certified.drivers.continuous import with_own_starts
-from planner_core.certified.lns.downlinks import with_more_downlinks
+from planner_core.certified.lns.downlinks import brought_down
 from planner_core.certified.proofs import continuous
 from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.proofs.lagrangian import lagrangian_bound
@@ -177,7 +177,7 @@ def _search(
         solution = with_own_starts(problem, solution, budget)
     is_optimal = solution.termination is Termination.OPTIMAL
     if problem.on_board or (scenario.replan is None and not is_optimal):
-        more = with_more_downlinks(problem, solution.plan, budget)
+        more = brought_down(problem, solution.plan, budget)
         solution = replace(solution, plan=more)
     effects: tuple[Effect, ...] = ()
     if aims:

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from planner_core import run
 from planner_core.budget import Budget, Termination
-from planner_core.certified.lns.downlinks import with_more_downlinks
+from planner_core.certified.lns.downlinks import brought_down
 from planner_core.certified.proofs.documents import from_json, is_proven, to_json
 from planner_core.certified.proofs.resource_bound import quick_bound
 from planner_core.domain import (
@@ -99,7 +99,7 @@ def test_no_plan_earns_more_than_the_bound(seed: int) -> None:
         best = max(best, timeline.reward)
         assert timeline.reward - timeline.earned_by_new <= most + 1e-9
         assert timeline.earned_by_new <= quick.value + 1e-9
-    plan = with_more_downlinks(problem, solution.plan, Budget())
+    plan = brought_down(problem, solution.plan, Budget())
     mine = replay(problem, plan)
     if best == 0.0 or not mine.is_valid:
         return

@@ -19,8 +19,9 @@ import numpy as np
 from planner_core.bundles import bundle
 from planner_core.certified.dp.energy_labels import (
     EnergyLevels,
+    extended,
     given_between,
-    raise_to,
+    merge_ended,
     sink,
 )
 from planner_core.certified.dp.resource_network import Network
@@ -137,10 +138,7 @@ def fill_layer(
     for k in range(m):
         sink(idle, base - levels.lowest[k])
         base = levels.lowest[k]
-        while merged < m and network.idle_from[network.by_idle[merged]] <= k:
-            i = network.by_idle[merged]
-            raise_to(idle, own[i, : num_own[i]], levels.lowest[i] - base)
-            merged += 1
+        merged = merge_ended(network, levels, k, merged, idle, own, num_own)
         number = layers.number[k]
         if number >= 0 and layers.group[k] != layer:
             # It ends an earlier layer, and begins this one.
@@ -148,7 +146,9 @@ def fill_layer(
             for x in range(num_own[k]):
                 own[k, x] = tables.at_contact[number, x]
         else:
-            num_own[k] = _take(network, levels, k, weight[layer, k], idle, base, own, num_own)
+            num_own[k] = 0
+            if weight[layer, k] != NEVER:
+                num_own[k] = extended(network, levels, k, weight[layer, k], idle, own, num_own)
         if number >= 0 and layers.group[k] == layer:
             tables.num_at_contact[number] = num_own[k]
             for x in range(num_own[k]):
@@ -156,37 +156,6 @@ def fill_layer(
         if num_own[k] > 0 and own[k, 0] > best:
             best, last = own[k, 0], k
     return best, last
-
-
-@inner
-def _take(
-    network: Network,
-    levels: EnergyLevels,
-    k: int,
-    weight: float,
-    idle: Floats,
-    base: int,
-    own: Floats,
-    num_own: Longs,
-) -> int:
-    """Extend all paths by a task; return how many entries its table has."""
-    low = max(0, levels.floor[k] - base)
-    high = levels.cap[k] - levels.cost[k] - base + 1
-    if weight == NEVER or high <= low:
-        return 0
-    values = own[k, :high]
-    values[:] = -np.inf
-    raise_to(values[low:], idle, -low - levels.cost[k])
-    for at in range(network.straight_first[k], network.straight_first[k + 1]):
-        i = network.straight_rows[at]
-        up = levels.lowest[i] + levels.give[at] - base - levels.cost[k]
-        raise_to(values[low:], own[i, : num_own[i]], up - low)
-    values[:low] = values[low]
-    while high > 0 and values[high - 1] == -np.inf:
-        high -= 1
-    for x in range(high):
-        values[x] += weight
-    return int(high)
 
 
 @inner

@@ -167,31 +167,69 @@ def most_by_energy(
     for k in range(m):
         sink(idle, base - levels.lowest[k])
         base = levels.lowest[k]
-        while merged < m and network.idle_from[network.by_idle[merged]] <= k:
-            i = network.by_idle[merged]
-            raise_to(idle, own[i, : num_own[i]], levels.lowest[i] - base)
-            merged += 1
+        merged = merge_ended(network, levels, k, merged, idle, own, num_own)
         num_own[k] = 0
-        low = max(0, levels.floor[k] - base)
-        high = levels.cap[k] - levels.cost[k] - base + 1
-        if weight[k] <= 0.0 or high <= low:
-            continue
-        values = own[k, :high]
-        values[:] = -np.inf
-        raise_to(values[low:], idle, -low - levels.cost[k])
-        for at in range(network.straight_first[k], network.straight_first[k + 1]):
-            i = network.straight_rows[at]
-            up = levels.lowest[i] + levels.give[at] - base - levels.cost[k]
-            raise_to(values[low:], own[i, : num_own[i]], up - low)
-        values[:low] = values[low]
-        while high > 0 and values[high - 1] == -np.inf:
-            high -= 1
-        for x in range(high):
-            values[x] += weight[k]
-        num_own[k] = high
-        if high > 0 and own[k, 0] > best:
+        if weight[k] > 0.0:
+            num_own[k] = extended(network, levels, k, weight[k], idle, own, num_own)
+        if num_own[k] > 0 and own[k, 0] > best:
             best, last = own[k, 0], k
     return best, _path_to(network, levels, weight, own, num_own, last)
+
+
+@inner
+def merge_ended(
+    network: Network,
+    levels: EnergyLevels,
+    k: int,
+    merged: int,
+    idle: Floats,
+    own: Floats,
+    num_own: Longs,
+) -> int:
+    """Let paths idle whose last task has ended before row ``k``; return how many have by now.
+
+    ``idle`` begins with the lowest level of row ``k``.
+    """
+    m = len(network.by_idle)
+    while merged < m and network.idle_from[network.by_idle[merged]] <= k:
+        i = network.by_idle[merged]
+        raise_to(idle, own[i, : num_own[i]], levels.lowest[i] - levels.lowest[k])
+        merged += 1
+    return merged
+
+
+@inner
+def extended(
+    network: Network,
+    levels: EnergyLevels,
+    k: int,
+    weight: float,
+    idle: Floats,
+    own: Floats,
+    num_own: Longs,
+) -> int:
+    """Extend all paths by row ``k``; return how many entries its table has.
+
+    ``idle`` begins with the lowest level of row ``k``.
+    """
+    base = levels.lowest[k]
+    low = max(0, levels.floor[k] - base)
+    high = levels.cap[k] - levels.cost[k] - base + 1
+    if high <= low:
+        return 0
+    values = own[k, :high]
+    values[:] = -np.inf
+    raise_to(values[low:], idle, -low - levels.cost[k])
+    for at in range(network.straight_first[k], network.straight_first[k + 1]):
+        i = network.straight_rows[at]
+        up = levels.lowest[i] + levels.give[at] - base - levels.cost[k]
+        raise_to(values[low:], own[i, : num_own[i]], up - low)
+    values[:low] = values[low]
+    while high > 0 and values[high - 1] == -np.inf:
+        high -= 1
+    for x in range(high):
+        values[x] += weight
+    return int(high)
 
 
 @templated

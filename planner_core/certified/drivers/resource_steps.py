@@ -17,7 +17,7 @@ from planner_core.certified.drivers.fleet import solve_without_resources
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.alternating import TurnSearch
 from planner_core.certified.lns.choices import ChoiceSearch
-from planner_core.certified.lns.downlinks import with_more_downlinks
+from planner_core.certified.lns.downlinks import brought_down
 from planner_core.certified.mip.contact_sets import FixedContacts, Relaxation
 from planner_core.certified.multipliers.ascent import Ascent
 from planner_core.certified.multipliers.energy import EnergyPaths, ascent_on_energy
@@ -125,7 +125,7 @@ class ResourceSearch:
         if plan in self._brought_down:
             return is_better
         self._brought_down.add(plan)
-        more = with_more_downlinks(self.problem, plan, self.budget)
+        more = brought_down(self.problem, plan, self.budget)
         return (more is not plan and self.best.offer(more)) or is_better
 
     def without_resources(self) -> Bools:
