@@ -145,14 +145,15 @@ def test_each_change_of_state_is_a_version_of_its_own(jobs: Jobs) -> None:
     assert versions == [1, 2, 3, 4, 5, 6]
 
 
-def test_an_answer_is_counted_with_its_owner_and_its_warnings_are_told(jobs: Jobs) -> None:
+def test_answers_are_counted_with_their_owner_and_their_warnings_are_told(jobs: Jobs) -> None:
     job_id = jobs.submit("answer")
+    finish(jobs, started(jobs, jobs.submit("answer")))
     outcome = replace(ANSWERED, num_shared_bytes=1000, warnings=("Elements are old.",))
     finish(jobs, started(jobs, job_id), outcome)
     num_chars = sum(len(block.text) for block in ANSWERED.blocks)
     with jobs.database.reading() as session:
         used = usage_store.used(session, "local")
-    assert used == (1 + len(ANSWERED.blocks), 1000 + num_chars)
+    assert used == (2 * (1 + len(ANSWERED.blocks)), 1000 + 2 * num_chars)
     assert jobs.job(job_id).warnings == ["Elements are old."]
 
 
