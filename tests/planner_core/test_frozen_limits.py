@@ -112,7 +112,8 @@ def test_an_image_that_finds_no_energy_at_all_earns_nothing() -> None:
 
 def test_no_recorder_is_full_for_want_of_the_longest_contact_of_a_pass() -> None:
     passes = [
-        Task(kind=CONTACT, place=0, start_s=200.0, end_s=end_s, access=9) for end_s in (220.0, 300.0)
+        Task(kind=CONTACT, place=0, start_s=200.0, end_s=end_s, access=9)
+        for end_s in (220.0, 300.0)
     ]
     whole = make_problem([*TASKS[:2], *passes], num_targets=2, resources=NEARLY_FULL)
     problem = _after(whole, [0], 100.0)
