@@ -147,9 +147,9 @@ def test_turns_take_as_long_in_whatever_axes_they_are_told(seed: int) -> None:
     axes, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
     whole = _headed(seed, is_moving=True)
     other = _rotated(whole, axes * np.linalg.det(axes))
-    for row, satellite in enumerate(whole.opportunities.satellite.tolist()):
+    for row, index in enumerate(whole.opportunities.satellite.tolist()):
         action = Plan.of(whole, [row]).actions[0]
-        turn, turned = (turn_from_start(p, satellite, action) for p in (whole, other))
+        turn, turned = (turn_from_start(p, index, action) for p in (whole, other))
         assert turned == pytest.approx(turn, abs=2e-3)
 
 
