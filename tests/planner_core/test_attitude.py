@@ -153,6 +153,21 @@ def test_turns_take_as_long_in_whatever_axes_they_are_told(seed: int) -> None:
         assert turned == pytest.approx(turn, abs=2e-3)
 
 
+@examples(50)
+@given(seed=SEEDS)
+def test_a_turn_takes_no_longer_where_there_is_more_time_for_it(seed: int) -> None:
+    whole = _headed(seed, is_moving=True)
+    satellites = []
+    for own in whole.satellites:
+        assert own.heading is not None
+        satellites.append(replace(own, heading=replace(own.heading, free_from_s=-5000.0)))
+    waiting = replace(whole, satellites=tuple(satellites))
+    for row, index in enumerate(whole.opportunities.satellite.tolist()):
+        action = Plan.of(whole, [row]).actions[0]
+        turn, later = (turn_from_start(p, index, action) for p in (whole, waiting))
+        assert later == pytest.approx(turn, abs=1e-4)
+
+
 def test_the_turn_takes_what_it_takes() -> None:
     """60 deg at 1 deg/s, 5 s to settle: a task may begin at 65 s, and none sooner."""
     look = (float(np.cos(np.pi / 3.0)), float(np.sin(np.pi / 3.0)), 0.0)

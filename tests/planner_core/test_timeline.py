@@ -145,6 +145,8 @@ def test_the_best_image_of_a_target_counts_and_of_equal_ones_the_first(
     timeline = judge(problem, 0, 1)
     assert timeline.is_valid
     assert codes(timeline) == ["duplicate"]
+    why = "has a better image later" if earns else "is collected already"
+    assert timeline.violations[0].detail == f"Target t0 {why}."
     assert timeline.collected[0].position == earns
     assert timeline.reward == timeline.collected[0].worth == 3.0 * max(quality)
     (line,) = timeline.satellites
