@@ -78,6 +78,16 @@ def test_prices_tighten_the_bound_where_targets_would_be_taken_twice() -> None:
     assert lagrangian_bound(problem, reward=0.0).value <= 8.0 < free
 
 
+def test_the_bound_says_how_often_its_paths_take_each_target() -> None:
+    tasks = [
+        Task(kind=COLLECT, place=place, start_s=200.0 * i, end_s=200.0 * i + 30.0)
+        for i, place in enumerate([0, 1, 0, 2])
+    ]
+    problem = make_problem(tasks, num_targets=4, use_resources=False, rewards=[1.0, 1.0, 0.0, 1.0])
+    value, counts = lagrangian_value(problem, np.array([0.25, 0.5, 0.5, 0.5]))
+    assert (value, counts[:2].tolist(), counts[3]) == (0.75 + 0.75 * 2 + 0.5, [2, 1], 0)
+
+
 def test_bounds_are_rounded_down_to_what_whole_rewards_add_up_to() -> None:
     problem = with_rewards(random_problem(3, num_targets=2, use_resources=False), [2.0, 4.0])
     assert problem.reward_unit == 2.0

@@ -290,6 +290,18 @@ def test_a_branch_needs_both_of_its_sides() -> None:
         assert is_refuted(_either_or(), certificate) == (open_ not in (taken, leaving))
 
 
+def test_a_branch_takes_its_task_and_leaves_what_that_excludes() -> None:
+    free = Refutation(steps=(Multipliers(prices=np.zeros(2)),))
+    certificate = Certificate(amount=1.5, refutation=Refutation(steps=(), branch=(0, free, free)))
+    apart = [Task(kind=COLLECT, place=i, start_s=200.0 * i, end_s=200.0 * i + 30) for i in range(2)]
+    problem = make_problem(apart, num_targets=2, use_resources=False)
+    assert not is_refuted(problem, certificate), "a plan takes both"
+    rivals = [Task(kind=COLLECT, place=0, start_s=0.0, end_s=30.0, satellite=i) for i in range(2)]
+    problem = make_problem(rivals, num_targets=2, num_satellites=2, use_resources=False)
+    assert not is_refuted(problem, Certificate(amount=1.5, refutation=free))
+    assert is_refuted(problem, certificate)
+
+
 def test_both_plan_and_bound_are_reported_and_close_in() -> None:
     problem = wide_problem(5, num_collects=400, num_targets=150, span_s=20_000.0)
     seen: list[Progress] = []

@@ -81,6 +81,12 @@ def test_without_a_freeze_the_same_images_break_a_limit() -> None:
     assert [(v.blamed, v.inherited) for v in timeline.violations] == [((0, 1), False)]
 
 
+def test_in_the_event_model_a_contact_is_not_blamed_for_what_it_empties() -> None:
+    whole = make_problem(TASKS, num_targets=3, resources=NEARLY_FULL, dynamics="paper")
+    timeline = replay(whole, Plan.of(whole, [0, 2]))
+    assert [(v.code, v.blamed) for v in timeline.violations] == [("recorder", (0,))]
+
+
 def test_a_pin_that_breaks_limits_by_itself_is_still_refused() -> None:
     whole = make_problem(TASKS, num_targets=3, resources=NEARLY_FULL)
     kept = (Kept(row=1, pointer="/pins/keep/0"),)

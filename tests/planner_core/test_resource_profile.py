@@ -84,12 +84,13 @@ def test_levels_at_the_start_may_be_whole_numbers() -> None:
 def test_curves_are_drawn_without_what_lies_on_a_line_or_repeats() -> None:
     battery = [0.5, 0.6, 0.7, 0.7, 0.65, 0.6, 0.6]
     recorder = [0.1, 0.2, 0.3, 0.3, 0.45, 0.6, 0.2]
-    time_s = [0.0, 10.0, 20.0, 20.0, 30.0, 40.0, 40.0]
+    time_s = [0.0, 0.25, 0.5, 0.5, 0.75, 1.0, 1.0]
     points = [Point(*state, 0.0, 0.0) for state in zip(time_s, battery, recorder, strict=True)]
     kept = [0, 3, 5, 6]
     drawn = thin(points)
     assert [column.tolist() for column in drawn] == [
         [column[i] for i in kept] for column in (time_s, battery, recorder)
     ]
-    bent = [points[0], Point(10.0, 0.6, 0.21, 0.0, 0.0), points[2]]
+    assert [column.tolist() for column in thin(points[:1])] == [[0.0], [0.5], [0.1]]
+    bent = [points[0], Point(0.25, 0.6, 0.21, 0.0, 0.0), points[2]]
     assert thin(bent)[2].tolist() == [0.1, 0.21, 0.3]

@@ -285,11 +285,13 @@ def test_the_event_model_books_lumps_at_starts_and_forgoes_the_segment_before_a_
 
 def test_a_recorder_of_the_event_model_holds_no_more_than_it_can() -> None:
     full = replace(TIGHT, initial_recorder_fraction=0.95, telemetry_per_s=1e-3)
-    tasks = [contact(200.0, 230.0), collect(0, 400.0)]
-    problem = make_problem(tasks, num_targets=1, resources=full, dynamics="paper")
-    (line,) = judge(problem, 0, 1).satellites
+    tasks = [contact(200.0, 230.0), collect(0, 400.0), collect(1, 600.0)]
+    problem = make_problem(tasks, num_targets=2, resources=full, dynamics="paper")
+    timeline = judge(problem, 0, 1)
+    (line,) = timeline.satellites
     levels = {a.mode: a.recorder_end for a in line.actions if a.mode != "sunpoint"}
     assert levels == {"contact": 1.0, "collect": 1.0}
+    assert timeline.recorder_max == 1.0
 
 
 def test_without_resources_there_is_neither_sun_pointing_nor_a_curve() -> None:
