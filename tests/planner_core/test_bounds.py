@@ -101,8 +101,8 @@ def test_bounds_are_rounded_down_to_what_whole_rewards_add_up_to() -> None:
 
 def test_a_bound_is_what_new_images_earn_and_those_on_board() -> None:
     new = Bound(value=3.0, proof="totals")
-    both = new.with_on_board(1.5)
-    assert (both.value, both.on_board) == (4.5, 1.5)
+    both = new.with_on_board(1.0)
+    assert (both.value, both.on_board) == (4.0, 1.0)
     assert (both.without_on_board().value, both.without_on_board().on_board) == (3.0, 0.0)
     assert accessible(with_rewards(random_problem(0, num_targets=2), [2.0, 4.0])).value == 6.0
 

@@ -109,6 +109,19 @@ def test_what_an_image_earns_by_where_it_is(
     assert timeline.reward == pytest.approx(expected + on_board)
 
 
+@pytest.mark.parametrize("dynamics", ["physical", "paper"])
+def test_an_image_without_data_is_down_when_the_next_contact_begins(dynamics: Dynamics) -> None:
+    """All that waited before it is down already, which is no reason to count it as older."""
+    empty = replace(ROOMY, collect_fill_per_s=0.0, telemetry_per_s=0.0)
+    tasks = [contact(100.0, 200.0), collect(0, 300.0), contact(400.0, 500.0), collect(1, 600.0)]
+    problem = make_problem(tasks, num_targets=2, resources=empty, dynamics=dynamics)
+    problem = with_objective(problem, Objective(collected_share=0.0, half_life_s=70.0))
+    first, second = (all_of(problem).collected[target] for target in range(2))
+    assert (first.delivered_s, first.age_s, first.worth) == (400.0, 70.0, 0.5)
+    assert first.worth <= problem.worth[1] <= 0.5 + 1e-6
+    assert (second.delivered_s, second.worth) == (None, 0.0)
+
+
 def test_of_several_images_the_one_that_earns_most_counts() -> None:
     """The better image is still on board at the end."""
     tasks = [collect(0, 100.0, quality=0.5), contact(300.0, 400.0), collect(0, 600.0)]
