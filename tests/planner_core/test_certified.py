@@ -300,6 +300,9 @@ def test_a_branch_takes_its_task_and_leaves_what_that_excludes() -> None:
     problem = make_problem(rivals, num_targets=2, num_satellites=2, use_resources=False)
     assert not is_refuted(problem, Certificate(amount=1.5, refutation=free))
     assert is_refuted(problem, certificate)
+    either = Cut(sets=(np.array([0, 1]),))
+    priced = Multipliers(prices=np.zeros(2), cuts=(either,), cut_prices=(1.0,))
+    assert _refutes(1.5, priced, problem=problem), "a cut says the same as the branch"
 
 
 def test_both_plan_and_bound_are_reported_and_close_in() -> None:
