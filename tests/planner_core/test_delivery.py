@@ -112,9 +112,14 @@ def test_what_an_image_earns_by_where_it_is(
 
 
 @pytest.mark.parametrize("dynamics", ["physical", "paper"])
-def test_an_image_without_data_is_down_when_the_next_contact_begins(dynamics: Dynamics) -> None:
+@pytest.mark.parametrize("held", [0.0, 0.05])
+def test_an_image_without_data_is_down_when_the_next_contact_begins(
+    held: float, dynamics: Dynamics
+) -> None:
     """All that waited before it is down already, which is no reason to count it as older."""
-    empty = replace(ROOMY, collect_fill_per_s=0.0, telemetry_per_s=0.0)
+    empty = replace(
+        ROOMY, collect_fill_per_s=0.0, telemetry_per_s=0.0, initial_recorder_fraction=held
+    )
     tasks = [contact(100.0, 200.0), collect(0, 300.0), contact(400.0, 500.0), collect(1, 600.0)]
     problem = make_problem(tasks, num_targets=2, resources=empty, dynamics=dynamics)
     problem = with_objective(problem, Objective(collected_share=0.0, half_life_s=70.0))
