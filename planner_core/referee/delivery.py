@@ -1,11 +1,13 @@
 """When images are on the ground: the recorder's queue, first in, first out.
 
 Telemetry waits in the queue as images do. An image is down with its last bit, that is once as
-much was removed from the recorder as had been recorded when the image ended.
+much was removed from the recorder as had been recorded when the image ended, and not before the
+next contact takes down data.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Final
 
@@ -13,6 +15,7 @@ import numpy as np
 
 from planner_core.problem import CONTACT, Floats, Problem, SatelliteProblem
 from planner_core.problem.plan import Action
+from planner_core.problem.slew import TIME_TOLERANCE_S
 from planner_core.referee.contact_flow import Piece, flow
 from planner_core.referee.resource_profile import Profile
 
@@ -38,9 +41,23 @@ def delivered_s(
     kind = problem.opportunities.kind
     queued = np.array([point.recorded for point in profile.after])
     found = on_ground_s(problem, satellite, actions, profile, queued)
+    contacts = [action for action in actions if kind[action.opportunity] == CONTACT]
     is_contact = [kind[action.opportunity] == CONTACT for action in actions]
     found[np.array(is_contact, dtype=np.bool_)] = np.nan
+    end_s = np.array([action.end_s for action in actions])
+    # Of an image without data all is down before it is taken: it waits for a contact all the same.
+    for own in np.flatnonzero(found < end_s - TIME_TOLERANCE_S).tolist():
+        found[own] = _next_flow_s(problem, satellite, contacts, end_s[own])
     return found
+
+
+def _next_flow_s(
+    problem: Problem, satellite: SatelliteProblem, contacts: Sequence[Action], after_s: float
+) -> float:
+    """Return when data can come down in a contact that begins then or later; NaN for never."""
+    later = [action for action in contacts if action.start_s >= after_s - TIME_TOLERANCE_S]
+    flows = [flow(problem, satellite, action) for action in later]
+    return min((pieces[0].from_s for pieces in flows if pieces), default=math.nan)
 
 
 def on_ground_s(

@@ -28,11 +28,12 @@ from planner_core.errors import InvalidScenario
 from planner_core.idling import sunlit_from
 from planner_core.orbits.omm import omm_from_elements
 from planner_core.pinning.apply_pins import apply_pins
-from planner_core.problem import Heading, Kept, Pinned, Problem
+from planner_core.problem import Floats, Heading, Kept, Pinned, Problem
 from planner_core.problem.plan import Plan
 from planner_core.problem.sun_turns import sun_turn_s
 from planner_core.reasons.explain import explain
 from planner_core.referee.replay import replay
+from planner_core.referee.sight import turn_from_start
 from planner_core.solvers.registry import SOLVERS, Rule
 from tests import independent
 from tests.examples import examples
@@ -115,6 +116,56 @@ def test_the_referee_finds_the_first_visit_to_the_sun_itself(seed: int, *, is_mo
         assert np.interp(at_s, mine.resources.time_s, mine.resources.battery) == pytest.approx(
             np.interp(at_s, own.resources.time_s, own.resources.battery), abs=1e-6
         )
+
+
+def _rotated(problem: Problem, axes: Floats) -> Problem:
+    """Return a problem whose lines of sight, their motion and the sun are seen in other axes."""
+    table, columns = (
+        problem.opportunities,
+        ("los_start", "los_end", "los_rate_start", "los_rate_end"),
+    )
+    satellites = []
+    for own in problem.satellites:
+        heading, sun = own.heading, own.sun
+        assert heading is not None
+        if heading.line_of_sight is not None:
+            look, moving = (
+                tuple((axes @ v).tolist()) for v in (heading.line_of_sight, heading.moving_deg_s)
+            )
+            heading = replace(heading, line_of_sight=look, moving_deg_s=moving)
+        if sun is not None:
+            sun = replace(sun, directions=sun.directions @ axes.T)
+        satellites.append(replace(own, heading=heading, sun=sun))
+    seen = {name: getattr(table, name) @ axes.T.astype(np.float32) for name in columns}
+    return replace(problem, opportunities=replace(table, **seen), satellites=tuple(satellites))
+
+
+@examples(50)
+@given(seed=SEEDS)
+def test_turns_take_as_long_in_whatever_axes_they_are_told(seed: int) -> None:
+    """In small problems all lies in one plane: here no axis is left out."""
+    axes, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
+    whole = _headed(seed, is_moving=True)
+    other = _rotated(whole, axes * np.linalg.det(axes))
+    for row, index in enumerate(whole.opportunities.satellite.tolist()):
+        action = Plan.of(whole, [row]).actions[0]
+        turn, turned = (turn_from_start(p, index, action) for p in (whole, other))
+        assert turned == pytest.approx(turn, abs=2e-3)
+
+
+@examples(50)
+@given(seed=SEEDS)
+def test_a_turn_takes_no_longer_where_there_is_more_time_for_it(seed: int) -> None:
+    whole = _headed(seed, is_moving=True)
+    satellites = []
+    for own in whole.satellites:
+        assert own.heading is not None
+        satellites.append(replace(own, heading=replace(own.heading, free_from_s=-5000.0)))
+    waiting = replace(whole, satellites=tuple(satellites))
+    for row, index in enumerate(whole.opportunities.satellite.tolist()):
+        action = Plan.of(whole, [row]).actions[0]
+        turn, later = (turn_from_start(p, index, action) for p in (whole, waiting))
+        assert later == pytest.approx(turn, abs=1e-4)
 
 
 def test_the_turn_takes_what_it_takes() -> None:

@@ -229,6 +229,82 @@ def test_sets_that_a_plan_may_take_two_of_prove_nothing() -> None:
     assert not is_refuted(problem, certificate)
 
 
+def _either_or() -> Problem:
+    """Return two targets of which a plan images one: their collects overlap."""
+    tasks = [Task(kind=COLLECT, place=i, start_s=10.0 * i, end_s=10.0 * i + 30) for i in range(2)]
+    return make_problem(tasks, num_targets=2, use_resources=False)
+
+
+def _refutes(amount: float, *steps: Multipliers, problem: Problem | None = None) -> bool:
+    certificate = Certificate(amount=amount, refutation=Refutation(steps=steps))
+    return is_refuted(problem or _either_or(), certificate)
+
+
+def test_a_certificate_proves_what_is_above_its_bound_and_not_what_a_plan_earns() -> None:
+    free = Multipliers(prices=np.zeros(2))
+    assert _refutes(1.00001, free)
+    assert not _refutes(1.0, free)
+    # Nearer than sums are exact nothing is proven.
+    assert not _refutes(1.0 + 1e-10, free)
+    assert not _refutes(1.00001), "no multipliers, no proof"
+    # At these prices each image leaves its target what it is worth.
+    assert not _refutes(1.5, Multipliers(prices=np.ones(2)))
+
+
+def test_multipliers_below_zero_prove_nothing() -> None:
+    apart = [Task(kind=COLLECT, place=i, start_s=200.0 * i, end_s=200.0 * i + 30) for i in range(2)]
+    problem = make_problem(apart, num_targets=2, use_resources=False)
+    assert not _refutes(1.5, Multipliers(prices=np.array([-5.0, 0.0])), problem=problem)
+    cut = Cut(sets=(np.array([0]),))
+    below = Multipliers(prices=np.ones(2), cuts=(cut,), cut_prices=(-1.0,))
+    assert not _refutes(1.5, below, problem=problem)
+    assert _refutes(2.5, Multipliers(prices=np.ones(2)), problem=problem)
+
+
+def test_a_cut_of_three_sets_takes_one_of_what_lies_in_two_of_them() -> None:
+    three = Cut(sets=(np.array([0, 1, 3]), np.array([1, 2]), np.array([0, 2])))
+    rows, weights = three.weights()
+    assert (three.limit, rows.tolist(), weights.tolist()) == (1, [0, 1, 2], [1, 1, 1])
+    assert Cut(sets=three.sets + (np.array([3, 4]),) * 2).limit == 2
+    single = Cut(sets=(np.array([4, 7]),))
+    rows, weights = single.weights()
+    assert (single.limit, rows.tolist(), weights.tolist()) == (1, [4, 7], [1, 1])
+
+
+@pytest.mark.parametrize("sets", [[[0, 1], [0, 1]], [[0, 0]]], ids=["even", "twice"])
+def test_cuts_of_an_even_number_of_sets_or_of_one_task_twice_prove_nothing(
+    sets: list[list[int]],
+) -> None:
+    cut = Cut(sets=tuple(np.array(rows) for rows in sets))
+    assert not _refutes(1.5, Multipliers(prices=np.zeros(2), cuts=(cut,), cut_prices=(0.0,)))
+    sound = Cut(sets=(np.array([0, 1]),))
+    assert _refutes(1.5, Multipliers(prices=np.zeros(2), cuts=(sound,), cut_prices=(0.5,)))
+
+
+def test_a_branch_needs_both_of_its_sides() -> None:
+    free = Multipliers(prices=np.zeros(2))
+    done, open_ = Refutation(steps=(free,)), Refutation(steps=())
+    for taken, leaving in ((done, done), (done, open_), (open_, done)):
+        refutation = Refutation(steps=(), branch=(0, taken, leaving))
+        certificate = Certificate(amount=1.5, refutation=refutation)
+        assert is_refuted(_either_or(), certificate) == (open_ not in (taken, leaving))
+
+
+def test_a_branch_takes_its_task_and_leaves_what_that_excludes() -> None:
+    free = Refutation(steps=(Multipliers(prices=np.zeros(2)),))
+    certificate = Certificate(amount=1.5, refutation=Refutation(steps=(), branch=(0, free, free)))
+    apart = [Task(kind=COLLECT, place=i, start_s=200.0 * i, end_s=200.0 * i + 30) for i in range(2)]
+    problem = make_problem(apart, num_targets=2, use_resources=False)
+    assert not is_refuted(problem, certificate), "a plan takes both"
+    rivals = [Task(kind=COLLECT, place=0, start_s=0.0, end_s=30.0, satellite=i) for i in range(2)]
+    problem = make_problem(rivals, num_targets=2, num_satellites=2, use_resources=False)
+    assert not is_refuted(problem, Certificate(amount=1.5, refutation=free))
+    assert is_refuted(problem, certificate)
+    either = Cut(sets=(np.array([0, 1]),))
+    priced = Multipliers(prices=np.zeros(2), cuts=(either,), cut_prices=(1.0,))
+    assert _refutes(1.5, priced, problem=problem), "a cut says the same as the branch"
+
+
 def test_both_plan_and_bound_are_reported_and_close_in() -> None:
     problem = wide_problem(5, num_collects=400, num_targets=150, span_s=20_000.0)
     seen: list[Progress] = []

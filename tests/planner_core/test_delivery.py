@@ -14,6 +14,8 @@ from planner_core.errors import InvalidScenario
 from planner_core.problem import COLLECT, CONTACT, Problem
 from planner_core.problem.delivery import least_age_s, with_objective
 from planner_core.problem.plan import Plan
+from planner_core.referee.contact_flow import Piece
+from planner_core.referee.delivery import _one_after_another
 from planner_core.referee.replay import replay
 from planner_core.referee.timeline import Timeline
 from tests.planner_core.problems import TIGHT, Task, make_problem, random_problem
@@ -107,6 +109,33 @@ def test_what_an_image_earns_by_where_it_is(
     assert timeline.collected[1].worth == pytest.approx(on_board)
     assert timeline.collected[1].age_s is None
     assert timeline.reward == pytest.approx(expected + on_board)
+
+
+@pytest.mark.parametrize("dynamics", ["physical", "paper"])
+@pytest.mark.parametrize("held", [0.0, 0.05])
+def test_an_image_without_data_is_down_when_the_next_contact_begins(
+    held: float, dynamics: Dynamics
+) -> None:
+    """All that waited before it is down already, which is no reason to count it as older."""
+    empty = replace(
+        ROOMY, collect_fill_per_s=0.0, telemetry_per_s=0.0, initial_recorder_fraction=held
+    )
+    tasks = [contact(100.0, 200.0), collect(0, 300.0), contact(400.0, 500.0), collect(1, 600.0)]
+    problem = make_problem(tasks, num_targets=2, resources=empty, dynamics=dynamics)
+    problem = with_objective(problem, Objective(collected_share=0.0, half_life_s=70.0))
+    first, second = (all_of(problem).collected[target] for target in range(2))
+    assert (first.delivered_s, first.age_s, first.worth) == (400.0, 70.0, 0.5)
+    assert first.worth <= problem.worth[1] <= 0.5 + 1e-6
+    assert (second.delivered_s, second.worth) == (None, 0.0)
+
+
+def test_a_contact_that_takes_down_all_it_can_ends_with_its_last_bit() -> None:
+    """Its pieces, added one by one, may fall short of their sum by a rounding."""
+    pieces = [Piece(0.0, 10.0, 0.01), Piece(10.0, 20.0, 0.03), Piece(20.0, 30.0, 0.02)]
+    points = _one_after_another(pieces, 0.2, 0.8 + 1e-12)
+    assert points[0] == (0.0, 0.2)
+    assert [time_s for time_s, _ in points] == [0.0, 10.0, 20.0, 30.0]
+    assert points[-1][1] == 0.8 + 1e-12
 
 
 def test_of_several_images_the_one_that_earns_most_counts() -> None:

@@ -15,6 +15,7 @@ from planner_core.build import build_problem, compute_opportunities
 from planner_core.domain import Forecast, Quality, Scenario, SkySeries
 from planner_core.errors import InvalidScenario
 from planner_core.problem import COLLECT
+from planner_core.valuation import worth_of_opportunities
 from planner_core.worth import clear_probability_of
 from tests.examples import examples
 from tests.planner_core.test_worth import scenario
@@ -61,9 +62,9 @@ def test_what_no_series_covers_has_the_default() -> None:
         series=(series([1], [100.0, 200.0], [[0.2, 0.4]]), series([3], [150.0], [[0.9]])),
         default_clear_probability=0.5,
     )
-    target = np.array([0, 1, 1, 1, 1, 3, 3])
-    at_s = np.array([150.0, 99.0, 100.0, 150.0, 201.0, 150.0, 151.0])
-    expected = [0.5, 0.5, 0.2, 0.3, 0.5, 0.9, 0.5]
+    target = np.array([0, 1, 1, 1, 1, 1, 3, 3])
+    at_s = np.array([150.0, 99.0, 100.0, 150.0, 200.0, 201.0, 150.0, 151.0])
+    expected = [0.5, 0.5, 0.2, 0.3, 0.4, 0.5, 0.9, 0.5]
     assert clear_probability_of(skies, target, at_s, 4) == pytest.approx(expected)
 
 
@@ -103,6 +104,20 @@ def test_collects_are_worth_reward_times_everything_that_lessens_it() -> None:
             checked += 1
         assert problem.worth[row] == pytest.approx(worth, rel=1e-6)
     assert checked > 5
+
+
+def test_rewards_begin_to_fall_when_a_target_is_released() -> None:
+    asked = scenario(Quality())
+    targets = [
+        replace(target, reward=4.0, reward_half_life_s=1.0, release=asked.horizon.instant(60.0))
+        for target in asked.targets
+    ]
+    table = build_problem(asked, compute_opportunities(asked, Budget()), Budget()).opportunities
+    start_s = np.full(len(table), 59.5)
+    start_s[1:3] = 60.0, 61.0
+    asked = replace(asked, targets=tuple(targets))
+    worth = worth_of_opportunities(asked, replace(table, start_s=start_s))
+    assert worth[:3] == pytest.approx([4.0, 4.0, 2.0])
 
 
 def test_opportunities_do_not_depend_on_weather_and_urgency() -> None:

@@ -21,6 +21,7 @@ from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
 from planner_core.referee.resource_profile import Point, integrate
 from planner_core.referee.timeline import Timeline
+from planner_core.referee.unavoidable import is_unavoidable
 from planner_core.replanning.question import Question
 from planner_core.replanning.relief import replanned, within_limits
 from planner_core.solvers.registry import SOLVERS, Certified, Rule
@@ -80,6 +81,12 @@ def test_without_a_freeze_the_same_images_break_a_limit() -> None:
     assert [(v.blamed, v.inherited) for v in timeline.violations] == [((0, 1), False)]
 
 
+def test_in_the_event_model_a_contact_is_not_blamed_for_what_it_empties() -> None:
+    whole = make_problem(TASKS, num_targets=3, resources=NEARLY_FULL, dynamics="paper")
+    timeline = replay(whole, Plan.of(whole, [0, 2]))
+    assert [(v.code, v.blamed) for v in timeline.violations] == [("recorder", (0,))]
+
+
 def test_a_pin_that_breaks_limits_by_itself_is_still_refused() -> None:
     whole = make_problem(TASKS, num_targets=3, resources=NEARLY_FULL)
     kept = (Kept(row=1, pointer="/pins/keep/0"),)
@@ -96,6 +103,30 @@ def test_an_image_that_finds_no_room_at_all_earns_nothing() -> None:
     assert timeline.validity == "inherited"
     assert [(v.blamed, v.inherited) for v in timeline.violations] == [((0,), True)]
     assert timeline.reward == 0.0
+
+
+def test_an_image_that_finds_no_energy_at_all_earns_nothing() -> None:
+    low = replace(TIGHT, initial_battery_fraction=0.05)
+    problem = _after(make_problem(TASKS, num_targets=3, resources=low), [0], 100.0)
+    timeline = replay(problem, Plan.of(problem, [0]))
+    assert timeline.battery_min == 0.0
+    assert [(v.code, v.blamed, v.inherited) for v in timeline.violations] == [
+        ("battery", (0,), True)
+    ]
+    assert timeline.reward == 0.0
+
+
+def test_no_recorder_is_full_for_want_of_the_longest_contact_of_a_pass() -> None:
+    passes = [
+        Task(kind=CONTACT, place=0, start_s=200.0, end_s=end_s, access=9)
+        for end_s in (220.0, 300.0)
+    ]
+    whole = make_problem([*TASKS[:2], *passes], num_targets=2, resources=NEARLY_FULL)
+    problem = _after(whole, [0], 100.0)
+    level = 0.4 + 30 / 200 + 350e-4 - 20 / 250
+    assert level > TIGHT.recorder_max_fraction
+    assert is_unavoidable(problem, 0, "recorder", level, 150.0)
+    assert not is_unavoidable(problem, 0, "recorder", level, 350.0)
 
 
 @pytest.mark.parametrize("name", sorted(SOLVERS))

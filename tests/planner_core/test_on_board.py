@@ -40,7 +40,7 @@ from planner_core.run import Judged, plan_scenario
 from planner_core.solvers.registry import SOLVERS, Certified
 from tests.examples import examples
 from tests.geometry import hours, orbit, satellite
-from tests.planner_core.problems import TIGHT, random_problem
+from tests.planner_core.problems import TIGHT, Task, make_problem, random_problem
 
 SEEDS = st.integers(0, 10**6)
 OBJECTIVES = (
@@ -250,6 +250,28 @@ def test_a_bound_that_a_plan_beats_by_what_is_on_board_is_not_repeated(
     assert judged.bound is None
     assert judged.solution.termination is not Termination.OPTIMAL
     assert "which a valid plan earns" in caplog.text
+
+
+def test_a_plan_earns_by_its_own_images_and_by_those_on_board_but_not_twice() -> None:
+    tasks = [
+        Task(kind=COLLECT, place=0, start_s=0.0, end_s=30.0),
+        Task(kind=COLLECT, place=1, start_s=100.0, end_s=130.0),
+        Task(kind=CONTACT, place=0, start_s=400.0, end_s=600.0),
+    ]
+    roomy = replace(TIGHT, recorder_max_fraction=0.9)
+    problem = with_objective(
+        make_problem(tasks, num_targets=2, resources=roomy), Objective.delivered()
+    )
+    held = ImageOnBoard(satellite=0, target=0, amount=0.05, collected_s=-100.0, worth=3.0)
+    problem = with_on_board(problem, (held, replace(held, worth=2.0)))
+    timeline = replay(problem, Plan.of(problem, range(3)))
+    assert [(v.code, v.satellite) for v in timeline.violations] == [("duplicate", 0)]
+    assert set(timeline.collected) == {1}
+    first, second = timeline.brought_down
+    assert (first.delivered_s, first.age_s) == pytest.approx((412.5, 512.5))
+    assert (second.delivered_s, second.age_s) == pytest.approx((425.0, 525.0))
+    assert (first.earned, second.earned) == (3.0, 0.0)
+    assert timeline.reward == 3.0 + 1.0
 
 
 def test_without_contacts_they_stay_on_board() -> None:

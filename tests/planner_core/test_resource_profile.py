@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.mdp.track import compile_track
-from planner_core.referee.resource_profile import advance, integrate, states_under
+from planner_core.referee.resource_profile import Point, advance, integrate, states_under, thin
 from tests.examples import examples
 from tests.planner_core.problems import random_problem
 
@@ -79,3 +79,18 @@ def test_levels_at_the_start_may_be_whole_numbers() -> None:
         for p in (whole, real)
     ]
     assert [type(v) for v in tracks[0]] == [type(v) for v in tracks[1]]
+
+
+def test_curves_are_drawn_without_what_lies_on_a_line_or_repeats() -> None:
+    battery = [0.5, 0.6, 0.7, 0.7, 0.65, 0.6, 0.6]
+    recorder = [0.1, 0.2, 0.3, 0.3, 0.45, 0.6, 0.2]
+    time_s = [0.0, 0.25, 0.5, 0.5, 0.75, 1.0, 1.0]
+    points = [Point(*state, 0.0, 0.0) for state in zip(time_s, battery, recorder, strict=True)]
+    kept = [0, 3, 5, 6]
+    drawn = thin(points)
+    assert [column.tolist() for column in drawn] == [
+        [column[i] for i in kept] for column in (time_s, battery, recorder)
+    ]
+    assert [column.tolist() for column in thin(points[:1])] == [[0.0], [0.5], [0.1]]
+    bent = [points[0], Point(0.25, 0.6, 0.21, 0.0, 0.0), points[2]]
+    assert thin(bent)[2].tolist() == [0.1, 0.21, 0.3]

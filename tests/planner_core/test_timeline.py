@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import replace
 
 import numpy as np
@@ -93,7 +94,20 @@ def test_overlap_is_seen_past_a_short_task_inside_a_long_one() -> None:
     timeline = judge(problem, 0, 1, 2)
     assert codes(timeline) == ["overlap", "overlap"]
     assert [(v.needed, v.available) for v in timeline.violations] == [(0.0, -180.0), (0.0, -100.0)]
+    assert timeline.violations[0].detail == "It starts 180.000 s before the task ahead of it ends."
     assert timeline.reward == 0.0
+
+
+def test_a_plan_is_judged_alike_in_whatever_order_its_actions_are_listed() -> None:
+    problem = make_problem(
+        [collect(0, 0.0), collect(1, 20.0), contact(200.0, 300.0)], num_targets=2
+    )
+    plan = Plan.of(problem, [0, 1, 2])
+    timeline, turned = replay(problem, plan), replay(problem, Plan(plan.actions[::-1]))
+    assert [(v.code, v.blamed) for v in timeline.violations] == [("overlap", (1,))]
+    assert [(v.code, v.blamed) for v in turned.violations] == [("overlap", (1,))]
+    assert turned.collected[0].worth == timeline.reward == turned.reward == 1.0
+    assert turned.on_board == timeline.on_board
 
 
 def test_an_action_outside_its_access_or_moved_without_leave_is_a_window_violation() -> None:
@@ -105,6 +119,18 @@ def test_an_action_outside_its_access_or_moved_without_leave_is_a_window_violati
     assert codes(replay(replace(problem, continuous_starts=True), outside)) == ["window"]
     short = Plan((Action(100.0, 120.0, 0),))
     assert codes(replay(problem, short)) == ["window"]
+
+
+def test_an_access_that_reaches_beyond_the_horizon_may_be_used_within_it_alone() -> None:
+    whole = make_problem([collect(0, 5.0), collect(1, 965.0)], num_targets=2)
+    problem = replace(whole, continuous_starts=True)
+    within = Plan((Action(0.0, 30.0, 0), Action(970.0, 1000.0, 1)))
+    assert replay(problem, within).is_valid
+    beyond = replay(problem, Plan((Action(-0.5, 29.5, 0), Action(970.5, 1000.5, 1))))
+    assert [(v.code, v.needed, v.available) for v in beyond.violations] == [
+        ("window", 0.0, -0.5),
+        ("window", 1000.0, 1000.5),
+    ]
 
 
 @pytest.mark.parametrize(
@@ -119,6 +145,8 @@ def test_the_best_image_of_a_target_counts_and_of_equal_ones_the_first(
     timeline = judge(problem, 0, 1)
     assert timeline.is_valid
     assert codes(timeline) == ["duplicate"]
+    why = "has a better image later" if earns else "is collected already"
+    assert timeline.violations[0].detail == f"Target t0 {why}."
     assert timeline.collected[0].position == earns
     assert timeline.reward == timeline.collected[0].worth == 3.0 * max(quality)
     (line,) = timeline.satellites
@@ -140,7 +168,9 @@ def test_a_better_image_that_breaks_a_rule_does_not_count() -> None:
 def test_a_station_with_one_antenna_serves_one_satellite_at_a_time() -> None:
     tasks = [contact(0.0, 100.0), contact(50.0, 150.0, satellite=1), contact(100.0, 180.0)]
     one = make_problem(tasks, num_targets=0, num_satellites=2)
-    assert codes(judge(one, 0, 1)) == ["station"]
+    (violation,) = judge(one, 0, 1).violations
+    assert (violation.code, violation.needed, violation.available) == ("station", 2.0, 1.0)
+    assert violation.detail == "Station g0 serves another satellite until 100.000 s."
     assert judge(one, 0, 2).is_valid, "the next contact may begin as the last ends"
     two = make_problem(tasks, num_targets=0, num_satellites=2, antennas=2)
     assert judge(two, 0, 1, 2).is_valid
@@ -176,6 +206,12 @@ def test_battery_and_recorder_follow_the_hand_worked_integral() -> None:
     assert timeline.downlinked[0] == pytest.approx(50 / 250)
     assert timeline.battery_min == pytest.approx(0.7 + 100 / 2500 - 30 / 300)
     assert timeline.recorder_max == pytest.approx(0.1 + 130e-4 + 30 / 200 + 270e-4)
+
+
+def test_there_is_no_idle_time_between_tasks_that_follow_at_once() -> None:
+    problem = make_problem([collect(0, 0.0), collect(1, 30.0)], num_targets=2)
+    (line,) = judge(problem, 0, 1).satellites
+    assert [a.mode for a in line.actions] == ["collect", "collect", "sunpoint"]
 
 
 def test_an_image_is_downlinked_only_once_everything_before_it_is_down() -> None:
@@ -247,6 +283,17 @@ def test_the_event_model_books_lumps_at_starts_and_forgoes_the_segment_before_a_
     )
 
 
+def test_a_recorder_of_the_event_model_holds_no_more_than_it_can() -> None:
+    full = replace(TIGHT, initial_recorder_fraction=0.95, telemetry_per_s=1e-3)
+    tasks = [contact(200.0, 230.0), collect(0, 400.0), collect(1, 600.0)]
+    problem = make_problem(tasks, num_targets=2, resources=full, dynamics="paper")
+    timeline = judge(problem, 0, 1)
+    (line,) = timeline.satellites
+    levels = {a.mode: a.recorder_end for a in line.actions if a.mode != "sunpoint"}
+    assert levels == {"contact": 1.0, "collect": 1.0}
+    assert timeline.recorder_max == 1.0
+
+
 def test_without_resources_there_is_neither_sun_pointing_nor_a_curve() -> None:
     problem = make_problem([collect(0, 100.0)], num_targets=1, use_resources=False)
     timeline = judge(problem, 0)
@@ -264,3 +311,10 @@ def test_the_plan_hash_tells_plans_apart_and_ignores_the_order_of_actions() -> N
     plan, later, earlier = (Plan((Action(s, s + 30.0, 0),)) for s in (1.001, 1.0014, 1.0))
     assert plan_sha256(problem, plan) == plan_sha256(problem, later)
     assert plan_sha256(problem, plan) != plan_sha256(problem, earlier)
+
+
+def test_the_plan_hash_stays_as_it_is_and_names_targets_by_their_ids() -> None:
+    problem = make_problem([collect(0, 0.0), contact(200.0, 300.0)], num_targets=1)
+    plan = Plan.of(problem, [0, 1])
+    listed = b'[[0,"collect","t0",0,30000],[0,"contact",0,200000,300000]]'
+    assert plan_sha256(problem, plan) == hashlib.sha256(listed).hexdigest()

@@ -12,7 +12,7 @@ from planner_core.build import build_problem, compute_opportunities
 from planner_core.domain import Curve, Quality, Scenario, Target
 from planner_core.errors import InvalidScenario
 from planner_core.problem import COLLECT
-from planner_core.worth import quality_of
+from planner_core.worth import common_unit, gain, quality_of, surplus, weights, worth_of
 from tests.geometry import hours, satellite
 
 OFF_NADIR: Curve = ((10.0, 1.0), (40.0, 0.4))
@@ -67,6 +67,30 @@ def test_opportunities_do_not_depend_on_quality() -> None:
     plain = replace(asked, quality=Quality())
     one, other = (compute_opportunities(each, Budget()) for each in (asked, plain))
     assert one.to_bytes() == other.to_bytes()
+
+
+def test_a_target_earns_its_best_image_and_another_one_what_it_is_better_by() -> None:
+    assert worth_of(np.array([0, 2, 2]), np.array([1.0, 4.0, 5.0])) == 6.0
+    assert worth_of(np.empty(0, dtype=np.int32), np.empty(0)) == 0.0
+    others = np.array([0.25, 0.5])
+    assert [gain(worth, others) for worth in (0.75, 0.5, 0.25)] == [0.25, 0.0, 0.0]
+    assert gain(0.75, np.empty(0)) == 0.75
+
+
+def test_what_paths_are_paid_and_what_targets_keep_is_what_the_best_image_earns() -> None:
+    multiplier, best = np.array([-1.0, 0.0, 0.25, 0.5, 2.0]), np.full(5, 0.5)
+    kept = surplus(multiplier, best)
+    assert kept.tolist() == [0.0, 0.0, 0.25, 0.5, 0.5]
+    assert (kept + weights(best, kept)).tolist() == best.tolist()
+    assert weights(best, multiplier).tolist() == [1.5, 0.5, 0.25, 0.0, 0.0]
+
+
+def test_rewards_have_a_common_unit_as_far_as_doubles_count_by_ones() -> None:
+    most = 2.0**50
+    assert common_unit(np.array([0.0, most - 2.0])) == most - 2.0
+    assert common_unit(np.array([2.0, most])) == 0.0
+    # Nothing at all is a multiple of anything, which 0 would deny.
+    assert common_unit(np.zeros(2)) == common_unit(np.empty(0)) == 1.0
 
 
 @pytest.mark.parametrize(

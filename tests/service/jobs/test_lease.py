@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import UTC
 
 import pytest
@@ -14,6 +15,7 @@ from service.db.ids import new_id
 from service.db.rows import JobResultRow, JobRow
 from service.jobs import lease
 from service.jobs.lease import Lease, Outcome
+from service.stores import usage_store
 from tests.service.jobs.conftest import Jobs
 
 ANSWERED = Outcome(
@@ -91,6 +93,7 @@ def test_a_superseded_dispatch_does_nothing(jobs: Jobs) -> None:
     job_id = jobs.submit("answer")
     with jobs.database.transaction() as session:
         assert lease.return_unstarted(session, jobs.queue, job_id, 1)
+        assert not lease.return_unstarted(session, jobs.queue, job_id, 1)
     assert start(jobs, job_id, dispatch=1) is None
     assert start(jobs, job_id, dispatch=2) == Lease(job_id=job_id, dispatch=2, run=1)
 
@@ -124,10 +127,40 @@ def test_progress_changes_the_version_and_a_bare_renewal_does_not(jobs: Jobs) ->
     assert reported.progress == {"phase": "solve", "reward": 3.0}
 
 
+def test_each_change_of_state_is_a_version_of_its_own(jobs: Jobs) -> None:
+    """Who watches a job is told by its ETag that something has changed."""
+    job_id = jobs.submit("answer")
+    versions = [jobs.job(job_id).version]
+    held = started(jobs, job_id)
+    versions.append(jobs.job(job_id).version)
+    with jobs.database.transaction() as session:
+        lease.hand_back(session, jobs.queue, held)
+    versions.append(jobs.job(job_id).version)
+    held = started(jobs, job_id)
+    versions.append(jobs.job(job_id).version)
+    cancel(jobs, job_id)
+    versions.append(jobs.job(job_id).version)
+    finish(jobs, held)
+    versions.append(jobs.job(job_id).version)
+    assert versions == [1, 2, 3, 4, 5, 6]
+
+
+def test_answers_are_counted_with_their_owner_and_their_warnings_are_told(jobs: Jobs) -> None:
+    job_id = jobs.submit("answer")
+    finish(jobs, started(jobs, jobs.submit("answer")))
+    outcome = replace(ANSWERED, num_shared_bytes=1000, warnings=("Elements are old.",))
+    finish(jobs, started(jobs, job_id), outcome)
+    num_chars = sum(len(block.text) for block in ANSWERED.blocks)
+    with jobs.database.reading() as session:
+        used = usage_store.used(session, "local")
+    assert used == (2 * (1 + len(ANSWERED.blocks)), 1000 + 2 * num_chars)
+    assert jobs.job(job_id).warnings == ["Elements are old."]
+
+
 def test_a_waiting_job_is_cancelled_at_once(jobs: Jobs) -> None:
     job_id = jobs.submit("answer")
     assert cancel(jobs, job_id)
-    assert jobs.job(job_id).state == "cancelled"
+    assert (jobs.job(job_id).state, jobs.job(job_id).cancel_requested) == ("cancelled", True)
     assert start(jobs, job_id) is None
 
 
@@ -135,7 +168,7 @@ def test_a_running_job_is_asked_to_stop_and_may_be_asked_twice(jobs: Jobs) -> No
     job_id = jobs.submit("answer")
     held = started(jobs, job_id)
     assert cancel(jobs, job_id)
-    assert jobs.job(job_id).state == "cancelling"
+    assert (jobs.job(job_id).state, jobs.job(job_id).cancel_requested) == ("cancelling", True)
     assert renew(jobs, held) == "cancelling"
     version = jobs.job(job_id).version
     assert cancel(jobs, job_id)
