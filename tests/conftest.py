@@ -27,6 +27,7 @@ _TOGETHER = {
     "tests/service/jobs/test_what_if.py": "mission",
     "tests/service/client/test_answers.py": "client",
     "tests/service/client/test_plan_command.py": "client",
+    "tests/service/client/test_replans.py": "client",
     "tests/service/client/test_resources.py": "client",
 }
 
