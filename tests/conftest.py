@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import os
+from collections.abc import Generator
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +27,7 @@ _TOGETHER = {
     "tests/service/jobs/test_what_if.py": "mission",
     "tests/service/client/test_answers.py": "client",
     "tests/service/client/test_plan_command.py": "client",
+    "tests/service/client/test_replans.py": "client",
     "tests/service/client/test_resources.py": "client",
 }
 
@@ -35,6 +38,9 @@ _LONG = (
     "tests/service/test_schemathesis.py",
     "tests/service/test_readme.py",
     "tests/service/test_mission.py",
+    "tests/service/test_plan_job.py",
+    "tests/attack/test_bulkhead.py",
+    "tests/service/test_server.py",
     "tests/planner_core/test_certified_resources.py",
     "tests/service/jobs/test_worker.py",
     "tests/planner_core/test_latency.py",
@@ -80,6 +86,17 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> _ByModule:
     """Hand modules out in the order in which they were found."""
     config.option.loadscopereorder = False
     return _ByModule(config, log)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """Look for no garbage in what is imported, neither now nor later: all of it stays."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -18,4 +18,4 @@ def wait_until(condition: Callable[[], object], what: object = "it never happene
     deadline_s = time.monotonic() + PATIENCE_S
     while not condition():
         assert time.monotonic() < deadline_s, what
-        time.sleep(0.02)
+        time.sleep(0.05)

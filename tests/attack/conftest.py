@@ -15,6 +15,7 @@ import httpx
 import psutil
 import pytest
 
+from tests.plain_http import NO_TLS
 from tests.service.access.conftest import Door, MakeDoor, door, make_door
 from tests.service.jobs.conftest import SERVER_URL, Jobs, client, jobs, template_url, workers
 from tests.service.webhooks.conftest import courier, post
@@ -78,7 +79,7 @@ def running_program(jobs: Jobs, num_files: int = 0, **settings: object) -> Itera
     assert process.stdout is not None
     try:
         address = process.stdout.readline().split()[-1]
-        with httpx.Client(base_url=address, timeout=120) as client:
+        with httpx.Client(base_url=address, timeout=120, verify=NO_TLS) as client:
             yield Program(door=Door(client=client, jobs=jobs), process=process)
     finally:
         process.terminate()

@@ -14,6 +14,7 @@ from planner_core.orbits.ingest import read_elements
 from service.api.body_limit import MOST_COMMAS
 from service.api.bulkhead import LIGHT_BYTES
 from tests.attack.conftest import StartProgram
+from tests.plain_http import NO_TLS
 from tests.service.factories import ground_station
 from tests.service.problems import assert_problem
 
@@ -49,7 +50,7 @@ def test_while_a_large_body_is_read_everybody_else_is_served(program: StartProgr
         def send() -> httpx.Response:
             sent.set()
             path = run.door.client.base_url.join("/v1/ground-stations")
-            return httpx.post(path, content=body, headers=key | JSON, timeout=300)
+            return httpx.post(path, content=body, headers=key | JSON, timeout=300, verify=NO_TLS)
 
         # As if it took for ever to parse it.
         run.heavy.send_signal(signal.SIGSTOP)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import json
+import re
 import signal
 import threading
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -16,12 +18,24 @@ import pytest
 from service.api.bulkhead import LIGHT_TARGETS
 from service.api.slots import Slots
 from service.problems.kinds import ServiceError
-from tests.attack.conftest import Program, StartProgram
+from tests.attack.conftest import Program, StartProgram, running_program
 from tests.patience import wait_until
+from tests.plain_http import NO_TLS
 from tests.service.factories import ground_station, satellite, target
+from tests.service.jobs.conftest import stored_jobs
 from tests.service.problems import assert_problem
 
 HORIZON = {"start": "2026-03-01T00:00:00Z", "end": "2026-03-02T00:00:00Z"}
+
+
+@pytest.fixture(scope="module")
+def plain(template_url: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Program]:
+    """A program with the settings of everybody, for all tests that leave it as it was."""
+    with (
+        stored_jobs(template_url, tmp_path_factory.mktemp("plain")) as jobs,
+        running_program(jobs) as run,
+    ):
+        yield run
 
 
 def targets(number: int) -> list[dict[str, Any]]:
@@ -49,34 +63,39 @@ def scenario(program: Program, key: dict[str, str], num_targets: int, **fields: 
     return str(answer.json()["id"])
 
 
-def test_what_is_passed_on_is_answered_as_if_it_were_not(program: StartProgram) -> None:
-    with program() as run:
-        key = run.door.key("submit")
-        held = run.heavy.pid
-        own_id = scenario(run, key, LIGHT_TARGETS + 1)  # a large body, and a large question
-        small = scenario(run, key, 1)
-        client = run.door.client
-        shown = client.get(f"/v1/scenarios/{own_id}", headers=key)
-        assert shown.json()["counts"]["targets"] == LIGHT_TARGETS + 1
-        known = {"If-None-Match": shown.headers["etag"]} | key
-        assert client.get(f"/v1/scenarios/{own_id}", headers=known).status_code == 304
-        page = client.get(f"/v1/scenarios/{small}/opportunities?kind=collect&limit=1", headers=key)
-        assert page.status_code == 200, page.text
-        assert_problem(client.get("/v1/scenarios/none", headers=key), 404, "not_found")
-        refused = client.get(f"/v1/scenarios/{small}/opportunities?limit=0", headers=key)
-        assert_problem(refused, 422, "value_out_of_range")
-        assert_problem(client.get(f"/v1/scenarios/{small}"), 401, "authentication_required")
-        # Whoever makes a key up to be somebody is nobody: the header is ours alone.
-        admin = {"x-slewline-caller": json.dumps({"owner": "x", "scope": "admin"})}
-        assert client.get(f"/v1/scenarios/{small}", headers=admin).status_code == 401
-        assert client.get("/v1/audit-events", headers=key | admin).status_code == 403
-        counted = client.get("/metrics", headers=key).text
-        assert 'route="/v1/scenarios/{scenario_id}/opportunities",status="200"} 1.0' in counted
-        assert "x-slewline-route" not in page.headers
-        assert run.heavy.pid == held
+def num_listed(program: Program, key: dict[str, str]) -> float:
+    """Return how many lists of opportunities the metrics have counted."""
+    counted = program.door.client.get("/metrics", headers=key).text
+    found = re.search(r'/opportunities",status="200"} (\S+)', counted)
+    return 0.0 if found is None else float(found[1])
 
 
-def test_what_reads_whole_timelines_or_catalogues_is_passed_on(program: StartProgram) -> None:
+def test_what_is_passed_on_is_answered_as_if_it_were_not(plain: Program) -> None:
+    key = plain.door.key("submit")
+    held, listed_before = plain.heavy.pid, num_listed(plain, key)
+    own_id = scenario(plain, key, LIGHT_TARGETS + 1)  # a large body, and a large question
+    small = scenario(plain, key, 1)
+    client = plain.door.client
+    shown = client.get(f"/v1/scenarios/{own_id}", headers=key)
+    assert shown.json()["counts"]["targets"] == LIGHT_TARGETS + 1
+    known = {"If-None-Match": shown.headers["etag"]} | key
+    assert client.get(f"/v1/scenarios/{own_id}", headers=known).status_code == 304
+    page = client.get(f"/v1/scenarios/{small}/opportunities?kind=collect&limit=1", headers=key)
+    assert page.status_code == 200, page.text
+    assert_problem(client.get("/v1/scenarios/none", headers=key), 404, "not_found")
+    refused = client.get(f"/v1/scenarios/{small}/opportunities?limit=0", headers=key)
+    assert_problem(refused, 422, "value_out_of_range")
+    assert_problem(client.get(f"/v1/scenarios/{small}"), 401, "authentication_required")
+    # Whoever makes a key up to be somebody is nobody: the header is ours alone.
+    admin = {"x-slewline-caller": json.dumps({"owner": "x", "scope": "admin"})}
+    assert client.get(f"/v1/scenarios/{small}", headers=admin).status_code == 401
+    assert client.get("/v1/audit-events", headers=key | admin).status_code == 403
+    assert num_listed(plain, key) == listed_before + 1
+    assert "x-slewline-route" not in page.headers
+    assert plain.heavy.pid == held
+
+
+def test_what_reads_whole_timelines_or_catalogues_is_passed_on(plain: Program) -> None:
     asked = [
         ("GET", "/v1/targets?state=cancelled", None, 200),
         ("GET", "/v1/plans/none/changes", None, 404),
@@ -85,23 +104,23 @@ def test_what_reads_whole_timelines_or_catalogues_is_passed_on(program: StartPro
         ("GET", "/stapi/orders", None, 200),
         ("POST", "/stapi/products/none/opportunities", {}, 404),
     ]
-    with program() as run:
-        key, url = run.door.key("submit"), run.door.client.base_url
+    key, url = plain.door.key("submit"), plain.door.client.base_url
 
-        def ask(call: tuple[str, str, Any, int]) -> int:
-            method, path, body, _ = call
-            answer = httpx.request(method, url.join(path), json=body, headers=key, timeout=300)
-            return answer.status_code
+    def ask(call: tuple[str, str, Any, int]) -> int:
+        method, path, body, _ = call
+        address = url.join(path)
+        answer = httpx.request(method, address, json=body, headers=key, timeout=300, verify=NO_TLS)
+        return answer.status_code
 
-        run.heavy.send_signal(signal.SIGSTOP)
-        with ThreadPoolExecutor(len(asked)) as threads:
-            answers = [threads.submit(ask, call) for call in asked]
-            for _ in range(20):
-                assert run.door.client.get("/v1/me", headers=key).status_code == 200
-                run.door.submit(key)
-            assert not any(answer.done() for answer in answers)
-            run.heavy.send_signal(signal.SIGCONT)
-            assert [answer.result() for answer in answers] == [call[3] for call in asked]
+    plain.heavy.send_signal(signal.SIGSTOP)
+    with ThreadPoolExecutor(len(asked)) as threads:
+        answers = [threads.submit(ask, call) for call in asked]
+        for _ in range(20):
+            assert plain.door.client.get("/v1/me", headers=key).status_code == 200
+            plain.door.submit(key)
+        assert not any(answer.done() for answer in answers)
+        plain.heavy.send_signal(signal.SIGCONT)
+        assert [answer.result() for answer in answers] == [call[3] for call in asked]
 
 
 def test_a_body_that_comes_in_pieces_or_is_too_large(program: StartProgram) -> None:
@@ -118,28 +137,27 @@ def test_a_body_that_comes_in_pieces_or_is_too_large(program: StartProgram) -> N
         assert_problem(refused, 413, "body_too_large")
 
 
-def test_one_who_asks_for_much_at_once_holds_up_nobody(program: StartProgram) -> None:
+def test_one_who_asks_for_much_at_once_holds_up_nobody(plain: Program) -> None:
     """Forty lists of opportunities that take long to compute, by one owner."""
-    with program() as run:
-        greedy, other = run.door.key("submit", "greedy"), run.door.key("read", "other")
-        long = {"start": "2026-03-01T00:00:00Z", "end": "2026-03-03T00:00:00Z"}
-        own_id = scenario(run, greedy, 20_000, collect_spacing_s=0.7, horizon=long)
-        address = run.door.client.base_url.join(f"/v1/scenarios/{own_id}/opportunities")
-        one_was_refused = threading.Event()
+    greedy, other = plain.door.key("submit", "greedy"), plain.door.key("read", "other")
+    long = {"start": "2026-03-01T00:00:00Z", "end": "2026-03-03T00:00:00Z"}
+    own_id = scenario(plain, greedy, 20_000, collect_spacing_s=0.7, horizon=long)
+    address = plain.door.client.base_url.join(f"/v1/scenarios/{own_id}/opportunities")
+    one_was_refused = threading.Event()
 
-        def ask(_: int) -> str:
-            answer = httpx.get(address, headers=greedy, timeout=300)
-            if answer.status_code == 503:
-                assert int(answer.headers["retry-after"]) > 0
-                one_was_refused.set()
-            return str(answer.json().get("code"))
+    def ask(_: int) -> str:
+        answer = httpx.get(address, headers=greedy, timeout=300, verify=NO_TLS)
+        if answer.status_code == 503:
+            assert int(answer.headers["retry-after"]) > 0
+            one_was_refused.set()
+        return str(answer.json().get("code"))
 
-        with ThreadPoolExecutor(40) as pool:
-            answers = [pool.submit(ask, number) for number in range(40)]
-            assert one_was_refused.wait(300)  # as many wait as may, and one more has asked
-            assert run.door.client.get("/v1/me", headers=other).status_code == 200
-            assert not all(one.done() for one in answers), "nobody waits for the answer any more"
-            assert "too_busy" in {one.result() for one in answers}
+    with ThreadPoolExecutor(40) as pool:
+        answers = [pool.submit(ask, number) for number in range(40)]
+        assert one_was_refused.wait(300)  # as many wait as may, and one more has asked
+        assert plain.door.client.get("/v1/me", headers=other).status_code == 200
+        assert not all(one.done() for one in answers), "nobody waits for the answer any more"
+        assert "too_busy" in {one.result() for one in answers}
 
 
 def test_a_process_that_holds_too_much_is_ended_and_the_api_goes_on(program: StartProgram) -> None:

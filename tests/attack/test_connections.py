@@ -16,6 +16,7 @@ from service.api.guard import MOST_OF_AN_OWNER
 from service.process.connections import LONGEST_HEAD
 from tests.attack.conftest import Door, Program, StartProgram, running_program
 from tests.patience import PATIENCE_S
+from tests.plain_http import NO_TLS
 from tests.service.jobs.conftest import stored_jobs
 
 NUM = 1050
@@ -68,7 +69,8 @@ def assert_served(run: Program, key: dict[str, str]) -> None:
     for _ in range(10):
         for path in ("/health/live", "/v1/me"):
             address = run.door.client.base_url.join(path)
-            assert httpx.get(address, headers=key, timeout=PATIENCE_S).status_code == 200
+            answer = httpx.get(address, headers=key, timeout=PATIENCE_S, verify=NO_TLS)
+            assert answer.status_code == 200
 
 
 @pytest.fixture(scope="module")

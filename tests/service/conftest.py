@@ -23,6 +23,7 @@ from service.jobs.queue import JobQueue
 from service.main import create_app
 from service.scenarios.opportunities import OpportunityReader
 from service.settings import Settings
+from tests.plain_http import NO_TLS
 from tests.service.contract import Contract
 
 
@@ -85,7 +86,8 @@ def contract() -> Contract:
 
 def checked_client(address: str) -> httpx.Client:
     """Return a client that holds every answer against the OpenAPI document."""
-    return httpx.Client(base_url=address, timeout=60, event_hooks={"response": [contract().check]})
+    hooks = {"response": [contract().check]}
+    return httpx.Client(base_url=address, timeout=60, verify=NO_TLS, event_hooks=hooks)
 
 
 @pytest.fixture(scope="session")

@@ -13,6 +13,7 @@ from planner_core.errors import InvalidElements
 from service.db.rows import WorkerRow
 from service.db.session import Database
 from service.settings import Settings
+from tests.plain_http import NO_TLS
 from tests.service.conftest import Service, new_app, serve
 from tests.service.factories import EPOCH, ground_station, satellite, target, tle
 from tests.service.problems import assert_problem
@@ -56,7 +57,7 @@ def broken(settings: Settings) -> Iterator[httpx.Client]:
     def data() -> None:
         raise InvalidElements("tle_checksum", "Line 2: expected 7, got 3", pointer="/tle/1")
 
-    with serve(app) as address, httpx.Client(base_url=address) as client:
+    with serve(app) as address, httpx.Client(base_url=address, verify=NO_TLS) as client:
         yield client
 
 

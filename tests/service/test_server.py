@@ -15,6 +15,7 @@ import pytest
 
 from service.server import listen
 from tests.patience import PATIENCE_S, wait_until
+from tests.plain_http import NO_TLS
 from tests.service.serving import serving
 
 
@@ -69,7 +70,8 @@ def test_a_worker_process_serves_the_jobs_of_an_api_process(tmp_path: Path) -> N
             stderr=subprocess.DEVNULL,
         )
         try:
-            wait_until(lambda: httpx.get(f"{url}/health/ready").status_code == 200)
+            ready = f"{url}/health/ready"
+            wait_until(lambda: httpx.get(ready, verify=NO_TLS).status_code == 200)
             worker.terminate()
             assert worker.wait(PATIENCE_S) == 0
         finally:

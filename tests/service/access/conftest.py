@@ -16,6 +16,7 @@ from service.access.callers import Scope
 from service.answers import store as answer_store
 from service.answers.blocks import Block
 from service.db.rows import JobRow
+from tests.plain_http import NO_TLS
 from tests.service.conftest import new_app, serve
 from tests.service.exports.conftest import Mission, mission  # noqa: F401 - a fixture
 from tests.service.jobs.conftest import Jobs, jobs, template_url  # noqa: F401 - fixtures
@@ -64,7 +65,10 @@ def make_door(jobs: Jobs) -> MakeDoor:  # noqa: F811 - a fixture is used by its 
     @contextmanager
     def make(**changes: Any) -> Iterator[Door]:
         app = new_app(type(jobs.settings)(**jobs.settings.model_dump() | changes), jobs.queue)
-        with serve(app) as address, httpx.Client(base_url=address, timeout=60) as client:
+        with (
+            serve(app) as address,
+            httpx.Client(base_url=address, timeout=60, verify=NO_TLS) as client,
+        ):
             yield Door(client=client, jobs=jobs)
         app.state.database.close()
 

@@ -10,6 +10,8 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import httpx
 
+from tests.plain_http import NO_TLS
+
 _OF_ONE_CONNECTION = {"connection", "transfer-encoding", "content-length", "date", "server"}
 
 
@@ -105,7 +107,7 @@ class _Handler(BaseHTTPRequestHandler):
             return
         sent = {n: v for n, v in headers.items() if n not in ("host", "connection")}
         with (
-            httpx.Client(trust_env=False, timeout=60.0) as client,
+            httpx.Client(trust_env=False, timeout=60.0, verify=NO_TLS) as client,
             client.stream(self.command, url, headers=sent, content=body) as answer,
         ):
             if isinstance(fault, LostAnswer):
