@@ -86,7 +86,7 @@ def fields_read_by(module: ModuleType) -> set[str]:
 
     What it reads once, for its kernels, it keeps under a name in capitals.
     """
-    source: str = module.__loader__.get_source(module.__name__)  # type: ignore[union-attr]  # has one
+    source: str = module.__loader__.get_source(module.__name__)  # type: ignore[union-attr]  # of a file: has one
     running = "\n".join(line for line in source.splitlines() if line[:1].isspace())
     return {each.name for each in fields(Tuning) if f"TUNING.{each.name}" in running}
 

@@ -41,10 +41,10 @@ def brought_down(problem: Problem, plan: Plan, budget: Budget) -> Plan:
         best = trial.timeline.reward
         return True
 
-    return _with_others_instead(with_contacts(view, accepts, budget), accepts, budget).plan
+    return _taken_elsewhere(with_contacts(view, accepts, budget), accepts, budget).plan
 
 
-def _with_others_instead(view: View, accepts: Accepts, budget: Budget) -> View:
+def _taken_elsewhere(view: View, accepts: Accepts, budget: Budget) -> View:
     """Return the plan with the last images that never come down taken elsewhere, where one can.
 
     Searches for plans go by the most that an image can earn. Where nearly all images of a fleet
