@@ -21,8 +21,7 @@ from service.client.plans import Plans
 from service.client.satellites import Satellites
 from service.client.scenarios import Scenarios
 from service.client.spacecraft import SpacecraftTypes
-from service.client.target_catalogs import TargetCatalogs
-from service.client.targets import Targets
+from service.client.target_catalogs import TargetCatalogs, Targets
 from service.client.transport import Transport, held, path_of
 from service.client.webhooks import Webhooks
 from service.wire.operations import Ready, Version
@@ -45,18 +44,6 @@ class Client:
     patience_s
         For how long a request that is lost, or that the service cannot take now, is sent again.
     """
-
-    satellites: Satellites
-    ground_stations: GroundStations
-    spacecraft: SpacecraftTypes
-    outages: Outages
-    target_catalogs: TargetCatalogs
-    forecasts: Forecasts
-    scenarios: Scenarios
-    jobs: Jobs
-    comparisons: Comparisons
-    plans: Plans
-    webhooks: Webhooks
 
     def __init__(
         self,
