@@ -8,6 +8,7 @@ from typing import Any, Final, TypeVar
 from fastapi import Request, Response
 from pydantic import BaseModel
 
+from service.api.errors import problem_responses
 from service.api.etags import etagged, matches, matches_strongly
 from service.problems.kinds import ServiceError
 
@@ -19,13 +20,21 @@ NOT_MODIFIED: Final[dict[int | str, dict[str, Any]]] = {
 """For ``responses=`` of every route that may answer so."""
 
 
+def readable(*statuses: int) -> dict[int | str, dict[str, Any]]:
+    """Return the OpenAPI entries of a route that reads one thing by its id."""
+    return {**NOT_MODIFIED, **problem_responses(404, *statuses)}
+
+
+def known_as(request: Request, etag: str) -> Response | None:
+    """Return 304 where ``If-None-Match`` names this ETag, else None."""
+    is_known = matches(request.headers.get("if-none-match"), etag)
+    return Response(status_code=304, headers={"ETag": etag}) if is_known else None
+
+
 def unless_known(request: Request, response: Response, model: M) -> M | Response:
     """Return the model with its ETag, or 304 where ``If-None-Match`` names that ETag."""
-    etag = etagged(model)
-    if matches(request.headers.get("if-none-match"), etag):
-        return Response(status_code=304, headers={"ETag": etag})
-    response.headers["ETag"] = etag
-    return model
+    response.headers["ETag"] = etag = etagged(model)
+    return known_as(request, etag) or model
 
 
 def require_match(request: Request, current: Callable[[], BaseModel]) -> None:

@@ -12,7 +12,7 @@ from sqlalchemy.orm import Session
 from planner_core.domain import OrbitEphemeris
 from planner_core.orbits import omm_writing
 from planner_core.orbits.omm_writing import Outgoing
-from service.api.conditional import NOT_MODIFIED
+from service.api.conditional import NOT_MODIFIED, readable
 from service.api.deps import CallDep
 from service.api.errors import problem_responses
 from service.api.etags import etag_of, matches
@@ -21,6 +21,7 @@ from service.db.rows import SatelliteRow
 from service.problems.kinds import ServiceError
 from service.scenarios.translate import orbit_from
 from service.stores import satellite_store as store
+from service.stores.finding import alive
 from service.wire.satellites import OrbitIn
 
 router = APIRouter(prefix="/v1/satellites", tags=["satellites"])
@@ -64,7 +65,7 @@ def get_all_omm(suffix: Suffix, call: CallDep) -> Response:
     """
     form = _form_of(suffix)
     with call.database.reading() as session:
-        rows = session.scalars(store.alive().order_by(SatelliteRow.id)).all()
+        rows = session.scalars(alive(SatelliteRow).order_by(SatelliteRow.id)).all()
         messages = [
             message
             for first in range(0, len(rows), _AT_ONCE)
@@ -95,8 +96,7 @@ def get_omm(satellite_id: str, suffix: Suffix, call: CallDep) -> Response:
     response_class=Response,
     responses={
         200: {"description": "The message.", "content": {"text/plain": {}}},
-        **NOT_MODIFIED,
-        **problem_responses(404, 406),
+        **readable(406),
     },
 )
 def get_oem(satellite_id: str, call: CallDep) -> Response:

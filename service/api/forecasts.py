@@ -9,7 +9,7 @@ import sqlalchemy as sa
 from fastapi import APIRouter, Query, Response
 from sqlalchemy.orm import Session
 
-from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
+from service.api.conditional import created, readable, require_match, unless_known
 from service.api.deps import ANY_FILE, Call, CallDep, RawBodyDep, file_type
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
@@ -20,10 +20,11 @@ from service.db.rows import ForecastRow
 from service.forecasts.csv_file import read_csv
 from service.forecasts.fields import Field, sha256_of, to_bytes
 from service.forecasts.netcdf_file import read_netcdf
-from service.problems.kinds import ServiceError
 from service.stores import forecast_store
+from service.stores.finding import no_such, of_owner
 from service.wire.base import Listed, Name
 from service.wire.forecasts import ForecastOut
+from service.wire.stored import from_row
 
 router = APIRouter(prefix="/v1/forecasts", tags=["forecasts"])
 
@@ -107,17 +108,13 @@ def _add(session: Session, call: Call, name: str, field: Field, block: bytes) ->
 @router.get("")
 def list_forecasts(call: CallDep, paging: PagingDep) -> Listed[ForecastOut]:
     """List your forecasts, newest first; the scope `admin` sees all."""
-    query = sa.select(ForecastRow).where(forecast_store.seen_by(call.caller.visible_owner))
+    query = sa.select(ForecastRow).where(of_owner(ForecastRow.owner, call.caller.visible_owner))
     with call.database.reading() as session:
         page = newest_first(session, query, ForecastRow.id, paging)
     return Listed(items=[_shown(row) for row in page.rows], next=page.next)
 
 
-@router.get(
-    "/{forecast_id}",
-    response_model=ForecastOut,
-    responses={**NOT_MODIFIED, **problem_responses(404)},
-)
+@router.get("/{forecast_id}", response_model=ForecastOut, responses=readable())
 def get_forecast(forecast_id: str, call: CallDep) -> ForecastOut | Response:
     """Return what is known of one forecast, without its values."""
     with call.database.reading() as session:
@@ -138,18 +135,9 @@ def delete_forecast(forecast_id: str, call: CallDep) -> None:
 def _find(session: Session, call: Call, forecast_id: str) -> ForecastRow:
     row = forecast_store.find(session, forecast_id, call.caller.visible_owner)
     if row is None:
-        raise ServiceError("not_found", f"There is no forecast {forecast_id!r}.")
+        raise no_such("forecast", forecast_id)
     return row
 
 
 def _shown(row: ForecastRow) -> ForecastOut:
-    return ForecastOut(
-        id=row.id,
-        name=row.name,
-        sha256=row.sha256,
-        first=row.first_at,
-        last=row.last_at,
-        default_clear_probability=row.default_clear_probability,
-        created_at=row.created_at,
-        **row.summary,
-    )
+    return from_row(ForecastOut, row, first=row.first_at, last=row.last_at, **row.summary)

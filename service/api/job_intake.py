@@ -10,7 +10,6 @@ from typing import Any, Final
 from fastapi import Request, Response
 from sqlalchemy.orm import Session
 
-from planner_core.errors import Fault
 from planner_core.solvers.registry import solver_class
 from service.answers import store as answer_store
 from service.api import ask_again, bulkhead
@@ -20,7 +19,7 @@ from service.db.rows import JobRow, ScenarioRow
 from service.jobs.queue import JobQueue
 from service.jobs.solver_params import params_of, parse_params
 from service.jobs.submission import JobSpec
-from service.problems.faults import refuse
+from service.problems.faults import refuse_one
 from service.problems.kinds import ServiceError
 from service.scenarios import freezing
 from service.scenarios.freezing import FrozenScenario
@@ -29,6 +28,7 @@ from service.scenarios.translate import inside, read_file
 from service.settings import Settings
 from service.stores import job_store as store
 from service.stores import scenario_store
+from service.stores.finding import no_such
 from service.wire.jobs import ACTIVE, JobIn, JobOut, LimitsIn, QuestionIn
 from service.wire.replans import ReplanIn
 from service.wire.scenarios import ScenarioFile, ScenarioIn
@@ -89,8 +89,8 @@ def frozen(call: Call, body: QuestionIn) -> FrozenScenario | None:
     if (scenario is None) == (body.scenario_id is None):
         detail = "Give either scenario_id or scenario."
         if scenario is None:
-            raise refuse([Fault(code="missing_field", detail=detail, pointer="/scenario_id")])
-        raise refuse([Fault(code="invalid_value", detail=detail, pointer="/scenario")])
+            raise refuse_one("missing_field", detail, "/scenario_id")
+        raise refuse_one("invalid_value", detail, "/scenario")
     with inside("/scenario"):
         if isinstance(scenario, ScenarioIn):
             return freeze(call, scenario)
@@ -136,7 +136,7 @@ def stored_scenario(
     if scenario_store.find(session, body.scenario_id, call.caller.visible_owner) is not None:
         return body.scenario_id
     detail = f"There is no scenario {body.scenario_id!r}."
-    raise refuse([Fault(code="unknown_scenario", detail=detail, pointer="/scenario_id")])
+    raise refuse_one("unknown_scenario", detail, "/scenario_id")
 
 
 def limits_of(limits: LimitsIn, settings: Settings) -> tuple[float, int]:
@@ -144,11 +144,11 @@ def limits_of(limits: LimitsIn, settings: Settings) -> tuple[float, int]:
     time_s = settings.default_time_s if limits.time_s is None else limits.time_s
     if time_s > settings.max_time_s:
         detail = f"{time_s:g} s is more than the {settings.max_time_s:g} s that a job may take."
-        raise refuse([Fault(code="value_out_of_range", detail=detail, pointer="/limits/time_s")])
+        raise refuse_one("value_out_of_range", detail, "/limits/time_s")
     memory_mb = settings.default_memory_mb if limits.memory_mb is None else limits.memory_mb
     if memory_mb > settings.max_memory_mb:
         detail = f"{memory_mb} MB are more than the {settings.max_memory_mb} that a job may hold."
-        raise refuse([Fault(code="value_out_of_range", detail=detail, pointer="/limits/memory_mb")])
+        raise refuse_one("value_out_of_range", detail, "/limits/memory_mb")
     return time_s, memory_mb
 
 
@@ -169,9 +169,9 @@ def require_room(session: Session, call: Call, num_jobs: int = 1) -> None:
 
 def find_job(session: Session, job_id: str) -> JobRow:
     """Return a job; 404 where there is none."""
-    job = store.find(session, job_id)
+    job = session.get(JobRow, job_id)
     if job is None:
-        raise ServiceError("not_found", f"There is no job {job_id!r}.")
+        raise no_such("job", job_id)
     return job
 
 

@@ -15,6 +15,7 @@ from service.db.rows import WorkerRow
 from service.db.session import Database
 from service.jobs.queue import JobQueue
 from service.problems.kinds import KINDS, ServiceError, kind_of
+from service.stores.finding import no_such
 from service.wire.operations import Live, ProblemExplained, Ready, Version
 
 router = APIRouter(tags=["operations"])
@@ -68,7 +69,7 @@ def explain_problem(code: Annotated[str, Path(examples=["tle-checksum"])]) -> Pr
     """Explain a problem code, written with hyphens or underscores."""
     name = code.replace("-", "_")
     if name not in KINDS:
-        raise ServiceError("not_found", f"There is no problem code {code!r}.")
+        raise no_such("problem code", code)
     kind = kind_of(name)
     return ProblemExplained(
         code=name, title=kind.title, status=kind.status, explanation=kind.explanation

@@ -25,7 +25,7 @@ from service.db.rows import JobRow, PlanActionRow, PlanRow, SatelliteRow, Scenar
 from service.jobs import submission
 from service.plans import replans
 from service.plans import store as plan_store
-from service.problems.faults import refuse
+from service.problems.faults import require_none
 from service.scenarios import freezing, replanning
 from service.scenarios.pin_inputs import with_settled_pins
 from service.scenarios.stored_question import StoredQuestion
@@ -130,8 +130,7 @@ def _telemetry(
         for i, state in enumerate(body.states)
         if state.at > now
     ]  # fmt: skip
-    if faults:
-        raise refuse(faults)
+    require_none(faults)
     known = plan_store.last_states(session, plan.id, now)
     known |= {state.satellite_id: state for state in sorted(body.states, key=lambda s: s.at)}
     began = {state.satellite_id: state.at for state in file.states}

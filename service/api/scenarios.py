@@ -15,18 +15,18 @@ from planner_core.orbits.places import View
 from planner_core.problem import COLLECT, CONTACT
 from service.access.callers import Caller
 from service.api import job_intake as intake
-from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
+from service.api.conditional import created, known_as, readable, require_match, unless_known
 from service.api.deps import CallDep
 from service.api.errors import problem_responses
-from service.api.etags import etag_of, matches
+from service.api.etags import etag_of
 from service.api.filters import NameQuery, SatelliteQuery, StationQuery, StoredDep, by_name
 from service.api.idempotency import OnceDep
 from service.api.paging import PagingDep, newest_first, size_of
 from service.db.rows import ScenarioRow
-from service.problems.kinds import ServiceError
 from service.scenarios.opportunities import Described, OpportunityReader
 from service.scenarios.stored_question import StoredQuestion
 from service.stores import deletion, scenario_store
+from service.stores.finding import no_such
 from service.wire.base import Listed
 from service.wire.scenarios import (
     Kind,
@@ -83,11 +83,7 @@ def list_scenarios(
     return Listed(items=[_summary(row) for row in page.rows], next=page.next)
 
 
-@router.get(
-    "/{scenario_id}",
-    response_model=ScenarioOut | ScenarioFile,
-    responses={**NOT_MODIFIED, **problem_responses(404)},
-)
+@router.get("/{scenario_id}", response_model=ScenarioOut | ScenarioFile, responses=readable())
 def get_scenario(
     scenario_id: str,
     call: CallDep,
@@ -107,9 +103,9 @@ def get_scenario(
 def _file(request: Request, row: ScenarioRow) -> Response:
     text = StoredQuestion(row.content).exported(row.name)
     etag = etag_of(text)
-    if matches(request.headers.get("if-none-match"), etag):
-        return Response(status_code=304, headers={"ETag": etag})
-    return Response(text, media_type="application/json", headers={"ETag": etag})
+    return known_as(request, etag) or Response(
+        text, media_type="application/json", headers={"ETag": etag}
+    )
 
 
 @router.delete("/{scenario_id}", status_code=204, responses=problem_responses(404, 409, 412))
@@ -224,28 +220,19 @@ def _rounded(value: float) -> float:
 def _find(session: Session, scenario_id: str, caller: Caller) -> ScenarioRow:
     row = scenario_store.find(session, scenario_id, caller.visible_owner)
     if row is None:
-        raise ServiceError("not_found", f"There is no scenario {scenario_id!r}.")
+        raise no_such("scenario", scenario_id)
     return row
 
 
 def _shown(row: ScenarioRow) -> ScenarioOut:
     question = StoredQuestion(row.content)
-    return ScenarioOut(
-        **dict(_summary(row)),
-        pins=question.pins,
-        outages=question.outages,
-        states=question.states,
-    )
+    parts = {name: getattr(question, name) for name in ("pins", "outages", "states")}
+    return ScenarioOut(**dict(_summary(row)), **parts)
 
 
 def _summary(row: ScenarioRow) -> ScenarioSummary:
     where = f"/v1/scenarios/{row.id}"
     summary = {name: value for name, value in row.summary.items() if name != "pins"}
-    return ScenarioSummary(
-        id=row.id,
-        sha256=row.sha256,
-        name=row.name,
-        created_at=row.created_at,
-        links={"opportunities": f"{where}/opportunities", "file": f"{where}?expand=true"},
-        **summary,
-    )
+    links = {"opportunities": f"{where}/opportunities", "file": f"{where}?expand=true"}
+    own = {"id": row.id, "sha256": row.sha256, "name": row.name, "created_at": row.created_at}
+    return ScenarioSummary(**own, links=links, **summary)

@@ -16,7 +16,7 @@ from service.answers.answered import Answered, in_chunks
 from service.answers.blocks import TIMELINE, Entry, holds, items_in
 from service.api import job_intake as intake
 from service.api.accept import preferred
-from service.api.conditional import NOT_MODIFIED
+from service.api.conditional import known_as, readable
 from service.api.deps import Call, CallDep, DatabaseDep, own_job_only
 from service.api.errors import problem_responses
 from service.api.etags import matches
@@ -70,8 +70,7 @@ def timeline_responses(forms: Sequence[Form]) -> dict[int | str, dict[str, Any]]
     }
     return {
         200: {"description": "The timeline.", "content": content, "headers": headers},
-        **NOT_MODIFIED,
-        **problem_responses(404, 406, 409),
+        **readable(406, 409),
     }
 
 
@@ -117,8 +116,7 @@ def timeline_answer(call: Call, job: JobRow, suffix: str) -> Response:
     "/{job_id}/proof",
     responses={
         200: {"content": {_JSON: {"schema": _PROOF}}, "description": "The proof document."},
-        **NOT_MODIFIED,
-        **problem_responses(404, 409),
+        **readable(409),
     },
 )
 def get_proof(job_id: str, call: CallDep) -> Response:
@@ -132,9 +130,9 @@ def get_proof(job_id: str, call: CallDep) -> Response:
         job = intake.find_job(session, job_id)
         intake.require_answer(session, job)
         proof = answer_store.proof_of(session, job_id)
-    if matches(call.request.headers.get("if-none-match"), etag):
-        return Response(status_code=304, headers={"ETag": etag})
-    return Response(proof or "null", media_type=_JSON, headers={"ETag": etag})
+    return known_as(call.request, etag) or Response(
+        proof or "null", media_type=_JSON, headers={"ETag": etag}
+    )
 
 
 @router.get(

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ValidationError
 
 from planner_core.errors import Fault, PlannerError
 from service.files.tables import Table, decoded, has_decimal_comma, read_table
-from service.problems.faults import faults_of_validation, refuse
+from service.problems.faults import faults_of_validation, refuse, refuse_one
 
 B = TypeVar("B", bound=BaseModel)
 
@@ -252,6 +252,14 @@ def _value(column: str, cell: str, table: Table) -> object:
         return int(cell)
     # What is no number stays text, which the schema refuses by name.
     return float(cell) if _NUMBER.fullmatch(cell) else cell
+
+
+def read_json(data: bytes) -> Any:
+    """Return a JSON document; 422 where it is none."""
+    try:
+        return json.loads(data.decode("utf-8-sig"))
+    except (ValueError, RecursionError) as error:
+        raise refuse_one("malformed_json", f"No JSON: {error}"[:200]) from None
 
 
 def read_geojson(data: bytes, known: Collection[str], *, most: int) -> Records:

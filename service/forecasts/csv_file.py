@@ -12,15 +12,11 @@ import numpy.typing as npt
 from pydantic import TypeAdapter, ValidationError
 
 from planner_core.errors import Fault
-from service.files.records import (
-    MOST_COLUMNS,
-    column_names,
-    faults_of_header,
-)
+from service.files.records import MOST_COLUMNS, column_names, faults_of_header
 from service.files.tables import Table, decoded, read_table
 from service.forecasts.axes import fault_of_axes, unwrapped
 from service.forecasts.fields import WHOLE, ByTarget, Field, Grid, time_ms_of
-from service.problems.faults import refuse
+from service.problems.faults import refuse, refuse_one, require_none
 from service.wire.base import Id, Instant
 
 _GRID: Final = ("time", "lat_deg", "lon_deg", "clear_probability")
@@ -52,8 +48,7 @@ def read_csv(data: bytes) -> tuple[Field, list[str]]:
         table.faults.append(
             Fault(code="empty_file", detail="The file has a header and no records.")
         )
-    if table.faults:
-        raise refuse(table.faults)
+    require_none(table.faults)
     field = _grid(table) if wanted is _GRID else _by_target(table)
     return field, [f"Probabilities are kept to 1/{WHOLE:,}."]
 
@@ -62,17 +57,16 @@ def _header(rows: Iterator[tuple[int, list[str]] | Fault]) -> tuple[tuple[str, .
     """Return which kind of file it is, and where its columns stand."""
     first = next(rows, None)
     if first is None:
-        raise refuse([Fault(code="empty_file", detail="The file is empty.")])
+        raise refuse_one("empty_file", "The file is empty.")
     if isinstance(first, Fault):
         raise refuse([first])
     line, header = first
     if len(header) > MOST_COLUMNS:
         detail = f"The header has {len(header)} columns; {MOST_COLUMNS} are the most."
-        raise refuse([Fault(code="malformed_csv", detail=detail, row=line)])
+        raise refuse_one("malformed_csv", detail, row=line)
     columns = column_names(header)
     wanted = _BY_TARGET if "target_id" in columns else _GRID
-    if faults := faults_of_header(line, columns, wanted, wanted):
-        raise refuse(faults)
+    require_none(faults_of_header(line, columns, wanted, wanted))
     return wanted, [columns.index(name) for name in wanted]
 
 
@@ -163,17 +157,12 @@ def _grid(table: _Table) -> Grid:
     number = math.prod(shape)
     if (twice := _first_twice(places, shape)) is not None:
         detail = "This instant and place are given twice."
-        raise refuse([Fault(code="invalid_value", detail=detail, row=table.lines[twice])])
+        raise refuse_one("invalid_value", detail, row=table.lines[twice])
     if number > len(table.lines):
-        raise refuse(
-            [
-                Fault(
-                    code="invalid_value",
-                    detail=f"The grid is not full: {shape[0]} instants, {shape[1]} latitudes and "
-                    f"{shape[2]} longitudes make {number} values, and there are "
-                    f"{len(table.lines)}.",
-                )
-            ]
+        raise refuse_one(
+            "invalid_value",
+            f"The grid is not full: {shape[0]} instants, {shape[1]} latitudes and {shape[2]} "
+            f"longitudes make {number} values, and there are {len(table.lines)}.",
         )
     if (fault := fault_of_axes(axes[1], axes[2])) is not None:
         raise refuse([fault])
@@ -201,7 +190,7 @@ def _by_target(table: _Table) -> ByTarget:
     if len(again):
         row = max(table.lines[order[again[0]]], table.lines[order[again[0] + 1]])
         detail = f"Target {ids[own[again[0]]]!r} has this instant twice."
-        raise refuse([Fault(code="invalid_value", detail=detail, row=row)])
+        raise refuse_one("invalid_value", detail, row=row)
     return ByTarget(
         ids=tuple(ids.tolist()),
         first=np.searchsorted(own, np.arange(len(ids) + 1)).astype(np.int64),

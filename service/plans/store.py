@@ -21,6 +21,7 @@ from service.db.rows import (
     PlanStateRow,
     PublisherRow,
 )
+from service.stores.finding import with_values
 from service.wire.base import dumped
 from service.wire.pins import StateIn
 from service.wire.plans import ExecutionIn, PlanState, WaiverIn
@@ -114,12 +115,8 @@ def matching(
 
     With an instant, `published` means what was or will be in force then, by what is known now.
     """
-    query = sa.select(PlanRow)
-    for column, value in (
-        (PlanRow.owner, owner), (PlanRow.job_id, job_id), (PlanRow.parent_id, parent_id)
-    ):  # fmt: skip
-        if value is not None:
-            query = query.where(column == value)
+    own = with_values(PlanRow, owner=owner, job_id=job_id, parent_id=parent_id)
+    query = sa.select(PlanRow).where(*own)
     if at is not None and state == "published":
         query = query.where(PlanRow.state.in_(("published", "superseded")))
     elif state is not None:

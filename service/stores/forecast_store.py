@@ -6,14 +6,12 @@ import sqlalchemy as sa
 from sqlalchemy.orm import Session
 
 from service.db.rows import ForecastRow
-
-
-def seen_by(owner: str | None) -> sa.ColumnElement[bool]:
-    """Return the condition that an owner sees a forecast; None sees all."""
-    return sa.true() if owner is None else ForecastRow.owner == owner
+from service.stores.finding import of_owner
 
 
 def find(session: Session, forecast_id: str, owner: str | None) -> ForecastRow | None:
     """Return a forecast that an owner sees, or None."""
-    wanted = sa.select(ForecastRow).where(ForecastRow.id == forecast_id, seen_by(owner))
+    wanted = sa.select(ForecastRow).where(
+        ForecastRow.id == forecast_id, of_owner(ForecastRow.owner, owner)
+    )
     return session.scalar(wanted)

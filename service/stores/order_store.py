@@ -80,9 +80,3 @@ def _standing(session: Session, owner: str) -> TargetCatalogRow:
     session.add(fresh)
     session.flush()
     return fresh
-
-
-def visible(owner: str | None) -> sa.Select[OrderRow]:
-    """Return the query of an owner's orders, or of all."""
-    wanted = sa.select(OrderRow)
-    return wanted if owner is None else wanted.where(OrderRow.owner == owner)

@@ -16,6 +16,7 @@ from service.db.ids import new_id
 from service.db.rows import ElementSetRow, SatelliteRow
 from service.db.session import take_turns
 from service.problems.kinds import ServiceError
+from service.stores.finding import alive
 from service.wire.satellites import WholeSatellite
 
 FIGURES: Final = ("agility", "sensor", "resources", "spacecraft")
@@ -35,11 +36,6 @@ class ImportedEntry:
     entry: Entry
 
 
-def alive() -> sa.Select[SatelliteRow]:
-    """Return the query of all satellites that have not been deleted."""
-    return sa.select(SatelliteRow).where(SatelliteRow.deleted_at.is_(None))
-
-
 def add_satellite(
     session: Session, body: WholeSatellite, elements: Orbit, orbit: dict[str, Any]
 ) -> SatelliteRow:
@@ -51,14 +47,8 @@ def add_satellite(
         ``duplicate_norad_cat_id`` where there is one of this catalogue number.
     """
     _require_new(session, elements.norad_cat_id)
-    dumped = body.model_dump(mode="json", include=set(FIGURES))
-    row = SatelliteRow(
-        id=new_id(),
-        name=body.name,
-        norad_cat_id=elements.norad_cat_id,
-        created_at=datetime.now(UTC),
-        **dumped,
-    )
+    figures = body.model_dump(mode="json", include=set(FIGURES))
+    row = _new_satellite(body.name, elements.norad_cat_id, figures)
     session.add(row)
     session.flush()
     add_elements(session, row.id, elements.epoch, orbit)
@@ -70,15 +60,11 @@ def _require_new(session: Session, norad_cat_id: int) -> None:
     if norad_cat_id == 0:
         return
     take_turns(session, _TURNS)
-    rival = session.scalar(
-        sa.select(SatelliteRow.id).where(
-            SatelliteRow.norad_cat_id == norad_cat_id, SatelliteRow.deleted_at.is_(None)
-        )
-    )
+    rival = session.scalar(alive(SatelliteRow).where(SatelliteRow.norad_cat_id == norad_cat_id))
     if rival is not None:
         raise ServiceError(
             "duplicate_norad_cat_id",
-            f"The satellite {rival!r} has the catalogue number {norad_cat_id}. "
+            f"The satellite {rival.id!r} has the catalogue number {norad_cat_id}. "
             "Send its new elements there, or import them.",
         )
 
@@ -200,7 +186,7 @@ def _new_satellite(name: str, norad_cat_id: int, figures: Mapping[str, Any]) -> 
 
 def _known_satellites(session: Session) -> dict[tuple[int, str], SatelliteRow]:
     # Oldest first, so that of several with one number the newest stays in the table.
-    rows = session.scalars(alive().order_by(SatelliteRow.id))
+    rows = session.scalars(alive(SatelliteRow).order_by(SatelliteRow.id))
     return {_key(row.norad_cat_id, row.name): row for row in rows}
 
 
