@@ -16,11 +16,7 @@ import numpy.typing as npt
 
 from planner_core.domain import Scenario
 from planner_core.errors import Fault, InvalidScenario
-from planner_core.problem import (
-    COLLECT,
-    CONTACT,
-    Problem,
-)
+from planner_core.problem import COLLECT, CONTACT, Problem
 from planner_core.problem.plan import Action, Plan
 from planner_core.referee.plan_diff import PlannedAction
 from planner_core.spreadsheets import unguarded

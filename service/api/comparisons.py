@@ -43,7 +43,7 @@ def create_comparison(body: ComparisonIn, call: CallDep, once: OnceDep) -> Compa
     for position, run in enumerate(body.runs):
         with inside(f"/runs/{position}"):
             params.append(intake.all_params(run.solver, run.params))
-    time_s, memory_mb = intake.limits_of(body.limits, call.settings)
+    limits = intake.limits_of(body.limits, call.settings)
     inline = intake.frozen(call, body)
     queue = intake.queue_with_room(call, len(body.runs))
     with once.transaction() as session:
@@ -55,8 +55,7 @@ def create_comparison(body: ComparisonIn, call: CallDep, once: OnceDep) -> Compa
                 solver=run.solver,
                 params=of_run,
                 seed=run.seed,
-                time_s=time_s,
-                memory_mb=memory_mb,
+                limits=limits,
                 priority=body.priority,
                 label=body.label,
                 owner=call.caller.owner,

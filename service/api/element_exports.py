@@ -12,6 +12,7 @@ from sqlalchemy.orm import Session
 from planner_core.domain import OrbitEphemeris
 from planner_core.orbits import omm_writing
 from planner_core.orbits.omm_writing import Outgoing
+from service.api.accept import require_offered
 from service.api.conditional import NOT_MODIFIED, readable
 from service.api.deps import CallDep
 from service.api.errors import problem_responses
@@ -113,9 +114,7 @@ def get_oem(satellite_id: str, call: CallDep) -> Response:
 
 
 def _form_of(suffix: str) -> _Form:
-    if suffix not in _FORMS:
-        offered = ", ".join(f".{known}" for known in _FORMS)
-        raise ServiceError("not_acceptable", f"Element sets are offered as {offered}.")
+    require_offered(suffix, _FORMS, "Element sets are")
     return _FORMS[suffix]
 
 

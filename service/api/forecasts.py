@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime, timedelta
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
 import sqlalchemy as sa
 from fastapi import APIRouter, Query, Response
@@ -13,7 +13,7 @@ from service.api.conditional import created, readable, require_match, unless_kno
 from service.api.deps import ANY_FILE, Call, CallDep, RawBodyDep, file_type
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
-from service.api.imports import BYTES
+from service.api.imports import BYTES, request_body
 from service.api.paging import PagingDep, newest_first
 from service.db.ids import new_id
 from service.db.rows import ForecastRow
@@ -33,30 +33,23 @@ _NETCDF: Final = ("application/netcdf", "application/x-netcdf")
 _UNNAMED: Final = "Forecast"
 _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 
-_REQUEST_BODY: dict[str, Any] = {
-    "requestBody": {
-        "required": True,
-        "content": {
-            _CSV: {
-                "schema": {
-                    "type": "string",
-                    "description": "A full grid, `time,lat_deg,lon_deg,clear_probability`; or "
-                    "values by target, `target_id,time,clear_probability`.",
-                }
-            },
-            ANY_FILE: BYTES,
-            _NETCDF[0]: {
-                "schema": {
-                    "type": "string",
-                    "format": "binary",
-                    "description": "NetCDF 4 with axes of time, latitude, longitude and "
-                    "optionally member: `clear_probability` from 0 to 1, or total cloud cover "
-                    "(`tcc` or the standard name `cloud_area_fraction`), from 0 to 1 or in %.",
-                }
-            },
+_REQUEST_BODY: Final = request_body(
+    {
+        _CSV: {
+            "type": "string",
+            "description": "A full grid, `time,lat_deg,lon_deg,clear_probability`; or values by "
+            "target, `target_id,time,clear_probability`.",
+        },
+        ANY_FILE: BYTES,
+        _NETCDF[0]: {
+            "type": "string",
+            "format": "binary",
+            "description": "NetCDF 4 with axes of time, latitude, longitude and optionally "
+            "member: `clear_probability` from 0 to 1, or total cloud cover (`tcc` or the standard "
+            "name `cloud_area_fraction`), from 0 to 1 or in %.",
         },
     }
-}
+)
 
 
 @router.post(

@@ -63,15 +63,12 @@ def asked_for(body: JobIn | ReplanIn, call: Call) -> partial[JobSpec]:
     ServiceError
         Where parameters or limits are wrong, before anything is stored.
     """
-    params = all_params(body.solver, body.params)
-    time_s, memory_mb = limits_of(body.limits, call.settings)
     return partial(
         JobSpec,
         solver=body.solver,
-        params=params,
+        params=all_params(body.solver, body.params),
         seed=body.seed,
-        time_s=time_s,
-        memory_mb=memory_mb,
+        limits=limits_of(body.limits, call.settings),
         priority=body.priority,
         label=body.label,
         owner=call.caller.owner,
@@ -139,7 +136,7 @@ def stored_scenario(
     raise refuse_one("unknown_scenario", detail, "/scenario_id")
 
 
-def limits_of(limits: LimitsIn, settings: Settings) -> tuple[float, int]:
+def limits_of(limits: LimitsIn, settings: Settings) -> dict[str, float]:
     """Return seconds and megabytes that a job may use, the server's where nothing is said."""
     time_s = settings.default_time_s if limits.time_s is None else limits.time_s
     if time_s > settings.max_time_s:
@@ -149,7 +146,7 @@ def limits_of(limits: LimitsIn, settings: Settings) -> tuple[float, int]:
     if memory_mb > settings.max_memory_mb:
         detail = f"{memory_mb} MB are more than the {settings.max_memory_mb} that a job may hold."
         raise refuse_one("value_out_of_range", detail, "/limits/memory_mb")
-    return time_s, memory_mb
+    return {"time_s": time_s, "memory_mb": memory_mb}
 
 
 def require_room(session: Session, call: Call, num_jobs: int = 1) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 import sqlalchemy as sa
 from fastapi import APIRouter, Query, Response
@@ -17,7 +17,7 @@ from service.api.deps import ANY_FILE, CallDep, DatabaseDep, RawBodyDep, file_ty
 from service.api.errors import problem_responses
 from service.api.filters import NameQuery, by_name
 from service.api.idempotency import OnceDep
-from service.api.imports import BYTES
+from service.api.imports import BYTES, request_body
 from service.api.paging import PagingDep, newest_first
 from service.db.ids import new_id
 from service.db.rows import TargetCatalogRow, TargetRow
@@ -60,30 +60,23 @@ class _Listed(Body):
     targets: list[dict[str, Any]] = Field(min_length=1, max_length=MAX_TARGETS)
 
 
-_REQUEST_BODY: dict[str, Any] = {
-    "requestBody": {
-        "required": True,
-        "content": {
-            "application/json": {"schema": {"$ref": "#/components/schemas/TargetCatalogIn"}},
-            "application/geo+json": {
-                "schema": {
-                    "type": "object",
-                    "description": "A FeatureCollection of points (RFC 7946). The id is the "
-                    "feature's or a property; other fields of a target are properties.",
-                }
-            },
-            ANY_FILE: BYTES,
-            "text/csv": {
-                "schema": {
-                    "type": "string",
-                    "description": f"A header with id, lat_deg, lon_deg and any of "
-                    f"{', '.join(_OPTIONAL)}; lat, latitude, lon, lng and longitude are "
-                    "taken as well, and city for name. An empty cell means the default.",
-                }
-            },
+_REQUEST_BODY: Final = request_body(
+    {
+        "application/json": {"$ref": "#/components/schemas/TargetCatalogIn"},
+        "application/geo+json": {
+            "type": "object",
+            "description": "A FeatureCollection of points (RFC 7946). The id is the feature's or a "
+            "property; other fields of a target are properties.",
+        },
+        ANY_FILE: BYTES,
+        "text/csv": {
+            "type": "string",
+            "description": f"A header with id, lat_deg, lon_deg and any of {', '.join(_OPTIONAL)}; "
+            "lat, latitude, lon, lng and longitude are taken as well, and city for name. An empty "
+            "cell means the default.",
         },
     }
-}
+)
 
 
 @router.post(

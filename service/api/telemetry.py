@@ -13,7 +13,7 @@ from planner_core.errors import Fault
 from service.api.deps import ANY_FILE, Call, CallDep, RawBodyDep, file_type
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
-from service.api.imports import BYTES
+from service.api.imports import BYTES, request_body
 from service.api.paging import PagingDep, newest_first
 from service.api.plans import find_plan
 from service.db.rows import ExecutionRow, JobRow, PlanRow, PlanStateRow, ScenarioRow
@@ -49,16 +49,8 @@ _LINE_OF_SIGHT: Final = ("los_x", "los_y", "los_z")
 def _bodies(schema: str, columns: str) -> dict[str, Any]:
     item = {"$ref": f"#/components/schemas/{schema}"}
     listed = {"type": "array", "items": item, "minItems": 1, "maxItems": MAX_REPORTED}
-    return {
-        "requestBody": {
-            "required": True,
-            "content": {
-                "application/json": {"schema": listed},
-                "text/csv": {"schema": {"type": "string", "description": columns}},
-                ANY_FILE: BYTES,
-            },
-        }
-    }
+    table = {"type": "string", "description": columns}
+    return request_body({"application/json": listed, "text/csv": table, ANY_FILE: BYTES})
 
 
 @router.post(

@@ -15,7 +15,7 @@ from service.answers import store as answer_store
 from service.answers.answered import Answered, in_chunks
 from service.answers.blocks import TIMELINE, Entry, holds, items_in
 from service.api import job_intake as intake
-from service.api.accept import preferred
+from service.api.accept import preferred, require_offered
 from service.api.conditional import known_as, readable
 from service.api.deps import Call, CallDep, DatabaseDep, own_job_only
 from service.api.errors import problem_responses
@@ -106,9 +106,7 @@ def get_timeline_as(job_id: str, suffix: Suffix, call: CallDep) -> Response:
 
 def timeline_answer(call: Call, job: JobRow, suffix: str) -> Response:
     """Return a job's plan in the form that a suffix names."""
-    if suffix not in _SUFFIXES:
-        offered = ", ".join(f".{known}" for known in _SUFFIXES)
-        raise ServiceError("not_acceptable", f"The timeline is offered as {offered}.")
+    require_offered(suffix, _SUFFIXES, "The timeline is")
     return _answer(call.database, call.request, job, _BY_SUFFIX.get(suffix))
 
 

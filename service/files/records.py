@@ -19,29 +19,13 @@ B = TypeVar("B", bound=BaseModel)
 
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _WHOLE = re.compile(r"[+-]?\d{1,18}", re.ASCII)
-_TEXT_COLUMNS = frozenset(
-    {
-        "id",
-        "name",
-        "satellite_id",
-        "target_id",
-        "station_id",
-        "release",
-        "due",
-        "sensor_type",
-        "action_id",
-        "outcome",
-        "at",
-        "detail",
-    }
-)
+_TEXT_COLUMNS = (
+    "id", "name", "satellite_id", "target_id", "station_id", "release", "due", "sensor_type",
+    "action_id", "outcome", "at", "detail",
+)  # fmt: skip
 _ALIASES = {
-    "lat": "lat_deg",
-    "latitude": "lat_deg",
-    "lon": "lon_deg",
-    "lng": "lon_deg",
-    "long": "lon_deg",
-    "longitude": "lon_deg",
+    **dict.fromkeys(("lat", "latitude"), "lat_deg"),
+    **dict.fromkeys(("lon", "lng", "long", "longitude"), "lon_deg"),
 }
 _MISSPELT = 0.75
 MOST_COLUMNS = 200

@@ -69,6 +69,10 @@ def faults_of_validation(error: ValidationError, body: object) -> list[Fault]:
     return faults_of(found, body)
 
 
+_OUT_OF_RANGE = (
+    "greater_than", "greater_than_equal", "less_than", "less_than_equal",
+    "too_short", "too_long", "string_too_short", "string_too_long",
+)  # fmt: skip
 _CODES = {
     "missing": "missing_field",
     "extra_forbidden": "unknown_field",
@@ -76,14 +80,7 @@ _CODES = {
     "literal_error": "unknown_value",
     "enum": "unknown_value",
     "finite_number": "not_finite",
-    "greater_than": "value_out_of_range",
-    "greater_than_equal": "value_out_of_range",
-    "less_than": "value_out_of_range",
-    "less_than_equal": "value_out_of_range",
-    "too_short": "value_out_of_range",
-    "too_long": "value_out_of_range",
-    "string_too_short": "value_out_of_range",
-    "string_too_long": "value_out_of_range",
+    **dict.fromkeys(_OUT_OF_RANGE, "value_out_of_range"),
     "too_many_fields": "too_many_fields",
     "naive_time": "naive_time",
     "invalid_time": "invalid_time",

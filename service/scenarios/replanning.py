@@ -12,6 +12,7 @@ from typing import Final
 from planner_core.errors import Fault, PlannerError
 from service.problems.faults import pointer_to, require_none
 from service.scenarios.translate import scenario_from_file
+from service.wire.base import fields_of
 from service.wire.pins import OutageIn, PinnedActionIn, PinsIn, PlacedOutage, StateIn
 from service.wire.plan_before import FlownIn, PromiseIn, ReplanOfFile
 from service.wire.replans import ReplanIn
@@ -194,10 +195,7 @@ def pointing_into(body: ReplanIn) -> Iterator[None]:
 
 
 def _is_among(outage: OutageIn, file: ScenarioFile) -> bool:
-    return any(
-        dict(outage) == {name: getattr(other, name) for name in OutageIn.model_fields}
-        for other in file.outages
-    )
+    return any(dict(outage) == fields_of(other, OutageIn) for other in file.outages)
 
 
 def _promises(file: ScenarioFile, body: ReplanIn) -> list[PromiseIn]:

@@ -10,12 +10,7 @@ from collections.abc import Iterator
 from functools import cached_property
 from typing import Any, Final
 
-from planner_core.domain import (
-    GroundStation,
-    Horizon,
-    Satellite,
-    Target,
-)
+from planner_core.domain import GroundStation, Horizon, Satellite, Target
 from service.scenarios.translate import (
     ground_station_from,
     horizon_from,
