@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, Final, TypeVar
 
 from fastapi import Request, Response
@@ -29,6 +29,15 @@ def known_as(request: Request, etag: str) -> Response | None:
     """Return 304 where ``If-None-Match`` names this ETag, else None."""
     is_known = matches(request.headers.get("if-none-match"), etag)
     return Response(status_code=304, headers={"ETag": etag}) if is_known else None
+
+
+def sent(
+    request: Request, content: str | bytes, media_type: str, headers: Mapping[str, str]
+) -> Response:
+    """Return a content, or 304 where ``If-None-Match`` names the ETag among its headers."""
+    if matches(request.headers.get("if-none-match"), headers["ETag"]):
+        return Response(status_code=304, headers=headers)
+    return Response(content, media_type=media_type, headers=headers)
 
 
 def unless_known(request: Request, response: Response, model: M) -> M | Response:

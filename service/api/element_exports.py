@@ -13,10 +13,10 @@ from planner_core.domain import OrbitEphemeris
 from planner_core.orbits import omm_writing
 from planner_core.orbits.omm_writing import Outgoing
 from service.api.accept import require_offered
-from service.api.conditional import NOT_MODIFIED, readable
+from service.api.conditional import NOT_MODIFIED, readable, sent
 from service.api.deps import CallDep
 from service.api.errors import problem_responses
-from service.api.etags import etag_of, matches
+from service.api.etags import etag_of
 from service.api.satellites import find_satellite
 from service.db.rows import SatelliteRow
 from service.problems.kinds import ServiceError
@@ -143,6 +143,4 @@ def _sent(request: Request, text: str, media_type: str, file_name: str) -> Respo
         "ETag": etag_of(text),
         "Content-Disposition": f'inline; filename="{file_name}"',
     }
-    if matches(request.headers.get("if-none-match"), headers["ETag"]):
-        return Response(status_code=304, headers=headers)
-    return Response(text, media_type=media_type, headers=headers)
+    return sent(request, text, media_type, headers)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
 from typing import Annotated, Final
 
 import sqlalchemy as sa
@@ -18,7 +18,7 @@ from service.api.paging import PagingDep, newest_first
 from service.db.ids import new_id
 from service.db.rows import ForecastRow
 from service.forecasts.csv_file import read_csv
-from service.forecasts.fields import Field, sha256_of, to_bytes
+from service.forecasts.fields import Field, instant_of, sha256_of, to_bytes
 from service.forecasts.netcdf_file import read_netcdf
 from service.stores import forecast_store
 from service.stores.finding import no_such, of_owner
@@ -31,7 +31,6 @@ router = APIRouter(prefix="/v1/forecasts", tags=["forecasts"])
 _CSV: Final = "text/csv"
 _NETCDF: Final = ("application/netcdf", "application/x-netcdf")
 _UNNAMED: Final = "Forecast"
-_EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 
 _REQUEST_BODY: Final = request_body(
     {
@@ -89,8 +88,8 @@ def _add(session: Session, call: Call, name: str, field: Field, block: bytes) ->
         owner=call.caller.owner,
         name=name,
         sha256=sha256_of(field),
-        first_at=_EPOCH + timedelta(milliseconds=field.first_ms),
-        last_at=_EPOCH + timedelta(milliseconds=field.last_ms),
+        first_at=instant_of(field.first_ms),
+        last_at=instant_of(field.last_ms),
         created_at=datetime.now(UTC),
         block=block,
     )

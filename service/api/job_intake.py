@@ -14,11 +14,12 @@ from planner_core.solvers.registry import solver_class
 from service.answers import store as answer_store
 from service.api import ask_again, bulkhead
 from service.api.deps import Call
+from service.api.idempotency import Once
 from service.api.job_shapes import headers_of, shown
 from service.db.rows import JobRow, ScenarioRow
 from service.jobs.queue import JobQueue
 from service.jobs.solver_params import params_of, parse_params
-from service.jobs.submission import JobSpec
+from service.jobs.submission import JobSpec, submit
 from service.problems.faults import refuse_one
 from service.problems.kinds import ServiceError
 from service.scenarios import freezing
@@ -207,8 +208,10 @@ def describe(response: Response, job: JobRow) -> None:
     response.headers.update(headers_of(job))
 
 
-def accepted(session: Session, response: Response, job: JobRow) -> JobOut:
-    """Return a job that was just queued, and tell where to follow it."""
-    response.headers["Location"] = f"/v1/jobs/{job.id}"
-    describe(response, job)
-    return shown_job(session, job)
+def queued(session: Session, call: Call, once: Once, queue: JobQueue, spec: JobSpec) -> JobOut:
+    """Queue a job; return it, and tell where to follow it."""
+    job = submit(session, queue, spec)
+    call.audit.record(session, "create", "job", job.id)
+    call.response.headers["Location"] = f"/v1/jobs/{job.id}"
+    describe(call.response, job)
+    return once.keep(session, shown_job(session, job))

@@ -48,9 +48,7 @@ def create_job(body: JobIn, call: CallDep, once: OnceDep) -> JobOut:
     with once.transaction() as session:
         intake.require_room(session, call)
         spec = asked(scenario_id=intake.stored_scenario(session, call, body, inline))
-        job = submission.submit(session, queue, spec)
-        call.audit.record(session, "create", "job", job.id)
-        return once.keep(session, intake.accepted(session, call.response, job))
+        return intake.queued(session, call, once, queue, spec)
 
 
 @router.get("")
@@ -146,9 +144,7 @@ def rerun_job(job_id: str, call: CallDep, once: OnceDep) -> JobOut:
         spec = submission.spec_again(intake.find_job(session, job_id), call.caller.owner)
         intake.require_room(session, call)
         scenario_store.let_see_too(session, spec.scenario_id, call.caller.owner)
-        job = submission.submit(session, queue, spec)
-        call.audit.record(session, "create", "job", job.id)
-        return once.keep(session, intake.accepted(session, call.response, job))
+        return intake.queued(session, call, once, queue, spec)
 
 
 def _forget(queue: JobQueue, job: JobRow) -> None:

@@ -22,7 +22,6 @@ from service.api.idempotency import OnceDep
 from service.api.plans import action_out, find_plan
 from service.api.telemetry import faults_of_states, take_down
 from service.db.rows import JobRow, PlanActionRow, PlanRow, SatelliteRow, ScenarioRow
-from service.jobs import submission
 from service.plans import replans
 from service.plans import store as plan_store
 from service.problems.faults import require_none
@@ -75,9 +74,7 @@ def create_replan(plan_id: str, body: ReplanIn, call: CallDep, once: OnceDep) ->
             scenario_id=row.id,
             change=replans.note_of(plan, call.caller, body.name, freeze_until),
         )
-        made = submission.submit(session, queue, spec)
-        call.audit.record(session, "create", "job", made.id)
-        return once.keep(session, intake.accepted(session, call.response, made))
+        return intake.queued(session, call, once, queue, spec)
 
 
 def _to_the_millisecond(instant: datetime) -> datetime:

@@ -15,7 +15,7 @@ from planner_core.orbits.places import View
 from planner_core.problem import COLLECT, CONTACT
 from service.access.callers import Caller
 from service.api import job_intake as intake
-from service.api.conditional import created, known_as, readable, require_match, unless_known
+from service.api.conditional import created, readable, require_match, sent, unless_known
 from service.api.deps import CallDep
 from service.api.errors import problem_responses
 from service.api.etags import etag_of
@@ -102,10 +102,7 @@ def get_scenario(
 
 def _file(request: Request, row: ScenarioRow) -> Response:
     text = StoredQuestion(row.content).exported(row.name)
-    etag = etag_of(text)
-    return known_as(request, etag) or Response(
-        text, media_type="application/json", headers={"ETag": etag}
-    )
+    return sent(request, text, "application/json", {"ETag": etag_of(text)})
 
 
 @router.delete("/{scenario_id}", status_code=204, responses=problem_responses(404, 409, 412))

@@ -112,11 +112,8 @@ def _opportunity(
         azimuth_deg=round(float(table.azimuth_deg[row]), 6),
         sun_elevation_deg=round(float(table.sun_elevation_deg[row]), 6),
     )
-    return Opportunity(type="Feature", geometry=_point(asked), properties=properties)
-
-
-def _point(asked: SearchIn | OrderIn) -> Point:
-    return Point.model_validate(asked.geometry.model_dump())
+    point = Point.model_validate(asked.geometry.model_dump())
+    return Opportunity(type="Feature", geometry=point, properties=properties)
 
 
 def _target(asked: SearchIn | OrderIn, own_id: str, product: Found) -> TargetIn:

@@ -16,7 +16,7 @@ from service.answers.answered import Answered, in_chunks
 from service.answers.blocks import TIMELINE, Entry, holds, items_in
 from service.api import job_intake as intake
 from service.api.accept import preferred, require_offered
-from service.api.conditional import known_as, readable
+from service.api.conditional import readable, sent
 from service.api.deps import Call, CallDep, DatabaseDep, own_job_only
 from service.api.errors import problem_responses
 from service.api.etags import matches
@@ -123,14 +123,11 @@ def get_proof(job_id: str, call: CallDep) -> Response:
     `proof` names the argument and `value` the bound. `prices` holds a multiplier for each
     target, in the order of the scenario: the dual function at these prices is the bound.
     """
-    etag = f'"{job_id}"'
     with call.database.reading() as session:
         job = intake.find_job(session, job_id)
         intake.require_answer(session, job)
         proof = answer_store.proof_of(session, job_id)
-    return known_as(call.request, etag) or Response(
-        proof or "null", media_type=_JSON, headers={"ETag": etag}
-    )
+    return sent(call.request, proof or "null", _JSON, {"ETag": f'"{job_id}"'})
 
 
 @router.get(

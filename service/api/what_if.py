@@ -69,9 +69,7 @@ def create_what_if(job_id: str, body: WhatIfIn, call: CallDep, once: OnceDep) ->
             change=body.model_dump(mode="json", include=_CHANGE, exclude_unset=True),
             **body.model_dump(include={"seed", "priority", "label"}, exclude_none=True),
         )
-        made = submission.submit(session, queue, spec)
-        call.audit.record(session, "create", "job", made.id)
-        return once.keep(session, intake.accepted(session, call.response, made))
+        return intake.queued(session, call, once, queue, spec)
 
 
 def _solver(job: JobRow, body: WhatIfIn) -> tuple[str, dict[str, Any]]:

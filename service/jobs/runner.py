@@ -31,6 +31,7 @@ from service.jobs.child import (
 )
 from service.jobs.grace import Grace
 from service.jobs.plan_request import PlanRequest
+from service.process.parent import held_mb
 
 log = logging.getLogger(__name__)
 
@@ -255,9 +256,9 @@ class _Run:
         return Refused("solver_crashed", f"The solver's process ended by itself ({how}).")
 
     def _check_limits(self) -> Ending | None:
-        held_mb = self._held_mb()
-        if held_mb > self._limits.memory_mb:
-            detail = f"The solver held {held_mb:.0f} MB; its limit is {self._limits.memory_mb} MB."
+        now_mb = held_mb(self._process.pid)  # 0 has ended; its last words are still to be read
+        if now_mb > self._limits.memory_mb:
+            detail = f"The solver held {now_mb:.0f} MB; its limit is {self._limits.memory_mb} MB."
             return Refused("memory_limit", detail)
         now_s = time.monotonic()
         if now_s >= self._expire_at_s:
@@ -274,12 +275,6 @@ class _Run:
             return self._grace is not None and self._grace.is_over()
         except psutil.NoSuchProcess:
             return False  # it has ended; its last words are still to be read
-
-    def _held_mb(self) -> float:
-        try:
-            return float(psutil.Process(self._process.pid).memory_info().rss) / 1e6
-        except psutil.NoSuchProcess:
-            return 0.0  # it has ended; its last words are still to be read
 
     def _out_of_time(self) -> Refused:
         if not self._started:

@@ -58,7 +58,11 @@ def pointer_to(*steps: str | int) -> str:
 def faults_of(errors: Iterable[Any], body: object) -> list[Fault]:
     """Return what pydantic found, with JSON pointers into ``body``."""
     return [
-        Fault(code=_code(e["type"]), detail=_sentence(e), pointer=_pointer(e["loc"], body))
+        Fault(
+            code=_CODES.get(e["type"], "invalid_value"),
+            detail=_sentence(e),
+            pointer=_pointer(e["loc"], body),
+        )
         for e in errors
     ]
 
@@ -85,10 +89,6 @@ _CODES = {
     "naive_time": "naive_time",
     "invalid_time": "invalid_time",
 }
-
-
-def _code(pydantic_type: str) -> str:
-    return _CODES.get(pydantic_type, "invalid_value")
 
 
 def _sentence(error: Mapping[str, Any]) -> str:

@@ -81,10 +81,11 @@ def replan_file(file: ScenarioFile, body: ReplanIn, happened: Happened) -> Scena
         ]
     )
     known = {outage.id for outage in file.outages}
+    said = [fields_of(outage, OutageIn) for outage in file.outages]
     outages = [
         *file.outages,
         *(one for one in happened.outages if one.id not in known),
-        *(PlacedOutage(**dict(outage)) for outage in body.outages if not _is_among(outage, file)),
+        *(PlacedOutage(**dict(outage)) for outage in body.outages if dict(outage) not in said),
     ]
     return file.model_copy(
         update={
@@ -192,10 +193,6 @@ def pointing_into(body: ReplanIn) -> Iterator[None]:
             placed = f"/{pin[1]}/{pin[2]}{pointer[pin.end() :]}"
             error.fault = replace(error.fault, pointer=placed)
         raise
-
-
-def _is_among(outage: OutageIn, file: ScenarioFile) -> bool:
-    return any(dict(outage) == fields_of(other, OutageIn) for other in file.outages)
 
 
 def _promises(file: ScenarioFile, body: ReplanIn) -> list[PromiseIn]:

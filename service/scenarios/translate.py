@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
@@ -35,12 +35,11 @@ from service.scenarios.pin_inputs import outage_from, pins_from, replan_from, st
 from service.wire.base import fields_of
 from service.wire.places import GroundStationIn, TargetIn
 from service.wire.satellites import (
-    AgilityIn,
     OrbitIn,
     Preset,
     PresetResourcesIn,
     ResourcesIn,
-    SensorIn,
+    TypedFigures,
     WholeSatellite,
 )
 from service.wire.scenarios import (
@@ -51,6 +50,7 @@ from service.wire.scenarios import (
     QualityIn,
     ScenarioFile,
 )
+from service.wire.spacecraft import WholeSpacecraft
 
 B = TypeVar("B")
 T = TypeVar("T")
@@ -223,16 +223,9 @@ def satellite_from(body: WholeSatellite, satellite_id: str) -> Satellite:
     )
 
 
-class _WithFigures(Protocol):
-    @property
-    def agility(self) -> AgilityIn: ...
-    @property
-    def sensor(self) -> SensorIn: ...
-    @property
-    def resources(self) -> Preset | PresetResourcesIn | ResourcesIn: ...
-
-
-def figures_from(body: _WithFigures, period_s: float) -> tuple[Agility, Sensor, Resources]:
+def figures_from(
+    body: TypedFigures | WholeSpacecraft, period_s: float
+) -> tuple[Agility, Sensor, Resources]:
     """Return what a spacecraft in an orbit of this period can do.
 
     Raises
@@ -276,7 +269,8 @@ def resources_from(body: Preset | PresetResourcesIn | ResourcesIn, period_s: flo
     battery_ws = body.battery_capacity_wh * _SECONDS_PER_HOUR
     recorder_mbit = body.recorder_capacity_mbit
     rate = body.downlink_rate_mbit_s
-    knots = tuple((deg, mbit_s / recorder_mbit) for deg, mbit_s in _knots(rate))
+    by_elevation = rate if isinstance(rate, list) else []
+    knots = tuple((deg, mbit_s / recorder_mbit) for deg, mbit_s in by_elevation)
     try:
         return Resources(
             battery_min_fraction=body.battery_min_fraction,
@@ -304,10 +298,6 @@ def resources_from(body: Preset | PresetResourcesIn | ResourcesIn, period_s: flo
         )
         error.fault = replace(error.fault, pointer=_FIELDS_OF_RATES.get(pointer, pointer))
         raise
-
-
-def _knots(rate: float | list[list[float]]) -> list[list[float]]:
-    return rate if isinstance(rate, list) else []
 
 
 def target_from(body: TargetIn, catalog_id: str | None = None) -> Target:
