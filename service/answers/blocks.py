@@ -68,17 +68,14 @@ class Entry:
     tally: Mapping[str, int]
 
 
+_TOLD: Final = ("kind", "first", "num_items", "tally")
+"""What a block and its entry say alike."""
+
+
 def contents_of(blocks: Iterable[Block]) -> list[Entry]:
     """Return the table of contents of blocks that stand in this order."""
     return [
-        Entry(
-            position=position,
-            kind=block.kind,
-            first=block.first,
-            num_items=block.num_items,
-            size=len(block.text),
-            tally=block.tally,
-        )
+        Entry(position=position, size=len(block.text), **{n: getattr(block, n) for n in _TOLD})
         for position, block in enumerate(blocks)
     ]
 

@@ -1,7 +1,8 @@
-"""Conditional requests: 304 where the client is up to date, 412 where it is not and should be."""
+"""ETags name states: 304 where a client is up to date, 412 where it is not and should be."""
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Mapping
 from typing import Any, Final, TypeVar
 
@@ -9,7 +10,6 @@ from fastapi import Request, Response
 from pydantic import BaseModel
 
 from service.api.errors import problem_responses
-from service.api.etags import etagged, matches, matches_strongly
 from service.problems.kinds import ServiceError
 
 M = TypeVar("M", bound=BaseModel)
@@ -18,6 +18,42 @@ NOT_MODIFIED: Final[dict[int | str, dict[str, Any]]] = {
     304: {"description": "`If-None-Match` names what there is: nothing has changed."}
 }
 """For ``responses=`` of every route that may answer so."""
+
+
+def etag_of(text: str) -> str:
+    """Return a strong ETag of a representation.
+
+    >>> etag_of("a")
+    '"ca978112ca1bbdca"'
+    """
+    return f'"{hashlib.sha256(text.encode()).hexdigest()[:16]}"'
+
+
+def matches(if_none_match: str | None, etag: str) -> bool:
+    """Return whether an ``If-None-Match`` header names this ETag (weak comparison).
+
+    >>> matches('"x", W/"y"', '"y"'), matches("*", '"y"'), matches(None, '"y"')
+    (True, True, False)
+    """
+    if if_none_match is None:
+        return False
+    known = {tag.strip().removeprefix("W/") for tag in if_none_match.split(",")}
+    return "*" in known or etag.removeprefix("W/") in known
+
+
+def matches_strongly(if_match: str, etag: str) -> bool:
+    """Return whether an ``If-Match`` header names this ETag; a weak tag names nothing.
+
+    >>> matches_strongly('"x", "y"', '"y"'), matches_strongly('W/"y"', '"y"')
+    (True, False)
+    """
+    named = {tag.strip() for tag in if_match.split(",")}
+    return "*" in named or etag in named
+
+
+def etagged(model: BaseModel) -> str:
+    """Return the ETag of a model's JSON."""
+    return etag_of(model.model_dump_json())
 
 
 def readable(*statuses: int) -> dict[int | str, dict[str, Any]]:

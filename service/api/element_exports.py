@@ -13,10 +13,9 @@ from planner_core.domain import OrbitEphemeris
 from planner_core.orbits import omm_writing
 from planner_core.orbits.omm_writing import Outgoing
 from service.api.accept import require_offered
-from service.api.conditional import NOT_MODIFIED, readable, sent
+from service.api.conditional import NOT_MODIFIED, etag_of, readable, sent
 from service.api.deps import CallDep
 from service.api.errors import problem_responses
-from service.api.etags import etag_of
 from service.api.satellites import find_satellite
 from service.db.rows import SatelliteRow
 from service.problems.kinds import ServiceError

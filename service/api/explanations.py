@@ -8,9 +8,8 @@ from fastapi import APIRouter, Depends, Path, Response
 
 from service.answers.explanations import Explainer, version_of
 from service.api import job_intake as intake
-from service.api.conditional import known_as, readable
+from service.api.conditional import etag_of, known_as, readable
 from service.api.deps import CallDep, own_job_only
-from service.api.etags import etag_of
 from service.problems.kinds import ServiceError
 from service.scenarios.opportunities import OpportunityReader
 from service.stores.job_store import hashes_of

@@ -9,9 +9,8 @@ from fastapi import APIRouter, Depends, Response
 from planner_core.referee.plan_diff import PlannedAction, plan_diff
 from service.answers.rebuilt import view_of
 from service.api import job_intake as intake
-from service.api.conditional import known_as, readable
+from service.api.conditional import etag_of, known_as, readable
 from service.api.deps import CallDep, own_job_only
-from service.api.etags import etag_of
 from service.stores import job_store as store
 from service.stores.finding import no_such
 from service.wire.base import read

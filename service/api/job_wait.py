@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from typing import Final
 
-from service.api.etags import matches
+from service.api.conditional import matches
 from service.api.job_shapes import etag_of_job
 from service.api.questions import Questions
 from service.db.rows import JobRow

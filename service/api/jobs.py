@@ -10,10 +10,9 @@ from fastapi import APIRouter, Depends, Query, Response
 from sqlalchemy.exc import SQLAlchemyError
 
 from service.api import job_intake as intake
-from service.api.conditional import readable, require_match_of
+from service.api.conditional import matches, readable, require_match_of
 from service.api.deps import CallDep, own_job_only
 from service.api.errors import problem_responses
-from service.api.etags import matches
 from service.api.filters import SatelliteQuery, StationQuery, StoredDep
 from service.api.idempotency import OnceDep
 from service.api.job_shapes import etag_of_job, shown

@@ -10,10 +10,9 @@ from sqlalchemy.orm import Session
 
 from service.access.callers import Caller, Scope
 from service.api import job_intake as intake
-from service.api.conditional import created, readable, require_match, unless_known
+from service.api.conditional import created, etagged, readable, require_match, unless_known
 from service.api.deps import CallDep
 from service.api.errors import problem_responses
-from service.api.etags import etagged
 from service.api.guard import require_scope
 from service.api.idempotency import OnceDep
 from service.api.paging import PagingDep, newest_first

@@ -12,13 +12,12 @@ from sqlalchemy.orm import Session
 
 from planner_core.build import view_at
 from planner_core.orbits.places import View
-from planner_core.problem import COLLECT, CONTACT
+from planner_core.problem import COLLECT, CONTACT, Opportunities
 from service.access.callers import Caller
 from service.api import job_intake as intake
-from service.api.conditional import created, readable, require_match, sent, unless_known
+from service.api.conditional import created, etag_of, readable, require_match, sent, unless_known
 from service.api.deps import CallDep
 from service.api.errors import problem_responses
-from service.api.etags import etag_of
 from service.api.filters import NameQuery, SatelliteQuery, StationQuery, StoredDep, by_name
 from service.api.idempotency import OnceDep
 from service.api.paging import PagingDep, newest_first, size_of
@@ -152,14 +151,17 @@ def _edges(described: Described, rows: Sequence[int]) -> list[dict[str, ViewOut]
 
 
 def _view(seen: View, position: int) -> ViewOut:
-    return ViewOut(
-        off_nadir_deg=_rounded(seen.off_nadir_deg[position]),
-        elevation_deg=_rounded(seen.elevation_deg[position]),
-        azimuth_deg=_rounded(seen.azimuth_deg[position]),
-        range_km=_rounded(seen.range_m[position] / 1000.0),
-        sun_elevation_deg=_rounded(seen.sun_elevation_deg[position]),
-        eclipse=bool(seen.in_eclipse[position]),
-    )
+    return ViewOut(**_seen(seen, position))
+
+
+def _seen(seen: View | Opportunities, row: int) -> dict[str, Any]:
+    """Return what satellite and place see of each other, as answers have it."""
+    angles = ("off_nadir_deg", "elevation_deg", "azimuth_deg", "sun_elevation_deg")
+    return {
+        **{name: _rounded(getattr(seen, name)[row]) for name in angles},
+        "range_km": _rounded(seen.range_m[row] / 1000.0),
+        "eclipse": bool(seen.in_eclipse[row]),
+    }
 
 
 def _matching(
@@ -199,13 +201,8 @@ def _opportunity(described: Described, row: int, **edges: ViewOut) -> Opportunit
         end=at(float(table.end_s[row])),
         access_start=at(float(table.access_start_s[row])),
         access_end=at(float(table.access_end_s[row])),
-        off_nadir_deg=_rounded(table.off_nadir_deg[row]),
-        elevation_deg=_rounded(table.elevation_deg[row]),
-        azimuth_deg=_rounded(table.azimuth_deg[row]),
-        sun_elevation_deg=_rounded(table.sun_elevation_deg[row]),
-        range_km=_rounded(table.range_m[row] / 1000.0),
-        eclipse=bool(table.in_eclipse[row]),
         nadir=satellite.sensor.nadir,
+        **_seen(table, row),
         **edges,
     )
 

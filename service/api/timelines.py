@@ -16,10 +16,9 @@ from service.answers.answered import Answered, in_chunks
 from service.answers.blocks import TIMELINE, Entry, holds, items_in
 from service.api import job_intake as intake
 from service.api.accept import preferred, require_offered
-from service.api.conditional import readable, sent
+from service.api.conditional import matches, readable, sent
 from service.api.deps import Call, CallDep, DatabaseDep, own_job_only
 from service.api.errors import problem_responses
-from service.api.etags import matches
 from service.api.job_shapes import etag_of_timeline
 from service.api.paging import PagingDep
 from service.db.rows import JobRow

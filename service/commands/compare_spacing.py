@@ -124,14 +124,7 @@ def compare_spacing(
     out
         Where to write the table, as CSV.
 
-    Raises
-    ------
-    PlannerError
-        Where the file, the solver's name or its parameters are wrong.
-    Cancelled
-        Where the patience ended before there was a plan.
-    OSError
-        Where a file cannot be read or written.
+    Raises what ``solve_file`` does.
     """
     if out is not None:
         require_folder(out)

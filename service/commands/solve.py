@@ -46,12 +46,8 @@ def solve_file(
 
     Raises
     ------
-    PlannerError
-        Where the file, the solver's name or its parameters are wrong.
-    Cancelled
-        Where the time or the patience ended before there was a plan.
-    OSError
-        Where a file cannot be read or written.
+    PlannerError, OSError, Cancelled
+        Where input is wrong, a file cannot be read or written, or there was no plan in time.
     """
     if out is not None:
         require_folder(out)

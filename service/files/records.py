@@ -7,6 +7,7 @@ import json
 import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import islice
 from typing import Any, Generic, TypeVar
 
 from pydantic import BaseModel, ValidationError
@@ -153,25 +154,15 @@ def read_csv(
     by commas, or by semicolons or tabs where the header shows it; there a comma may be the decimal
     sign.
     """
-    text = decoded(data)
-    if isinstance(text, Fault):
-        return Records(faults=(text,))
-    table = read_table(text, column_names, required)
-    rows = table.rows
-    first = next(rows, None)
-    if first is None:
-        return Records(faults=(Fault(code="empty_file", detail="The file is empty."),))
-    if isinstance(first, Fault):
-        return Records(faults=(first,))
-    if len(first[1]) > MOST_COLUMNS:
-        detail = f"The header has {len(first[1])} columns; {MOST_COLUMNS} are the most."
-        return Records(faults=(Fault(code="malformed_csv", detail=detail, row=first[0]),))
-    columns = column_names(first[1])
-    faults = faults_of_header(first[0], columns, known, required)
+    try:
+        table, line, columns = open_table(data, required)
+    except NoTable as error:
+        return Records(faults=(error.fault,))
+    faults = faults_of_header(line, columns, known, required)
     if faults:
         return Records(faults=tuple(faults))
     records: list[Record] = []
-    for number, row in enumerate(rows):
+    for number, row in enumerate(islice(table.rows, 1, None)):
         if number == most:
             return _too_many_rows(most)
         if isinstance(row, Fault):
@@ -191,6 +182,32 @@ def read_csv(
         faults.append(Fault(code="empty_file", detail="The file has a header and no records."))
     ignored = tuple(column for column in columns if column not in known)
     return Records(records=tuple(records), faults=tuple(faults), ignored=ignored)
+
+
+class NoTable(Exception):
+    """A file holds no table; ``fault`` says why."""
+
+    def __init__(self, code: str, detail: str, row: int | None = None):
+        super().__init__(detail)
+        self.fault = Fault(code=code, detail=detail, row=row)
+
+
+def open_table(data: bytes, required: Collection[str]) -> tuple[Table, int, list[str]]:
+    """Return the table of a file, the line of its header, and our names of its columns."""
+    text = decoded(data)
+    if isinstance(text, Fault):
+        raise NoTable(text.code, text.detail)
+    table = read_table(text, column_names, required)
+    first = next(table.rows, None)
+    if first is None:
+        raise NoTable("empty_file", "The file is empty.")
+    if isinstance(first, Fault):
+        raise NoTable(first.code, first.detail, first.row)
+    line, header = first
+    if len(header) > MOST_COLUMNS:
+        detail = f"The header has {len(header)} columns; {MOST_COLUMNS} are the most."
+        raise NoTable("malformed_csv", detail, line)
+    return table, line, column_names(header)
 
 
 def column_names(header: Sequence[str]) -> list[str]:
