@@ -108,18 +108,6 @@ def timeline_blocks(
     yield Block(kind="tail", text="]}")
 
 
-def blocks_of_timeline(timeline: Document) -> Iterator[Block]:
-    """Yield a timeline that is there as a whole."""
-
-    def parts(satellite: Document) -> tuple[Document, list[Document], Document]:
-        about = {name: satellite[name] for name in ("id", "name")}
-        rest = {k: v for k, v in satellite.items() if k not in ("id", "name", "actions")}
-        return about, satellite["actions"], rest
-
-    head = {name: value for name, value in timeline.items() if name != "satellites"}
-    return timeline_blocks(head, (parts(one) for one in timeline["satellites"]))
-
-
 def target_blocks(targets: Iterable[Document]) -> Iterator[Block]:
     """Yield a list of targets with their outcomes; its brackets are `targets_text`'s."""
     first = 0

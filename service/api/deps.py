@@ -55,13 +55,6 @@ RawBodyDep = Annotated[bytes, Depends(_raw_body)]
 CallerDep = Annotated[Caller, Depends(_caller)]
 
 
-async def _audit(request: Request, caller: CallerDep) -> Audit:
-    return Audit(caller=caller, request_id=request.state.request_id)
-
-
-AuditDep = Annotated[Audit, Depends(_audit)]
-
-
 @dataclass(frozen=True, slots=True)
 class Call:
     """A request under way: who asks, what it reaches, and the headers of its answer."""

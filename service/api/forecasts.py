@@ -20,8 +20,7 @@ from service.db.rows import ForecastRow
 from service.forecasts.csv_file import read_csv
 from service.forecasts.fields import Field, instant_of, sha256_of, to_bytes
 from service.forecasts.netcdf_file import read_netcdf
-from service.stores import forecast_store
-from service.stores.finding import no_such, of_owner
+from service.stores.finding import find_own, no_such, of_owner
 from service.wire.base import Listed, Name
 from service.wire.forecasts import ForecastOut
 from service.wire.stored import from_row
@@ -125,7 +124,7 @@ def delete_forecast(forecast_id: str, call: CallDep) -> None:
 
 
 def _find(session: Session, call: Call, forecast_id: str) -> ForecastRow:
-    row = forecast_store.find(session, forecast_id, call.caller.visible_owner)
+    row = find_own(session, ForecastRow, forecast_id, call.caller.visible_owner)
     if row is None:
         raise no_such("forecast", forecast_id)
     return row

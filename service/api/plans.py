@@ -23,7 +23,7 @@ from service.plans import lifecycle
 from service.plans import store as plan_store
 from service.problems.faults import refuse_one
 from service.stores import deletion, job_store
-from service.stores.finding import no_such
+from service.stores.finding import find_own, no_such
 from service.webhooks import outbox
 from service.wire.base import Listed, parse_instant, read
 from service.wire.plans import (
@@ -185,8 +185,8 @@ def find_plan(
     session: Session, plan_id: str, caller: Caller, *, to_change: bool = False
 ) -> PlanRow:
     """Return a plan; 404 where there is none that the caller may see."""
-    plan = session.get(PlanRow, plan_id, with_for_update=to_change, populate_existing=to_change)
-    if plan is None or caller.visible_owner not in (None, plan.owner):
+    plan = find_own(session, PlanRow, plan_id, caller.visible_owner, to_change=to_change)
+    if plan is None:
         raise no_such("plan", plan_id)
     return plan
 

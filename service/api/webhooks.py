@@ -21,7 +21,7 @@ from service.db.ids import new_id
 from service.db.rows import WebhookDeliveryRow, WebhookRow
 from service.problems.faults import refuse_one
 from service.problems.kinds import ServiceError
-from service.stores.finding import no_such, of_owner
+from service.stores.finding import find_own, no_such, of_owner
 from service.webhooks import outbox
 from service.webhooks.addresses import AddressRefused, require_good_url
 from service.wire.base import Listed
@@ -170,8 +170,8 @@ def _require_enabled(row: WebhookRow) -> None:
 def _find(
     session: Session, webhook_id: str, caller: Caller, *, to_change: bool = False
 ) -> WebhookRow:
-    row = session.get(WebhookRow, webhook_id, with_for_update=to_change)
-    if row is None or caller.visible_owner not in (None, row.owner):
+    row = find_own(session, WebhookRow, webhook_id, caller.visible_owner, to_change=to_change)
+    if row is None:
         raise no_such("webhook", webhook_id)
     return row
 

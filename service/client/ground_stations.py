@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from service.client.collection import Changeable
-from service.client.uploads import Source, on_error, upload
+from service.client.uploads import Source, upload
 from service.wire.imports import Imported as Import
 from service.wire.places import GroundStationOut as GroundStation
 from service.wire.places import ImportedStation
@@ -41,7 +41,7 @@ class GroundStations(Changeable[GroundStation]):
         return self._transport.post(
             self._path("import"),
             Import[ImportedStation],
-            params={"on_error": on_error(reject_all=reject_all)},
+            params={"on_error": "reject_all" if reject_all else "skip"},
             idempotency_key=idempotency_key,
             **upload(source, form),
         )

@@ -7,7 +7,7 @@ from typing import Any
 
 from service.client.collection import Changeable
 from service.client.transport import said
-from service.client.uploads import Source, on_error, upload
+from service.client.uploads import Source, upload
 from service.wire.imports import Imported as Import
 from service.wire.satellites import ElementsOut as Elements
 from service.wire.satellites import ImportedSatellite
@@ -66,7 +66,10 @@ class Satellites(Changeable[Satellite]):
         return self._transport.post(
             self._path("import"),
             Import[ImportedSatellite],
-            params={"on_error": on_error(reject_all=reject_all), "spacecraft": spacecraft},
+            params={
+                "on_error": "reject_all" if reject_all else "skip",
+                "spacecraft": spacecraft,
+            },
             idempotency_key=idempotency_key,
             **upload(source, form),
         )

@@ -53,8 +53,3 @@ def upload(source: Source, form: str | None) -> dict[str, Any]:
         case bytes():
             content = source
     return {"content": content, "headers": {"Content-Type": MEDIA_TYPES[name]}}
-
-
-def on_error(*, reject_all: bool) -> str:
-    """Return what is done with the good records of a file that has bad ones."""
-    return "reject_all" if reject_all else "skip"

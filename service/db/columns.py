@@ -61,6 +61,14 @@ class Kept(Made):
     deleted_at: Mapped[datetime | None]
 
 
+class Owned(Made):
+    """A thing of an owner's."""
+
+    __abstract__ = True
+
+    owner: Mapped[str] = mapped_column(sa.String(64))
+
+
 class Reported(Row):
     """What somebody has reported of a plan. Rows are added, never changed."""
 

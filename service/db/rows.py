@@ -12,7 +12,7 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy.orm import Mapped, mapped_column
 
-from service.db.columns import Json, Kept, Made, Reported, Row
+from service.db.columns import Json, Kept, Made, Owned, Reported, Row
 
 
 class SatelliteRow(Kept):
@@ -78,7 +78,7 @@ class TargetRow(Row):
     body: Mapped[Json]
 
 
-class OrderRow(Made):
+class OrderRow(Owned):
     """An order that came over STAPI; its id is that of its target.
 
     ``target`` is that target as it was ordered, ``sent`` what the order said.
@@ -87,7 +87,6 @@ class OrderRow(Made):
     __tablename__ = "stapi_order"
     __table_args__ = (sa.Index("ix_stapi_order_owner_id", "owner", "id"),)
 
-    owner: Mapped[str] = mapped_column(sa.String(64))
     product_id: Mapped[str] = mapped_column(sa.String(36))
     catalog_id: Mapped[str] = mapped_column(sa.ForeignKey("target_catalog.id"))
     target: Mapped[Json]
@@ -120,7 +119,7 @@ class ScenarioPartRow(Row):
     kind: Mapped[str] = mapped_column(sa.String(16), primary_key=True)
 
 
-class ForecastRow(Made):
+class ForecastRow(Owned):
     """A forecast of clear skies; ``block`` is what it says, compressed (`forecasts.fields`).
 
     ``summary`` is what readers are told of its size and of how it was read.
@@ -306,7 +305,7 @@ class AuditEventRow(Row):
     object_id: Mapped[str] = mapped_column(sa.String(64), index=True)
 
 
-class WebhookRow(Made):
+class WebhookRow(Owned):
     """Where the ends of an owner's jobs are told. ``secret`` signs, so it is kept as it is."""
 
     owner: Mapped[str] = mapped_column(sa.String(64), index=True)
@@ -338,7 +337,7 @@ class WebhookDeliveryRow(Made):
     ended_at: Mapped[datetime | None]
 
 
-class PlanRow(Made):
+class PlanRow(Owned):
     """A plan with a life: a job's answer that is approved, published, and one day superseded.
 
     What it says never changes; a change is a new plan with a ``parent_id``. ``version`` grows with
@@ -347,7 +346,6 @@ class PlanRow(Made):
 
     __table_args__ = (sa.Index("ix_plan_owner_state_id", "owner", "state", "id"),)
 
-    owner: Mapped[str] = mapped_column(sa.String(64))
     name: Mapped[str | None]
     job_id: Mapped[str] = mapped_column(sa.ForeignKey("job.id"), index=True)
     parent_id: Mapped[str | None] = mapped_column(sa.ForeignKey("plan.id"), index=True)

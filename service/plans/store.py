@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from datetime import datetime
+from typing import TypeVar
 
 import sqlalchemy as sa
 from sqlalchemy.dialects import postgresql, sqlite
@@ -11,6 +12,7 @@ from sqlalchemy.orm import Session
 
 from service.access.callers import Caller
 from service.db.clock import utc_now
+from service.db.columns import Reported
 from service.db.ids import new_id
 from service.db.rows import (
     ExecutionRow,
@@ -22,11 +24,13 @@ from service.db.rows import (
     PublisherRow,
 )
 from service.stores.finding import with_values
-from service.wire.base import dumped
+from service.wire.base import Json, dumped
 from service.wire.pins import StateIn
 from service.wire.plans import ExecutionIn, PlanState, WaiverIn
 from service.wire.stored import from_store
 from service.wire.timelines import IDLE_MODES, TimelineOut
+
+R = TypeVar("R", bound=Reported)
 
 
 def now(session: Session) -> datetime:
@@ -198,32 +202,26 @@ def report(
     session: Session, caller: Caller, plan_id: str, reports: Sequence[ExecutionIn]
 ) -> list[ExecutionRow]:
     """Take down what became of some actions."""
-    reported_at = now(session)
-    rows = [
-        ExecutionRow(
-            id=new_id(), plan_id=plan_id, owner=caller.owner, key_name=caller.key_name,
-            reported_at=reported_at, **each.model_dump(),
-        )
-        for each in reports
-    ]  # fmt: skip
-    session.add_all(rows)
-    session.flush()
-    return rows
+    told = (each.model_dump() for each in reports)
+    return _take_down(session, caller, plan_id, ExecutionRow, told)
 
 
 def report_states(
     session: Session, caller: Caller, plan_id: str, states: Sequence[StateIn]
 ) -> list[PlanStateRow]:
     """Take down telemetry."""
-    reported_at = now(session)
-    rows = [
-        PlanStateRow(
-            id=new_id(), plan_id=plan_id, satellite_id=each.satellite_id, at=each.at,
-            body=dumped(each), owner=caller.owner, key_name=caller.key_name,
-            reported_at=reported_at,
-        )
-        for each in states
-    ]  # fmt: skip
+    told = (
+        {"satellite_id": each.satellite_id, "at": each.at, "body": dumped(each)} for each in states
+    )
+    return _take_down(session, caller, plan_id, PlanStateRow, told)
+
+
+def _take_down(
+    session: Session, caller: Caller, plan_id: str, table: type[R], told: Iterable[Json]
+) -> list[R]:
+    shared: Json = {"plan_id": plan_id, "owner": caller.owner, "key_name": caller.key_name}
+    shared["reported_at"] = now(session)
+    rows = [table(id=new_id(), **shared, **own) for own in told]
     session.add_all(rows)
     session.flush()
     return rows

@@ -14,7 +14,7 @@ from sqlalchemy.orm import Session
 from planner_core.errors import InvalidScenario
 from service.db.rows import ForecastRow
 from service.forecasts.fields import from_bytes, instant_of, time_ms_of
-from service.stores import forecast_store
+from service.stores.finding import find_own
 from service.wire.scenarios import FileForecast, ScenarioFile, SkySeriesIn
 
 _DIGITS = 4
@@ -22,7 +22,7 @@ _DIGITS = 4
 
 def find_forecast(session: Session, forecast_id: str, owner: str | None) -> ForecastRow:
     """Return a forecast of an owner's, its block too; ``unknown_forecast`` where there is none."""
-    row = forecast_store.find(session, forecast_id, owner)
+    row = find_own(session, ForecastRow, forecast_id, owner)
     if row is None:
         raise InvalidScenario(
             "unknown_forecast", f"There is no forecast {forecast_id!r}.", pointer="/forecast_id"

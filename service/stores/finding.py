@@ -7,10 +7,11 @@ from typing import Any, TypeVar
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
 
-from service.db.columns import Kept
+from service.db.columns import Kept, Owned
 from service.problems.kinds import ServiceError
 
 K = TypeVar("K", bound=Kept)
+W = TypeVar("W", bound=Owned)
 
 
 def alive(table: type[K]) -> sa.Select[K]:
@@ -27,6 +28,16 @@ def find(session: Session, table: type[K], own_id: str, *, to_change: bool = Fal
 def of_owner(column: sa.SQLColumnExpression[str], owner: str | None) -> sa.ColumnElement[bool]:
     """Return the condition that a thing is an owner's; None stands for everybody."""
     return sa.true() if owner is None else column == owner
+
+
+def find_own(
+    session: Session, table: type[W], own_id: str, owner: str | None, *, to_change: bool = False
+) -> W | None:
+    """Return a thing of an owner's, or of anybody's, its row locked where it is to change."""
+    wanted = sa.select(table).where(table.id == own_id, of_owner(table.owner, owner))
+    if to_change:
+        wanted = wanted.with_for_update().execution_options(populate_existing=True)
+    return session.scalar(wanted)
 
 
 def with_values(table: type[Any], **wanted: str | None) -> list[sa.ColumnElement[bool]]:
