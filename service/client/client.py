@@ -6,7 +6,6 @@ import ipaddress
 import os
 import re
 from collections.abc import Iterator
-from types import TracebackType
 from typing import Final, Self
 
 import httpx
@@ -106,12 +105,7 @@ class Client:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def __repr__(self) -> str:
