@@ -22,7 +22,7 @@ from service.db.rows import GroundStationRow
 from service.files.records import Checked, check, read_csv, read_geojson
 from service.problems.faults import validated
 from service.scenarios.translate import ground_station_from
-from service.stores.finding import alive, find, no_such
+from service.stores.finding import alive, existing
 from service.wire.base import Listed
 from service.wire.imports import Imported
 from service.wire.places import (
@@ -115,7 +115,7 @@ def list_ground_stations(
 def get_ground_station(station_id: str, call: CallDep) -> GroundStationOut | Response:
     """Return one ground station."""
     with call.database.reading() as session:
-        shown = _shown(_find(session, station_id))
+        shown = _shown(existing(session, GroundStationRow, "ground station", station_id))
     return unless_known(call.request, call.response, shown)
 
 
@@ -128,7 +128,7 @@ def change_ground_station(
     `If-Match` takes the ETag of the station.
     """
     with call.database.transaction() as session:
-        row = _find(session, station_id, to_change=True)
+        row = existing(session, GroundStationRow, "ground station", station_id, to_change=True)
         require_match(call.request, lambda: _shown(row))
         changes = body.model_dump(mode="json", exclude_none=True)
         whole = row.body | changes
@@ -144,17 +144,10 @@ def change_ground_station(
 def delete_ground_station(station_id: str, call: CallDep) -> None:
     """Delete a ground station. Scenarios that use it keep their copy."""
     with call.database.transaction() as session:
-        row = _find(session, station_id, to_change=True)
+        row = existing(session, GroundStationRow, "ground station", station_id, to_change=True)
         require_match(call.request, lambda: _shown(row))
         row.deleted_at = datetime.now(UTC)
         call.audit.record(session, "delete", "ground_station", station_id)
-
-
-def _find(session: Session, station_id: str, *, to_change: bool = False) -> GroundStationRow:
-    row = find(session, GroundStationRow, station_id, to_change=to_change)
-    if row is None:
-        raise no_such("ground station", station_id)
-    return row
 
 
 def _add(session: Session, body: GroundStationIn) -> GroundStationRow:

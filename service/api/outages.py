@@ -19,7 +19,7 @@ from service.db.ids import new_id
 from service.db.rows import GroundStationRow, OutageRow, SatelliteRow
 from service.scenarios.pin_inputs import outage_from
 from service.stores import outage_store
-from service.stores.finding import alive, find, no_such, with_values
+from service.stores.finding import alive, existing, find, with_values
 from service.wire.base import Instant, Listed
 from service.wire.pins import OutageIn, OutageOut
 from service.wire.stored import from_row
@@ -69,7 +69,7 @@ def list_outages(
 def get_outage(outage_id: str, call: CallDep) -> OutageOut | Response:
     """Return one outage."""
     with call.database.reading() as session:
-        shown = _shown(session, [_find(session, outage_id)])[0]
+        shown = _shown(session, [existing(session, OutageRow, "outage", outage_id)])[0]
     return unless_known(call.request, call.response, shown)
 
 
@@ -77,17 +77,10 @@ def get_outage(outage_id: str, call: CallDep) -> OutageOut | Response:
 def delete_outage(outage_id: str, call: CallDep) -> None:
     """Delete an outage, as where it ends early. Scenarios that took it along keep it."""
     with call.database.transaction() as session:
-        row = _find(session, outage_id, to_change=True)
+        row = existing(session, OutageRow, "outage", outage_id, to_change=True)
         require_match(call.request, lambda: _shown(session, [row])[0])
         row.deleted_at = datetime.now(UTC)
         call.audit.record(session, "delete", "outage", outage_id)
-
-
-def _find(session: Session, outage_id: str, *, to_change: bool = False) -> OutageRow:
-    row = find(session, OutageRow, outage_id, to_change=to_change)
-    if row is None:
-        raise no_such("outage", outage_id)
-    return row
 
 
 def _alive(

@@ -25,7 +25,7 @@ from service.problems.faults import refuse_one
 from service.scenarios.translate import orbit_from, satellite_from
 from service.stores import satellite_store as store
 from service.stores import spacecraft_store
-from service.stores.finding import alive, find, no_such
+from service.stores.finding import alive, existing
 from service.wire.base import Json, Listed
 from service.wire.imports import Imported
 from service.wire.satellites import (
@@ -200,10 +200,7 @@ def list_elements(
 
 def find_satellite(session: Session, satellite_id: str, *, to_change: bool = False) -> SatelliteRow:
     """Return a satellite, its row locked where it is to change; 404 where there is none."""
-    row = find(session, SatelliteRow, satellite_id, to_change=to_change)
-    if row is None:
-        raise no_such("satellite", satellite_id)
-    return row
+    return existing(session, SatelliteRow, "satellite", satellite_id, to_change=to_change)
 
 
 def _figures_of(session: Session, spacecraft_id: str) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from service.problems.faults import validated
 from service.problems.kinds import ServiceError
 from service.scenarios.translate import figures_from
 from service.stores import spacecraft_store as store
-from service.stores.finding import alive, find, no_such
+from service.stores.finding import alive, existing
 from service.wire.base import Listed
 from service.wire.satellites import sent_by
 from service.wire.spacecraft import SpacecraftIn, SpacecraftOut, SpacecraftPatch, WholeSpacecraft
@@ -101,10 +101,7 @@ def _find(session: Session, spacecraft_id: str, *, to_change: bool = False) -> S
         raise ServiceError(
             "built_in", f"{spacecraft_id} is built in: store a type of your own instead."
         )
-    row = find(session, SpacecraftRow, spacecraft_id, to_change=to_change)
-    if row is None:
-        raise no_such("spacecraft type", spacecraft_id)
-    return row
+    return existing(session, SpacecraftRow, "spacecraft type", spacecraft_id, to_change=to_change)
 
 
 def _figures(whole: WholeSpacecraft) -> dict[str, Any]:

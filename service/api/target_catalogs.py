@@ -32,7 +32,7 @@ from service.files.records import (
 )
 from service.problems.faults import pointer_to, require_none, validated
 from service.scenarios.translate import target_from
-from service.stores.finding import alive, find, no_such
+from service.stores.finding import alive, existing
 from service.wire.base import Body, Listed, Name
 from service.wire.places import (
     MAX_TARGETS,
@@ -179,7 +179,7 @@ def list_target_catalogs(
 def get_target_catalog(catalog_id: str, call: CallDep) -> TargetCatalogOut | Response:
     """Return one catalogue, without its targets."""
     with call.database.reading() as session:
-        shown = _shown(_find(session, catalog_id))
+        shown = _shown(existing(session, TargetCatalogRow, "target catalogue", catalog_id))
     return unless_known(call.request, call.response, shown)
 
 
@@ -193,7 +193,7 @@ def list_targets(catalog_id: str, database: DatabaseDep, paging: PagingDep) -> L
         .limit(paging.limit + 1)
     )
     with database.reading() as session:
-        _find(session, catalog_id)
+        existing(session, TargetCatalogRow, "target catalogue", catalog_id)
         page = paging.answer(session.scalars(query).all(), lambda row: row.position)
     return Listed(items=[from_store(TargetIn, row.body) for row in page.rows], next=page.next)
 
@@ -207,7 +207,7 @@ def change_target_catalog(
     Scenarios that use it keep their copy. `If-Match` takes the ETag of the catalogue.
     """
     with call.database.transaction() as session:
-        row = _find(session, catalog_id, to_change=True)
+        row = existing(session, TargetCatalogRow, "target catalogue", catalog_id, to_change=True)
         require_match(call.request, lambda: _shown(row))
         row.name = body.name or row.name
         _set_rewards(session, catalog_id, body.rewards or {})
@@ -243,17 +243,10 @@ def _set_rewards(session: Session, catalog_id: str, rewards: Mapping[str, float]
 def delete_target_catalog(catalog_id: str, call: CallDep) -> None:
     """Delete a catalogue. Scenarios that use it keep their copy."""
     with call.database.transaction() as session:
-        row = _find(session, catalog_id, to_change=True)
+        row = existing(session, TargetCatalogRow, "target catalogue", catalog_id, to_change=True)
         require_match(call.request, lambda: _shown(row))
         row.deleted_at = datetime.now(UTC)
         call.audit.record(session, "delete", "target_catalog", catalog_id)
-
-
-def _find(session: Session, catalog_id: str, *, to_change: bool = False) -> TargetCatalogRow:
-    row = find(session, TargetCatalogRow, catalog_id, to_change=to_change)
-    if row is None:
-        raise no_such("target catalogue", catalog_id)
-    return row
 
 
 def _shown(row: TargetCatalogRow) -> TargetCatalogOut:

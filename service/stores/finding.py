@@ -25,6 +25,16 @@ def find(session: Session, table: type[K], own_id: str, *, to_change: bool = Fal
     return None if row is None or row.deleted_at is not None else row
 
 
+def existing(
+    session: Session, table: type[K], what: str, own_id: str, *, to_change: bool = False
+) -> K:
+    """Return one that has not been deleted; 404 where there is none, in these words."""
+    row = find(session, table, own_id, to_change=to_change)
+    if row is None:
+        raise no_such(what, own_id)
+    return row
+
+
 def of_owner(column: sa.SQLColumnExpression[str], owner: str | None) -> sa.ColumnElement[bool]:
     """Return the condition that a thing is an owner's; None stands for everybody."""
     return sa.true() if owner is None else column == owner
