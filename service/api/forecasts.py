@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
 from typing import Annotated, Final
 
 import sqlalchemy as sa
@@ -15,10 +14,9 @@ from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
 from service.api.imports import BYTES, request_body
 from service.api.paging import PagingDep, newest_first
-from service.db.ids import new_id
 from service.db.rows import ForecastRow
 from service.forecasts.csv_file import read_csv
-from service.forecasts.fields import Field, instant_of, sha256_of, to_bytes
+from service.forecasts.fields import instant_of, sha256_of, to_bytes
 from service.forecasts.netcdf_file import read_netcdf
 from service.stores.finding import find_own, no_such, of_owner
 from service.wire.base import Listed, Name
@@ -73,27 +71,20 @@ def create_forecast(
     block = to_bytes(field)
     with once.transaction() as session:
         call.count_stored(session, num_rows=1, num_bytes=len(block))
-        row = _add(session, call, name or _UNNAMED, field, block)
-        row.summary = field.describe() | {"notes": notes}
-        row.default_clear_probability = default_clear_probability
+        row = ForecastRow(
+            owner=call.caller.owner,
+            name=name or _UNNAMED,
+            sha256=sha256_of(field),
+            first_at=instant_of(field.first_ms),
+            last_at=instant_of(field.last_ms),
+            default_clear_probability=default_clear_probability,
+            summary=field.describe() | {"notes": notes},
+            block=block,
+        )
+        session.add(row)
         session.flush()
         call.audit.record(session, "create", "forecast", row.id)
         return once.keep(session, created(call.response, _shown(row), f"/v1/forecasts/{row.id}"))
-
-
-def _add(session: Session, call: Call, name: str, field: Field, block: bytes) -> ForecastRow:
-    row = ForecastRow(
-        id=new_id(),
-        owner=call.caller.owner,
-        name=name,
-        sha256=sha256_of(field),
-        first_at=instant_of(field.first_ms),
-        last_at=instant_of(field.last_ms),
-        created_at=datetime.now(UTC),
-        block=block,
-    )
-    session.add(row)
-    return row
 
 
 @router.get("")

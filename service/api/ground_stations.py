@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from datetime import UTC, datetime
 from typing import Final, Literal
 
 from fastapi import APIRouter, Response
@@ -17,7 +16,6 @@ from service.api.filters import NameQuery, by_name
 from service.api.idempotency import OnceDep
 from service.api.imports import OnError, OnErrorQuery, body_schemas, imported, refuse_if_asked
 from service.api.paging import PagingDep, newest_first, size_of
-from service.db.ids import new_id
 from service.db.rows import GroundStationRow
 from service.files.records import Checked, check, read_csv, read_geojson
 from service.problems.faults import validated
@@ -146,17 +144,12 @@ def delete_ground_station(station_id: str, call: CallDep) -> None:
     with call.database.transaction() as session:
         row = existing(session, GroundStationRow, "ground station", station_id, to_change=True)
         require_match(call.request, lambda: _shown(row))
-        row.deleted_at = datetime.now(UTC)
+        row.delete()
         call.audit.record(session, "delete", "ground_station", station_id)
 
 
 def _add(session: Session, body: GroundStationIn) -> GroundStationRow:
-    row = GroundStationRow(
-        id=new_id(),
-        name=body.name,
-        body=body.model_dump(mode="json"),
-        created_at=datetime.now(UTC),
-    )
+    row = GroundStationRow(name=body.name, body=body.model_dump(mode="json"))
     session.add(row)
     return row
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from datetime import UTC, datetime
 from typing import Annotated
 
 import sqlalchemy as sa
@@ -15,7 +14,6 @@ from service.api.deps import CallDep
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
 from service.api.paging import PagingDep, newest_first
-from service.db.ids import new_id
 from service.db.rows import GroundStationRow, OutageRow, SatelliteRow
 from service.scenarios.pin_inputs import outage_from
 from service.stores import outage_store
@@ -38,7 +36,7 @@ def create_outage(body: OutageIn, call: CallDep, once: OnceDep) -> OutageOut:
         outage_from(body).check(
             "", satellite_ids, _alive(session, GroundStationRow, body.station_id)
         )
-        row = OutageRow(id=new_id(), created_at=datetime.now(UTC), **body.model_dump())
+        row = OutageRow(**body.model_dump())
         session.add(row)
         session.flush()
         call.audit.record(session, "create", "outage", row.id)
@@ -79,7 +77,7 @@ def delete_outage(outage_id: str, call: CallDep) -> None:
     with call.database.transaction() as session:
         row = existing(session, OutageRow, "outage", outage_id, to_change=True)
         require_match(call.request, lambda: _shown(session, [row])[0])
-        row.deleted_at = datetime.now(UTC)
+        row.delete()
         call.audit.record(session, "delete", "outage", outage_id)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict
-from datetime import UTC, datetime
 from typing import Annotated, Any, Final, TypeVar
 
 import sqlalchemy as sa
@@ -162,7 +161,7 @@ def delete_satellite(satellite_id: str, call: CallDep) -> None:
     with call.database.transaction() as session:
         row = find_satellite(session, satellite_id, to_change=True)
         require_match(call.request, lambda: _shown(session, [row])[0])
-        row.deleted_at = datetime.now(UTC)
+        row.delete()
         call.audit.record(session, "delete", "satellite", satellite_id)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
 from typing import Any, Final
 
 from fastapi import APIRouter, Response
@@ -13,7 +12,6 @@ from service.api.deps import CallDep, DatabaseDep
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
 from service.api.paging import PagingDep, newest_first
-from service.db.ids import new_id
 from service.db.rows import SpacecraftRow
 from service.problems.faults import validated
 from service.problems.kinds import ServiceError
@@ -38,9 +36,7 @@ def create_spacecraft(body: SpacecraftIn, once: OnceDep, call: CallDep) -> Space
     with once.transaction() as session:
         whole = store.completed(session, sent_by(body), WholeSpacecraft, names_type=False)
         figures_from(whole, _ANY_PERIOD_S)
-        row = SpacecraftRow(
-            id=new_id(), name=whole.name, body=_figures(whole), created_at=datetime.now(UTC)
-        )
+        row = SpacecraftRow(name=whole.name, body=_figures(whole))
         session.add(row)
         call.audit.record(session, "create", "spacecraft", row.id)
         shown = created(call.response, _shown(row), f"/v1/spacecraft/{row.id}")
@@ -92,7 +88,7 @@ def delete_spacecraft(spacecraft_id: str, call: CallDep) -> None:
     with call.database.transaction() as session:
         row = _find(session, spacecraft_id, to_change=True)
         require_match(call.request, lambda: _shown(row))
-        row.deleted_at = datetime.now(UTC)
+        row.delete()
         call.audit.record(session, "delete", "spacecraft", spacecraft_id)
 
 

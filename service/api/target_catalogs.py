@@ -19,7 +19,6 @@ from service.api.filters import NameQuery, by_name
 from service.api.idempotency import OnceDep
 from service.api.imports import BYTES, request_body
 from service.api.paging import PagingDep, newest_first
-from service.db.ids import new_id
 from service.db.rows import TargetCatalogRow, TargetRow
 from service.files.records import (
     Record,
@@ -144,9 +143,7 @@ def _checked(found: Records) -> list[TargetIn]:
 
 
 def _add(session: Session, name: str, targets: Sequence[TargetIn]) -> TargetCatalogRow:
-    row = TargetCatalogRow(
-        id=new_id(), name=name, num_targets=len(targets), created_at=datetime.now(UTC)
-    )
+    row = TargetCatalogRow(name=name, num_targets=len(targets))
     session.add(row)
     session.flush()
     session.execute(
@@ -245,7 +242,7 @@ def delete_target_catalog(catalog_id: str, call: CallDep) -> None:
     with call.database.transaction() as session:
         row = existing(session, TargetCatalogRow, "target catalogue", catalog_id, to_change=True)
         require_match(call.request, lambda: _shown(row))
-        row.deleted_at = datetime.now(UTC)
+        row.delete()
         call.audit.record(session, "delete", "target_catalog", catalog_id)
 
 

@@ -17,7 +17,6 @@ from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
 from service.api.paging import PagingDep, newest_first
 from service.db.clock import utc_now
-from service.db.ids import new_id
 from service.db.rows import WebhookDeliveryRow, WebhookRow
 from service.problems.faults import refuse_one
 from service.problems.kinds import ServiceError
@@ -54,7 +53,6 @@ def create_webhook(body: WebhookIn, call: CallDep, once: OnceDep) -> CreatedWebh
     with once.transaction() as session:
         _require_room(session, call.caller.owner)
         row = WebhookRow(
-            id=new_id(),
             owner=call.caller.owner,
             name=body.name,
             url=body.url,

@@ -9,6 +9,8 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy.orm import DeclarativeBase, Mapped, declared_attr, mapped_column
 
+from service.db.ids import new_id
+
 Json = dict[str, Any]
 
 
@@ -45,12 +47,15 @@ class Row(DeclarativeBase):
 
 
 class Made(Row):
-    """A thing with an id of its own."""
+    """A thing with an id of its own, which it has from the moment that it is made."""
 
     __abstract__ = True
 
     id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
     created_at: Mapped[datetime]
+
+    def __init__(self, **values: Any):
+        super().__init__(**{"id": new_id(), "created_at": datetime.now(UTC)} | values)
 
 
 class Kept(Made):
@@ -59,6 +64,10 @@ class Kept(Made):
     __abstract__ = True
 
     deleted_at: Mapped[datetime | None]
+
+    def delete(self) -> None:
+        """Note that it is deleted now."""
+        self.deleted_at = datetime.now(UTC)
 
 
 class Owned(Made):

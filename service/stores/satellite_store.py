@@ -12,7 +12,6 @@ from sqlalchemy.orm import Session, aliased
 
 from planner_core.domain import Orbit, OrbitEphemeris
 from planner_core.orbits.ingest import Entry
-from service.db.ids import new_id
 from service.db.rows import ElementSetRow, SatelliteRow
 from service.db.session import take_turns
 from service.problems.kinds import ServiceError
@@ -48,7 +47,7 @@ def add_satellite(
     """
     _require_new(session, elements.norad_cat_id)
     figures = body.model_dump(mode="json", include=set(FIGURES))
-    row = _new_satellite(body.name, elements.norad_cat_id, figures)
+    row = SatelliteRow(name=body.name, norad_cat_id=elements.norad_cat_id, **figures)
     session.add(row)
     session.flush()
     add_elements(session, row.id, elements.epoch, orbit)
@@ -79,7 +78,7 @@ def add_elements(
     for stored in session.scalars(same_epoch):
         if stored.orbit == orbit:
             return stored
-    row = _element_set(satellite_id, epoch, orbit)
+    row = ElementSetRow(satellite_id=satellite_id, epoch=epoch, orbit=orbit)
     session.add(row)
     session.flush()
     return row
@@ -147,7 +146,8 @@ class _Import:
             key = self._only_one_named(name) or key
         status: Status = "elements_added"
         if key not in self._known:
-            self._known[key] = _new_satellite(name, elements.norad_cat_id, self._figures)
+            norad_cat_id = elements.norad_cat_id
+            self._known[key] = SatelliteRow(name=name, norad_cat_id=norad_cat_id, **self._figures)
             self.new_satellites.append(self._known[key])
             status = "created"
         satellite = self._known[key]
@@ -155,33 +155,15 @@ class _Import:
             status = "unchanged"
         else:
             self._epochs.add((satellite.id, _tick(elements.epoch)))
-            self.new_elements.append(_element_set(satellite.id, elements.epoch, entry.orbit))
+            self.new_elements.append(
+                ElementSetRow(satellite_id=satellite.id, epoch=elements.epoch, orbit=entry.orbit)
+            )
         return ImportedEntry(satellite=satellite, status=status, entry=entry)
 
     def _only_one_named(self, name: str) -> tuple[int, str] | None:
         """Return the key of the satellite of a name, where there is one and no other."""
         keys = [key for key, row in self._known.items() if row.name == name]
         return keys[0] if len(keys) == 1 else None
-
-
-def _element_set(satellite_id: str, epoch: datetime, orbit: dict[str, Any]) -> ElementSetRow:
-    return ElementSetRow(
-        id=new_id(),
-        satellite_id=satellite_id,
-        epoch=epoch,
-        orbit=orbit,
-        created_at=datetime.now(UTC),
-    )
-
-
-def _new_satellite(name: str, norad_cat_id: int, figures: Mapping[str, Any]) -> SatelliteRow:
-    return SatelliteRow(
-        id=new_id(),
-        name=name,
-        norad_cat_id=norad_cat_id,
-        created_at=datetime.now(UTC),
-        **figures,
-    )
 
 
 def _known_satellites(session: Session) -> dict[tuple[int, str], SatelliteRow]:
