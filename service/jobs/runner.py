@@ -248,7 +248,7 @@ class _Run:
         return Refused("solver_crashed", f"The solver's process ended by itself ({how}).")
 
     def _check_limits(self) -> Ending | None:
-        now_mb = held_mb(self.process.pid)  # 0 has ended; its last words are still to be read
+        now_mb = held_mb(self.process.pid)  # 0 where it has ended: it is still heard
         if now_mb > self.limits.memory_mb:
             detail = f"The solver held {now_mb:.0f} MB; its limit is {self.limits.memory_mb} MB."
             return Refused("memory_limit", detail)
