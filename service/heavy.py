@@ -23,13 +23,12 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any, Final
 
-import psutil
 import uvicorn
 
 from service.jobs.queue import DbosQueue
 from service.main import create_app
 from service.process.logs import STDERR, configure_logging
-from service.process.parent import die_with_parent, name_this_process
+from service.process.parent import die_with_parent, held_mb, name_this_process
 from service.process.tracing import start_tracing
 from service.settings import Settings
 
@@ -123,18 +122,11 @@ def _watch(process: BaseProcess, pipe: Connection[Any, Any], most_mb: float) -> 
             process.kill()
             process.join()
             return False
-        if (held_mb := _held_mb(process.pid)) > most_mb:
-            log.warning("the process for heavy work held %.0f MB and is ended", held_mb)
+        if (now_mb := held_mb(process.pid)) > most_mb:
+            log.warning("the process for heavy work held %.0f MB and is ended", now_mb)
             process.kill()
             process.join()
     return True
-
-
-def _held_mb(pid: int | None) -> float:
-    try:
-        return float(psutil.Process(pid).memory_info().rss) / 1e6
-    except psutil.NoSuchProcess:
-        return 0.0
 
 
 def _serve(settings: Settings, listener: socket.socket) -> None:

@@ -23,7 +23,6 @@ from service.api import (
     job_diffs,
     job_events,
     jobs,
-    me,
     meta,
     metrics,
     openapi,
@@ -68,37 +67,15 @@ DESCRIPTION = (
     "errors are problem documents (RFC 9457)."
 )
 
-ROUTERS = (
-    element_exports.router,
-    satellites.router,
-    spacecraft.router,
-    stapi.router,
-    ground_stations.router,
-    outages.router,
-    target_catalogs.router,
-    targets.router,
-    forecasts.router,
-    scenarios.router,
-    jobs.router,
-    timelines.router,
-    explanations.router,
-    job_diffs.router,
-    what_if.router,
-    job_events.router,
-    comparisons.router,
-    solvers.router,
-    plans.router,
-    telemetry.router,
-    passes.router,
-    replans.router,
-    webhooks.router,
-    audit_events.router,
-    me.router,
-    meta.router,
-    metrics.router,
-    openapi.router,
-    dashboard.router,
-)
+ROUTERS = tuple(
+    module.router
+    for module in (
+        element_exports, satellites, spacecraft, stapi, ground_stations, outages, target_catalogs,
+        targets, forecasts, scenarios, jobs, timelines, explanations, job_diffs, what_if,
+        job_events, comparisons, solvers, plans, telemetry, passes, replans, webhooks, audit_events,
+        meta, metrics, openapi, dashboard,
+    )
+)  # fmt: skip
 
 
 def create_app(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hmac
 from collections.abc import Collection, Sequence
-from typing import Any, Final, cast
+from typing import Final
 
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
@@ -13,6 +13,7 @@ from service.access.callers import Caller, Scope
 from service.access.tokens import digest_of, key_id_of, new_token
 from service.db.clock import utc_now
 from service.db.rows import ApiKeyRow
+from service.db.session import changed
 
 _SECONDS_A_DAY: Final = 86_400.0
 
@@ -50,13 +51,8 @@ def every_key(session: Session) -> Sequence[tuple[ApiKeyRow, bool]]:
 
 def revoke(session: Session, key_id: str) -> bool:
     """Make a key worthless from now on; return whether it was there and not yet revoked."""
-    changed = session.execute(
-        sa.update(ApiKeyRow)
-        .where(ApiKeyRow.id == key_id, ApiKeyRow.revoked_at.is_(None))
-        .values(revoked_at=utc_now())
-        .execution_options(synchronize_session=False)
-    )
-    return cast("sa.CursorResult[Any]", changed).rowcount == 1
+    is_good = sa.and_(ApiKeyRow.id == key_id, ApiKeyRow.revoked_at.is_(None))
+    return changed(session, ApiKeyRow, is_good, ApiKeyRow.id, revoked_at=utc_now()) is not None
 
 
 def has_key(session: Session, key_id: str) -> bool:

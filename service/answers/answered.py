@@ -7,17 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from datetime import datetime
 
-from service.answers.blocks import (
-    Document,
-    Entry,
-    blocks_of_timeline,
-    contents_of,
-    head_in,
-    items_in,
-    rest_in,
-    satellite_in,
-    target_blocks,
-)
+from service.answers.blocks import Document, Entry, head_in, items_in, rest_in, satellite_in
 from service.scenarios.stored_question import StoredQuestion
 
 __all__ = ["Answered", "Document", "compact", "in_chunks", "listed"]
@@ -77,19 +67,6 @@ class Answered:
                 self._satellites[-1].entries.append(entry)
             elif entry.kind == "rest":
                 self._satellites[-1].rest.append(entry)
-
-    @classmethod
-    def of(cls, timeline: str, targets: str, content: str, finished_at: datetime) -> Answered:
-        """Return what the texts of a job say; ``content`` is its scenario file."""
-        blocks = [
-            *blocks_of_timeline(json.loads(timeline)),
-            *target_blocks(json.loads(targets)),
-        ]
-
-        def texts(entries: Iterable[Entry]) -> Iterator[tuple[Entry, str]]:
-            return ((entry, blocks[entry.position].text) for entry in entries)
-
-        return cls(contents_of(blocks), texts, content, finished_at)
 
     @property
     def satellites(self) -> list[Document]:

@@ -68,17 +68,14 @@ class Entry:
     tally: Mapping[str, int]
 
 
+_TOLD: Final = ("kind", "first", "num_items", "tally")
+"""What a block and its entry say alike."""
+
+
 def contents_of(blocks: Iterable[Block]) -> list[Entry]:
     """Return the table of contents of blocks that stand in this order."""
     return [
-        Entry(
-            position=position,
-            kind=block.kind,
-            first=block.first,
-            num_items=block.num_items,
-            size=len(block.text),
-            tally=block.tally,
-        )
+        Entry(position=position, size=len(block.text), **{n: getattr(block, n) for n in _TOLD})
         for position, block in enumerate(blocks)
     ]
 
@@ -109,18 +106,6 @@ def timeline_blocks(
         text = f"], {json.dumps(rest)[1:]}" if rest else "]}"
         yield from (Block(kind="rest", text=part, first=number) for part in _parts(text))
     yield Block(kind="tail", text="]}")
-
-
-def blocks_of_timeline(timeline: Document) -> Iterator[Block]:
-    """Yield a timeline that is there as a whole."""
-
-    def parts(satellite: Document) -> tuple[Document, list[Document], Document]:
-        about = {name: satellite[name] for name in ("id", "name")}
-        rest = {k: v for k, v in satellite.items() if k not in ("id", "name", "actions")}
-        return about, satellite["actions"], rest
-
-    head = {name: value for name, value in timeline.items() if name != "satellites"}
-    return timeline_blocks(head, (parts(one) for one in timeline["satellites"]))
 
 
 def target_blocks(targets: Iterable[Document]) -> Iterator[Block]:

@@ -20,12 +20,12 @@ _KEPT = 200
 _KEPT_JOBS = 2
 
 
-class Explainer:
+class Explainer(Background):
     """Explains targets beside the requests; the jobs looked at last stay compiled."""
 
     def __init__(self) -> None:
         told = "The explanation is being worked out."
-        self._background = Background("explanations", kept=_KEPT, told=told)
+        super().__init__("explanations", kept=_KEPT, told=told)
         # Only the thread of the background touches these.
         self._jobs: dict[str, Rebuilt] = {}
 
@@ -41,11 +41,7 @@ class Explainer:
                 del self._jobs[oldest]
             return _Words(job).explanation(target, budget)
 
-        return self._background.get(f"{job_id}/{target}", work)
-
-    def close(self) -> None:
-        """Stop the work under way."""
-        self._background.close()
+        return self.work_out(f"{job_id}/{target}", work)
 
 
 def version_of(job_id: str, target_id: str) -> str:

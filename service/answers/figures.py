@@ -34,19 +34,19 @@ def num_delivered(problem: Problem, images: Iterable[Collected]) -> int | None:
     return sum(image.is_downlinked for image in images) if problem.use_resources else None
 
 
-def on_board_mbit(scenario: Scenario, problem: Problem, on_board: Sequence[float]) -> float | None:
-    """Return what recorders hold; None where one has no capacity in megabits.
+def in_mbit(scenario: Scenario, problem: Problem, shares: Sequence[float]) -> float | None:
+    """Return how much data it is in all; None where a recorder has no capacity in megabits.
 
     Parameters
     ----------
-    on_board
+    shares
         By satellite of the scenario, in recorder capacities.
     """
     capacities = [satellite.resources.recorder_capacity_mbit for satellite in scenario.satellites]
     if not problem.use_resources or None in capacities:
         return None
-    pairs = zip(on_board, capacities, strict=True)
-    return round(sum(share * (capacity or 0.0) for share, capacity in pairs), 6)
+    pairs = zip(shares, capacities, strict=True)
+    return sum(share * (capacity or 0.0) for share, capacity in pairs)
 
 
 def satellite_totals(

@@ -16,11 +16,7 @@ import numpy.typing as npt
 
 from planner_core.domain import Scenario
 from planner_core.errors import Fault, InvalidScenario
-from planner_core.problem import (
-    COLLECT,
-    CONTACT,
-    Problem,
-)
+from planner_core.problem import COLLECT, CONTACT, Problem
 from planner_core.problem.plan import Action, Plan
 from planner_core.referee.plan_diff import PlannedAction
 from planner_core.spreadsheets import unguarded
@@ -91,14 +87,13 @@ def records_of_csv(data: bytes) -> Records:
     # A plan may be empty; a file without a header is none.
     faults = [f for f in found.faults if f.code != "empty_file" or not data.strip()]
     records = tuple(
-        Record(fields={name: _text(value) for name, value in one.fields.items()}, row=one.row)
+        Record(
+            fields={k: unguarded(v) if isinstance(v, str) else v for k, v in one.fields.items()},
+            row=one.row,
+        )
         for one in found.records
     )
     return Records(records=records, faults=tuple(faults))
-
-
-def _text(value: object) -> object:
-    return unguarded(value) if isinstance(value, str) else value
 
 
 def records_of_json(data: bytes) -> Records:

@@ -20,7 +20,7 @@ from planner_core.referee.replay import plan_sha256
 from planner_core.referee.timeline import JudgedAction, Resourceline, Slew, Timeline, Violation
 from planner_core.run import Judged
 from planner_core.valuation import clear_probabilities
-from service.answers.figures import ages_of, num_delivered, on_board_mbit, satellite_totals
+from service.answers.figures import ages_of, in_mbit, num_delivered, satellite_totals
 from service.answers.image_figures import ImageFigures
 from service.wire.base import Json
 from service.wire.jobs import FiguresOut
@@ -241,13 +241,6 @@ class Documents(Wording):
         judged, timeline = self._judged, self._judged.timeline
         outcomes = Counter(outcome.outcome for outcome in judged.outcomes)
         modes = Counter(a.mode for s in timeline.satellites for a in s.actions)
-        capacities = [s.resources.recorder_capacity_mbit for s in judged.scenario.satellites]
-        downlinked_mbit: float | None = None
-        if judged.problem.use_resources and None not in capacities:
-            downlinked_mbit = sum(
-                share * (capacity or 0.0)
-                for share, capacity in zip(timeline.downlinked, capacities, strict=True)
-            )
         bound = judged.bound.value if judged.bound else None
         gap = None
         if bound is not None:
@@ -261,14 +254,14 @@ class Documents(Wording):
             collects=modes["collect"],
             contacts=modes["contact"],
             targets={name: outcomes[name] for name in get_args(Outcome)},
-            downlinked_mbit=downlinked_mbit,
+            downlinked_mbit=in_mbit(self.scenario, self.problem, timeline.downlinked),
             downlinked_fraction=sum(timeline.downlinked) if use_resources else None,
             battery_min_fraction=timeline.battery_min,
             recorder_max_fraction=timeline.recorder_max,
             **self._images.of().model_dump(),
             delivered=num_delivered(self.problem, timeline.collected.values()),
             age_s=ages_of(timeline.collected.values()),
-            on_board_mbit_end=on_board_mbit(self.scenario, self.problem, timeline.on_board),
+            on_board_mbit_end=_rounded(in_mbit(self.scenario, self.problem, timeline.on_board), 6),
             preferred=[
                 PreferredOut(
                     aim=effect.aim, before=round(effect.before, 6), after=round(effect.after, 6)

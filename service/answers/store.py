@@ -16,6 +16,8 @@ from service.db.rows import JobBlockRow, JobResultRow
 
 _AT_ONCE: Final = 1 << 17
 """Characters that are read or written in one statement."""
+_TOLD: Final = ("position", "kind", "first", "num_items", "size")
+"""What a table of contents and its row tell alike."""
 
 
 def save(
@@ -31,16 +33,9 @@ def save(
     )
     for some in _batches(contents_of(blocks)):
         rows = [
-            {
-                "job_id": job_id,
-                "position": entry.position,
-                "kind": entry.kind,
-                "first": entry.first,
-                "num_items": entry.num_items,
-                "size": entry.size,
-                "tally": dict(entry.tally) or None,
-                "text": blocks[entry.position].text,
-            }
+            {name: getattr(entry, name) for name in _TOLD}
+            | {"job_id": job_id, "tally": dict(entry.tally) or None}
+            | {"text": blocks[entry.position].text}
             for entry in some
         ]
         session.execute(sa.insert(JobBlockRow), rows)
@@ -54,18 +49,11 @@ def answered_at(session: Session, job_id: str) -> datetime | None:
 def contents(session: Session, job_id: str, *kinds: Kind) -> list[Entry]:
     """Return the table of contents of a job's answer, as far as it is of these kinds."""
     row = JobBlockRow
-    columns = (row.position, row.kind, row.first, row.num_items, row.size, row.tally)
-    wanted = sa.select(*columns).where(row.job_id == job_id, row.kind.in_(kinds))
+    columns = [getattr(row, name) for name in _TOLD]
+    wanted = sa.select(row.tally, *columns).where(row.job_id == job_id, row.kind.in_(kinds))
     return [
-        Entry(
-            position=found.position,
-            kind=found.kind,
-            first=found.first,
-            num_items=found.num_items,
-            size=found.size,
-            tally=found.tally or {},
-        )
-        for found in session.execute(wanted.order_by(row.position))
+        Entry(tally=tally or {}, **dict(zip(_TOLD, told, strict=True)))
+        for tally, *told in session.execute(wanted.order_by(row.position))
     ]
 
 

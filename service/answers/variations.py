@@ -56,12 +56,12 @@ class Asked:
         return sha256_of(f"{sha256_of(self.content)}{sha256_of(self.timeline or '')}{change}")
 
 
-class Variations:
+class Variations(Background):
     """Works out changed questions beside the requests."""
 
     def __init__(self) -> None:
         told = "The change is being worked out."
-        self._background = Background("variations", kept=_KEPT, told=told)
+        super().__init__("variations", kept=_KEPT, told=told)
 
     def get(self, asked: Asked, described: Described) -> Variation:
         """Return the changed question; 503 ``still_computing`` where that takes long.
@@ -71,11 +71,7 @@ class Variations:
         PlannerError
             The change is impossible; with a pointer into it.
         """
-        return self._background.get(asked.key, lambda budget: vary(asked, described, budget))
-
-    def close(self) -> None:
-        """Stop the work under way."""
-        self._background.close()
+        return self.work_out(asked.key, lambda budget: vary(asked, described, budget))
 
 
 def vary(asked: Asked, described: Described, budget: Budget) -> Variation:

@@ -2,7 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+
+from service.problems.kinds import ServiceError
+
+
+def require_offered(suffix: str, offered: Collection[str], what: str) -> None:
+    """Refuse a suffix that is none of the forms that something is offered in (406)."""
+    if suffix not in offered:
+        forms = ", ".join(f".{known}" for known in offered)
+        raise ServiceError("not_acceptable", f"{what} offered as {forms}.")
 
 
 def preferred(accept: str | None, offered: Sequence[str]) -> str | None:

@@ -10,8 +10,10 @@ from fastapi import APIRouter, Depends, Query
 from service.api.deps import DatabaseDep, admin_only
 from service.api.paging import PagingDep, newest_first
 from service.db.rows import AuditEventRow
+from service.stores.finding import with_values
 from service.wire.base import Listed
 from service.wire.operations import AuditEventOut
+from service.wire.stored import from_row
 
 router = APIRouter(
     prefix="/v1/audit-events", tags=["operations"], dependencies=[Depends(admin_only)]
@@ -29,16 +31,7 @@ def list_audit_events(
 ) -> Listed[AuditEventOut]:
     """List who changed what, newest first. Needs the scope `admin`."""
     wanted = {"object_id": object_id, "kind": kind, "action": action, "owner": owner}
-    conditions = [
-        getattr(AuditEventRow, column) == value
-        for column, value in wanted.items()
-        if value is not None
-    ]
-    query = sa.select(AuditEventRow).where(*conditions)
+    query = sa.select(AuditEventRow).where(*with_values(AuditEventRow, **wanted))
     with database.reading() as session:
         page = newest_first(session, query, AuditEventRow.id, paging)
-    return Listed(items=[_shown(row) for row in page.rows], next=page.next)
-
-
-def _shown(row: AuditEventRow) -> AuditEventOut:
-    return AuditEventOut.model_validate(row, from_attributes=True)
+    return Listed(items=[from_row(AuditEventOut, row) for row in page.rows], next=page.next)

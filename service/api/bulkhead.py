@@ -46,13 +46,8 @@ _CALLER: Final = "x-slewline-caller"
 _SCHEME: Final = "x-slewline-scheme"
 _ROUTE: Final = b"x-slewline-route"
 _OF_ONE_HOP: Final = (
-    b"connection",
-    b"keep-alive",
-    b"transfer-encoding",
-    b"expect",
-    b"upgrade",
-    b"te",
-)
+    b"connection", b"keep-alive", b"transfer-encoding", b"expect", b"upgrade", b"te",
+)  # fmt: skip
 _WITHIN_S: Final = 120.0
 _AGAIN_S: Final = 5
 

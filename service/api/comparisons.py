@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import cast
 
 import sqlalchemy as sa
 from fastapi import APIRouter, Response
@@ -11,29 +10,28 @@ from sqlalchemy.orm import Session
 
 from service.api import ask_again
 from service.api import job_intake as intake
-from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
+from service.api.conditional import created, readable, require_match, unless_known
 from service.api.deps import Call, CallDep
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
 from service.api.paging import PagingDep, newest_first
 from service.db.rows import ComparisonRow
 from service.jobs import submission
-from service.problems.kinds import ServiceError
 from service.scenarios.translate import inside
 from service.stores import comparison_store as store
 from service.stores import deletion, job_store
 from service.stores.comparison_store import Run
+from service.stores.finding import no_such, of_owner
 from service.wire.base import Listed
 from service.wire.jobs import (
     ACTIVE,
     ComparedRun,
     ComparisonIn,
     ComparisonOut,
-    ErrorOut,
-    JobState,
-    ProgressOut,
+    FiguresOut,
     ScenarioRef,
 )
+from service.wire.stored import from_row
 
 router = APIRouter(prefix="/v1/comparisons", tags=["comparisons"])
 
@@ -45,7 +43,7 @@ def create_comparison(body: ComparisonIn, call: CallDep, once: OnceDep) -> Compa
     for position, run in enumerate(body.runs):
         with inside(f"/runs/{position}"):
             params.append(intake.all_params(run.solver, run.params))
-    time_s, memory_mb = intake.limits_of(body.limits, call.settings)
+    limits = intake.limits_of(body.limits, call.settings)
     inline = intake.frozen(call, body)
     queue = intake.queue_with_room(call, len(body.runs))
     with once.transaction() as session:
@@ -57,8 +55,7 @@ def create_comparison(body: ComparisonIn, call: CallDep, once: OnceDep) -> Compa
                 solver=run.solver,
                 params=of_run,
                 seed=run.seed,
-                time_s=time_s,
-                memory_mb=memory_mb,
+                limits=limits,
                 priority=body.priority,
                 label=body.label,
                 owner=call.caller.owner,
@@ -77,19 +74,14 @@ def create_comparison(body: ComparisonIn, call: CallDep, once: OnceDep) -> Compa
 @router.get("")
 def list_comparisons(call: CallDep, paging: PagingDep) -> Listed[ComparisonOut]:
     """List the comparisons of the key's owner, newest first; all for the scope `admin`."""
-    query = sa.select(ComparisonRow)
-    if call.caller.visible_owner is not None:
-        query = query.where(ComparisonRow.tenant == call.caller.visible_owner)
+    own = of_owner(ComparisonRow.tenant, call.caller.visible_owner)
+    query = sa.select(ComparisonRow).where(own)
     with call.database.reading() as session:
         page = newest_first(session, query, ComparisonRow.id, paging, store.weight())
         return Listed(items=_shown(session, page.rows), next=page.next)
 
 
-@router.get(
-    "/{comparison_id}",
-    response_model=ComparisonOut,
-    responses={**NOT_MODIFIED, **problem_responses(404)},
-)
+@router.get("/{comparison_id}", response_model=ComparisonOut, responses=readable())
 def get_comparison(comparison_id: str, call: CallDep) -> ComparisonOut | Response:
     """Return the table as it stands: a line fills when its job has an answer."""
     with call.database.reading() as session:
@@ -111,7 +103,7 @@ def delete_comparison(comparison_id: str, call: CallDep) -> None:
 def _find(session: Session, comparison_id: str, call: Call) -> ComparisonRow:
     row = session.get(ComparisonRow, comparison_id)
     if row is None or call.caller.visible_owner not in (None, row.tenant):
-        raise ServiceError("not_found", f"There is no comparison {comparison_id!r}.")
+        raise no_such("comparison", comparison_id)
     return row
 
 
@@ -128,12 +120,11 @@ def _shown(session: Session, rows: Sequence[ComparisonRow]) -> list[ComparisonOu
 
 def _table(row: ComparisonRow, runs: list[Run], sha256: str) -> ComparisonOut:
     is_active = any(run.job.state in ACTIVE for run in runs)
-    return ComparisonOut(
-        id=row.id,
+    return from_row(
+        ComparisonOut,
+        row,
         state="running" if is_active else "finished",
         scenario=ScenarioRef(id=row.scenario_id, sha256=sha256),
-        label=row.label,
-        created_at=row.created_at,
         runs=[_line(run) for run in runs],
         links={
             "self": f"/v1/comparisons/{row.id}",
@@ -143,16 +134,7 @@ def _table(row: ComparisonRow, runs: list[Run], sha256: str) -> ComparisonOut:
 
 
 def _line(run: Run) -> ComparedRun:
-    job, address = run.job, f"/v1/jobs/{run.job.id}"
-    return ComparedRun(
-        job_id=job.id,
-        state=cast(JobState, job.state),
-        solver=job.solver,
-        params=job.params,
-        seed=job.seed,
-        progress=None if job.progress is None else ProgressOut(**job.progress),
-        termination=job.termination,
-        error=None if job.error is None else ErrorOut(**job.error),
-        links={"job": address, "timeline": f"{address}/timeline"},
-        **(run.figures or {}),
-    )
+    address = f"/v1/jobs/{run.job.id}"
+    links = {"job": address, "timeline": f"{address}/timeline"}
+    figures = FiguresOut(**(run.figures or {}))
+    return from_row(ComparedRun, run.job, job_id=run.job.id, links=links, **dict(figures))

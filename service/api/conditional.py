@@ -1,14 +1,15 @@
-"""Conditional requests: 304 where the client is up to date, 412 where it is not and should be."""
+"""ETags name states: 304 where a client is up to date, 412 where it is not and should be."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import hashlib
+from collections.abc import Callable, Mapping
 from typing import Any, Final, TypeVar
 
 from fastapi import Request, Response
 from pydantic import BaseModel
 
-from service.api.etags import etagged, matches, matches_strongly
+from service.api.errors import problem_responses
 from service.problems.kinds import ServiceError
 
 M = TypeVar("M", bound=BaseModel)
@@ -19,13 +20,66 @@ NOT_MODIFIED: Final[dict[int | str, dict[str, Any]]] = {
 """For ``responses=`` of every route that may answer so."""
 
 
+def etag_of(text: str) -> str:
+    """Return a strong ETag of a representation.
+
+    >>> etag_of("a")
+    '"ca978112ca1bbdca"'
+    """
+    return f'"{hashlib.sha256(text.encode()).hexdigest()[:16]}"'
+
+
+def matches(if_none_match: str | None, etag: str) -> bool:
+    """Return whether an ``If-None-Match`` header names this ETag (weak comparison).
+
+    >>> matches('"x", W/"y"', '"y"'), matches("*", '"y"'), matches(None, '"y"')
+    (True, True, False)
+    """
+    if if_none_match is None:
+        return False
+    known = {tag.strip().removeprefix("W/") for tag in if_none_match.split(",")}
+    return "*" in known or etag.removeprefix("W/") in known
+
+
+def matches_strongly(if_match: str, etag: str) -> bool:
+    """Return whether an ``If-Match`` header names this ETag; a weak tag names nothing.
+
+    >>> matches_strongly('"x", "y"', '"y"'), matches_strongly('W/"y"', '"y"')
+    (True, False)
+    """
+    named = {tag.strip() for tag in if_match.split(",")}
+    return "*" in named or etag in named
+
+
+def etagged(model: BaseModel) -> str:
+    """Return the ETag of a model's JSON."""
+    return etag_of(model.model_dump_json())
+
+
+def readable(*statuses: int) -> dict[int | str, dict[str, Any]]:
+    """Return the OpenAPI entries of a route that reads one thing by its id."""
+    return {**NOT_MODIFIED, **problem_responses(404, *statuses)}
+
+
+def known_as(request: Request, etag: str) -> Response | None:
+    """Return 304 where ``If-None-Match`` names this ETag, else None."""
+    is_known = matches(request.headers.get("if-none-match"), etag)
+    return Response(status_code=304, headers={"ETag": etag}) if is_known else None
+
+
+def sent(
+    request: Request, content: str | bytes, media_type: str, headers: Mapping[str, str]
+) -> Response:
+    """Return a content, or 304 where ``If-None-Match`` names the ETag among its headers."""
+    if matches(request.headers.get("if-none-match"), headers["ETag"]):
+        return Response(status_code=304, headers=headers)
+    return Response(content, media_type=media_type, headers=headers)
+
+
 def unless_known(request: Request, response: Response, model: M) -> M | Response:
     """Return the model with its ETag, or 304 where ``If-None-Match`` names that ETag."""
-    etag = etagged(model)
-    if matches(request.headers.get("if-none-match"), etag):
-        return Response(status_code=304, headers={"ETag": etag})
-    response.headers["ETag"] = etag
-    return model
+    response.headers["ETag"] = etag = etagged(model)
+    return known_as(request, etag) or model
 
 
 def require_match(request: Request, current: Callable[[], BaseModel]) -> None:

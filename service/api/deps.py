@@ -19,10 +19,11 @@ from service.api.guard import require_scope
 from service.api.questions import QuestionsDep
 from service.db.session import Database
 from service.files.told import media_type_told
-from service.problems.faults import refuse
+from service.problems.faults import require_none
 from service.problems.kinds import ServiceError
 from service.settings import Settings
 from service.stores import usage_store
+from service.stores.finding import no_such
 from service.wire.base import is_plain
 
 ANY_FILE: Final = "application/octet-stream"
@@ -52,13 +53,6 @@ DatabaseDep = Annotated[Database, Depends(_database)]
 SettingsDep = Annotated[Settings, Depends(_settings)]
 RawBodyDep = Annotated[bytes, Depends(_raw_body)]
 CallerDep = Annotated[Caller, Depends(_caller)]
-
-
-async def _audit(request: Request, caller: CallerDep) -> Audit:
-    return Audit(caller=caller, request_id=request.state.request_id)
-
-
-AuditDep = Annotated[Audit, Depends(_audit)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +96,7 @@ async def own_job_only(request: Request, caller: CallerDep, questions: Questions
     if job_id is None or owner is None:
         return
     if await questions.owners.get(job_id) != owner:
-        raise ServiceError("not_found", f"There is no job {job_id!r}.")
+        raise no_such("job", job_id)
 
 
 def media_type_of(request: Request) -> str:
@@ -149,8 +143,7 @@ async def check_request(request: Request) -> None:
     if not all(map(is_plain, (request.scope["path"], *request.query_params.values()))):
         detail = "A path or parameter holds characters that no text may hold."
         faults.append(Fault(code="invalid_value", detail=detail))
-    if faults:
-        raise refuse(faults)
+    require_none(faults)
     if route.body_field is not None and await request.body():
         require_media_type(request, "application/json")
 

@@ -12,15 +12,16 @@ from sqlalchemy.orm import Session
 from planner_core.domain import OrbitEphemeris
 from planner_core.orbits import omm_writing
 from planner_core.orbits.omm_writing import Outgoing
-from service.api.conditional import NOT_MODIFIED
+from service.api.accept import require_offered
+from service.api.conditional import NOT_MODIFIED, etag_of, readable, sent
 from service.api.deps import CallDep
 from service.api.errors import problem_responses
-from service.api.etags import etag_of, matches
 from service.api.satellites import find_satellite
 from service.db.rows import SatelliteRow
 from service.problems.kinds import ServiceError
 from service.scenarios.translate import orbit_from
 from service.stores import satellite_store as store
+from service.stores.finding import alive
 from service.wire.satellites import OrbitIn
 
 router = APIRouter(prefix="/v1/satellites", tags=["satellites"])
@@ -64,7 +65,7 @@ def get_all_omm(suffix: Suffix, call: CallDep) -> Response:
     """
     form = _form_of(suffix)
     with call.database.reading() as session:
-        rows = session.scalars(store.alive().order_by(SatelliteRow.id)).all()
+        rows = session.scalars(alive(SatelliteRow).order_by(SatelliteRow.id)).all()
         messages = [
             message
             for first in range(0, len(rows), _AT_ONCE)
@@ -95,8 +96,7 @@ def get_omm(satellite_id: str, suffix: Suffix, call: CallDep) -> Response:
     response_class=Response,
     responses={
         200: {"description": "The message.", "content": {"text/plain": {}}},
-        **NOT_MODIFIED,
-        **problem_responses(404, 406),
+        **readable(406),
     },
 )
 def get_oem(satellite_id: str, call: CallDep) -> Response:
@@ -113,9 +113,7 @@ def get_oem(satellite_id: str, call: CallDep) -> Response:
 
 
 def _form_of(suffix: str) -> _Form:
-    if suffix not in _FORMS:
-        offered = ", ".join(f".{known}" for known in _FORMS)
-        raise ServiceError("not_acceptable", f"Element sets are offered as {offered}.")
+    require_offered(suffix, _FORMS, "Element sets are")
     return _FORMS[suffix]
 
 
@@ -144,6 +142,4 @@ def _sent(request: Request, text: str, media_type: str, file_name: str) -> Respo
         "ETag": etag_of(text),
         "Content-Disposition": f'inline; filename="{file_name}"',
     }
-    if matches(request.headers.get("if-none-match"), headers["ETag"]):
-        return Response(status_code=304, headers=headers)
-    return Response(text, media_type=media_type, headers=headers)
+    return sent(request, text, media_type, headers)

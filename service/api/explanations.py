@@ -8,10 +8,8 @@ from fastapi import APIRouter, Depends, Path, Response
 
 from service.answers.explanations import Explainer, version_of
 from service.api import job_intake as intake
-from service.api.conditional import NOT_MODIFIED
+from service.api.conditional import etag_of, known_as, readable
 from service.api.deps import CallDep, own_job_only
-from service.api.errors import problem_responses
-from service.api.etags import etag_of, matches
 from service.problems.kinds import ServiceError
 from service.scenarios.opportunities import OpportunityReader
 from service.stores.job_store import hashes_of
@@ -24,7 +22,7 @@ router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[Depends(own_j
     # Ids of targets may hold slashes.
     "/{job_id}/targets/{target_id:path}/explanation",
     response_model=ExplanationOut,
-    responses={**NOT_MODIFIED, **problem_responses(404, 409, 503)},
+    responses=readable(409, 503),
 )
 def get_explanation(
     job_id: str,
@@ -46,8 +44,8 @@ def get_explanation(
     if target_id not in ids:
         raise ServiceError("not_found", f"The job has no target {target_id!r}.")
     etag = etag_of(version_of(job_id, target_id))
-    if matches(call.request.headers.get("if-none-match"), etag):
-        return Response(status_code=304, headers={"ETag": etag})
+    if (known := known_as(call.request, etag)) is not None:
+        return known
     explainer = cast(Explainer, call.request.app.state.explainer)
     call.response.headers["ETag"] = etag
     return explainer.get(job_id, described, timeline, ids.index(target_id))

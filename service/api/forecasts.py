@@ -2,60 +2,50 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime, timedelta
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
 import sqlalchemy as sa
 from fastapi import APIRouter, Query, Response
 from sqlalchemy.orm import Session
 
-from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
+from service.api.conditional import created, readable, require_match, unless_known
 from service.api.deps import ANY_FILE, Call, CallDep, RawBodyDep, file_type
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
-from service.api.imports import BYTES
+from service.api.imports import BYTES, request_body
 from service.api.paging import PagingDep, newest_first
-from service.db.ids import new_id
 from service.db.rows import ForecastRow
 from service.forecasts.csv_file import read_csv
-from service.forecasts.fields import Field, sha256_of, to_bytes
+from service.forecasts.fields import instant_of, sha256_of, to_bytes
 from service.forecasts.netcdf_file import read_netcdf
-from service.problems.kinds import ServiceError
-from service.stores import forecast_store
+from service.stores.finding import find_own, no_such, of_owner
 from service.wire.base import Listed, Name
 from service.wire.forecasts import ForecastOut
+from service.wire.stored import from_row
 
 router = APIRouter(prefix="/v1/forecasts", tags=["forecasts"])
 
 _CSV: Final = "text/csv"
 _NETCDF: Final = ("application/netcdf", "application/x-netcdf")
 _UNNAMED: Final = "Forecast"
-_EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 
-_REQUEST_BODY: dict[str, Any] = {
-    "requestBody": {
-        "required": True,
-        "content": {
-            _CSV: {
-                "schema": {
-                    "type": "string",
-                    "description": "A full grid, `time,lat_deg,lon_deg,clear_probability`; or "
-                    "values by target, `target_id,time,clear_probability`.",
-                }
-            },
-            ANY_FILE: BYTES,
-            _NETCDF[0]: {
-                "schema": {
-                    "type": "string",
-                    "format": "binary",
-                    "description": "NetCDF 4 with axes of time, latitude, longitude and "
-                    "optionally member: `clear_probability` from 0 to 1, or total cloud cover "
-                    "(`tcc` or the standard name `cloud_area_fraction`), from 0 to 1 or in %.",
-                }
-            },
+_REQUEST_BODY: Final = request_body(
+    {
+        _CSV: {
+            "type": "string",
+            "description": "A full grid, `time,lat_deg,lon_deg,clear_probability`; or values by "
+            "target, `target_id,time,clear_probability`.",
+        },
+        ANY_FILE: BYTES,
+        _NETCDF[0]: {
+            "type": "string",
+            "format": "binary",
+            "description": "NetCDF 4 with axes of time, latitude, longitude and optionally "
+            "member: `clear_probability` from 0 to 1, or total cloud cover (`tcc` or the standard "
+            "name `cloud_area_fraction`), from 0 to 1 or in %.",
         },
     }
-}
+)
 
 
 @router.post(
@@ -81,43 +71,32 @@ def create_forecast(
     block = to_bytes(field)
     with once.transaction() as session:
         call.count_stored(session, num_rows=1, num_bytes=len(block))
-        row = _add(session, call, name or _UNNAMED, field, block)
-        row.summary = field.describe() | {"notes": notes}
-        row.default_clear_probability = default_clear_probability
+        row = ForecastRow(
+            owner=call.caller.owner,
+            name=name or _UNNAMED,
+            sha256=sha256_of(field),
+            first_at=instant_of(field.first_ms),
+            last_at=instant_of(field.last_ms),
+            default_clear_probability=default_clear_probability,
+            summary=field.describe() | {"notes": notes},
+            block=block,
+        )
+        session.add(row)
         session.flush()
         call.audit.record(session, "create", "forecast", row.id)
         return once.keep(session, created(call.response, _shown(row), f"/v1/forecasts/{row.id}"))
 
 
-def _add(session: Session, call: Call, name: str, field: Field, block: bytes) -> ForecastRow:
-    row = ForecastRow(
-        id=new_id(),
-        owner=call.caller.owner,
-        name=name,
-        sha256=sha256_of(field),
-        first_at=_EPOCH + timedelta(milliseconds=field.first_ms),
-        last_at=_EPOCH + timedelta(milliseconds=field.last_ms),
-        created_at=datetime.now(UTC),
-        block=block,
-    )
-    session.add(row)
-    return row
-
-
 @router.get("")
 def list_forecasts(call: CallDep, paging: PagingDep) -> Listed[ForecastOut]:
     """List your forecasts, newest first; the scope `admin` sees all."""
-    query = sa.select(ForecastRow).where(forecast_store.seen_by(call.caller.visible_owner))
+    query = sa.select(ForecastRow).where(of_owner(ForecastRow.owner, call.caller.visible_owner))
     with call.database.reading() as session:
         page = newest_first(session, query, ForecastRow.id, paging)
     return Listed(items=[_shown(row) for row in page.rows], next=page.next)
 
 
-@router.get(
-    "/{forecast_id}",
-    response_model=ForecastOut,
-    responses={**NOT_MODIFIED, **problem_responses(404)},
-)
+@router.get("/{forecast_id}", response_model=ForecastOut, responses=readable())
 def get_forecast(forecast_id: str, call: CallDep) -> ForecastOut | Response:
     """Return what is known of one forecast, without its values."""
     with call.database.reading() as session:
@@ -136,20 +115,11 @@ def delete_forecast(forecast_id: str, call: CallDep) -> None:
 
 
 def _find(session: Session, call: Call, forecast_id: str) -> ForecastRow:
-    row = forecast_store.find(session, forecast_id, call.caller.visible_owner)
+    row = find_own(session, ForecastRow, forecast_id, call.caller.visible_owner)
     if row is None:
-        raise ServiceError("not_found", f"There is no forecast {forecast_id!r}.")
+        raise no_such("forecast", forecast_id)
     return row
 
 
 def _shown(row: ForecastRow) -> ForecastOut:
-    return ForecastOut(
-        id=row.id,
-        name=row.name,
-        sha256=row.sha256,
-        first=row.first_at,
-        last=row.last_at,
-        default_clear_probability=row.default_clear_probability,
-        created_at=row.created_at,
-        **row.summary,
-    )
+    return from_row(ForecastOut, row, first=row.first_at, last=row.last_at, **row.summary)

@@ -3,28 +3,24 @@
 from __future__ import annotations
 
 from collections import Counter
-from datetime import UTC, datetime
 from typing import Final, Literal
 
-import sqlalchemy as sa
 from fastapi import APIRouter, Response
-from pydantic import ValidationError
 from sqlalchemy.orm import Session
 
 from planner_core.errors import Fault
-from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
+from service.api.conditional import created, readable, require_match, unless_known
 from service.api.deps import CallDep, DatabaseDep, RawBodyDep, file_type
 from service.api.errors import problem_responses
 from service.api.filters import NameQuery, by_name
 from service.api.idempotency import OnceDep
 from service.api.imports import OnError, OnErrorQuery, body_schemas, imported, refuse_if_asked
 from service.api.paging import PagingDep, newest_first, size_of
-from service.db.ids import new_id
 from service.db.rows import GroundStationRow
 from service.files.records import Checked, check, read_csv, read_geojson
-from service.problems.faults import faults_of_validation, refuse
-from service.problems.kinds import ServiceError
+from service.problems.faults import validated
 from service.scenarios.translate import ground_station_from
+from service.stores.finding import alive, existing
 from service.wire.base import Listed
 from service.wire.imports import Imported
 from service.wire.places import (
@@ -33,7 +29,7 @@ from service.wire.places import (
     GroundStationPatch,
     ImportedStation,
 )
-from service.wire.stored import from_store
+from service.wire.stored import from_row, from_store
 
 router = APIRouter(prefix="/v1/ground-stations", tags=["ground stations"])
 
@@ -105,23 +101,19 @@ def list_ground_stations(
     database: DatabaseDep, paging: PagingDep, name: NameQuery = None
 ) -> Listed[GroundStationOut]:
     """List the ground stations, newest first."""
-    query = sa.select(GroundStationRow).where(GroundStationRow.deleted_at.is_(None))
-    query = by_name(query, GroundStationRow.body["name"].as_string(), name)
+    own_name = GroundStationRow.body["name"].as_string()
+    query = by_name(alive(GroundStationRow), own_name, name)
     with database.reading() as session:
         weight = size_of(GroundStationRow.body)
         page = newest_first(session, query, GroundStationRow.id, paging, weight)
     return Listed(items=[_shown(row) for row in page.rows], next=page.next)
 
 
-@router.get(
-    "/{station_id}",
-    response_model=GroundStationOut,
-    responses={**NOT_MODIFIED, **problem_responses(404)},
-)
+@router.get("/{station_id}", response_model=GroundStationOut, responses=readable())
 def get_ground_station(station_id: str, call: CallDep) -> GroundStationOut | Response:
     """Return one ground station."""
     with call.database.reading() as session:
-        shown = _shown(_find(session, station_id))
+        shown = _shown(existing(session, GroundStationRow, "ground station", station_id))
     return unless_known(call.request, call.response, shown)
 
 
@@ -134,14 +126,11 @@ def change_ground_station(
     `If-Match` takes the ETag of the station.
     """
     with call.database.transaction() as session:
-        row = _find(session, station_id, to_change=True)
+        row = existing(session, GroundStationRow, "ground station", station_id, to_change=True)
         require_match(call.request, lambda: _shown(row))
         changes = body.model_dump(mode="json", exclude_none=True)
         whole = row.body | changes
-        try:
-            changed = GroundStationIn(**whole)
-        except ValidationError as error:  # a stored value may be out of today's range
-            raise refuse(faults_of_validation(error, whole)) from None
+        changed = validated(GroundStationIn, whole)  # a stored value may be out of today's range
         ground_station_from(changed, station_id)
         if _change(row, changed):
             call.audit.record(session, "update", "ground_station", station_id)
@@ -153,33 +142,20 @@ def change_ground_station(
 def delete_ground_station(station_id: str, call: CallDep) -> None:
     """Delete a ground station. Scenarios that use it keep their copy."""
     with call.database.transaction() as session:
-        row = _find(session, station_id, to_change=True)
+        row = existing(session, GroundStationRow, "ground station", station_id, to_change=True)
         require_match(call.request, lambda: _shown(row))
-        row.deleted_at = datetime.now(UTC)
+        row.delete()
         call.audit.record(session, "delete", "ground_station", station_id)
 
 
-def _find(session: Session, station_id: str, *, to_change: bool = False) -> GroundStationRow:
-    row = session.get(GroundStationRow, station_id, with_for_update=to_change)
-    if row is None or row.deleted_at is not None:
-        raise ServiceError("not_found", f"There is no ground station {station_id!r}.")
-    return row
-
-
 def _add(session: Session, body: GroundStationIn) -> GroundStationRow:
-    row = GroundStationRow(
-        id=new_id(),
-        name=body.name,
-        body=body.model_dump(mode="json"),
-        created_at=datetime.now(UTC),
-    )
+    row = GroundStationRow(name=body.name, body=body.model_dump(mode="json"))
     session.add(row)
     return row
 
 
 def _store(session: Session, good: list[Checked[GroundStationIn]]) -> list[ImportedStation]:
-    query = sa.select(GroundStationRow).where(GroundStationRow.deleted_at.is_(None))
-    stored = session.scalars(query).all()
+    stored = session.scalars(alive(GroundStationRow)).all()
     known = {_body(row): row for row in stored}
     # A name that is there twice, or twice in the file, says nothing about which station is meant.
     of_file = Counter(one.body.name for one in good)
@@ -212,4 +188,4 @@ def _body(row: GroundStationRow) -> str:
 
 
 def _shown(row: GroundStationRow) -> GroundStationOut:
-    return from_store(GroundStationOut, {"id": row.id, "created_at": row.created_at, **row.body})
+    return from_row(GroundStationOut, row, **row.body)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from typing import Annotated, Any, Final, TypeVar
 
@@ -14,12 +14,11 @@ from service.problems.faults import refuse
 from service.wire.imports import Imported, RejectedRow
 
 BYTES: Final[dict[str, Any]] = {
-    "schema": {
-        "type": "string",
-        "format": "binary",
-        "description": "A file of any of these forms; its content tells which.",
-    }
+    "type": "string",
+    "format": "binary",
+    "description": "A file of any of these forms; its content tells which.",
 }
+"""The schema of a file that tells its form itself."""
 
 T = TypeVar("T")
 
@@ -66,13 +65,11 @@ def _schema_of(kind: str) -> dict[str, Any]:
 
 def body_schemas(**examples: tuple[str, str]) -> dict[str, Any]:
     """Return OpenAPI's ``requestBody`` for files: media type to description."""
-    return {
-        "requestBody": {
-            "required": True,
-            "content": {
-                kind: {"schema": _schema_of(kind) | {"description": text}}
-                for kind, text in examples.values()
-            }
-            | {ANY_FILE: BYTES},
-        }
-    }
+    schemas = {kind: _schema_of(kind) | {"description": text} for kind, text in examples.values()}
+    return request_body(schemas | {ANY_FILE: BYTES})
+
+
+def request_body(schemas: Mapping[str, Any]) -> dict[str, Any]:
+    """Return OpenAPI's ``requestBody``, for ``openapi_extra=``: media type to schema."""
+    content = {kind: {"schema": schema} for kind, schema in schemas.items()}
+    return {"requestBody": {"required": True, "content": content}}

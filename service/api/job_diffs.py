@@ -9,23 +9,17 @@ from fastapi import APIRouter, Depends, Response
 from planner_core.referee.plan_diff import PlannedAction, plan_diff
 from service.answers.rebuilt import view_of
 from service.api import job_intake as intake
-from service.api.conditional import NOT_MODIFIED
+from service.api.conditional import etag_of, known_as, readable
 from service.api.deps import CallDep, own_job_only
-from service.api.errors import problem_responses
-from service.api.etags import etag_of, matches
-from service.problems.kinds import ServiceError
 from service.stores import job_store as store
+from service.stores.finding import no_such
 from service.wire.base import read
 from service.wire.timelines import Difference, DiffOut, MovedOut, PlannedOut, TimelineOut, TotalDiff
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[Depends(own_job_only)])
 
 
-@router.get(
-    "/{job_id}/diff/{other_id}",
-    response_model=DiffOut,
-    responses={**NOT_MODIFIED, **problem_responses(404, 409)},
-)
+@router.get("/{job_id}/diff/{other_id}", response_model=DiffOut, responses=readable(409))
 def get_diff(job_id: str, other_id: str, call: CallDep) -> DiffOut | Response:
     """Compare the plans of two jobs: actions added, removed and moved, and the totals.
 
@@ -34,12 +28,12 @@ def get_diff(job_id: str, other_id: str, call: CallDep) -> DiffOut | Response:
     """
     with call.database.reading() as session:
         if call.caller.visible_owner not in (None, store.owner_of(session, other_id)):
-            raise ServiceError("not_found", f"There is no job {other_id!r}.")
+            raise no_such("job", other_id)
         jobs = [intake.find_job(session, own_id) for own_id in (job_id, other_id)]
         before, after = (intake.find_timeline(session, job) for job in jobs)
     etag = etag_of(f"{job_id}/{other_id}")  # timelines never change
-    if matches(call.request.headers.get("if-none-match"), etag):
-        return Response(status_code=304, headers={"ETag": etag})
+    if (known := known_as(call.request, etag)) is not None:
+        return known
     call.response.headers["ETag"] = etag
     return _diff(job_id, other_id, before, after)
 

@@ -10,17 +10,17 @@ from typing import Any, Final
 from fastapi import Request, Response
 from sqlalchemy.orm import Session
 
-from planner_core.errors import Fault
 from planner_core.solvers.registry import solver_class
 from service.answers import store as answer_store
 from service.api import ask_again, bulkhead
 from service.api.deps import Call
+from service.api.idempotency import Once
 from service.api.job_shapes import headers_of, shown
 from service.db.rows import JobRow, ScenarioRow
 from service.jobs.queue import JobQueue
 from service.jobs.solver_params import params_of, parse_params
-from service.jobs.submission import JobSpec
-from service.problems.faults import refuse
+from service.jobs.submission import JobSpec, submit
+from service.problems.faults import refuse_one
 from service.problems.kinds import ServiceError
 from service.scenarios import freezing
 from service.scenarios.freezing import FrozenScenario
@@ -29,6 +29,7 @@ from service.scenarios.translate import inside, read_file
 from service.settings import Settings
 from service.stores import job_store as store
 from service.stores import scenario_store
+from service.stores.finding import no_such
 from service.wire.jobs import ACTIVE, JobIn, JobOut, LimitsIn, QuestionIn
 from service.wire.replans import ReplanIn
 from service.wire.scenarios import ScenarioFile, ScenarioIn
@@ -63,15 +64,12 @@ def asked_for(body: JobIn | ReplanIn, call: Call) -> partial[JobSpec]:
     ServiceError
         Where parameters or limits are wrong, before anything is stored.
     """
-    params = all_params(body.solver, body.params)
-    time_s, memory_mb = limits_of(body.limits, call.settings)
     return partial(
         JobSpec,
         solver=body.solver,
-        params=params,
+        params=all_params(body.solver, body.params),
         seed=body.seed,
-        time_s=time_s,
-        memory_mb=memory_mb,
+        limits=limits_of(body.limits, call.settings),
         priority=body.priority,
         label=body.label,
         owner=call.caller.owner,
@@ -89,8 +87,8 @@ def frozen(call: Call, body: QuestionIn) -> FrozenScenario | None:
     if (scenario is None) == (body.scenario_id is None):
         detail = "Give either scenario_id or scenario."
         if scenario is None:
-            raise refuse([Fault(code="missing_field", detail=detail, pointer="/scenario_id")])
-        raise refuse([Fault(code="invalid_value", detail=detail, pointer="/scenario")])
+            raise refuse_one("missing_field", detail, "/scenario_id")
+        raise refuse_one("invalid_value", detail, "/scenario")
     with inside("/scenario"):
         if isinstance(scenario, ScenarioIn):
             return freeze(call, scenario)
@@ -136,20 +134,20 @@ def stored_scenario(
     if scenario_store.find(session, body.scenario_id, call.caller.visible_owner) is not None:
         return body.scenario_id
     detail = f"There is no scenario {body.scenario_id!r}."
-    raise refuse([Fault(code="unknown_scenario", detail=detail, pointer="/scenario_id")])
+    raise refuse_one("unknown_scenario", detail, "/scenario_id")
 
 
-def limits_of(limits: LimitsIn, settings: Settings) -> tuple[float, int]:
+def limits_of(limits: LimitsIn, settings: Settings) -> dict[str, float]:
     """Return seconds and megabytes that a job may use, the server's where nothing is said."""
     time_s = settings.default_time_s if limits.time_s is None else limits.time_s
     if time_s > settings.max_time_s:
         detail = f"{time_s:g} s is more than the {settings.max_time_s:g} s that a job may take."
-        raise refuse([Fault(code="value_out_of_range", detail=detail, pointer="/limits/time_s")])
+        raise refuse_one("value_out_of_range", detail, "/limits/time_s")
     memory_mb = settings.default_memory_mb if limits.memory_mb is None else limits.memory_mb
     if memory_mb > settings.max_memory_mb:
         detail = f"{memory_mb} MB are more than the {settings.max_memory_mb} that a job may hold."
-        raise refuse([Fault(code="value_out_of_range", detail=detail, pointer="/limits/memory_mb")])
-    return time_s, memory_mb
+        raise refuse_one("value_out_of_range", detail, "/limits/memory_mb")
+    return {"time_s": time_s, "memory_mb": memory_mb}
 
 
 def require_room(session: Session, call: Call, num_jobs: int = 1) -> None:
@@ -169,9 +167,9 @@ def require_room(session: Session, call: Call, num_jobs: int = 1) -> None:
 
 def find_job(session: Session, job_id: str) -> JobRow:
     """Return a job; 404 where there is none."""
-    job = store.find(session, job_id)
+    job = session.get(JobRow, job_id)
     if job is None:
-        raise ServiceError("not_found", f"There is no job {job_id!r}.")
+        raise no_such("job", job_id)
     return job
 
 
@@ -210,8 +208,10 @@ def describe(response: Response, job: JobRow) -> None:
     response.headers.update(headers_of(job))
 
 
-def accepted(session: Session, response: Response, job: JobRow) -> JobOut:
-    """Return a job that was just queued, and tell where to follow it."""
-    response.headers["Location"] = f"/v1/jobs/{job.id}"
-    describe(response, job)
-    return shown_job(session, job)
+def queued(session: Session, call: Call, once: Once, queue: JobQueue, spec: JobSpec) -> JobOut:
+    """Queue a job; return it, and tell where to follow it."""
+    job = submit(session, queue, spec)
+    call.audit.record(session, "create", "job", job.id)
+    call.response.headers["Location"] = f"/v1/jobs/{job.id}"
+    describe(call.response, job)
+    return once.keep(session, shown_job(session, job))

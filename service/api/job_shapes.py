@@ -2,38 +2,25 @@
 
 from __future__ import annotations
 
-from typing import Any, cast
+from typing import Any
 
 import sqlalchemy as sa
 
 from service.api import ask_again
 from service.db.rows import JobRow
-from service.wire.jobs import ErrorOut, JobOut, JobState, LimitsOut, ProgressOut, ScenarioRef
+from service.wire.jobs import JobOut, ScenarioRef
+from service.wire.stored import from_row
 
 
 def shown(job: JobRow, scenario_sha256: str) -> JobOut:
     """Return a job as clients see it."""
     address = f"/v1/jobs/{job.id}"
-    return JobOut(
-        id=job.id,
-        state=cast(JobState, job.state),
+    return from_row(
+        JobOut,
+        job,
         scenario=ScenarioRef(id=job.scenario_id, sha256=scenario_sha256),
-        solver=job.solver,
-        params=job.params,
-        seed=job.seed,
-        limits=LimitsOut(**job.limits),
         attempt=max(job.run, 1),
-        priority=job.priority,
-        label=job.label,
-        progress=None if job.progress is None else ProgressOut(**job.progress),
-        created_at=job.created_at,
-        started_at=job.started_at,
-        finished_at=job.finished_at,
-        termination=job.termination,
-        error=None if job.error is None else ErrorOut(**job.error),
-        validity=job.validity,
         warnings=job.warnings or (),
-        change=job.change,
         links={
             "self": address,
             "timeline": f"{address}/timeline",

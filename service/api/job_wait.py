@@ -6,11 +6,11 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from typing import Final
 
-from service.api.etags import matches
+from service.api.conditional import matches
 from service.api.job_shapes import etag_of_job
 from service.api.questions import Questions
 from service.db.rows import JobRow
-from service.problems.kinds import ServiceError
+from service.stores.finding import no_such
 from service.wire.jobs import ACTIVE
 
 LOOK_EVERY_S: Final = 0.1
@@ -53,5 +53,5 @@ async def wait_for_change(
 async def _read(questions: Questions, job_id: str) -> tuple[JobRow, str]:
     found = await questions.jobs.get(job_id)
     if found is None:
-        raise ServiceError("not_found", f"There is no job {job_id!r}.")
+        raise no_such("job", job_id)
     return found

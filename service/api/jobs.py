@@ -5,14 +5,14 @@ from __future__ import annotations
 import logging
 from typing import Annotated, Final
 
+import sqlalchemy as sa
 from fastapi import APIRouter, Depends, Query, Response
 from sqlalchemy.exc import SQLAlchemyError
 
 from service.api import job_intake as intake
-from service.api.conditional import NOT_MODIFIED, require_match_of
+from service.api.conditional import matches, readable, require_match_of
 from service.api.deps import CallDep, own_job_only
 from service.api.errors import problem_responses
-from service.api.etags import matches
 from service.api.filters import SatelliteQuery, StationQuery, StoredDep
 from service.api.idempotency import OnceDep
 from service.api.job_shapes import etag_of_job, shown
@@ -25,6 +25,7 @@ from service.jobs.queue import JobQueue
 from service.problems.kinds import ServiceError
 from service.stores import deletion, scenario_store
 from service.stores import job_store as store
+from service.stores.finding import with_values
 from service.wire.base import Listed
 from service.wire.jobs import JobIn, JobOut, JobState
 
@@ -46,9 +47,7 @@ def create_job(body: JobIn, call: CallDep, once: OnceDep) -> JobOut:
     with once.transaction() as session:
         intake.require_room(session, call)
         spec = asked(scenario_id=intake.stored_scenario(session, call, body, inline))
-        job = submission.submit(session, queue, spec)
-        call.audit.record(session, "create", "job", job.id)
-        return once.keep(session, intake.accepted(session, call.response, job))
+        return intake.queued(session, call, once, queue, spec)
 
 
 @router.get("")
@@ -64,26 +63,19 @@ def list_jobs(
     station_id: StationQuery = None,
 ) -> Listed[JobOut]:
     """List the jobs of the key's owner, newest first; all jobs for the scope `admin`."""
-    query = store.matching(
-        state=state,
-        solver=solver,
-        scenario_id=scenario_id,
-        label=label,
-        tenant=call.caller.visible_owner,
+    own = {"state": state, "solver": solver, "scenario_id": scenario_id, "label": label}
+    query = sa.select(JobRow).where(
+        *with_values(JobRow, tenant=call.caller.visible_owner, **own),
+        *scenario_store.with_parts(JobRow.scenario_id, satellite_id, station_id),
     )
     query = stored.narrow(query, JobRow.created_at)
-    query = query.where(*scenario_store.with_parts(JobRow.scenario_id, satellite_id, station_id))
     with call.database.reading() as session:
         page = newest_first(session, query, JobRow.id, paging, size_of(JobRow.change))
         hashes = store.scenario_hashes(session, page.rows)
     return Listed(items=[shown(job, hashes[job.scenario_id]) for job in page.rows], next=page.next)
 
 
-@router.get(
-    "/{job_id}",
-    response_model=JobOut,
-    responses={**NOT_MODIFIED, **problem_responses(404)},
-)
+@router.get("/{job_id}", response_model=JobOut, responses=readable())
 async def get_job(
     job_id: str,
     call: CallDep,
@@ -151,9 +143,7 @@ def rerun_job(job_id: str, call: CallDep, once: OnceDep) -> JobOut:
         spec = submission.spec_again(intake.find_job(session, job_id), call.caller.owner)
         intake.require_room(session, call)
         scenario_store.let_see_too(session, spec.scenario_id, call.caller.owner)
-        job = submission.submit(session, queue, spec)
-        call.audit.record(session, "create", "job", job.id)
-        return once.keep(session, intake.accepted(session, call.response, job))
+        return intake.queued(session, call, once, queue, spec)
 
 
 def _forget(queue: JobQueue, job: JobRow) -> None:

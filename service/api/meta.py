@@ -1,4 +1,4 @@
-"""Health, version, and what each problem code means."""
+"""Whom the service takes a caller for, its health, its version, and what problem codes mean."""
 
 from __future__ import annotations
 
@@ -9,17 +9,29 @@ import sqlalchemy as sa
 from fastapi import APIRouter, Path
 
 import planner_core
-from service.api.deps import CallDep
+from service.api.deps import CallDep, CallerDep
 from service.api.errors import problem_responses
 from service.db.rows import WorkerRow
 from service.db.session import Database
 from service.jobs.queue import JobQueue
 from service.problems.kinds import KINDS, ServiceError, kind_of
-from service.wire.operations import Live, ProblemExplained, Ready, Version
+from service.stores.finding import no_such
+from service.wire.operations import CallerOut, Live, ProblemExplained, Ready, Version
 
 router = APIRouter(tags=["operations"])
 
 WORKER_SILENCE = timedelta(seconds=30)
+
+
+@router.get("/v1/me")
+def who_am_i(caller: CallerDep) -> CallerOut:
+    """Say whose key this is and what it allows."""
+    return CallerOut(
+        owner=caller.owner,
+        scope=caller.scope.value,
+        key_id=caller.key_id,
+        key_name=caller.key_name,
+    )
 
 
 @router.get("/health/live")
@@ -68,7 +80,7 @@ def explain_problem(code: Annotated[str, Path(examples=["tle-checksum"])]) -> Pr
     """Explain a problem code, written with hyphens or underscores."""
     name = code.replace("-", "_")
     if name not in KINDS:
-        raise ServiceError("not_found", f"There is no problem code {code!r}.")
+        raise no_such("problem code", code)
     kind = kind_of(name)
     return ProblemExplained(
         code=name, title=kind.title, status=kind.status, explanation=kind.explanation

@@ -6,7 +6,7 @@ are counted by each process for itself.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Final, cast
 
 import sqlalchemy as sa
@@ -116,16 +116,9 @@ def _families(database: Database) -> Iterator[Metric]:
 
 
 def _of_jobs(snapshot: Snapshot) -> Iterator[Metric]:
-    jobs = GaugeMetricFamily("slewline_jobs", "Jobs by state.", labels=["state"])
-    for state, number in snapshot.num_jobs.items():
-        jobs.add_metric([state], number)
-    yield jobs
-    plans = GaugeMetricFamily(
-        "slewline_job_plans", "Plans that jobs have found, by validity.", labels=["validity"]
-    )
-    for validity, number in snapshot.num_plans.items():
-        plans.add_metric([validity], number)
-    yield plans
+    yield _gauge("slewline_jobs", "Jobs by state.", "state", snapshot.num_jobs)
+    about = "Plans that jobs have found, by validity."
+    yield _gauge("slewline_job_plans", about, "validity", snapshot.num_plans)
     yield GaugeMetricFamily(
         "slewline_queue_oldest_seconds",
         "How long the oldest waiting job has waited.",
@@ -146,14 +139,12 @@ def _of_jobs(snapshot: Snapshot) -> Iterator[Metric]:
 
 
 def _of_others(snapshot: Snapshot) -> Iterator[Metric]:
-    workers = GaugeMetricFamily(
+    yield _gauge(
         "slewline_worker_heartbeat_age_seconds",
         "Since the last sign of life of each worker of the last day.",
-        labels=["worker"],
+        "worker",
+        snapshot.heartbeat_age_s,
     )
-    for worker, age_s in snapshot.heartbeat_age_s.items():
-        workers.add_metric([worker], age_s)
-    yield workers
     orbits = GaugeMetricFamily(
         "slewline_orbit_age_seconds",
         "Since the epoch of the newest elements of each satellite planned in the last 7 days.",
@@ -162,11 +153,17 @@ def _of_others(snapshot: Snapshot) -> Iterator[Metric]:
     for orbit in snapshot.orbits:
         orbits.add_metric([orbit.satellite_id, orbit.name], orbit.age_s)
     yield orbits
-    deliveries = GaugeMetricFamily(
+    yield _gauge(
         "slewline_webhook_deliveries",
         "Messages of webhooks by state; ended ones of the last 30 days.",
-        labels=["state"],
+        "state",
+        snapshot.num_deliveries,
     )
-    for state, number in snapshot.num_deliveries.items():
-        deliveries.add_metric([state], number)
-    yield deliveries
+
+
+def _gauge(name: str, about: str, label: str, values: Mapping[str, float]) -> Metric:
+    """Return a figure for each value of one label."""
+    family = GaugeMetricFamily(name, about, labels=[label])
+    for value, number in values.items():
+        family.add_metric([value], number)
+    return family

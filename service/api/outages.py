@@ -3,25 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from datetime import UTC, datetime
 from typing import Annotated
 
 import sqlalchemy as sa
 from fastapi import APIRouter, Query, Response
 from sqlalchemy.orm import Session
 
-from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
+from service.api.conditional import created, readable, require_match, unless_known
 from service.api.deps import CallDep
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
 from service.api.paging import PagingDep, newest_first
-from service.db.ids import new_id
 from service.db.rows import GroundStationRow, OutageRow, SatelliteRow
-from service.problems.kinds import ServiceError
 from service.scenarios.pin_inputs import outage_from
 from service.stores import outage_store
+from service.stores.finding import alive, existing, find, with_values
 from service.wire.base import Instant, Listed
 from service.wire.pins import OutageIn, OutageOut
+from service.wire.stored import from_row
 
 router = APIRouter(prefix="/v1/outages", tags=["outages"])
 
@@ -37,7 +36,7 @@ def create_outage(body: OutageIn, call: CallDep, once: OnceDep) -> OutageOut:
         outage_from(body).check(
             "", satellite_ids, _alive(session, GroundStationRow, body.station_id)
         )
-        row = OutageRow(id=new_id(), created_at=datetime.now(UTC), **body.model_dump())
+        row = OutageRow(**body.model_dump())
         session.add(row)
         session.flush()
         call.audit.record(session, "create", "outage", row.id)
@@ -57,25 +56,18 @@ def list_outages(
     to: Annotated[Instant | None, Query(description="Only those that begin before it.")] = None,
 ) -> Listed[OutageOut]:
     """List the outages, newest first."""
-    query = outage_store.overlapping(outage_store.alive(), from_, to)
-    if satellite_id is not None:
-        query = query.where(OutageRow.satellite_id == satellite_id)
-    if station_id is not None:
-        query = query.where(OutageRow.station_id == station_id)
+    own = with_values(OutageRow, satellite_id=satellite_id, station_id=station_id)
+    query = outage_store.overlapping(alive(OutageRow).where(*own), from_, to)
     with call.database.reading() as session:
         page = newest_first(session, query, OutageRow.id, paging)
         return Listed(items=_shown(session, page.rows), next=page.next)
 
 
-@router.get(
-    "/{outage_id}",
-    response_model=OutageOut,
-    responses={**NOT_MODIFIED, **problem_responses(404)},
-)
+@router.get("/{outage_id}", response_model=OutageOut, responses=readable())
 def get_outage(outage_id: str, call: CallDep) -> OutageOut | Response:
     """Return one outage."""
     with call.database.reading() as session:
-        shown = _shown(session, [_find(session, outage_id)])[0]
+        shown = _shown(session, [existing(session, OutageRow, "outage", outage_id)])[0]
     return unless_known(call.request, call.response, shown)
 
 
@@ -83,25 +75,17 @@ def get_outage(outage_id: str, call: CallDep) -> OutageOut | Response:
 def delete_outage(outage_id: str, call: CallDep) -> None:
     """Delete an outage, as where it ends early. Scenarios that took it along keep it."""
     with call.database.transaction() as session:
-        row = _find(session, outage_id, to_change=True)
+        row = existing(session, OutageRow, "outage", outage_id, to_change=True)
         require_match(call.request, lambda: _shown(session, [row])[0])
-        row.deleted_at = datetime.now(UTC)
+        row.delete()
         call.audit.record(session, "delete", "outage", outage_id)
-
-
-def _find(session: Session, outage_id: str, *, to_change: bool = False) -> OutageRow:
-    row = session.get(OutageRow, outage_id, with_for_update=to_change)
-    if row is None or row.deleted_at is not None:
-        raise ServiceError("not_found", f"There is no outage {outage_id!r}.")
-    return row
 
 
 def _alive(
     session: Session, table: type[SatelliteRow] | type[GroundStationRow], own_id: str | None
 ) -> set[str]:
     """Return the id, where something of it is stored."""
-    wanted = sa.select(table.id).where(table.id == own_id, table.deleted_at.is_(None))
-    return set(session.scalars(wanted))
+    return set() if own_id is None or find(session, table, own_id) is None else {own_id}
 
 
 def _shown(session: Session, rows: Sequence[OutageRow]) -> list[OutageOut]:
@@ -113,17 +97,11 @@ def _shown(session: Session, rows: Sequence[OutageRow]) -> list[OutageOut]:
         wanted = sa.select(table.id, table.name).where(table.id.in_(ids - {None}))
         names |= {row.id: row.name for row in session.execute(wanted)}
     return [
-        OutageOut(
-            id=row.id,
-            satellite_id=row.satellite_id,
+        from_row(
+            OutageOut,
+            row,
             satellite_name=names.get(row.satellite_id or ""),
-            station_id=row.station_id,
             station_name=names.get(row.station_id or ""),
-            start=row.start,
-            end=row.end,
-            modes=tuple(row.modes),
-            reason=row.reason,
-            created_at=row.created_at,
         )
         for row in rows
     ]

@@ -13,13 +13,13 @@ from fastapi.responses import StreamingResponse
 from planner_core.domain import GroundStation
 from service.answers.passes import PassFilter, passes_of_plan
 from service.api import job_intake as intake
+from service.api.accept import require_offered
 from service.api.deps import Call, CallDep
 from service.api.errors import problem_responses
 from service.api.paging import PagingDep
 from service.api.plans import find_plan
 from service.db.rows import JobRow
 from service.exports.passes import write_csv, write_ics
-from service.problems.kinds import ServiceError
 from service.scenarios.stored_question import StoredQuestion
 from service.stores import job_store
 from service.wire.base import Instant, Listed, read
@@ -87,9 +87,7 @@ def get_passes_as(plan_id: str, suffix: Suffix, call: CallDep, wanted: FilterDep
     """Return the passes of a plan as a table or as a calendar."""
     with call.database.reading() as session:
         find_plan(session, plan_id, call.caller)
-    if suffix not in _TYPES:
-        offered = ", ".join(f".{known}" for known in _TYPES)
-        raise ServiceError("not_acceptable", f"Passes are offered as {offered}.")
+    require_offered(suffix, _TYPES, "Passes are")
     found = _find(call, plan_id, wanted)
     return StreamingResponse(
         _written(found, suffix),

@@ -3,34 +3,27 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Annotated, Any, cast
+from typing import Annotated, cast
 
 from fastapi import APIRouter, Query, Response
 from sqlalchemy.orm import Session
 
-from planner_core.errors import Fault
 from service.access.callers import Caller, Scope
 from service.api import job_intake as intake
-from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
+from service.api.conditional import created, etagged, readable, require_match, unless_known
 from service.api.deps import CallDep
 from service.api.errors import problem_responses
-from service.api.etags import etagged
 from service.api.guard import require_scope
 from service.api.idempotency import OnceDep
 from service.api.paging import PagingDep, newest_first
 from service.api.timelines import Suffix, timeline_answer, timeline_responses
-from service.db.rows import (
-    JobRow,
-    PlanActionRow,
-    PlanRow,
-    PlanSatelliteRow,
-)
+from service.db.rows import JobRow, PlanActionRow, PlanRow, PlanSatelliteRow
 from service.exports.forms import FORMS
 from service.plans import lifecycle
 from service.plans import store as plan_store
-from service.problems.faults import refuse
-from service.problems.kinds import ServiceError
+from service.problems.faults import refuse_one
 from service.stores import deletion, job_store
+from service.stores.finding import find_own, no_such
 from service.webhooks import outbox
 from service.wire.base import Listed, parse_instant, read
 from service.wire.plans import (
@@ -44,7 +37,8 @@ from service.wire.plans import (
     TransitionIn,
 )
 from service.wire.scenarios import HorizonOut
-from service.wire.timelines import TimelineOut, ViolationOut
+from service.wire.stored import from_row
+from service.wire.timelines import TimelineOut
 
 router = APIRouter(prefix="/v1/plans", tags=["plans"])
 
@@ -61,7 +55,7 @@ def create_plan(body: PlanIn, call: CallDep, once: OnceDep) -> PlanOut:
         owner = job_store.owner_of(session, body.job_id)
         if owner is None or call.caller.visible_owner not in (None, owner):
             detail = f"There is no job {body.job_id!r}."
-            raise refuse([Fault(code="unknown_job", detail=detail, pointer="/job_id")])
+            raise refuse_one("unknown_job", detail, "/job_id")
         job = intake.find_job(session, body.job_id)
         timeline = read(TimelineOut, intake.find_timeline(session, job))
         plan = plan_store.add(session, call.caller, owner, job.id, body.name, timeline)
@@ -106,12 +100,10 @@ def _instant(session: Session, at: str | None) -> datetime | None:
     try:
         return parse_instant(at)
     except ValueError as error:
-        raise refuse([Fault(code="invalid_time", detail=f"at: {error}.")]) from None
+        raise refuse_one("invalid_time", f"at: {error}.") from None
 
 
-@router.get(
-    "/{plan_id}", response_model=PlanOut, responses={**NOT_MODIFIED, **problem_responses(404)}
-)
+@router.get("/{plan_id}", response_model=PlanOut, responses=readable())
 def get_plan(plan_id: str, call: CallDep) -> PlanOut | Response:
     """Return one plan."""
     with call.database.reading() as session:
@@ -159,10 +151,7 @@ def list_history(plan_id: str, call: CallDep) -> Listed[PlanEventOut]:
     with call.database.reading() as session:
         find_plan(session, plan_id, call.caller)
         events = plan_store.history(session, plan_id)
-    return Listed(
-        items=[PlanEventOut.model_validate(event, from_attributes=True) for event in events],
-        next=None,
-    )
+    return Listed(items=[from_row(PlanEventOut, event) for event in events], next=None)
 
 
 @router.get("/{plan_id}/actions", responses=problem_responses(404))
@@ -196,9 +185,9 @@ def find_plan(
     session: Session, plan_id: str, caller: Caller, *, to_change: bool = False
 ) -> PlanRow:
     """Return a plan; 404 where there is none that the caller may see."""
-    plan = session.get(PlanRow, plan_id, with_for_update=to_change, populate_existing=to_change)
-    if plan is None or caller.visible_owner not in (None, plan.owner):
-        raise ServiceError("not_found", f"There is no plan {plan_id!r}.")
+    plan = find_own(session, PlanRow, plan_id, caller.visible_owner, to_change=to_change)
+    if plan is None:
+        raise no_such("plan", plan_id)
     return plan
 
 
@@ -208,12 +197,10 @@ def _shown(session: Session, plan: PlanRow) -> PlanOut:
 
 def _plan_out(plan: PlanRow, satellites: list[PlanSatelliteRow]) -> PlanOut:
     address = f"/v1/plans/{plan.id}"
+    parts = ("actions", "history", "executions", "states")
     links = {
         "self": address,
-        "actions": f"{address}/actions",
-        "history": f"{address}/history",
-        "executions": f"{address}/executions",
-        "states": f"{address}/states",
+        **{part: f"{address}/{part}" for part in parts},
         "timeline": f"{address}/timeline.json",
         "passes": f"{address}/passes",
         "job": f"/v1/jobs/{plan.job_id}",
@@ -221,29 +208,16 @@ def _plan_out(plan: PlanRow, satellites: list[PlanSatelliteRow]) -> PlanOut:
     if plan.parent_id is not None:
         links["parent"] = f"/v1/plans/{plan.parent_id}"
         links["changes"] = f"{address}/changes"
-    return PlanOut(
-        id=plan.id,
-        name=plan.name,
-        state=cast(PlanState, plan.state),
-        owner=plan.owner,
-        job_id=plan.job_id,
-        parent_id=plan.parent_id,
-        plan_sha256=plan.plan_sha256,
+    return from_row(
+        PlanOut,
+        plan,
         horizon=HorizonOut(start=plan.horizon_start, end=plan.horizon_end),
-        validity=cast(Any, plan.validity),
-        violations=tuple(ViolationOut.model_validate(each) for each in plan.violations),
-        satellites=tuple(
-            PlanSatelliteOut.model_validate(row, from_attributes=True) for row in satellites
-        ),
+        satellites=[from_row(PlanSatelliteOut, row) for row in satellites],
         allowed=TRANSITIONS[cast(PlanState, plan.state)],
-        created_at=plan.created_at,
         links=links,
     )
 
 
 def action_out(row: PlanActionRow, outcome: str | None) -> PlanActionOut:
     """Return an action, and what became of it."""
-    fields = {
-        name: getattr(row, name) for name in PlanActionOut.model_fields.keys() - {"id", "outcome"}
-    }
-    return PlanActionOut(id=row.action_id, outcome=cast(Any, outcome), **fields)
+    return from_row(PlanActionOut, row, id=row.action_id, outcome=outcome)

@@ -15,7 +15,7 @@ from starlette.responses import Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from service.access.callers import Caller
-from service.api.etags import matches
+from service.api.conditional import matches
 from service.api.job_shapes import etag_of_job, etag_of_timeline, headers_of, shown
 from service.api.together import Together
 from service.db.rows import JobResultRow, JobRow

@@ -22,10 +22,9 @@ from service.api.idempotency import OnceDep
 from service.api.plans import action_out, find_plan
 from service.api.telemetry import faults_of_states, take_down
 from service.db.rows import JobRow, PlanActionRow, PlanRow, SatelliteRow, ScenarioRow
-from service.jobs import submission
 from service.plans import replans
 from service.plans import store as plan_store
-from service.problems.faults import refuse
+from service.problems.faults import require_none
 from service.scenarios import freezing, replanning
 from service.scenarios.pin_inputs import with_settled_pins
 from service.scenarios.stored_question import StoredQuestion
@@ -75,9 +74,7 @@ def create_replan(plan_id: str, body: ReplanIn, call: CallDep, once: OnceDep) ->
             scenario_id=row.id,
             change=replans.note_of(plan, call.caller, body.name, freeze_until),
         )
-        made = submission.submit(session, queue, spec)
-        call.audit.record(session, "create", "job", made.id)
-        return once.keep(session, intake.accepted(session, call.response, made))
+        return intake.queued(session, call, once, queue, spec)
 
 
 def _to_the_millisecond(instant: datetime) -> datetime:
@@ -130,8 +127,7 @@ def _telemetry(
         for i, state in enumerate(body.states)
         if state.at > now
     ]  # fmt: skip
-    if faults:
-        raise refuse(faults)
+    require_none(faults)
     known = plan_store.last_states(session, plan.id, now)
     known |= {state.satellite_id: state for state in sorted(body.states, key=lambda s: s.at)}
     began = {state.satellite_id: state.at for state in file.states}

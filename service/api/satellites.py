@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict
-from datetime import UTC, datetime
 from typing import Annotated, Any, Final, TypeVar
 
 import sqlalchemy as sa
 from fastapi import APIRouter, Query, Response
 from sqlalchemy.orm import Session
 
-from planner_core.errors import Fault
 from planner_core.orbits.ingest import read_elements
 from planner_core.orbits.oem import outline_of
-from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
+from service.api.conditional import created, readable, require_match, unless_known
 from service.api.deps import CallDep, DatabaseDep, RawBodyDep, file_type
 from service.api.errors import problem_responses
 from service.api.filters import NameQuery, by_name
@@ -22,18 +20,17 @@ from service.api.idempotency import OnceDep
 from service.api.imports import OnError, OnErrorQuery, body_schemas, imported, refuse_if_asked
 from service.api.paging import PagingDep, newest_first
 from service.db.rows import ElementSetRow, SatelliteRow
-from service.problems.faults import refuse
-from service.problems.kinds import ServiceError
+from service.problems.faults import refuse_one
 from service.scenarios.translate import orbit_from, satellite_from
 from service.stores import satellite_store as store
 from service.stores import spacecraft_store
+from service.stores.finding import alive, existing
 from service.wire.base import Json, Listed
 from service.wire.imports import Imported
 from service.wire.satellites import (
     AgilityIn,
     ElementsOut,
     ImportedSatellite,
-    OemOut,
     OrbitIn,
     RecordWarning,
     SatelliteIn,
@@ -45,7 +42,7 @@ from service.wire.satellites import (
     sent_by,
 )
 from service.wire.spacecraft_types import DEFAULT
-from service.wire.stored import from_store
+from service.wire.stored import from_row
 
 router = APIRouter(prefix="/v1/satellites", tags=["satellites"])
 
@@ -121,7 +118,7 @@ def list_satellites(
     name: NameQuery = None,
 ) -> Listed[SatelliteOut]:
     """List the satellites, newest first."""
-    query = by_name(store.alive(), SatelliteRow.name, name)
+    query = by_name(alive(SatelliteRow), SatelliteRow.name, name)
     if norad_cat_id is not None:
         query = query.where(SatelliteRow.norad_cat_id == norad_cat_id)
     with database.reading() as session:
@@ -129,11 +126,7 @@ def list_satellites(
         return Listed(items=_shown(session, page.rows), next=page.next)
 
 
-@router.get(
-    "/{satellite_id}",
-    response_model=SatelliteOut,
-    responses={**NOT_MODIFIED, **problem_responses(404)},
-)
+@router.get("/{satellite_id}", response_model=SatelliteOut, responses=readable())
 def get_satellite(satellite_id: str, call: CallDep) -> SatelliteOut | Response:
     """Return one satellite with the element set in force."""
     with call.database.reading() as session:
@@ -168,7 +161,7 @@ def delete_satellite(satellite_id: str, call: CallDep) -> None:
     with call.database.transaction() as session:
         row = find_satellite(session, satellite_id, to_change=True)
         require_match(call.request, lambda: _shown(session, [row])[0])
-        row.deleted_at = datetime.now(UTC)
+        row.delete()
         call.audit.record(session, "delete", "satellite", satellite_id)
 
 
@@ -199,15 +192,14 @@ def list_elements(
     with database.reading() as session:
         find_satellite(session, satellite_id)
         page = newest_first(session, query, ElementSetRow.id, paging)
-    return Listed(items=[_shown_elements(row) for row in page.rows], next=page.next)
+    return Listed(
+        items=[from_row(ElementsOut, row, **_told(row.orbit)) for row in page.rows], next=page.next
+    )
 
 
 def find_satellite(session: Session, satellite_id: str, *, to_change: bool = False) -> SatelliteRow:
     """Return a satellite, its row locked where it is to change; 404 where there is none."""
-    row = session.get(SatelliteRow, satellite_id, with_for_update=to_change)
-    if row is None or row.deleted_at is not None:
-        raise ServiceError("not_found", f"There is no satellite {satellite_id!r}.")
-    return row
+    return existing(session, SatelliteRow, "satellite", satellite_id, to_change=to_change)
 
 
 def _figures_of(session: Session, spacecraft_id: str) -> dict[str, Any]:
@@ -242,58 +234,29 @@ def _require_same_object(row: SatelliteRow, norad_cat_id: int, body: OrbitIn) ->
     # An ephemeris has no catalogue number.
     if norad_cat_id == row.norad_cat_id or body.oem is not None:
         return
-    raise refuse(
-        [
-            Fault(
-                code="different_satellite",
-                detail=f"The elements are of {norad_cat_id}, the satellite is {row.norad_cat_id}.",
-                pointer="/tle" if body.tle is not None else "/omm/NORAD_CAT_ID",
-            )
-        ]
-    )
+    detail = f"The elements are of {norad_cat_id}, the satellite is {row.norad_cat_id}."
+    pointer = "/tle" if body.tle is not None else "/omm/NORAD_CAT_ID"
+    raise refuse_one("different_satellite", detail, pointer)
 
 
 def _shown(session: Session, rows: Sequence[SatelliteRow]) -> list[SatelliteOut]:
     elements = store.in_force(session, [row.id for row in rows])
     return [
-        from_store(
+        from_row(
             SatelliteOut,
-            {
-                "id": row.id,
-                "name": row.name,
-                "norad_cat_id": row.norad_cat_id,
-                "epoch": elements[row.id].epoch,
-                "tle": elements[row.id].orbit.get("tle"),
-                "omm": elements[row.id].orbit.get("omm"),
-                "oem": _told(elements[row.id].orbit),
-                "spacecraft": row.spacecraft,
-                "agility": row.agility,
-                "sensor": row.sensor,
-                "resources": row.resources,
-                "created_at": row.created_at,
-                "links": {"elements": f"/v1/satellites/{row.id}/elements"},
-            },
+            row,
+            epoch=elements[row.id].epoch,
+            links={"elements": f"/v1/satellites/{row.id}/elements"},
+            **_told(elements[row.id].orbit),
         )
         for row in rows
     ]
 
 
-def _told(orbit: Json) -> OemOut | None:
-    """Return what an answer tells of an ephemeris, whose states are many."""
-    if "oem" not in orbit:
-        return None
-    return OemOut(**asdict(outline_of(orbit["oem"])))
-
-
-def _shown_elements(row: ElementSetRow) -> ElementsOut:
-    return ElementsOut(
-        id=row.id,
-        epoch=row.epoch,
-        tle=row.orbit.get("tle"),
-        omm=row.orbit.get("omm"),
-        oem=_told(row.orbit),
-        created_at=row.created_at,
-    )
+def _told(orbit: Json) -> Json:
+    """Return what an answer tells of an orbit; of an ephemeris, whose states are many, a little."""
+    oem = asdict(outline_of(orbit["oem"])) if "oem" in orbit else None
+    return {"tle": orbit.get("tle"), "omm": orbit.get("omm"), "oem": oem}
 
 
 def _imported(one: store.ImportedEntry) -> ImportedSatellite:

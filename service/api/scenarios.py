@@ -12,21 +12,20 @@ from sqlalchemy.orm import Session
 
 from planner_core.build import view_at
 from planner_core.orbits.places import View
-from planner_core.problem import COLLECT, CONTACT
+from planner_core.problem import COLLECT, CONTACT, Opportunities
 from service.access.callers import Caller
 from service.api import job_intake as intake
-from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
+from service.api.conditional import created, etag_of, readable, require_match, sent, unless_known
 from service.api.deps import CallDep
 from service.api.errors import problem_responses
-from service.api.etags import etag_of, matches
 from service.api.filters import NameQuery, SatelliteQuery, StationQuery, StoredDep, by_name
 from service.api.idempotency import OnceDep
 from service.api.paging import PagingDep, newest_first, size_of
 from service.db.rows import ScenarioRow
-from service.problems.kinds import ServiceError
 from service.scenarios.opportunities import Described, OpportunityReader
 from service.scenarios.stored_question import StoredQuestion
 from service.stores import deletion, scenario_store
+from service.stores.finding import no_such
 from service.wire.base import Listed
 from service.wire.scenarios import (
     Kind,
@@ -83,11 +82,7 @@ def list_scenarios(
     return Listed(items=[_summary(row) for row in page.rows], next=page.next)
 
 
-@router.get(
-    "/{scenario_id}",
-    response_model=ScenarioOut | ScenarioFile,
-    responses={**NOT_MODIFIED, **problem_responses(404)},
-)
+@router.get("/{scenario_id}", response_model=ScenarioOut | ScenarioFile, responses=readable())
 def get_scenario(
     scenario_id: str,
     call: CallDep,
@@ -106,10 +101,7 @@ def get_scenario(
 
 def _file(request: Request, row: ScenarioRow) -> Response:
     text = StoredQuestion(row.content).exported(row.name)
-    etag = etag_of(text)
-    if matches(request.headers.get("if-none-match"), etag):
-        return Response(status_code=304, headers={"ETag": etag})
-    return Response(text, media_type="application/json", headers={"ETag": etag})
+    return sent(request, text, "application/json", {"ETag": etag_of(text)})
 
 
 @router.delete("/{scenario_id}", status_code=204, responses=problem_responses(404, 409, 412))
@@ -159,14 +151,17 @@ def _edges(described: Described, rows: Sequence[int]) -> list[dict[str, ViewOut]
 
 
 def _view(seen: View, position: int) -> ViewOut:
-    return ViewOut(
-        off_nadir_deg=_rounded(seen.off_nadir_deg[position]),
-        elevation_deg=_rounded(seen.elevation_deg[position]),
-        azimuth_deg=_rounded(seen.azimuth_deg[position]),
-        range_km=_rounded(seen.range_m[position] / 1000.0),
-        sun_elevation_deg=_rounded(seen.sun_elevation_deg[position]),
-        eclipse=bool(seen.in_eclipse[position]),
-    )
+    return ViewOut(**_seen(seen, position))
+
+
+def _seen(seen: View | Opportunities, row: int) -> dict[str, Any]:
+    """Return what satellite and place see of each other, as answers have it."""
+    angles = ("off_nadir_deg", "elevation_deg", "azimuth_deg", "sun_elevation_deg")
+    return {
+        **{name: _rounded(getattr(seen, name)[row]) for name in angles},
+        "range_km": _rounded(seen.range_m[row] / 1000.0),
+        "eclipse": bool(seen.in_eclipse[row]),
+    }
 
 
 def _matching(
@@ -206,13 +201,8 @@ def _opportunity(described: Described, row: int, **edges: ViewOut) -> Opportunit
         end=at(float(table.end_s[row])),
         access_start=at(float(table.access_start_s[row])),
         access_end=at(float(table.access_end_s[row])),
-        off_nadir_deg=_rounded(table.off_nadir_deg[row]),
-        elevation_deg=_rounded(table.elevation_deg[row]),
-        azimuth_deg=_rounded(table.azimuth_deg[row]),
-        sun_elevation_deg=_rounded(table.sun_elevation_deg[row]),
-        range_km=_rounded(table.range_m[row] / 1000.0),
-        eclipse=bool(table.in_eclipse[row]),
         nadir=satellite.sensor.nadir,
+        **_seen(table, row),
         **edges,
     )
 
@@ -224,28 +214,19 @@ def _rounded(value: float) -> float:
 def _find(session: Session, scenario_id: str, caller: Caller) -> ScenarioRow:
     row = scenario_store.find(session, scenario_id, caller.visible_owner)
     if row is None:
-        raise ServiceError("not_found", f"There is no scenario {scenario_id!r}.")
+        raise no_such("scenario", scenario_id)
     return row
 
 
 def _shown(row: ScenarioRow) -> ScenarioOut:
     question = StoredQuestion(row.content)
-    return ScenarioOut(
-        **dict(_summary(row)),
-        pins=question.pins,
-        outages=question.outages,
-        states=question.states,
-    )
+    parts = {name: getattr(question, name) for name in ("pins", "outages", "states")}
+    return ScenarioOut(**dict(_summary(row)), **parts)
 
 
 def _summary(row: ScenarioRow) -> ScenarioSummary:
     where = f"/v1/scenarios/{row.id}"
     summary = {name: value for name, value in row.summary.items() if name != "pins"}
-    return ScenarioSummary(
-        id=row.id,
-        sha256=row.sha256,
-        name=row.name,
-        created_at=row.created_at,
-        links={"opportunities": f"{where}/opportunities", "file": f"{where}?expand=true"},
-        **summary,
-    )
+    links = {"opportunities": f"{where}/opportunities", "file": f"{where}?expand=true"}
+    own = {"id": row.id, "sha256": row.sha256, "name": row.name, "created_at": row.created_at}
+    return ScenarioSummary(**own, links=links, **summary)

@@ -8,7 +8,7 @@ from planner_core.solvers.base import Solver
 from planner_core.solvers.registry import SOLVERS
 from service.api.errors import problem_responses
 from service.jobs.solver_params import params_schema
-from service.problems.kinds import ServiceError
+from service.stores.finding import no_such
 from service.wire.base import Listed
 from service.wire.operations import SolverOut
 
@@ -26,7 +26,7 @@ def get_solver(name: str) -> SolverOut:
     """Return one solver."""
     solver = SOLVERS.get(name)
     if solver is None:
-        raise ServiceError("not_found", f"There is no solver {name!r}.")
+        raise no_such("solver", name)
     return _shown(solver)
 
 

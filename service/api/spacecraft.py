@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
 from typing import Any, Final
 
 from fastapi import APIRouter, Response
 from sqlalchemy.orm import Session
 
-from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
+from service.api.conditional import created, readable, require_match, unless_known
 from service.api.deps import CallDep, DatabaseDep
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
 from service.api.paging import PagingDep, newest_first
-from service.db.ids import new_id
 from service.db.rows import SpacecraftRow
+from service.problems.faults import validated
 from service.problems.kinds import ServiceError
 from service.scenarios.translate import figures_from
 from service.stores import spacecraft_store as store
+from service.stores.finding import alive, existing
 from service.wire.base import Listed
 from service.wire.satellites import sent_by
 from service.wire.spacecraft import SpacecraftIn, SpacecraftOut, SpacecraftPatch, WholeSpacecraft
 from service.wire.spacecraft_types import BUILT_IN, filled
+from service.wire.stored import from_row
 
 _ANY_PERIOD_S: Final = 5700.0
 """Presets follow the period of the orbit, which a type does not know; all are valid in any."""
@@ -35,9 +36,7 @@ def create_spacecraft(body: SpacecraftIn, once: OnceDep, call: CallDep) -> Space
     with once.transaction() as session:
         whole = store.completed(session, sent_by(body), WholeSpacecraft, names_type=False)
         figures_from(whole, _ANY_PERIOD_S)
-        row = SpacecraftRow(
-            id=new_id(), name=whole.name, body=_figures(whole), created_at=datetime.now(UTC)
-        )
+        row = SpacecraftRow(name=whole.name, body=_figures(whole))
         session.add(row)
         call.audit.record(session, "create", "spacecraft", row.id)
         shown = created(call.response, _shown(row), f"/v1/spacecraft/{row.id}")
@@ -48,16 +47,12 @@ def create_spacecraft(body: SpacecraftIn, once: OnceDep, call: CallDep) -> Space
 def list_spacecraft(database: DatabaseDep, paging: PagingDep) -> Listed[SpacecraftOut]:
     """List the types: one's own, newest first; on the last page those that are built in as well."""
     with database.reading() as session:
-        page = newest_first(session, store.alive(), SpacecraftRow.id, paging)
+        page = newest_first(session, alive(SpacecraftRow), SpacecraftRow.id, paging)
     built_in = [_built_in(name) for name in BUILT_IN] if page.next is None else []
     return Listed(items=[*(_shown(row) for row in page.rows), *built_in], next=page.next)
 
 
-@router.get(
-    "/{spacecraft_id}",
-    response_model=SpacecraftOut,
-    responses={**NOT_MODIFIED, **problem_responses(404)},
-)
+@router.get("/{spacecraft_id}", response_model=SpacecraftOut, responses=readable())
 def get_spacecraft(spacecraft_id: str, call: CallDep) -> SpacecraftOut | Response:
     """Return one type, by its id or the name of one that is built in."""
     if spacecraft_id in BUILT_IN:
@@ -78,7 +73,7 @@ def change_spacecraft(spacecraft_id: str, body: SpacecraftPatch, call: CallDep) 
         before = _shown(row)
         require_match(call.request, lambda: before)
         merged = filled({"name": row.name} | sent_by(body), row.body)
-        whole = store.validated(merged, WholeSpacecraft)
+        whole = validated(WholeSpacecraft, merged)
         figures_from(whole, _ANY_PERIOD_S)
         row.name, row.body = whole.name, _figures(whole)
         shown = _shown(row)
@@ -93,7 +88,7 @@ def delete_spacecraft(spacecraft_id: str, call: CallDep) -> None:
     with call.database.transaction() as session:
         row = _find(session, spacecraft_id, to_change=True)
         require_match(call.request, lambda: _shown(row))
-        row.deleted_at = datetime.now(UTC)
+        row.delete()
         call.audit.record(session, "delete", "spacecraft", spacecraft_id)
 
 
@@ -102,10 +97,7 @@ def _find(session: Session, spacecraft_id: str, *, to_change: bool = False) -> S
         raise ServiceError(
             "built_in", f"{spacecraft_id} is built in: store a type of your own instead."
         )
-    row = store.find(session, spacecraft_id, to_change=to_change)
-    if row is None:
-        raise ServiceError("not_found", f"There is no spacecraft type {spacecraft_id!r}.")
-    return row
+    return existing(session, SpacecraftRow, "spacecraft type", spacecraft_id, to_change=to_change)
 
 
 def _figures(whole: WholeSpacecraft) -> dict[str, Any]:
@@ -117,6 +109,4 @@ def _built_in(name: str) -> SpacecraftOut:
 
 
 def _shown(row: SpacecraftRow) -> SpacecraftOut:
-    return SpacecraftOut(
-        id=row.id, name=row.name, is_built_in=False, created_at=row.created_at, **row.body
-    )
+    return from_row(SpacecraftOut, row, is_built_in=False, **row.body)

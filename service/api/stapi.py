@@ -28,7 +28,6 @@ from stapi_pydantic import (
 from stapi_pydantic import Product as ProductShown
 from starlette.concurrency import run_in_threadpool
 
-from planner_core.errors import Fault
 from service.api import stapi_backend as backend
 from service.api.deps import CallDep
 from service.api.stapi_bodies import (
@@ -38,7 +37,7 @@ from service.api.stapi_bodies import (
     StapiOrderParameters,
     StapiQueryables,
 )
-from service.problems.faults import faults_of_validation, refuse
+from service.problems.faults import refuse_one, validated
 from service.problems.kinds import ServiceError
 
 PREFIX: Final = "/stapi"
@@ -54,10 +53,10 @@ async def _check_call(call: CallDep) -> None:
     try:
         AnyUrl(str(request.base_url))
     except ValidationError:
-        raise _refused("invalid_value", "The header Host names no host.") from None
+        raise refuse_one("invalid_value", "The header Host names no host.") from None
     limit = request.query_params.get("limit", "1")
     if not (limit.isdecimal() and len(limit) < 9 and 1 <= int(limit) <= _MOST_ON_A_PAGE):
-        raise _refused("value_out_of_range", f"limit is a number from 1 to {_MOST_ON_A_PAGE}.")
+        raise refuse_one("value_out_of_range", f"limit is a number from 1 to {_MOST_ON_A_PAGE}.")
 
 
 async def _check_product(product_id: str, request: Request, call: CallDep) -> None:
@@ -67,16 +66,8 @@ async def _check_product(product_id: str, request: Request, call: CallDep) -> No
         return
     if len(await request.body()) > MOST_BYTES:
         raise ServiceError("body_too_large", f"A body here has at most {MOST_BYTES} bytes.")
-    document = await request.json()
     model = OrderIn if request.url.path.endswith("/orders") else SearchIn
-    try:
-        request.state.asked = model.model_validate(document)
-    except ValidationError as error:
-        raise refuse(faults_of_validation(error, document)) from None
-
-
-def _refused(code: str, detail: str) -> ServiceError:
-    return refuse([Fault(code=code, detail=detail)])
+    request.state.asked = validated(model, await request.json())
 
 
 class _Products(ProductRouter):

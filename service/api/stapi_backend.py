@@ -18,14 +18,14 @@ from planner_core.errors import Fault
 from service.api.deps import Call
 from service.api.stapi_bodies import OrderIn, SearchIn, StapiOpportunity
 from service.db.ids import new_id
-from service.db.rows import OrderRow
+from service.db.rows import OrderRow, SpacecraftRow
 from service.plans.order_tracking import Step, steps_of
-from service.problems.faults import faults_of_validation, refuse
-from service.problems.kinds import ServiceError
+from service.problems.faults import faults_of_validation, refuse, refuse_one
 from service.scenarios.opportunities import Described
 from service.scenarios.spacecraft_views import fleet_of, types_flown, views_of
 from service.scenarios.translate import target_from
-from service.stores import order_store, spacecraft_store
+from service.stores import order_store
+from service.stores.finding import find, find_own, no_such, of_owner
 from service.wire.places import TargetIn
 from service.wire.scenarios import FileTarget
 from service.wire.spacecraft_types import BUILT_IN
@@ -60,16 +60,12 @@ def find_product(call: Call, product_id: str) -> Found:
     with call.database.reading() as session:
         found = _product(session, product_id) if product_id in types_flown(session) else None
     if found is None:
-        raise _no_product(product_id)
+        raise no_such("product", product_id)
     return found
 
 
-def _no_product(product_id: str) -> ServiceError:
-    return ServiceError("not_found", f"There is no product {product_id!r}.")
-
-
 def _product(session: Session, type_id: str) -> Found | None:
-    row = None if type_id in BUILT_IN else spacecraft_store.find(session, type_id)
+    row = None if type_id in BUILT_IN else find(session, SpacecraftRow, type_id)
     if row is None and type_id not in BUILT_IN:
         return None  # deleted, while its satellites fly on
     body: Any = BUILT_IN[type_id] if row is None else row.body
@@ -91,7 +87,7 @@ def search(call: Call, product: Found, asked: SearchIn) -> tuple[list[Opportunit
     with call.database.reading() as session:
         fleet = fleet_of(session, product.shown.id)
     if not fleet:  # the last satellite went a moment ago
-        raise _no_product(product.shown.id)
+        raise no_such("product", product.shown.id)
     described = views_of(fleet, target, start, end, call.settings.scenario_limits)
     first = int(asked.next or 0)
     number = len(described.computed.opportunities)
@@ -116,11 +112,8 @@ def _opportunity(
         azimuth_deg=round(float(table.azimuth_deg[row]), 6),
         sun_elevation_deg=round(float(table.sun_elevation_deg[row]), 6),
     )
-    return Opportunity(type="Feature", geometry=_point(asked), properties=properties)
-
-
-def _point(asked: SearchIn | OrderIn) -> Point:
-    return Point.model_validate(asked.geometry.model_dump())
+    point = Point.model_validate(asked.geometry.model_dump())
+    return Opportunity(type="Feature", geometry=point, properties=properties)
 
 
 def _target(asked: SearchIn | OrderIn, own_id: str, product: Found) -> TargetIn:
@@ -130,8 +123,7 @@ def _target(asked: SearchIn | OrderIn, own_id: str, product: Found) -> TargetIn:
     try:
         body = asked.as_target(own_id, **fields)
     except ValueError as error:
-        fault = Fault(code="invalid_value", detail=f"{error}.", pointer="/filter")
-        raise refuse([fault]) from None
+        raise refuse_one("invalid_value", f"{error}.", "/filter") from None
     try:
         target = TargetIn.model_validate(body)
     except ValidationError as error:
@@ -157,7 +149,7 @@ def list_orders(
     call: Call, after: str | None, limit: int
 ) -> tuple[list[Order[OrderStatus]], str | None, int]:
     """Return a page of the caller's orders, newest first, the id to go on after, how many."""
-    wanted = order_store.visible(call.caller.visible_owner)
+    wanted = sa.select(OrderRow).where(of_owner(OrderRow.owner, call.caller.visible_owner))
     with call.database.reading() as session:
         count = session.scalar(sa.select(sa.func.count()).select_from(wanted.subquery())) or 0
         if after is not None:
@@ -182,11 +174,11 @@ def statuses(call: Call, order_id: str) -> list[OrderStatus]:
 
 
 def _find(call: Call, order_id: str) -> tuple[OrderRow, Sequence[Step]]:
-    wanted = order_store.visible(call.caller.visible_owner).where(OrderRow.id == order_id)
+    owner = call.caller.visible_owner
     with call.database.reading() as session:
-        row = session.scalar(wanted)
+        row = find_own(session, OrderRow, order_id, owner)
         if row is None:
-            raise ServiceError("not_found", f"There is no order {order_id!r}.")
+            raise no_such("order", order_id)
         return row, steps_of(session, [row])[0]
 
 

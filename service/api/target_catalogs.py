@@ -2,30 +2,36 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 import sqlalchemy as sa
 from fastapi import APIRouter, Query, Response
-from pydantic import Field, ValidationError
+from pydantic import Field
 from sqlalchemy.orm import Session
 
 from planner_core.errors import Fault
-from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
+from service.api.conditional import created, readable, require_match, unless_known
 from service.api.deps import ANY_FILE, CallDep, DatabaseDep, RawBodyDep, file_type
 from service.api.errors import problem_responses
 from service.api.filters import NameQuery, by_name
 from service.api.idempotency import OnceDep
-from service.api.imports import BYTES
+from service.api.imports import BYTES, request_body
 from service.api.paging import PagingDep, newest_first
-from service.db.ids import new_id
 from service.db.rows import TargetCatalogRow, TargetRow
-from service.files.records import Record, Records, check, first_of_each, read_csv, read_geojson
-from service.problems.faults import faults_of_validation, refuse
-from service.problems.kinds import ServiceError
+from service.files.records import (
+    Record,
+    Records,
+    check,
+    first_of_each,
+    read_csv,
+    read_geojson,
+    read_json,
+)
+from service.problems.faults import pointer_to, require_none, validated
 from service.scenarios.translate import target_from
+from service.stores.finding import alive, existing
 from service.wire.base import Body, Listed, Name
 from service.wire.places import (
     MAX_TARGETS,
@@ -34,7 +40,7 @@ from service.wire.places import (
     TargetCatalogPatch,
     TargetIn,
 )
-from service.wire.stored import from_store
+from service.wire.stored import from_row, from_store
 
 router = APIRouter(prefix="/v1/target-catalogs", tags=["target catalogs"])
 
@@ -53,30 +59,23 @@ class _Listed(Body):
     targets: list[dict[str, Any]] = Field(min_length=1, max_length=MAX_TARGETS)
 
 
-_REQUEST_BODY: dict[str, Any] = {
-    "requestBody": {
-        "required": True,
-        "content": {
-            "application/json": {"schema": {"$ref": "#/components/schemas/TargetCatalogIn"}},
-            "application/geo+json": {
-                "schema": {
-                    "type": "object",
-                    "description": "A FeatureCollection of points (RFC 7946). The id is the "
-                    "feature's or a property; other fields of a target are properties.",
-                }
-            },
-            ANY_FILE: BYTES,
-            "text/csv": {
-                "schema": {
-                    "type": "string",
-                    "description": f"A header with id, lat_deg, lon_deg and any of "
-                    f"{', '.join(_OPTIONAL)}; lat, latitude, lon, lng and longitude are "
-                    "taken as well, and city for name. An empty cell means the default.",
-                }
-            },
+_REQUEST_BODY: Final = request_body(
+    {
+        "application/json": {"$ref": "#/components/schemas/TargetCatalogIn"},
+        "application/geo+json": {
+            "type": "object",
+            "description": "A FeatureCollection of points (RFC 7946). The id is the feature's or a "
+            "property; other fields of a target are properties.",
+        },
+        ANY_FILE: BYTES,
+        "text/csv": {
+            "type": "string",
+            "description": f"A header with id, lat_deg, lon_deg and any of {', '.join(_OPTIONAL)}; "
+            "lat, latitude, lon, lng and longitude are taken as well, and city for name. An empty "
+            "cell means the default.",
         },
     }
-}
+)
 
 
 @router.post(
@@ -127,14 +126,7 @@ def _read(kind: str, data: bytes) -> Records:
 
 
 def _read_json(data: bytes) -> Records:
-    try:
-        document = json.loads(data.decode("utf-8-sig"))
-    except (ValueError, RecursionError) as error:
-        raise refuse([Fault(code="malformed_json", detail=f"No JSON: {error}"[:200])]) from None
-    try:
-        body = _Listed.model_validate(document)
-    except ValidationError as error:
-        raise refuse(faults_of_validation(error, document)) from None
+    body = validated(_Listed, read_json(data))
     records = tuple(
         Record(fields=target, pointer=f"/targets/{position}")
         for position, target in enumerate(body.targets)
@@ -146,15 +138,12 @@ def _checked(found: Records) -> list[TargetIn]:
     good, faults = check(found.records, TargetIn, target_from)
     faults += found.faults
     faults += first_of_each(good, lambda target: target.id, "duplicate_target_id", "id")
-    if faults:
-        raise refuse(sorted(faults, key=lambda fault: fault.row or 0))
+    require_none(sorted(faults, key=lambda fault: fault.row or 0))
     return [one.body for one in good]
 
 
 def _add(session: Session, name: str, targets: Sequence[TargetIn]) -> TargetCatalogRow:
-    row = TargetCatalogRow(
-        id=new_id(), name=name, num_targets=len(targets), created_at=datetime.now(UTC)
-    )
+    row = TargetCatalogRow(name=name, num_targets=len(targets))
     session.add(row)
     session.flush()
     session.execute(
@@ -177,22 +166,17 @@ def list_target_catalogs(
     database: DatabaseDep, paging: PagingDep, name: NameQuery = None
 ) -> Listed[TargetCatalogOut]:
     """List the catalogues, newest first."""
-    query = sa.select(TargetCatalogRow).where(TargetCatalogRow.deleted_at.is_(None))
-    query = by_name(query, TargetCatalogRow.name, name)
+    query = by_name(alive(TargetCatalogRow), TargetCatalogRow.name, name)
     with database.reading() as session:
         page = newest_first(session, query, TargetCatalogRow.id, paging)
     return Listed(items=[_shown(row) for row in page.rows], next=page.next)
 
 
-@router.get(
-    "/{catalog_id}",
-    response_model=TargetCatalogOut,
-    responses={**NOT_MODIFIED, **problem_responses(404)},
-)
+@router.get("/{catalog_id}", response_model=TargetCatalogOut, responses=readable())
 def get_target_catalog(catalog_id: str, call: CallDep) -> TargetCatalogOut | Response:
     """Return one catalogue, without its targets."""
     with call.database.reading() as session:
-        shown = _shown(_find(session, catalog_id))
+        shown = _shown(existing(session, TargetCatalogRow, "target catalogue", catalog_id))
     return unless_known(call.request, call.response, shown)
 
 
@@ -206,7 +190,7 @@ def list_targets(catalog_id: str, database: DatabaseDep, paging: PagingDep) -> L
         .limit(paging.limit + 1)
     )
     with database.reading() as session:
-        _find(session, catalog_id)
+        existing(session, TargetCatalogRow, "target catalogue", catalog_id)
         page = paging.answer(session.scalars(query).all(), lambda row: row.position)
     return Listed(items=[from_store(TargetIn, row.body) for row in page.rows], next=page.next)
 
@@ -220,7 +204,7 @@ def change_target_catalog(
     Scenarios that use it keep their copy. `If-Match` takes the ETag of the catalogue.
     """
     with call.database.transaction() as session:
-        row = _find(session, catalog_id, to_change=True)
+        row = existing(session, TargetCatalogRow, "target catalogue", catalog_id, to_change=True)
         require_match(call.request, lambda: _shown(row))
         row.name = body.name or row.name
         _set_rewards(session, catalog_id, body.rewards or {})
@@ -237,18 +221,17 @@ def _set_rewards(session: Session, catalog_id: str, rewards: Mapping[str, float]
     for first in range(0, len(ids), _AT_ONCE):
         wanted = TargetRow.target_id.in_(ids[first : first + _AT_ONCE])
         found |= {row.target_id: row for row in session.scalars(of_catalog.where(wanted))}
-    unknown = [own_id for own_id in rewards if own_id not in found]
-    if unknown:
-        raise refuse(
-            [
-                Fault(
-                    code="unknown_target",
-                    detail=f"The catalogue has no target {own_id!r}.",
-                    pointer="/rewards/" + own_id.replace("~", "~0").replace("/", "~1"),
-                )
-                for own_id in unknown
-            ]
-        )
+    require_none(
+        [
+            Fault(
+                code="unknown_target",
+                detail=f"The catalogue has no target {own_id!r}.",
+                pointer=pointer_to("rewards", own_id),
+            )
+            for own_id in rewards
+            if own_id not in found
+        ]
+    )
     for own_id, reward in rewards.items():
         found[own_id].body = found[own_id].body | {"reward": reward}
 
@@ -257,25 +240,12 @@ def _set_rewards(session: Session, catalog_id: str, rewards: Mapping[str, float]
 def delete_target_catalog(catalog_id: str, call: CallDep) -> None:
     """Delete a catalogue. Scenarios that use it keep their copy."""
     with call.database.transaction() as session:
-        row = _find(session, catalog_id, to_change=True)
+        row = existing(session, TargetCatalogRow, "target catalogue", catalog_id, to_change=True)
         require_match(call.request, lambda: _shown(row))
-        row.deleted_at = datetime.now(UTC)
+        row.delete()
         call.audit.record(session, "delete", "target_catalog", catalog_id)
 
 
-def _find(session: Session, catalog_id: str, *, to_change: bool = False) -> TargetCatalogRow:
-    row = session.get(TargetCatalogRow, catalog_id, with_for_update=to_change)
-    if row is None or row.deleted_at is not None:
-        raise ServiceError("not_found", f"There is no target catalogue {catalog_id!r}.")
-    return row
-
-
 def _shown(row: TargetCatalogRow) -> TargetCatalogOut:
-    return TargetCatalogOut(
-        id=row.id,
-        name=row.name,
-        num_targets=row.num_targets,
-        created_at=row.created_at,
-        changed_at=row.changed_at,
-        links={"targets": f"/v1/target-catalogs/{row.id}/targets"},
-    )
+    links = {"targets": f"/v1/target-catalogs/{row.id}/targets"}
+    return from_row(TargetCatalogOut, row, links=links)

@@ -51,7 +51,9 @@ def list_target_lives(
             for numbered in _lives(session, catalog, plans.get(catalog.id, []), after, now)
             if state in (None, numbered[1].state)
         )
-        page = paging.answer(list(islice(found, paging.limit + 1)), lambda row: _cursor(row[0]))
+        page = paging.answer(
+            list(islice(found, paging.limit + 1)), lambda row: f"{row[0][0]} {row[0][1]}"
+        )
     return Listed(items=[life for _, life in page.rows], next=page.next)
 
 
@@ -93,10 +95,6 @@ def _rows(session: Session, catalog_id: str, after: int) -> Iterator[TargetRow]:
         if len(rows) < _AT_ONCE:
             return
         after = rows[-1].position
-
-
-def _cursor(key: tuple[str, int]) -> str:
-    return f"{key[0]} {key[1]}"
 
 
 def _after(cursor: str | None) -> tuple[str, int]:

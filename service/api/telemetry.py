@@ -13,13 +13,13 @@ from planner_core.errors import Fault
 from service.api.deps import ANY_FILE, Call, CallDep, RawBodyDep, file_type
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
-from service.api.imports import BYTES
+from service.api.imports import BYTES, request_body
 from service.api.paging import PagingDep, newest_first
 from service.api.plans import find_plan
 from service.db.rows import ExecutionRow, JobRow, PlanRow, PlanStateRow, ScenarioRow
-from service.files.records import Record, Records, check, read_csv
+from service.files.records import Record, Records, check, read_csv, read_json
 from service.plans import store as plan_store
-from service.problems.faults import refuse
+from service.problems.faults import refuse_one, require_none
 from service.problems.kinds import ServiceError
 from service.scenarios.pin_inputs import state_from
 from service.wire.base import Body, Listed
@@ -32,6 +32,7 @@ from service.wire.plans import (
     ReportedOut,
     StatesReportedOut,
 )
+from service.wire.stored import from_row
 
 router = APIRouter(prefix="/v1/plans", tags=["plans"])
 
@@ -48,16 +49,8 @@ _LINE_OF_SIGHT: Final = ("los_x", "los_y", "los_z")
 def _bodies(schema: str, columns: str) -> dict[str, Any]:
     item = {"$ref": f"#/components/schemas/{schema}"}
     listed = {"type": "array", "items": item, "minItems": 1, "maxItems": MAX_REPORTED}
-    return {
-        "requestBody": {
-            "required": True,
-            "content": {
-                "application/json": {"schema": listed},
-                "text/csv": {"schema": {"type": "string", "description": columns}},
-                ANY_FILE: BYTES,
-            },
-        }
-    }
+    table = {"type": "string", "description": columns}
+    return request_body({"application/json": listed, "text/csv": table, ANY_FILE: BYTES})
 
 
 @router.post(
@@ -89,8 +82,7 @@ def take_down(
         for i, each in enumerate(reports)
         if each.action_id in unknown
     ]  # fmt: skip
-    if faults:
-        raise refuse(faults)
+    require_none(faults)
     rows = plan_store.report(session, call.caller, plan.id, reports)
     call.audit.record(session, "report", "plan", plan.id)
     return rows
@@ -125,9 +117,7 @@ def report_states(
     with once.transaction() as session:
         plan = find_plan(session, plan_id, call.caller)
         _require_published(plan)
-        faults = faults_of_states(session, plan, states, "")
-        if faults:
-            raise refuse(faults)
+        require_none(faults_of_states(session, plan, states, ""))
         rows = plan_store.report_states(session, call.caller, plan.id, states)
         call.audit.record(session, "report", "plan", plan.id)
         return once.keep(session, StatesReportedOut(states=tuple(map(_state_out, rows))))
@@ -199,20 +189,15 @@ def _reports(
         found = _listed(data)
         records = found.records
     good, faults = check(records, schema, build)
-    faults += found.faults
-    if faults:
-        raise refuse(faults)
+    require_none([*faults, *found.faults])
     return [one.body for one in good]
 
 
 def _listed(data: bytes) -> Records:
-    try:
-        document = json.loads(data.decode("utf-8-sig"))
-    except (ValueError, RecursionError) as error:
-        raise refuse([Fault(code="malformed_json", detail=f"No JSON: {error}"[:200])]) from None
+    document = read_json(data)
     if not isinstance(document, list) or not 1 <= len(document) <= MAX_REPORTED:
         detail = f"Send a list of 1 to {MAX_REPORTED} reports."
-        raise refuse([Fault(code="value_out_of_range", detail=detail, pointer="")])
+        raise refuse_one("value_out_of_range", detail, "")
     return Records(
         records=tuple(Record(fields=one, pointer=f"/{i}") for i, one in enumerate(document))
     )
@@ -238,10 +223,8 @@ def _nested(record: Record) -> Record:
 
 
 def _execution_out(row: ExecutionRow) -> ExecutionOut:
-    return ExecutionOut.model_validate(row, from_attributes=True)
+    return from_row(ExecutionOut, row)
 
 
 def _state_out(row: PlanStateRow) -> PlanStateOut:
-    return PlanStateOut(
-        **row.body, id=row.id, owner=row.owner, key_name=row.key_name, reported_at=row.reported_at
-    )
+    return from_row(PlanStateOut, row, **row.body)

@@ -15,11 +15,10 @@ from service.answers import store as answer_store
 from service.answers.answered import Answered, in_chunks
 from service.answers.blocks import TIMELINE, Entry, holds, items_in
 from service.api import job_intake as intake
-from service.api.accept import preferred
-from service.api.conditional import NOT_MODIFIED
+from service.api.accept import preferred, require_offered
+from service.api.conditional import matches, readable, sent
 from service.api.deps import Call, CallDep, DatabaseDep, own_job_only
 from service.api.errors import problem_responses
-from service.api.etags import matches
 from service.api.job_shapes import etag_of_timeline
 from service.api.paging import PagingDep
 from service.db.rows import JobRow
@@ -70,8 +69,7 @@ def timeline_responses(forms: Sequence[Form]) -> dict[int | str, dict[str, Any]]
     }
     return {
         200: {"description": "The timeline.", "content": content, "headers": headers},
-        **NOT_MODIFIED,
-        **problem_responses(404, 406, 409),
+        **readable(406, 409),
     }
 
 
@@ -107,9 +105,7 @@ def get_timeline_as(job_id: str, suffix: Suffix, call: CallDep) -> Response:
 
 def timeline_answer(call: Call, job: JobRow, suffix: str) -> Response:
     """Return a job's plan in the form that a suffix names."""
-    if suffix not in _SUFFIXES:
-        offered = ", ".join(f".{known}" for known in _SUFFIXES)
-        raise ServiceError("not_acceptable", f"The timeline is offered as {offered}.")
+    require_offered(suffix, _SUFFIXES, "The timeline is")
     return _answer(call.database, call.request, job, _BY_SUFFIX.get(suffix))
 
 
@@ -117,8 +113,7 @@ def timeline_answer(call: Call, job: JobRow, suffix: str) -> Response:
     "/{job_id}/proof",
     responses={
         200: {"content": {_JSON: {"schema": _PROOF}}, "description": "The proof document."},
-        **NOT_MODIFIED,
-        **problem_responses(404, 409),
+        **readable(409),
     },
 )
 def get_proof(job_id: str, call: CallDep) -> Response:
@@ -127,14 +122,11 @@ def get_proof(job_id: str, call: CallDep) -> Response:
     `proof` names the argument and `value` the bound. `prices` holds a multiplier for each
     target, in the order of the scenario: the dual function at these prices is the bound.
     """
-    etag = f'"{job_id}"'
     with call.database.reading() as session:
         job = intake.find_job(session, job_id)
         intake.require_answer(session, job)
         proof = answer_store.proof_of(session, job_id)
-    if matches(call.request.headers.get("if-none-match"), etag):
-        return Response(status_code=304, headers={"ETag": etag})
-    return Response(proof or "null", media_type=_JSON, headers={"ETag": etag})
+    return sent(call.request, proof or "null", _JSON, {"ETag": f'"{job_id}"'})
 
 
 @router.get(

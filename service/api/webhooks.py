@@ -4,27 +4,27 @@ from __future__ import annotations
 
 import base64
 import secrets
-from typing import Any, Final
+from typing import Final
 
 import sqlalchemy as sa
 from fastapi import APIRouter, Response
 from sqlalchemy.orm import Session
 
-from planner_core.errors import Fault
 from service.access.callers import Caller
-from service.api.conditional import NOT_MODIFIED, created, require_match, unless_known
+from service.api.conditional import created, readable, require_match, unless_known
 from service.api.deps import CallDep
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
 from service.api.paging import PagingDep, newest_first
 from service.db.clock import utc_now
-from service.db.ids import new_id
 from service.db.rows import WebhookDeliveryRow, WebhookRow
-from service.problems.faults import refuse
+from service.problems.faults import refuse_one
 from service.problems.kinds import ServiceError
+from service.stores.finding import find_own, no_such, of_owner
 from service.webhooks import outbox
 from service.webhooks.addresses import AddressRefused, require_good_url
 from service.wire.base import Listed
+from service.wire.stored import from_row
 from service.wire.webhooks import (
     EVENTS,
     CreatedWebhook,
@@ -49,12 +49,10 @@ def create_webhook(body: WebhookIn, call: CallDep, once: OnceDep) -> CreatedWebh
     try:
         require_good_url(body.url, private=call.settings.webhook_private_addresses)
     except AddressRefused as error:
-        fault = Fault(code="webhook_address_refused", detail=str(error), pointer="/url")
-        raise refuse([fault]) from None
+        raise refuse_one("webhook_address_refused", str(error), "/url") from None
     with once.transaction() as session:
         _require_room(session, call.caller.owner)
         row = WebhookRow(
-            id=new_id(),
             owner=call.caller.owner,
             name=body.name,
             url=body.url,
@@ -73,19 +71,13 @@ def create_webhook(body: WebhookIn, call: CallDep, once: OnceDep) -> CreatedWebh
 @router.get("")
 def list_webhooks(call: CallDep, paging: PagingDep) -> Listed[WebhookOut]:
     """List the webhooks of the key's owner, newest first; all for the scope `admin`."""
-    query = sa.select(WebhookRow)
-    if call.caller.visible_owner is not None:
-        query = query.where(WebhookRow.owner == call.caller.visible_owner)
+    query = sa.select(WebhookRow).where(of_owner(WebhookRow.owner, call.caller.visible_owner))
     with call.database.reading() as session:
         page = newest_first(session, query, WebhookRow.id, paging)
     return Listed(items=[_shown(row) for row in page.rows], next=page.next)
 
 
-@router.get(
-    "/{webhook_id}",
-    response_model=WebhookOut,
-    responses={**NOT_MODIFIED, **problem_responses(404)},
-)
+@router.get("/{webhook_id}", response_model=WebhookOut, responses=readable())
 def get_webhook(webhook_id: str, call: CallDep) -> WebhookOut | Response:
     """Return one webhook."""
     with call.database.reading() as session:
@@ -130,7 +122,7 @@ def list_deliveries(webhook_id: str, call: CallDep, paging: PagingDep) -> Listed
     with call.database.reading() as session:
         _find(session, webhook_id, call.caller)
         page = newest_first(session, query, WebhookDeliveryRow.id, paging)
-    return Listed(items=[_delivery(row) for row in page.rows], next=page.next)
+    return Listed(items=[from_row(DeliveryOut, row) for row in page.rows], next=page.next)
 
 
 @router.post(
@@ -145,7 +137,7 @@ def redeliver(webhook_id: str, delivery_id: str, once: OnceDep, call: CallDep) -
         _require_enabled(row)
         delivery = session.get(WebhookDeliveryRow, delivery_id)
         if delivery is None or delivery.webhook_id != webhook_id:
-            raise ServiceError("not_found", f"There is no delivery {delivery_id!r}.")
+            raise no_such("delivery", delivery_id)
         again = outbox.repeat(session, row, delivery)
         call.audit.record(session, "redeliver", "webhook", row.id)
         return once.keep(session, _accepted(session, call.response, row, again))
@@ -155,7 +147,7 @@ def _accepted(
     session: Session, response: Response, row: WebhookRow, delivery_id: str
 ) -> DeliveryOut:
     response.headers["Location"] = f"/v1/webhooks/{row.id}/deliveries"
-    return _delivery(session.get_one(WebhookDeliveryRow, delivery_id))
+    return from_row(DeliveryOut, session.get_one(WebhookDeliveryRow, delivery_id))
 
 
 def _require_room(session: Session, owner: str) -> None:
@@ -176,20 +168,13 @@ def _require_enabled(row: WebhookRow) -> None:
 def _find(
     session: Session, webhook_id: str, caller: Caller, *, to_change: bool = False
 ) -> WebhookRow:
-    row = session.get(WebhookRow, webhook_id, with_for_update=to_change)
-    if row is None or caller.visible_owner not in (None, row.owner):
-        raise ServiceError("not_found", f"There is no webhook {webhook_id!r}.")
+    row = find_own(session, WebhookRow, webhook_id, caller.visible_owner, to_change=to_change)
+    if row is None:
+        raise no_such("webhook", webhook_id)
     return row
 
 
 def _shown(row: WebhookRow) -> WebhookOut:
     address = f"/v1/webhooks/{row.id}"
     links = {"self": address, "deliveries": f"{address}/deliveries"}
-    fields: dict[str, Any] = {
-        name: getattr(row, name) for name in WebhookOut.model_fields if name != "links"
-    }
-    return WebhookOut(**fields, links=links)
-
-
-def _delivery(row: WebhookDeliveryRow) -> DeliveryOut:
-    return DeliveryOut.model_validate(row, from_attributes=True)
+    return from_row(WebhookOut, row, links=links)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, Final, cast
 
 from fastapi import APIRouter, Depends
@@ -47,7 +48,7 @@ def create_what_if(job_id: str, body: WhatIfIn, call: CallDep, once: OnceDep) ->
         limits=call.settings.scenario_limits,
     )
     solver, params = _solver(job, body)
-    time_s, memory_mb = _limits(job, body, call.settings)
+    limits = _limits(job, body, call.settings)
     reader = cast(OpportunityReader, call.request.app.state.opportunities)
     described = reader.get(call.database, job.scenario_id, sha256)
     varied = cast(Variations, call.request.app.state.variations).get(asked, described)
@@ -57,22 +58,18 @@ def create_what_if(job_id: str, body: WhatIfIn, call: CallDep, once: OnceDep) ->
         if is_new:
             call.count_stored(session, num_bytes=len(varied.opportunity_block))
             opportunity_store.save(session, row.sha256, varied.opportunity_block)
-        spec = submission.JobSpec(
+        spec = replace(
+            submission.spec_again(job, call.caller.owner),
             scenario_id=row.id,
             solver=solver,
             params=params,
-            seed=job.seed if body.seed is None else body.seed,
-            time_s=time_s,
-            memory_mb=memory_mb,
-            priority=job.priority if body.priority is None else body.priority,
-            label=job.label if body.label is None else body.label,
-            owner=call.caller.owner,
+            limits=limits,
+            rerun_of=None,
             what_if_of=job_id,
             change=body.model_dump(mode="json", include=_CHANGE, exclude_unset=True),
+            **body.model_dump(include={"seed", "priority", "label"}, exclude_none=True),
         )
-        made = submission.submit(session, queue, spec)
-        call.audit.record(session, "create", "job", made.id)
-        return once.keep(session, intake.accepted(session, call.response, made))
+        return intake.queued(session, call, once, queue, spec)
 
 
 def _solver(job: JobRow, body: WhatIfIn) -> tuple[str, dict[str, Any]]:
@@ -83,8 +80,8 @@ def _solver(job: JobRow, body: WhatIfIn) -> tuple[str, dict[str, Any]]:
     return solver, intake.all_params(solver, body.params or {})
 
 
-def _limits(job: JobRow, body: WhatIfIn, settings: Settings) -> tuple[float, int]:
+def _limits(job: JobRow, body: WhatIfIn, settings: Settings) -> dict[str, float]:
     given = body.limits.model_dump(exclude_none=True)
     if not given:
-        return job.limits["time_s"], job.limits["memory_mb"]
+        return job.limits
     return intake.limits_of(LimitsIn(**job.limits | given), settings)

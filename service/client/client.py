@@ -6,7 +6,6 @@ import ipaddress
 import os
 import re
 from collections.abc import Iterator
-from types import TracebackType
 from typing import Final, Self
 
 import httpx
@@ -21,8 +20,7 @@ from service.client.plans import Plans
 from service.client.satellites import Satellites
 from service.client.scenarios import Scenarios
 from service.client.spacecraft import SpacecraftTypes
-from service.client.target_catalogs import TargetCatalogs
-from service.client.targets import Targets
+from service.client.target_catalogs import TargetCatalogs, Targets
 from service.client.transport import Transport, held, path_of
 from service.client.webhooks import Webhooks
 from service.wire.operations import Ready, Version
@@ -45,18 +43,6 @@ class Client:
     patience_s
         For how long a request that is lost, or that the service cannot take now, is sent again.
     """
-
-    satellites: Satellites
-    ground_stations: GroundStations
-    spacecraft: SpacecraftTypes
-    outages: Outages
-    target_catalogs: TargetCatalogs
-    forecasts: Forecasts
-    scenarios: Scenarios
-    jobs: Jobs
-    comparisons: Comparisons
-    plans: Plans
-    webhooks: Webhooks
 
     def __init__(
         self,
@@ -119,12 +105,7 @@ class Client:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def __repr__(self) -> str:

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
+from service.client.collection import Collection
 from service.client.following import polled
 from service.client.jobs import question
-from service.client.transport import Transport, parsed, path_of
+from service.client.transport import parsed
 from service.wire.jobs import ComparisonOut as Comparison
 from service.wire.scenarios import ScenarioOut as Scenario
 
 
-class Comparisons:
-    """The comparisons of the service."""
+class Comparisons(Collection[Comparison]):
+    """The comparisons of the service. The jobs of one that is deleted stay."""
 
-    def __init__(self, transport: Transport):
-        self._transport = transport
+    _name, _shape = "comparisons", Comparison
 
     def submit(
         self,
@@ -42,21 +42,7 @@ class Comparisons:
         """
         body = question(scenario, time_s, memory_mb, priority, label)
         body["runs"] = [dict(run) for run in runs]
-        return self._transport.post(
-            path_of("comparisons"), Comparison, json=body, idempotency_key=idempotency_key
-        )
-
-    def list(self) -> Iterator[Comparison]:
-        """Yield the comparisons, newest first."""
-        return self._transport.pages(path_of("comparisons"), Comparison)
-
-    def get(self, comparison_id: str) -> Comparison:
-        """Return the table as it stands."""
-        return self._transport.get(path_of("comparisons", comparison_id), Comparison)
-
-    def delete(self, comparison_id: str) -> None:
-        """Delete a comparison; its jobs stay."""
-        self._transport.delete(path_of("comparisons", comparison_id))
+        return self._create(body, idempotency_key)
 
     def wait(self, comparison_id: str, timeout_s: float | None = None) -> Comparison:
         """Return the table once every job has ended, well or not.
@@ -66,7 +52,7 @@ class Comparisons:
         WaitTimedOut
             Where one has not after ``timeout_s``.
         """
-        path = path_of("comparisons", comparison_id)
         read = partial(parsed, Comparison, what="a comparison")
+        path = self._path(comparison_id)
         tables = polled(self._transport, path, read, timeout_s=timeout_s, can_hold=False)
         return deque(tables, maxlen=1).pop()

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
-from service.client.transport import Transport, path_of
+from service.client.collection import Collection
 from service.client.uploads import Source, upload
 from service.wire.forecasts import ForecastOut as Forecast
 
 
-class Forecasts:
-    """The forecasts that are stored."""
+class Forecasts(Collection[Forecast]):
+    """The forecasts that are stored, without their values.
 
-    def __init__(self, transport: Transport):
-        self._transport = transport
+    Scenarios keep what a forecast said of their targets when it is deleted.
+    """
+
+    _name, _shape = "forecasts", Forecast
 
     def create(
         self,
@@ -34,27 +34,10 @@ class Forecasts:
             Of targets and instants that the file does not cover; None to refuse scenarios with
             such.
         """
-        content, headers = upload(file, form)
-        params: dict[str, str | float] = {"name": name}
-        if default_clear_probability is not None:
-            params["default_clear_probability"] = default_clear_probability
         return self._transport.post(
-            path_of("forecasts"),
+            self._path(),
             Forecast,
-            params=params,
-            content=content,
-            headers=headers,
+            params={"name": name, "default_clear_probability": default_clear_probability},
             idempotency_key=idempotency_key,
+            **upload(file, form),
         )
-
-    def list(self) -> Iterator[Forecast]:
-        """Yield the forecasts, newest first."""
-        return self._transport.pages(path_of("forecasts"), Forecast)
-
-    def get(self, forecast_id: str) -> Forecast:
-        """Return what is known of one forecast, without its values."""
-        return self._transport.get(path_of("forecasts", forecast_id), Forecast)
-
-    def delete(self, forecast_id: str, *, if_match: str | None = None) -> None:
-        """Delete a forecast; scenarios keep what it said of their targets."""
-        self._transport.delete(path_of("forecasts", forecast_id), if_match=if_match)

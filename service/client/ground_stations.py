@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
-from service.client.transport import Transport, held, path_of
+from service.client.collection import Changeable
 from service.client.uploads import Source, upload
 from service.wire.imports import Imported as Import
 from service.wire.places import GroundStationOut as GroundStation
 from service.wire.places import ImportedStation
 
 
-class GroundStations:
-    """The ground stations that are stored."""
+class GroundStations(Changeable[GroundStation]):
+    """The ground stations that are stored. Scenarios keep their copy of one that is deleted."""
 
-    def __init__(self, transport: Transport):
-        self._transport = transport
+    _name, _shape = "ground-stations", GroundStation
 
     def create(
         self,
@@ -28,12 +26,8 @@ class GroundStations:
         **optional: Any,
     ) -> GroundStation:
         """Store a station; ``min_elevation_deg``, ``antennas`` and the like are optional."""
-        return self._transport.post(
-            path_of("ground-stations"),
-            GroundStation,
-            json={"name": name, "lat_deg": lat_deg, "lon_deg": lon_deg, **optional},
-            idempotency_key=idempotency_key,
-        )
+        body = {"name": name, "lat_deg": lat_deg, "lon_deg": lon_deg, **optional}
+        return self._create(body, idempotency_key)
 
     def import_stations(
         self,
@@ -44,33 +38,10 @@ class GroundStations:
         idempotency_key: str | None = None,
     ) -> Import[ImportedStation]:
         """Store the stations of a file, ``csv`` or ``geojson``; those that are known stay one."""
-        content, headers = upload(source, form)
         return self._transport.post(
-            path_of("ground-stations", "import"),
+            self._path("import"),
             Import[ImportedStation],
             params={"on_error": "reject_all" if reject_all else "skip"},
-            content=content,
-            headers=headers,
             idempotency_key=idempotency_key,
+            **upload(source, form),
         )
-
-    def list(self) -> Iterator[GroundStation]:
-        """Yield the stations, newest first."""
-        return self._transport.pages(path_of("ground-stations"), GroundStation)
-
-    def get(self, station_id: str) -> GroundStation:
-        """Return one station."""
-        return self._transport.get(path_of("ground-stations", station_id), GroundStation)
-
-    def change(
-        self, station_id: str, *, if_match: str | None = None, **changes: Any
-    ) -> GroundStation:
-        """Change what is given, where the station is still as ``if_match`` says."""
-        headers = {} if if_match is None else {"If-Match": if_match}
-        path = path_of("ground-stations", station_id)
-        answer = self._transport.request("PATCH", path, json=changes, headers=headers)
-        return held(GroundStation, answer)
-
-    def delete(self, station_id: str, *, if_match: str | None = None) -> None:
-        """Delete a station; scenarios keep their copy."""
-        self._transport.delete(path_of("ground-stations", station_id), if_match=if_match)

@@ -9,9 +9,10 @@ from typing import Any
 
 from pydantic import PrivateAttr
 
+from service.client.collection import Collection
 from service.client.errors import JobFailed
 from service.client.following import follow, polled
-from service.client.transport import Transport, parsed, path_of
+from service.client.transport import parsed, path_of, said
 from service.wire.base import Json
 from service.wire.jobs import JobOut
 from service.wire.scenarios import ScenarioOut as Scenario
@@ -79,11 +80,10 @@ class Job(JobOut):
         return self._jobs.what_if(self.id, **change)
 
 
-class Jobs:
-    """The jobs of the service."""
+class Jobs(Collection[Job]):
+    """The jobs of the service. A finished one is deleted with its answer, for good."""
 
-    def __init__(self, transport: Transport):
-        self._transport = transport
+    _name, _shape = "jobs", Job
 
     def submit(
         self,
@@ -114,9 +114,7 @@ class Jobs:
         """
         body = question(scenario, time_s, memory_mb, priority, label)
         body |= {"solver": solver, "params": dict(params or {}), "seed": seed}
-        return self._own(
-            self._transport.post(path_of("jobs"), Job, json=body, idempotency_key=idempotency_key)
-        )
+        return self._own(self._create(body, idempotency_key))
 
     def list(
         self,
@@ -129,32 +127,28 @@ class Jobs:
         station_id: str | None = None,
     ) -> Iterator[Job]:
         """Yield the jobs, newest first."""
-        params = {
-            "state": state,
-            "solver": solver,
-            "scenario_id": scenario_id,
-            "label": label,
-            "satellite_id": satellite_id,
-            "station_id": station_id,
-        }
-        return map(self._own, self._transport.pages(path_of("jobs"), Job, params))
+        jobs = self._listed(
+            state=state, solver=solver, scenario_id=scenario_id, label=label,
+            satellite_id=satellite_id, station_id=station_id,
+        )  # fmt: skip
+        return map(self._own, jobs)
 
-    def get(self, job_id: str, *, known: Job | None = None) -> Job:
+    def get(self, job_id: str, /, *, known: Job | None = None) -> Job:
         """Return one job; ``known`` itself where nothing has changed since it was read."""
         etag = known.etag if known else None
         headers = {} if etag is None else {"If-None-Match": etag}
-        answer = self._transport.request("GET", path_of("jobs", job_id), headers=headers)
+        answer = self._transport.request("GET", self._path(job_id), headers=headers)
         if known is not None and answer.status_code == 304:
             return known
         return self._read(answer.text, answer.headers.get("etag"))
 
     def follow(self, job_id: str) -> Iterator[Job]:
         """Yield the job as it is, then at each change, until it is final."""
-        return follow(self._transport, path_of("jobs", job_id), self._read)
+        return follow(self._transport, self._path(job_id), self._read)
 
     def wait(self, job_id: str, timeout_s: float | None = None) -> Job:
         """Return the job once it has succeeded or was cancelled; see ``Job.wait``."""
-        path = path_of("jobs", job_id)
+        path = self._path(job_id)
         # A stream of events has no end of its own in sight: only questions can be timed.
         states = (
             self.follow(job_id)
@@ -168,30 +162,23 @@ class Jobs:
 
     def cancel(self, job_id: str) -> Job:
         """Ask for a job's end. Not sent again where the answer is lost: look at the job then."""
-        answer = self._transport.request("POST", path_of("jobs", job_id, "cancel"))
+        answer = self._transport.request("POST", self._path(job_id, "cancel"))
         return self._read(answer.text, answer.headers.get("etag"))
-
-    def delete(self, job_id: str) -> None:
-        """Delete a finished job with its answer, for good."""
-        self._transport.delete(path_of("jobs", job_id))
 
     def rerun(self, job_id: str, *, idempotency_key: str | None = None) -> Job:
         """Queue the same question again."""
-        path = path_of("jobs", job_id, "rerun")
-        return self._own(self._transport.post(path, Job, idempotency_key=idempotency_key))
+        return self._queue(self._path(job_id, "rerun"), idempotency_key)
 
     def replan(
         self, plan_id: str, happened: Mapping[str, Any], *, idempotency_key: str | None = None
     ) -> Job:
         """Queue the plan that follows another one; see ``Plans.replan``."""
         path = path_of("plans", plan_id, "replans")
-        return self._own(
-            self._transport.post(path, Job, json=dict(happened), idempotency_key=idempotency_key)
-        )
+        return self._queue(path, idempotency_key, json=dict(happened))
 
     def timeline(self, job_id: str) -> Timeline:
         """Return a job's plan, judged; ``not_ready`` before there is one."""
-        return self._transport.get(path_of("jobs", job_id, "timeline"), Timeline)
+        return self._transport.get(self._path(job_id, "timeline"), Timeline)
 
     def download(self, job_id: str, file: Path | str) -> Path:
         """Write a timeline to a file, in the form that its suffix names.
@@ -201,7 +188,7 @@ class Jobs:
         to = Path(file)
         suffix = _OPENMCT if to.name.lower().endswith(_OPENMCT) else to.suffix.lower()
         name = f"timeline{suffix or '.json'}"
-        self._transport.save(path_of("jobs", job_id, name), to)
+        self._transport.save(self._path(job_id, name), to)
         return to
 
     def targets(
@@ -209,11 +196,11 @@ class Jobs:
     ) -> Iterator[TargetOutcome]:
         """Yield every target of the scenario with what became of it."""
         params = {"outcome": outcome, "reason": reason, "limit": 500}
-        return self._transport.pages(path_of("jobs", job_id, "targets"), TargetOutcome, params)
+        return self._transport.pages(self._path(job_id, "targets"), TargetOutcome, params)
 
     def explanation(self, job_id: str, target_id: str) -> Explanation:
         """Return why a target is in a plan or not, opportunity by opportunity."""
-        path = path_of("jobs", job_id, "targets", target_id, "explanation")
+        path = self._path(job_id, "targets", target_id, "explanation")
         return self._transport.get(path, Explanation)
 
     def what_if(
@@ -239,15 +226,15 @@ class Jobs:
             are not those of the job.
         """
         body = {"force": list(force), "forbid": list(forbid), "relax": dict(relax or {}), **other}
-        path = path_of("jobs", job_id, "what-if")
-        return self._own(
-            self._transport.post(path, Job, json=body, idempotency_key=idempotency_key)
-        )
+        return self._queue(self._path(job_id, "what-if"), idempotency_key, json=body)
 
     def diff(self, before: str | Job, after: str | Job) -> PlanDiff:
         """Return what the second job's plan has that the first one's has not, and back."""
         first, second = (job.id if isinstance(job, Job) else job for job in (before, after))
-        return self._transport.get(path_of("jobs", first, "diff", second), PlanDiff)
+        return self._transport.get(self._path(first, "diff", second), PlanDiff)
+
+    def _queue(self, path: str, idempotency_key: str | None, **body: Any) -> Job:
+        return self._own(self._transport.post(path, Job, idempotency_key=idempotency_key, **body))
 
     def _read(self, text: str, etag: str | None = None) -> Job:
         return self._own(parsed(Job, text, "a job").with_etag(etag))
@@ -269,7 +256,5 @@ def question(
         asked: Json = {"scenario": dict(scenario)}
     else:
         asked = {"scenario_id": scenario.id if isinstance(scenario, Scenario) else scenario}
-    limits = {"time_s": time_s, "memory_mb": memory_mb}
-    asked["limits"] = {name: value for name, value in limits.items() if value is not None}
-    optional = {"priority": priority, "label": label}
-    return asked | {name: value for name, value in optional.items() if value is not None}
+    asked["limits"] = said(time_s=time_s, memory_mb=memory_mb)
+    return asked | said(priority=priority, label=label)

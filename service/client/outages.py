@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from datetime import datetime
 
-from service.client.transport import Transport, path_of
-from service.wire.instants import instant_text
+from service.client.collection import Collection
+from service.client.transport import said
 from service.wire.pins import OutageOut as Outage
 
 
-class Outages:
-    """The outages that are stored: scenarios made in their span take them along."""
+class Outages(Collection[Outage]):
+    """The outages that are stored: scenarios made in their span take them along, and keep them."""
 
-    def __init__(self, transport: Transport):
-        self._transport = transport
+    _name, _shape = "outages", Outage
 
     def create(
         self,
@@ -28,13 +27,11 @@ class Outages:
         idempotency_key: str | None = None,
     ) -> Outage:
         """Report that a satellite or a station is out from ``start`` to ``end``."""
-        body = {
-            "satellite_id": satellite_id, "station_id": station_id, "modes": list(modes),
-            "start": instant_text(start), "end": instant_text(end), "reason": reason,
-        }  # fmt: skip
-        return self._transport.post(
-            path_of("outages"), Outage, json=body, idempotency_key=idempotency_key
-        )
+        body = said(
+            satellite_id=satellite_id, station_id=station_id, modes=list(modes),
+            start=start, end=end, reason=reason,
+        )  # fmt: skip
+        return self._create(body, idempotency_key)
 
     def list(
         self,
@@ -45,19 +42,5 @@ class Outages:
         to: datetime | None = None,
     ) -> Iterator[Outage]:
         """Yield the outages that touch a span, newest first."""
-        wanted = {
-            "satellite_id": satellite_id,
-            "station_id": station_id,
-            "from": None if from_ is None else instant_text(from_),
-            "to": None if to is None else instant_text(to),
-        }
-        params = {name: value for name, value in wanted.items() if value is not None}
-        return self._transport.pages(path_of("outages"), Outage, params=params)
-
-    def get(self, outage_id: str) -> Outage:
-        """Return one outage."""
-        return self._transport.get(path_of("outages", outage_id), Outage)
-
-    def delete(self, outage_id: str, *, if_match: str | None = None) -> None:
-        """Delete an outage; scenarios that took it along keep it."""
-        self._transport.delete(path_of("outages", outage_id), if_match=if_match)
+        span = {"from": from_, "to": to}
+        return self._listed(satellite_id=satellite_id, station_id=station_id, **span)

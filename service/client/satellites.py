@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from service.client.transport import Transport, held, path_of
+from service.client.collection import Changeable
+from service.client.transport import said
 from service.client.uploads import Source, upload
 from service.wire.imports import Imported as Import
 from service.wire.satellites import ElementsOut as Elements
@@ -13,11 +14,10 @@ from service.wire.satellites import ImportedSatellite
 from service.wire.satellites import SatelliteOut as Satellite
 
 
-class Satellites:
-    """The satellites that are stored."""
+class Satellites(Changeable[Satellite]):
+    """The satellites that are stored. Scenarios keep their copy of one that is deleted."""
 
-    def __init__(self, transport: Transport):
-        self._transport = transport
+    _name, _shape = "satellites", Satellite
 
     def create(
         self,
@@ -37,19 +37,8 @@ class Satellites:
         It is of the type ``spacecraft``, an id or the name of one that is built in
         (``generic_optical`` by default), but for the figures given.
         """
-        optional = {
-            "tle": None if tle is None else list(tle),
-            "omm": omm,
-            "oem": None if oem is None else list(oem),
-            "agility": agility,
-            "sensor": sensor,
-            "resources": resources,
-            "spacecraft": spacecraft,
-        }
-        body = {"name": name} | {k: v for k, v in optional.items() if v is not None}
-        return self._transport.post(
-            path_of("satellites"), Satellite, json=body, idempotency_key=idempotency_key
-        )
+        figures = said(agility=agility, sensor=sensor, resources=resources, spacecraft=spacecraft)
+        return self._create({"name": name, **_orbit(tle, omm, oem), **figures}, idempotency_key)
 
     def import_elements(
         self,
@@ -74,29 +63,24 @@ class Satellites:
         spacecraft
             Type of the new satellites, ``generic_optical`` by default.
         """
-        content, headers = upload(source, form)
         return self._transport.post(
-            path_of("satellites", "import"),
+            self._path("import"),
             Import[ImportedSatellite],
-            params={"on_error": "reject_all" if reject_all else "skip"}
-            | ({} if spacecraft is None else {"spacecraft": spacecraft}),
-            content=content,
-            headers=headers,
+            params={
+                "on_error": "reject_all" if reject_all else "skip",
+                "spacecraft": spacecraft,
+            },
             idempotency_key=idempotency_key,
+            **upload(source, form),
         )
 
     def list(self, *, norad_cat_id: int | None = None) -> Iterator[Satellite]:
         """Yield the satellites, newest first."""
-        params = {"norad_cat_id": norad_cat_id}
-        return self._transport.pages(path_of("satellites"), Satellite, params)
-
-    def get(self, satellite_id: str) -> Satellite:
-        """Return one satellite."""
-        return self._transport.get(path_of("satellites", satellite_id), Satellite)
+        return self._listed(norad_cat_id=norad_cat_id)
 
     def elements(self, satellite_id: str) -> Iterator[Elements]:
         """Yield all element sets of a satellite, the last stored first."""
-        return self._transport.pages(path_of("satellites", satellite_id, "elements"), Elements)
+        return self._transport.pages(self._path(satellite_id, "elements"), Elements)
 
     def put_elements(
         self,
@@ -108,22 +92,11 @@ class Satellites:
         if_match: str | None = None,
     ) -> Satellite:
         """Store a further orbit, where the satellite is still as ``if_match`` says."""
-        forms = {"tle": tle, "omm": omm, "oem": oem}
-        body = {form: value for form, value in forms.items() if value is not None}
-        headers = {} if if_match is None else {"If-Match": if_match}
-        path = path_of("satellites", satellite_id, "elements")
-        answer = self._transport.request("PUT", path, json=body, headers=headers)
-        return held(Satellite, answer)
+        path, body = self._path(satellite_id, "elements"), _orbit(tle, omm, oem)
+        return self._transport.change("PUT", path, Satellite, body, if_match=if_match)
 
-    def change(
-        self, satellite_id: str, *, if_match: str | None = None, **changes: Any
-    ) -> Satellite:
-        """Change what is given, where the satellite is still as ``if_match`` says."""
-        headers = {} if if_match is None else {"If-Match": if_match}
-        path = path_of("satellites", satellite_id)
-        answer = self._transport.request("PATCH", path, json=changes, headers=headers)
-        return held(Satellite, answer)
 
-    def delete(self, satellite_id: str, *, if_match: str | None = None) -> None:
-        """Delete a satellite; scenarios keep their copy."""
-        self._transport.delete(path_of("satellites", satellite_id), if_match=if_match)
+def _orbit(
+    tle: Sequence[str] | None, omm: Mapping[str, Any] | None, oem: Sequence[str] | None
+) -> dict[str, Any]:
+    return said(tle=tle and list(tle), omm=omm, oem=oem and list(oem))

@@ -6,18 +6,17 @@ from collections.abc import Iterator, Sequence
 from datetime import datetime
 from typing import Any
 
-from service.client.transport import Transport, path_of
+from service.client.collection import Collection
 from service.wire.base import Json
 from service.wire.scenarios import OpportunityOut as Opportunity
 from service.wire.scenarios import ScenarioOut as Scenario
 from service.wire.scenarios import ScenarioSummary
 
 
-class Scenarios:
-    """The scenarios that are stored."""
+class Scenarios(Collection[ScenarioSummary]):
+    """The scenarios that are stored. One that a job has cannot be deleted."""
 
-    def __init__(self, transport: Transport):
-        self._transport = transport
+    _name, _shape = "scenarios", ScenarioSummary
 
     def create(
         self,
@@ -47,7 +46,7 @@ class Scenarios:
             **optional,
         }
         return self._transport.post(
-            path_of("scenarios"), Scenario, json=body, idempotency_key=idempotency_key
+            self._path(), Scenario, json=body, idempotency_key=idempotency_key
         )
 
     def list(
@@ -58,20 +57,15 @@ class Scenarios:
         station_id: str | None = None,
     ) -> Iterator[ScenarioSummary]:
         """Yield the scenarios, newest first, without their pins; ``name`` may be a part of one."""
-        params = {"name": name, "satellite_id": satellite_id, "station_id": station_id}
-        return self._transport.pages(path_of("scenarios"), ScenarioSummary, params)
+        return self._listed(name=name, satellite_id=satellite_id, station_id=station_id)
 
-    def get(self, scenario_id: str) -> Scenario:
+    def get(self, scenario_id: str, /) -> Scenario:
         """Return one scenario."""
-        return self._transport.get(path_of("scenarios", scenario_id), Scenario)
-
-    def delete(self, scenario_id: str) -> None:
-        """Delete a scenario that no job has, for good."""
-        self._transport.delete(path_of("scenarios", scenario_id))
+        return self._transport.get(self._path(scenario_id), Scenario)
 
     def file(self, scenario_id: str) -> Json:
         """Return the self-contained scenario file, which ``slewline solve`` takes too."""
-        path = path_of("scenarios", scenario_id)
+        path = self._path(scenario_id)
         answer: Json = self._transport.request("GET", path, params={"expand": True}).json()
         return answer
 
@@ -87,15 +81,9 @@ class Scenarios:
 
         The service computes it at the first call and asks to come back until it has.
         """
-        params = {
-            "kind": kind,
-            "target_id": target_id,
-            "satellite_id": satellite_id,
-            "limit": 500,
-        }
-        return self._transport.pages(
-            path_of("scenarios", scenario_id, "opportunities"), Opportunity, params
-        )
+        wanted = {"kind": kind, "target_id": target_id, "satellite_id": satellite_id, "limit": 500}
+        path = self._path(scenario_id, "opportunities")
+        return self._transport.pages(path, Opportunity, wanted)
 
 
 def _text(instant: datetime | str) -> str:

@@ -1,22 +1,26 @@
-"""Catalogues of targets."""
+"""Catalogues of targets, and how far their targets have come."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from service.client.transport import Transport, held, path_of
+from service.client.collection import Changeable
+from service.client.transport import Transport, path_of
 from service.client.uploads import Source, upload
 from service.wire.places import CreatedCatalog
 from service.wire.places import TargetCatalogOut as TargetCatalog
 from service.wire.places import TargetIn as Target
+from service.wire.target_lives import TargetLifeOut as TargetLife
 
 
-class TargetCatalogs:
-    """The target catalogues that are stored."""
+class TargetCatalogs(Changeable[TargetCatalog]):
+    """The target catalogues that are stored. Scenarios keep their copy of one that is deleted.
 
-    def __init__(self, transport: Transport):
-        self._transport = transport
+    What can be changed is the ``name``, and by target the ``rewards`` that images earn from now on.
+    """
+
+    _name, _shape = "target-catalogs", TargetCatalog
 
     def create(
         self,
@@ -36,44 +40,28 @@ class TargetCatalogs:
             Targets as mappings, each with ``id``, ``lat_deg``, ``lon_deg``; or a file, or its
             content and form: ``csv``, ``geojson`` or ``json``.
         """
-        path = path_of("target-catalogs")
         if isinstance(targets, Source):
-            content, headers = upload(targets, form)
-            return self._transport.post(
-                path,
-                CreatedCatalog,
-                params={"name": name},
-                content=content,
-                headers=headers,
-                idempotency_key=idempotency_key,
-            )
-        body = {"name": name, "targets": [dict(target) for target in targets]}
+            sent = {"params": {"name": name}, **upload(targets, form)}
+        else:
+            sent = {"json": {"name": name, "targets": [dict(target) for target in targets]}}
         return self._transport.post(
-            path, CreatedCatalog, json=body, idempotency_key=idempotency_key
+            self._path(), CreatedCatalog, idempotency_key=idempotency_key, **sent
         )
-
-    def list(self) -> Iterator[TargetCatalog]:
-        """Yield the catalogues, newest first."""
-        return self._transport.pages(path_of("target-catalogs"), TargetCatalog)
-
-    def get(self, catalog_id: str) -> TargetCatalog:
-        """Return one catalogue, without its targets."""
-        return self._transport.get(path_of("target-catalogs", catalog_id), TargetCatalog)
 
     def targets(self, catalog_id: str) -> Iterator[Target]:
         """Yield the targets of a catalogue, in the order of its file."""
-        path = path_of("target-catalogs", catalog_id, "targets")
-        return self._transport.pages(path, Target, {"limit": 500})
+        return self._transport.pages(self._path(catalog_id, "targets"), Target, {"limit": 500})
 
-    def change(
-        self, catalog_id: str, *, if_match: str | None = None, **changes: Any
-    ) -> TargetCatalog:
-        """Change its ``name``, or by target the ``rewards`` that images earn from now on."""
-        headers = {} if if_match is None else {"If-Match": if_match}
-        path = path_of("target-catalogs", catalog_id)
-        answer = self._transport.request("PATCH", path, json=changes, headers=headers)
-        return held(TargetCatalog, answer)
 
-    def delete(self, catalog_id: str, *, if_match: str | None = None) -> None:
-        """Delete a catalogue; scenarios keep their copy."""
-        self._transport.delete(path_of("target-catalogs", catalog_id), if_match=if_match)
+class Targets:
+    """The targets of all catalogues, with how far each has come."""
+
+    def __init__(self, transport: Transport):
+        self._transport = transport
+
+    def list(
+        self, *, state: str | None = None, catalog_id: str | None = None
+    ) -> Iterator[TargetLife]:
+        """Yield targets: ``open``, ``planned``, ``collected``, ``delivered`` and so on."""
+        wanted = {"state": state, "catalog_id": catalog_id}
+        return self._transport.pages(path_of("targets"), TargetLife, wanted)

@@ -7,6 +7,7 @@ import os
 import secrets
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from datetime import datetime
 from pathlib import Path
 from typing import IO, Any, Final, TypeVar
 from urllib.parse import quote
@@ -21,20 +22,16 @@ from tenacity import (
     wait_random_exponential,
 )
 
-from service.client.errors import (
-    ServiceError,
-    UnexpectedAnswer,
-    Unreachable,
-    error_of,
-)
-from service.wire.base import Listed, Stored, Wire, read
+from service.client.errors import ServiceError, UnexpectedAnswer, Unreachable, error_of
+from service.wire.base import Json, Listed, Stored, Wire, read
+from service.wire.instants import instant_text
 
 log = logging.getLogger("service.client")
 
 M = TypeVar("M", bound=Wire)
 R = TypeVar("R")
 
-Params = Mapping[str, str | int | float | bool | None]
+Params = Mapping[str, str | int | float | bool | datetime | None]
 
 _COME_BACK: Final = frozenset({429, 502, 503, 504})
 _NEVER_SENT: Final = (httpx.ConnectError, httpx.ConnectTimeout, httpx.PoolTimeout)
@@ -82,7 +79,7 @@ class Transport:
             Where no answer came.
         """
         sent = httpx.Headers(headers)
-        given = {name: value for name, value in (params or {}).items() if value is not None}
+        given = said(**(params or {}))
 
         def send() -> httpx.Response:
             answer = self.http.request(method, path, params=given, headers=sent, **body)
@@ -107,10 +104,16 @@ class Transport:
         key = {"Idempotency-Key": idempotency_key or secrets.token_hex(16)}
         return held(shape, self.request("POST", path, headers={**(headers or {}), **key}, **rest))
 
+    def change(
+        self, method: str, path: str, shape: type[M], body: Json, *, if_match: str | None
+    ) -> M:
+        """Return what is there once it was changed, in the state that ``if_match`` names."""
+        return held(shape, self.request(method, path, json=body, headers=only_if(if_match)))
+
     def delete(self, path: str, *, if_match: str | None = None) -> None:
         """Delete what is there; only in the state that ``if_match`` names, where it is given."""
         attempts = 0
-        headers = {} if if_match is None else {"If-Match": if_match}
+        headers = only_if(if_match)
 
         def send() -> None:
             nonlocal attempts
@@ -178,6 +181,24 @@ def path_of(*parts: str) -> str:
     '/v1/jobs/a%2Fb/cancel'
     """
     return "/".join(["/v1", *(quote(part, safe="") for part in parts)])
+
+
+def only_if(if_match: str | None) -> dict[str, str]:
+    """Return the header that allows a change in one state alone; none where any will do."""
+    return {} if if_match is None else {"If-Match": if_match}
+
+
+def said(**fields: Any) -> Json:
+    """Return what is said, instants as text; nothing is said of what is None."""
+    return in_text({name: value for name, value in fields.items() if value is not None})
+
+
+def in_text(fields: Mapping[str, Any]) -> Json:
+    """Return the same with its instants as text."""
+    return {
+        name: instant_text(value) if isinstance(value, datetime) else value
+        for name, value in fields.items()
+    }
 
 
 def is_repeatable(method: str, headers: httpx.Headers) -> bool:

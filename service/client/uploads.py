@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 Source = Path | str | bytes
 """A file, or its content."""
@@ -27,8 +27,8 @@ _SUFFIXES: Final = {
 }
 
 
-def upload(source: Source, form: str | None) -> tuple[bytes, dict[str, str]]:
-    """Return the content of a file and the header that tells its form.
+def upload(source: Source, form: str | None) -> dict[str, Any]:
+    """Return how a file is sent: its content, and the header that tells its form.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def upload(source: Source, form: str | None) -> tuple[bytes, dict[str, str]]:
         A name of ``MEDIA_TYPES``; of a ``Path`` the suffix tells it.
 
     >>> upload("id,lat_deg,lon_deg", "csv")
-    (b'id,lat_deg,lon_deg', {'Content-Type': 'text/csv'})
+    {'content': b'id,lat_deg,lon_deg', 'headers': {'Content-Type': 'text/csv'}}
     """
     name = form
     if name is None and isinstance(source, Path):
@@ -52,4 +52,4 @@ def upload(source: Source, form: str | None) -> tuple[bytes, dict[str, str]]:
             content = source.encode()
         case bytes():
             content = source
-    return content, {"Content-Type": MEDIA_TYPES[name]}
+    return {"content": content, "headers": {"Content-Type": MEDIA_TYPES[name]}}

@@ -246,12 +246,9 @@ def replan(options: argparse.Namespace) -> int:
 
 def _asked(ask: Callable[[argparse.Namespace], int], options: argparse.Namespace) -> int:
     from service.client import ClientError
-    from service.commands.plan_command import Refused
 
     try:
         return ask(options)
-    except Refused as error:
-        raise WrongInput(str(error)) from error
     except ClientError as error:
         return complain(str(error), FAILED)
 

@@ -13,10 +13,8 @@ from planner_core.budget import Budget
 from planner_core.build import ScenarioOpportunities
 from planner_core.solvers.registry import solver_class
 from service.commands.scenario_files import read_object, require_folder
-from service.commands.solve import answer_of
-from service.jobs.plan_request import PlanRequest
+from service.commands.solve import Search, answer_of
 from service.jobs.solver_params import params_of, parse_params
-from service.scenarios.canonical import canonical, sha256_of
 from service.scenarios.translate import quality_from, read_file
 
 SPACINGS_S: Final = (60.0, 30.0, 15.0)
@@ -69,29 +67,13 @@ class _Row:
         )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Search:
+class _Search(Search):
     """How each row is searched for."""
-
-    solver: str
-    params: Mapping[str, Any]
-    seed: int
-    time_s: float
 
     def row(self, starts: str, question: Mapping[str, Any]) -> _Row:
         """Plan a question."""
-        varied = canonical(question)
-        request = PlanRequest(
-            job_id="local",
-            scenario_sha256=sha256_of(varied),
-            content=varied,
-            solver=self.solver,
-            params=self.params,
-            seed=self.seed,
-            limits={"time_s": self.time_s},
-        )
         budget = Budget(self.time_s)
-        answer = answer_of(request, budget)
+        answer = answer_of(self.request(question), budget)
         assert answer.opportunity_block is not None
         found = ScenarioOpportunities.from_bytes(answer.opportunity_block)
         return _Row(
@@ -142,14 +124,7 @@ def compare_spacing(
     out
         Where to write the table, as CSV.
 
-    Raises
-    ------
-    PlannerError
-        Where the file, the solver's name or its parameters are wrong.
-    Cancelled
-        Where the patience ended before there was a plan.
-    OSError
-        Where a file cannot be read or written.
+    Raises what ``solve_file`` does.
     """
     if out is not None:
         require_folder(out)

@@ -1,65 +1,15 @@
-"""``slewline plan``: a scenario to the service, its plan back."""
+"""What ``slewline plan`` and ``replan`` share: a job to the service, its plan back."""
 
 from __future__ import annotations
 
-import secrets
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 from service.client import Client, Job, JobFailed, ServiceError
 from service.commands.progress_line import ProgressLine
 from service.commands.summary import summary
-
-
-def plan(
-    client: Client,
-    scenario: str | Mapping[str, Any],
-    *,
-    solver: str,
-    params: Mapping[str, Any],
-    seed: int = 0,
-    time_s: float | None = None,
-    priority: int | None = None,
-    label: str | None = None,
-    out: Path | None = None,
-    detach: bool = False,
-) -> int:
-    """Have a scenario planned, print a summary, and return 0 where the plan is valid, else 1.
-
-    Ctrl-C cancels the job and saves the best plan that it had; a second one leaves at once.
-
-    Parameters
-    ----------
-    scenario
-        The content of a scenario file, or the id of a stored scenario. A content that the
-        service knows is not stored again.
-    solver, params, seed, time_s, priority, label
-        Of the job.
-    out
-        Where to save the timeline; the suffix chooses its form.
-    detach
-        Whether to print the job's id and leave it to itself.
-
-    Raises what ``follow_to_plan`` raises.
-    """
-    key = secrets.token_hex(16)
-
-    def submit() -> Job:
-        return client.jobs.submit(
-            scenario,
-            solver,
-            params=params,
-            seed=seed,
-            time_s=time_s,
-            priority=priority,
-            label=label,
-            idempotency_key=key,
-        )
-
-    return follow_to_plan(client, submit, out=out, detach=detach)
 
 
 def follow_to_plan(
@@ -72,12 +22,16 @@ def follow_to_plan(
 ) -> int:
     """Submit a job, follow it, print a summary of its plan; return 0 where that is valid, else 1.
 
+    Ctrl-C cancels the job and saves the best plan that it had; a second one leaves at once.
+
     Parameters
     ----------
     submit
         Posts the job under a key of its own: asked twice, it is the same job.
-    out, detach
-        As ``plan`` takes them.
+    out
+        Where to save the timeline; the suffix chooses its form.
+    detach
+        Whether to print the job's id and leave it to itself.
     tell
         Prints what else there is to say of a job that has a plan.
 

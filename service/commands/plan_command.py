@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import argparse
 import os
+import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Final
 
 from planner_core.errors import PlannerError
 from service.client import Client, ServiceError
-from service.commands.plan import plan
+from service.commands.bodies import WrongInput
+from service.commands.plan import follow_to_plan
 from service.commands.replan import replan
 from service.commands.scenario_files import place_of, read_object, require_folder
 
@@ -28,17 +31,13 @@ _OPTIONS: Final = {
 _OF_THE_INPUT: Final = (413, 422)
 
 
-class Refused(Exception):
-    """Something on the command line, in the environment or in a file; the message names it."""
-
-
 def run_plan(options: argparse.Namespace) -> int:
     """Run ``slewline plan`` and return its exit status.
 
     Raises
     ------
-    Refused
-        Where the input is wrong.
+    WrongInput
+        Where something is.
     ClientError
         Where the service does not do what was asked.
     """
@@ -46,18 +45,18 @@ def run_plan(options: argparse.Namespace) -> int:
         _check(options)
         scenario = options.scenario_id or read_object(options.scenario)
         with _client(options) as client:
-            return plan(
-                client,
+            submit = partial(
+                client.jobs.submit,
                 scenario,
-                solver=options.solver,
+                options.solver,
                 params=dict(options.param),
                 seed=options.seed,
                 time_s=options.time_s,
                 priority=options.priority,
                 label=options.label,
-                out=options.out,
-                detach=options.detach,
+                idempotency_key=secrets.token_hex(16),
             )
+            return follow_to_plan(client, submit, out=options.out, detach=options.detach)
 
 
 def run_replan(options: argparse.Namespace) -> int:
@@ -80,17 +79,17 @@ def run_replan(options: argparse.Namespace) -> int:
 
 def _client(options: argparse.Namespace) -> Client:
     if options.key_env is not None and options.key_env not in os.environ:
-        raise Refused(f"--key-env: there is no variable {options.key_env}")
+        raise WrongInput(f"--key-env: there is no variable {options.key_env}")
     key = None if options.key_env is None else os.environ[options.key_env]
     try:
         return Client(options.url, key)
     except ValueError as error:
-        raise Refused(str(error)) from error
+        raise WrongInput(str(error)) from error
 
 
 def _check(options: argparse.Namespace) -> None:
     if (options.scenario is None) == (options.scenario_id is None):
-        raise Refused("give either SCENARIO.json or --scenario-id")
+        raise WrongInput("give either SCENARIO.json or --scenario-id")
     _check_out(options)
 
 
@@ -98,9 +97,9 @@ def _check_out(options: argparse.Namespace) -> None:
     if options.out is None:
         return
     if options.detach:
-        raise Refused("--out: with --detach there is no plan to write yet")
+        raise WrongInput("--out: with --detach there is no plan to write yet")
     if options.out.suffix.lower() not in _SUFFIXES:
-        raise Refused(f"--out: {options.out} must end in one of {', '.join(_SUFFIXES)}")
+        raise WrongInput(f"--out: {options.out} must end in one of {', '.join(_SUFFIXES)}")
     require_folder(options.out)
 
 
@@ -111,11 +110,11 @@ def _placed(scenario: Path | None) -> Iterator[None]:
     except ServiceError as error:
         if error.status not in _OF_THE_INPUT:
             raise
-        raise Refused(_faults(error, scenario)) from error
+        raise WrongInput(_faults(error, scenario)) from error
     except PlannerError as error:
-        raise Refused(f"{scenario}: {error.detail}") from error
+        raise WrongInput(f"{scenario}: {error.detail}") from error
     except OSError as error:
-        raise Refused(f"{error.filename}: {error.strerror}") from error
+        raise WrongInput(f"{error.filename}: {error.strerror}") from error
 
 
 def _faults(error: ServiceError, scenario: Path | None) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import shutil
 import threading
 import time
-from types import TracebackType
 from typing import Final, Self, TextIO
 
 from service.client import Job
@@ -38,12 +37,7 @@ class ProgressLine:
             self._clock.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._is_over.set()
         if self._is_live:
             self._clock.join()

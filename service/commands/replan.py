@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import secrets
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,16 +17,11 @@ _HEADER = ("change", "cause", "satellite", "action", "of", "was at", "is at")
 
 
 def replan(
-    client: Client,
-    plan_id: str,
-    happened: Mapping[str, Any],
-    *,
-    out: Path | None = None,
-    detach: bool = False,
+    client: Client, plan_id: str, happened: Mapping[str, Any], *, out: Path | None, detach: bool
 ) -> int:
     """Have a plan replanned; print a summary, the draft and its changes.
 
-    Ctrl-C cancels the job: the best plan that it had by then is a draft all the same.
+    Where the job is cancelled, the best plan that it had by then is a draft all the same.
 
     Parameters
     ----------
@@ -33,17 +29,11 @@ def replan(
         Of the plan that goes on.
     happened
         The body of the call, as the API takes it.
-    out
-        Where to save the timeline; the suffix chooses its form.
-    detach
-        Whether to print the job's id and leave it to itself.
 
-    Returns and raises what ``follow_to_plan`` does.
+    Takes, returns and raises else what ``follow_to_plan`` does.
     """
     key = secrets.token_hex(16)
-
-    def submit() -> Job:
-        return client.jobs.replan(plan_id, happened, idempotency_key=key)
+    submit = partial(client.jobs.replan, plan_id, happened, idempotency_key=key)
 
     def tell(job: Job) -> None:
         draft = client.plans.draft_of(job)

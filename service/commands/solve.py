@@ -6,6 +6,7 @@ import json
 import signal
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor, wait
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -45,31 +46,42 @@ def solve_file(
 
     Raises
     ------
-    PlannerError
-        Where the file, the solver's name or its parameters are wrong.
-    Cancelled
-        Where the time or the patience ended before there was a plan.
-    OSError
-        Where a file cannot be read or written.
+    PlannerError, OSError, Cancelled
+        Where input is wrong, a file cannot be read or written, or there was no plan in time.
     """
     if out is not None:
         require_folder(out)
     chosen = parse_params(solver_class(solver), params)
-    content = canonical(read_object(path))
-    request = PlanRequest(
-        job_id="local",
-        scenario_sha256=sha256_of(content),
-        content=content,
-        solver=solver,
-        params=params_of(chosen),
-        seed=seed,
-        limits={"time_s": time_s},
-    )
-    timeline = json.loads(answer_of(request, Budget(time_s)).timeline)
+    search = Search(solver=solver, params=params_of(chosen), seed=seed, time_s=time_s)
+    answer = answer_of(search.request(read_object(path)), Budget(time_s))
+    timeline = json.loads(answer.timeline)
     if out is not None:
         out.write_text(json.dumps(timeline, indent=1) + "\n", encoding="utf-8")
     print(summary(timeline))
     return 0 if timeline["validity"] != "violations" else 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Search:
+    """How a scenario is searched; ``params`` are all that the solver has."""
+
+    solver: str
+    params: Mapping[str, Any]
+    seed: int
+    time_s: float | None
+
+    def request(self, scenario: Mapping[str, Any]) -> PlanRequest:
+        """Return the question of a scenario file."""
+        content = canonical(scenario)
+        return PlanRequest(
+            job_id="local",
+            scenario_sha256=sha256_of(content),
+            content=content,
+            solver=self.solver,
+            params=self.params,
+            seed=self.seed,
+            limits={"time_s": self.time_s},
+        )
 
 
 def answer_of(request: PlanRequest, budget: Budget) -> PlanAnswer:

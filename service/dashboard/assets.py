@@ -44,23 +44,18 @@ class Assets:
     pages: dict[str, Asset]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Page:
-    title: str
-    script: str
-
-
-_PAGES: Final = {
-    "jobs": _Page(title="Jobs", script="jobs_page.js"),
-    "new": _Page(title="New plan", script="new_page.js"),
-    "job": _Page(title="Job", script="job_page.js"),
-    "plans": _Page(title="Plans", script="plans_page.js"),
-    "plan": _Page(title="Plan", script="plan_page.js"),
-    "fleet": _Page(title="Fleet", script="fleet_page.js"),
-    "targets": _Page(title="Targets", script="targets_page.js"),
-    "wall": _Page(title="Wall", script="wall_page.js"),
-    "comparison": _Page(title="Comparison", script="comparison_page.js"),
+_TITLES: Final = {
+    "jobs": "Jobs",
+    "new": "New plan",
+    "job": "Job",
+    "plans": "Plans",
+    "plan": "Plan",
+    "fleet": "Fleet",
+    "targets": "Targets",
+    "wall": "Wall",
+    "comparison": "Comparison",
 }
+"""Of the pages, each of which has a script of its name."""
 
 
 @cache
@@ -75,14 +70,17 @@ def load_assets() -> Assets:
     for name, asset in static.items():
         digest.update(f"{name} {len(asset.content)}\n".encode() + asset.content)
     version = digest.hexdigest()[:16]
-    pages = {name: _page(name, page, version) for name, page in _PAGES.items()}
+    pages = {name: _page(name, version) for name in _TITLES}
     return Assets(version=version, static=static, pages=pages)
 
 
-def _page(name: str, page: _Page, version: str) -> Asset:
+def _page(name: str, version: str) -> Asset:
     layout = Template((_HERE / "pages" / "layout.html").read_text(encoding="utf-8"))
     main = (_HERE / "pages" / f"{name}.html").read_text(encoding="utf-8")
     filled = layout.substitute(
-        title=page.title, static=f"/static/{version}", script=page.script, main=main.strip()
+        title=_TITLES[name],
+        static=f"/static/{version}",
+        script=f"{name}_page.js",
+        main=main.strip(),
     )
     return Asset(content=filled.encode(), media_type="text/html; charset=utf-8")

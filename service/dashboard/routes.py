@@ -7,7 +7,7 @@ from typing import Final
 
 from fastapi import APIRouter, Request, Response
 
-from service.api.etags import matches
+from service.api.conditional import sent
 from service.dashboard.assets import load_assets
 from service.problems.kinds import ServiceError
 
@@ -54,9 +54,7 @@ def _page(request: Request, name: str) -> Response:
     headers = {
         "ETag": etag, "Cache-Control": "no-cache", "Content-Security-Policy": PAGE_POLICY,
     }  # fmt: skip
-    if matches(request.headers.get("if-none-match"), etag):
-        return Response(status_code=304, headers=headers)
-    return Response(page.content, media_type=page.media_type, headers=headers)
+    return sent(request, page.content, page.media_type, headers)
 
 
 def _show(path: str, name: str) -> None:

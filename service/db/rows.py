@@ -6,128 +6,71 @@ uses them: a scenario stores its whole content.
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
+from datetime import datetime
 from typing import Any
 
 import sqlalchemy as sa
-from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
+from sqlalchemy.orm import Mapped, mapped_column
 
-Json = dict[str, Any]
-
-
-class UtcDateTime(sa.TypeDecorator[datetime]):
-    """An aware UTC instant on every database (SQLite itself forgets the zone)."""
-
-    impl = sa.DateTime(timezone=True)
-    cache_ok = True
-
-    def process_bind_param(self, value: datetime | None, dialect: sa.Dialect) -> datetime | None:
-        """Refuse naive instants and store UTC."""
-        if value is None:
-            return None
-        if value.tzinfo is None:
-            raise ValueError("naive datetime")
-        return value.astimezone(UTC)
-
-    def process_result_value(self, value: datetime | None, dialect: sa.Dialect) -> datetime | None:
-        """Give back an aware instant."""
-        if value is None:
-            return None
-        return value.replace(tzinfo=UTC) if value.tzinfo is None else value.astimezone(UTC)
+from service.db.columns import Json, Kept, Made, Owned, Reported, Row
 
 
-class Row(DeclarativeBase):
-    """Base of all rows."""
-
-    type_annotation_map = {Json: sa.JSON, datetime: UtcDateTime, str: sa.Text}  # noqa: RUF012 - as SQLAlchemy reads it
-
-
-class SatelliteRow(Row):
+class SatelliteRow(Kept):
     """A satellite; its element sets stand in their own table, newest epoch in force."""
 
-    __tablename__ = "satellite"
-
-    id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
     name: Mapped[str]
     norad_cat_id: Mapped[int] = mapped_column(sa.BigInteger, index=True)
     agility: Mapped[Json]
     sensor: Mapped[Json]
     resources: Mapped[Any] = mapped_column(sa.JSON)
     spacecraft: Mapped[str | None] = mapped_column(sa.String(200))
-    created_at: Mapped[datetime]
-    deleted_at: Mapped[datetime | None]
 
 
-class SpacecraftRow(Row):
+class SpacecraftRow(Kept):
     """A type of spacecraft; ``body`` holds its agility, sensor and resources."""
 
-    __tablename__ = "spacecraft"
-
-    id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
     name: Mapped[str]
     body: Mapped[Json]
-    created_at: Mapped[datetime]
-    deleted_at: Mapped[datetime | None]
 
 
-class ElementSetRow(Row):
+class ElementSetRow(Made):
     """One element set of a satellite, as it came (``tle`` or ``omm``), never changed."""
 
-    __tablename__ = "element_set"
-
-    id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
     satellite_id: Mapped[str] = mapped_column(sa.ForeignKey("satellite.id"), index=True)
     epoch: Mapped[datetime]
     orbit: Mapped[Json]
-    created_at: Mapped[datetime]
 
 
-class GroundStationRow(Row):
+class GroundStationRow(Kept):
     """A ground station; ``body`` is what its POST takes, defaults filled in."""
 
-    __tablename__ = "ground_station"
-
-    id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
     name: Mapped[str]
     body: Mapped[Json]
-    created_at: Mapped[datetime]
-    deleted_at: Mapped[datetime | None]
 
 
-class OutageRow(Row):
+class OutageRow(Kept):
     """A span in which a satellite or a ground station is out."""
 
-    __tablename__ = "outage"
     __table_args__ = (sa.Index("ix_outage_end", "end"),)
 
-    id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
     satellite_id: Mapped[str | None] = mapped_column(sa.ForeignKey("satellite.id"))
     station_id: Mapped[str | None] = mapped_column(sa.ForeignKey("ground_station.id"))
     start: Mapped[datetime]
     end: Mapped[datetime]
     modes: Mapped[list[str]] = mapped_column(sa.JSON)
     reason: Mapped[str | None]
-    created_at: Mapped[datetime]
-    deleted_at: Mapped[datetime | None]
 
 
-class TargetCatalogRow(Row):
+class TargetCatalogRow(Kept):
     """A catalogue of targets."""
 
-    __tablename__ = "target_catalog"
-
-    id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
     name: Mapped[str]
     num_targets: Mapped[int]
-    created_at: Mapped[datetime]
     changed_at: Mapped[datetime | None]
-    deleted_at: Mapped[datetime | None]
 
 
 class TargetRow(Row):
     """One target of a catalogue, in the order of its file."""
-
-    __tablename__ = "target"
 
     catalog_id: Mapped[str] = mapped_column(sa.ForeignKey("target_catalog.id"), primary_key=True)
     position: Mapped[int] = mapped_column(primary_key=True)
@@ -135,7 +78,7 @@ class TargetRow(Row):
     body: Mapped[Json]
 
 
-class OrderRow(Row):
+class OrderRow(Owned):
     """An order that came over STAPI; its id is that of its target.
 
     ``target`` is that target as it was ordered, ``sent`` what the order said.
@@ -144,32 +87,23 @@ class OrderRow(Row):
     __tablename__ = "stapi_order"
     __table_args__ = (sa.Index("ix_stapi_order_owner_id", "owner", "id"),)
 
-    id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
-    owner: Mapped[str] = mapped_column(sa.String(64))
     product_id: Mapped[str] = mapped_column(sa.String(36))
     catalog_id: Mapped[str] = mapped_column(sa.ForeignKey("target_catalog.id"))
     target: Mapped[Json]
     sent: Mapped[Json]
-    created_at: Mapped[datetime]
 
 
-class ScenarioRow(Row):
+class ScenarioRow(Made):
     """A frozen question. ``content`` is the self-contained scenario file; ``sha256`` its hash."""
 
-    __tablename__ = "scenario"
-
-    id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
     sha256: Mapped[str] = mapped_column(sa.String(64), unique=True)
     name: Mapped[str | None]
     summary: Mapped[Json]
     content: Mapped[str] = mapped_column(sa.Text, deferred=True)
-    created_at: Mapped[datetime]
 
 
 class ScenarioOwnerRow(Row):
     """Who may see a scenario that came with a job of its own; without any, everybody may."""
-
-    __tablename__ = "scenario_owner"
 
     scenario_id: Mapped[str] = mapped_column(sa.ForeignKey("scenario.id"), primary_key=True)
     owner: Mapped[str] = mapped_column(sa.String(64), primary_key=True)
@@ -178,8 +112,6 @@ class ScenarioOwnerRow(Row):
 class ScenarioPartRow(Row):
     """A satellite or a ground station of a scenario: lists are narrowed by it."""
 
-    __tablename__ = "scenario_part"
-
     part_id: Mapped[str] = mapped_column(primary_key=True)
     scenario_id: Mapped[str] = mapped_column(
         sa.ForeignKey("scenario.id"), primary_key=True, index=True
@@ -187,15 +119,12 @@ class ScenarioPartRow(Row):
     kind: Mapped[str] = mapped_column(sa.String(16), primary_key=True)
 
 
-class ForecastRow(Row):
+class ForecastRow(Owned):
     """A forecast of clear skies; ``block`` is what it says, compressed (`forecasts.fields`).
 
     ``summary`` is what readers are told of its size and of how it was read.
     """
 
-    __tablename__ = "forecast"
-
-    id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
     owner: Mapped[str] = mapped_column(sa.String(64), index=True)
     name: Mapped[str]
     sha256: Mapped[str] = mapped_column(sa.String(64))
@@ -203,14 +132,11 @@ class ForecastRow(Row):
     last_at: Mapped[datetime]
     default_clear_probability: Mapped[float | None] = mapped_column(sa.Double)
     summary: Mapped[Json]
-    created_at: Mapped[datetime]
     block: Mapped[bytes] = mapped_column(sa.LargeBinary, deferred=True)
 
 
 class OpportunitySetRow(Row):
     """The opportunities of a scenario, computed once, as a compressed columnar block."""
-
-    __tablename__ = "opportunity_set"
 
     scenario_sha256: Mapped[str] = mapped_column(sa.String(64), primary_key=True)
     version: Mapped[str]
@@ -230,7 +156,7 @@ class BoundRow(Row):
     created_at: Mapped[datetime]
 
 
-class JobRow(Row):
+class JobRow(Made):
     """A job: the truth about one piece of queue work (DBOS only dispatches it).
 
     ``dispatch`` counts how often it was handed to the queue; ``run`` counts starts and
@@ -243,14 +169,12 @@ class JobRow(Row):
     ``validity`` and ``warnings`` repeat what the head of its timeline says.
     """
 
-    __tablename__ = "job"
     # A filtered list is read in order of the ids, and ends with its page.
     __table_args__ = tuple(
         sa.Index(f"ix_job_{column}_id", column, "id")
         for column in ("scenario_id", "tenant", "state", "label")
     )
 
-    id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
     scenario_id: Mapped[str] = mapped_column(sa.ForeignKey("scenario.id"))
     tenant: Mapped[str] = mapped_column(sa.String(64), default="local")
     state: Mapped[str] = mapped_column(sa.String(16))
@@ -277,7 +201,6 @@ class JobRow(Row):
     dispatched_at: Mapped[datetime]
     cancel_requested: Mapped[bool] = mapped_column(default=False)
     version: Mapped[int] = mapped_column(default=1)
-    created_at: Mapped[datetime]
     started_at: Mapped[datetime | None]
     finished_at: Mapped[datetime | None]
 
@@ -287,8 +210,6 @@ class JobResultRow(Row):
 
     ``figures`` repeats the numbers of the timeline that tables show.
     """
-
-    __tablename__ = "job_result"
 
     job_id: Mapped[str] = mapped_column(sa.ForeignKey("job.id"), primary_key=True)
     figures: Mapped[Json | None]
@@ -301,8 +222,6 @@ class JobBlockRow(Row):
     ``size`` counts the characters of ``text``.
     """
 
-    __tablename__ = "job_block"
-
     job_id: Mapped[str] = mapped_column(sa.ForeignKey("job_result.job_id"), primary_key=True)
     position: Mapped[int] = mapped_column(primary_key=True)
     kind: Mapped[str] = mapped_column(sa.String(16))
@@ -313,22 +232,16 @@ class JobBlockRow(Row):
     text: Mapped[str]
 
 
-class ComparisonRow(Row):
+class ComparisonRow(Made):
     """Several solvers on one scenario, side by side."""
 
-    __tablename__ = "comparison"
-
-    id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
     scenario_id: Mapped[str] = mapped_column(sa.ForeignKey("scenario.id"))
     tenant: Mapped[str] = mapped_column(sa.String(64), default="local")
     label: Mapped[str | None]
-    created_at: Mapped[datetime]
 
 
 class ComparisonRunRow(Row):
     """One line of a comparison, in the order of its request: a job like any other."""
-
-    __tablename__ = "comparison_run"
 
     comparison_id: Mapped[str] = mapped_column(sa.ForeignKey("comparison.id"), primary_key=True)
     position: Mapped[int] = mapped_column(primary_key=True)
@@ -342,8 +255,6 @@ class IdempotencyKeyRow(Row):
     headers and body; it is set in the transaction that stores what the request created.
     """
 
-    __tablename__ = "idempotency_key"
-
     tenant: Mapped[str] = mapped_column(sa.String(64), primary_key=True)
     key: Mapped[str] = mapped_column(sa.String(255), primary_key=True)
     request_sha256: Mapped[str] = mapped_column(sa.String(64))
@@ -354,8 +265,6 @@ class IdempotencyKeyRow(Row):
 class OwnerUsageRow(Row):
     """How much an owner has had stored: what it has sent, and what its jobs have found."""
 
-    __tablename__ = "owner_usage"
-
     owner: Mapped[str] = mapped_column(sa.String(64), primary_key=True)
     num_rows: Mapped[int] = mapped_column(sa.BigInteger)
     num_bytes: Mapped[int] = mapped_column(sa.BigInteger)
@@ -364,8 +273,6 @@ class OwnerUsageRow(Row):
 class WorkerRow(Row):
     """A worker's heartbeat; readiness asks for a recent one."""
 
-    __tablename__ = "worker"
-
     id: Mapped[str] = mapped_column(sa.String(128), primary_key=True)
     started_at: Mapped[datetime]
     seen_at: Mapped[datetime]
@@ -373,8 +280,6 @@ class WorkerRow(Row):
 
 class ApiKeyRow(Row):
     """An API key: all but its token, of which only a digest is kept."""
-
-    __tablename__ = "api_key"
 
     id: Mapped[str] = mapped_column(sa.String(12), primary_key=True)
     name: Mapped[str] = mapped_column(sa.String(64))
@@ -389,8 +294,6 @@ class ApiKeyRow(Row):
 class AuditEventRow(Row):
     """One change of one object. Triggers of the database refuse to change or delete a row."""
 
-    __tablename__ = "audit_event"
-
     id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
     at: Mapped[datetime]
     owner: Mapped[str] = mapped_column(sa.String(64))
@@ -402,32 +305,26 @@ class AuditEventRow(Row):
     object_id: Mapped[str] = mapped_column(sa.String(64), index=True)
 
 
-class WebhookRow(Row):
+class WebhookRow(Owned):
     """Where the ends of an owner's jobs are told. ``secret`` signs, so it is kept as it is."""
 
-    __tablename__ = "webhook"
-
-    id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
     owner: Mapped[str] = mapped_column(sa.String(64), index=True)
     name: Mapped[str | None]
     url: Mapped[str]
     events: Mapped[list[str]] = mapped_column(sa.JSON)
     secret: Mapped[str]
-    created_at: Mapped[datetime]
     disabled_at: Mapped[datetime | None]
     disabled_because: Mapped[str | None]
 
 
-class WebhookDeliveryRow(Row):
+class WebhookDeliveryRow(Made):
     """One message to one webhook: ``pending`` until it is ``delivered`` or has ``failed``.
 
     ``attempts`` is also the fencing token: only who made the newest attempt tells how it went.
     """
 
-    __tablename__ = "webhook_delivery"
     __table_args__ = (sa.Index("ix_webhook_delivery_due", "state", "due_at"),)
 
-    id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
     webhook_id: Mapped[str] = mapped_column(sa.ForeignKey("webhook.id"), index=True)
     job_id: Mapped[str | None] = mapped_column(sa.String(36))
     event: Mapped[str] = mapped_column(sa.String(32))
@@ -437,22 +334,18 @@ class WebhookDeliveryRow(Row):
     due_at: Mapped[datetime | None]
     last_status: Mapped[int | None]
     last_error: Mapped[str | None]
-    created_at: Mapped[datetime]
     ended_at: Mapped[datetime | None]
 
 
-class PlanRow(Row):
+class PlanRow(Owned):
     """A plan with a life: a job's answer that is approved, published, and one day superseded.
 
     What it says never changes; a change is a new plan with a ``parent_id``. ``version`` grows with
     each transition. ``violations`` are those that approval has to waive.
     """
 
-    __tablename__ = "plan"
     __table_args__ = (sa.Index("ix_plan_owner_state_id", "owner", "state", "id"),)
 
-    id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
-    owner: Mapped[str] = mapped_column(sa.String(64))
     name: Mapped[str | None]
     job_id: Mapped[str] = mapped_column(sa.ForeignKey("job.id"), index=True)
     parent_id: Mapped[str | None] = mapped_column(sa.ForeignKey("plan.id"), index=True)
@@ -463,7 +356,6 @@ class PlanRow(Row):
     validity: Mapped[str] = mapped_column(sa.String(16))
     violations: Mapped[list[Json]] = mapped_column(sa.JSON)
     version: Mapped[int] = mapped_column(default=1)
-    created_at: Mapped[datetime]
 
 
 class PlanSatelliteRow(Row):
@@ -471,8 +363,6 @@ class PlanSatelliteRow(Row):
 
     Both ends are null as long as the plan has not been published.
     """
-
-    __tablename__ = "plan_satellite"
 
     plan_id: Mapped[str] = mapped_column(sa.ForeignKey("plan.id"), primary_key=True)
     satellite_id: Mapped[str] = mapped_column(primary_key=True, index=True)
@@ -487,8 +377,6 @@ class PlanActionRow(Row):
     ``delivered_at`` of a collect is when the plan has its image down; null for never, and in plans
     of earlier releases. There ``station_name`` is null too, where the station is no longer stored.
     """
-
-    __tablename__ = "plan_action"
 
     plan_id: Mapped[str] = mapped_column(sa.ForeignKey("plan.id"), primary_key=True)
     position: Mapped[int] = mapped_column(primary_key=True)
@@ -508,8 +396,6 @@ class PlanActionRow(Row):
 class PlanEventRow(Row):
     """One transition of a plan: who, when and why."""
 
-    __tablename__ = "plan_event"
-
     id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
     plan_id: Mapped[str] = mapped_column(sa.ForeignKey("plan.id"), index=True)
     at: Mapped[datetime]
@@ -522,41 +408,27 @@ class PlanEventRow(Row):
     waivers: Mapped[list[Json]] = mapped_column(sa.JSON)
 
 
-class PlanStateRow(Row):
-    """Telemetry of a satellite of a plan, as reported. Rows are added, never changed."""
+class PlanStateRow(Reported):
+    """Telemetry of a satellite of a plan."""
 
-    __tablename__ = "plan_state"
-
-    id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
-    plan_id: Mapped[str] = mapped_column(sa.ForeignKey("plan.id"), index=True)
     satellite_id: Mapped[str]
     at: Mapped[datetime]
     body: Mapped[Json]
-    owner: Mapped[str] = mapped_column(sa.String(64))
-    key_name: Mapped[str | None] = mapped_column(sa.String(64))
-    reported_at: Mapped[datetime]
 
 
 class PublisherRow(Row):
     """One row for each owner, locked by whoever publishes: one plan after the other."""
 
-    __tablename__ = "publisher"
-
     owner: Mapped[str] = mapped_column(sa.String(64), primary_key=True)
 
 
-class ExecutionRow(Row):
-    """What became of an action, as reported. Rows are added, never changed."""
+class ExecutionRow(Reported):
+    """What became of an action."""
 
     __tablename__ = "plan_execution"
 
-    id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
-    plan_id: Mapped[str] = mapped_column(sa.ForeignKey("plan.id"), index=True)
     action_id: Mapped[str]
     outcome: Mapped[str] = mapped_column(sa.String(16))
     at: Mapped[datetime | None]
     mbit: Mapped[float | None] = mapped_column(sa.Double)
     detail: Mapped[str | None]
-    owner: Mapped[str] = mapped_column(sa.String(64))
-    key_name: Mapped[str | None] = mapped_column(sa.String(64))
-    reported_at: Mapped[datetime]

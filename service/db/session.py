@@ -10,6 +10,7 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
 
+from service.db.columns import Row
 from service.db.postgresql import DEFAULT_TIMEOUT_S, make_postgresql_engine
 
 _SQLITE_PRAGMAS = ("busy_timeout = 30000", "synchronous = FULL", "foreign_keys = ON")
@@ -81,6 +82,19 @@ def take_turns(session: Session, name: str) -> None:
     """
     if session.get_bind().dialect.name == "postgresql":
         session.execute(sa.select(sa.func.pg_advisory_xact_lock(sa.func.hashtext(name))))
+
+
+def changed(
+    session: Session,
+    table: type[Row],
+    guard: sa.ColumnElement[bool],
+    *columns: sa.SQLColumnExpression[Any],
+    **values: Any,
+) -> sa.Row[*tuple[Any, ...]] | None:
+    """Change the row for which a condition holds; return these columns of it, None if none did."""
+    statement = sa.update(table).where(guard).values(**values).returning(*columns)
+    statement = statement.execution_options(synchronize_session=False)
+    return session.execute(statement).one_or_none()
 
 
 def make_engine(url: str, timeout_s: float | None = DEFAULT_TIMEOUT_S) -> sa.Engine:

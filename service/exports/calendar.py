@@ -71,11 +71,7 @@ def _event(
     event.add("summary", what)
     event.add("description", _description(answered.head, action))
     event.add("categories", ["Contact"])
-    alarm = Alarm()
-    alarm.add("action", "DISPLAY")
-    alarm.add("trigger", -ALARM)
-    alarm.add("description", what)
-    event.add_component(alarm)
+    event.add_component(alarm(what))
     return event
 
 
@@ -90,6 +86,15 @@ def entry(start: datetime, end: datetime, station: GroundStation, made_at: datet
     event.add("location", station.name)
     event.add("geo", (round(station.lat_deg, 6), round(_signed(station.lon_deg), 6)))
     return event
+
+
+def alarm(what: str) -> Alarm:
+    """Return what tells of an event before it begins."""
+    found = Alarm()
+    found.add("action", "DISPLAY")
+    found.add("trigger", -ALARM)
+    found.add("description", what)
+    return found
 
 
 def uid(kind: str, satellite_id: str, station_id: str, middle: datetime, seen: Counter[str]) -> str:

@@ -14,12 +14,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from planner_core.domain import (
-    GroundStation,
-    Horizon,
-    Satellite,
-    Target,
-)
+from planner_core.domain import GroundStation, Horizon, Satellite, Target
 from planner_core.orbits.ephemeris import propagate
 from service.answers.answered import Answered, Document, compact, in_chunks, listed
 from service.wire.instants import instant_text

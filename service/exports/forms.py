@@ -9,7 +9,7 @@ from service.answers.answered import Answered
 from service.exports import calendar, czml, geojson, openmct, table
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Form:
     """A form other than the timeline document itself.
 
@@ -31,36 +31,19 @@ class Form:
 
 
 FORMS: tuple[Form, ...] = (
+    Form("csv", "text/csv", "one row for each action", table.write),
     Form(
-        suffix="csv",
-        media_type="text/csv",
-        about="one row for each action",
-        write=table.write,
+        "geojson", "application/geo+json", "targets with outcome, ground tracks, stations",
+        geojson.write,
     ),
+    # CZML has no registered type; Cesium asks for none.
     Form(
-        suffix="geojson",
-        media_type="application/geo+json",
-        about="targets with outcome, ground tracks, stations",
-        write=geojson.write,
-    ),
-    Form(
-        suffix="czml",
-        media_type="application/json",  # CZML has no registered type; Cesium asks for none
-        about="satellites, targets and contacts for Cesium",
-        write=czml.write,
+        "czml", "application/json", "satellites, targets and contacts for Cesium", czml.write,
         has_own_type=False,
     ),
+    Form("ics", "text/calendar", "contacts with alarms", calendar.write),
     Form(
-        suffix="ics",
-        media_type="text/calendar",
-        about="contacts with alarms",
-        write=calendar.write,
-    ),
-    Form(
-        suffix="openmct.json",
-        media_type="application/json",
-        about="a plan file of Open MCT",
-        write=openmct.write,
+        "openmct.json", "application/json", "a plan file of Open MCT", openmct.write,
         has_own_type=False,
     ),
-)
+)  # fmt: skip

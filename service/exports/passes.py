@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from datetime import datetime
 
-from icalendar import Alarm
-
 from planner_core.domain import GroundStation
 from planner_core.spreadsheets import guarded
 from service.answers.answered import in_chunks
-from service.exports.calendar import ALARM, around, entry, uid
+from service.exports.calendar import alarm, around, entry, uid
+from service.exports.table import line
 from service.wire.instants import instant_text
 from service.wire.passes import PassOut
 
@@ -44,9 +41,9 @@ def write_ics(
 
 
 def _lines(passes: Iterable[PassOut]) -> Iterator[str]:
-    yield _line(COLUMNS)
+    yield line(COLUMNS)
     for one in passes:
-        yield _line(
+        yield line(
             (
                 guarded(one.station_id),
                 guarded(one.station_name),
@@ -63,12 +60,6 @@ def _lines(passes: Iterable[PassOut]) -> Iterator[str]:
         )
 
 
-def _line(cells: Iterable[object]) -> str:
-    line = io.StringIO(newline="")
-    csv.writer(line).writerow(cells)
-    return line.getvalue()
-
-
 def _entries(
     passes: Iterable[PassOut], stations: Mapping[str, GroundStation], made_at: datetime
 ) -> Iterator[str]:
@@ -83,11 +74,7 @@ def _entries(
         event.add("description", _description(one))
         event.add("categories", ["Pass"])
         if one.planned:
-            alarm = Alarm()
-            alarm.add("action", "DISPLAY")
-            alarm.add("trigger", -ALARM)
-            alarm.add("description", what)
-            event.add_component(alarm)
+            event.add_component(alarm(what))
         yield event.to_ical().decode()
     yield tail
 

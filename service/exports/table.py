@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from datetime import datetime
 from typing import Any
 
@@ -31,13 +31,13 @@ def write(answered: Answered) -> Iterator[str]:
 
 
 def _lines(answered: Answered) -> Iterator[str]:
-    yield _line(COLUMNS)
+    yield line(COLUMNS)
     for satellite, action in answered.each_action():
         station_name = guarded(_station_name(answered, action))
         # Answers of earlier releases do not have them.
         behind = (action.get(name) for name in ("delivered_at", "age_s", "clear_probability"))
         target_name = guarded(action.get("target_name"))
-        yield _line((*_cells(satellite, action), station_name, *behind, target_name))
+        yield line((*_cells(satellite, action), station_name, *behind, target_name))
 
 
 def _station_name(answered: Answered, action: Document) -> str | None:
@@ -48,10 +48,11 @@ def _station_name(answered: Answered, action: Document) -> str | None:
     return next((one.name for one in stations if one.id == action["station_id"]), None)
 
 
-def _line(cells: tuple[Any, ...]) -> str:
-    line = io.StringIO(newline="")
-    csv.writer(line).writerow(cells)
-    return line.getvalue()
+def line(cells: Iterable[object]) -> str:
+    """Return a line of a table."""
+    written = io.StringIO(newline="")
+    csv.writer(written).writerow(cells)
+    return written.getvalue()
 
 
 def _cells(satellite: Document, action: Document) -> tuple[Any, ...]:

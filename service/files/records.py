@@ -7,41 +7,26 @@ import json
 import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import islice
 from typing import Any, Generic, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
 from planner_core.errors import Fault, PlannerError
 from service.files.tables import Table, decoded, has_decimal_comma, read_table
-from service.problems.faults import faults_of_validation, refuse
+from service.problems.faults import faults_of_validation, refuse, refuse_one
 
 B = TypeVar("B", bound=BaseModel)
 
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _WHOLE = re.compile(r"[+-]?\d{1,18}", re.ASCII)
-_TEXT_COLUMNS = frozenset(
-    {
-        "id",
-        "name",
-        "satellite_id",
-        "target_id",
-        "station_id",
-        "release",
-        "due",
-        "sensor_type",
-        "action_id",
-        "outcome",
-        "at",
-        "detail",
-    }
-)
+_TEXT_COLUMNS = (
+    "id", "name", "satellite_id", "target_id", "station_id", "release", "due", "sensor_type",
+    "action_id", "outcome", "at", "detail",
+)  # fmt: skip
 _ALIASES = {
-    "lat": "lat_deg",
-    "latitude": "lat_deg",
-    "lon": "lon_deg",
-    "lng": "lon_deg",
-    "long": "lon_deg",
-    "longitude": "lon_deg",
+    **dict.fromkeys(("lat", "latitude"), "lat_deg"),
+    **dict.fromkeys(("lon", "lng", "long", "longitude"), "lon_deg"),
 }
 _MISSPELT = 0.75
 MOST_COLUMNS = 200
@@ -169,25 +154,15 @@ def read_csv(
     by commas, or by semicolons or tabs where the header shows it; there a comma may be the decimal
     sign.
     """
-    text = decoded(data)
-    if isinstance(text, Fault):
-        return Records(faults=(text,))
-    table = read_table(text, column_names, required)
-    rows = table.rows
-    first = next(rows, None)
-    if first is None:
-        return Records(faults=(Fault(code="empty_file", detail="The file is empty."),))
-    if isinstance(first, Fault):
-        return Records(faults=(first,))
-    if len(first[1]) > MOST_COLUMNS:
-        detail = f"The header has {len(first[1])} columns; {MOST_COLUMNS} are the most."
-        return Records(faults=(Fault(code="malformed_csv", detail=detail, row=first[0]),))
-    columns = column_names(first[1])
-    faults = faults_of_header(first[0], columns, known, required)
+    try:
+        table, line, columns = open_table(data, required)
+    except NoTable as error:
+        return Records(faults=(error.fault,))
+    faults = faults_of_header(line, columns, known, required)
     if faults:
         return Records(faults=tuple(faults))
     records: list[Record] = []
-    for number, row in enumerate(rows):
+    for number, row in enumerate(islice(table.rows, 1, None)):
         if number == most:
             return _too_many_rows(most)
         if isinstance(row, Fault):
@@ -207,6 +182,32 @@ def read_csv(
         faults.append(Fault(code="empty_file", detail="The file has a header and no records."))
     ignored = tuple(column for column in columns if column not in known)
     return Records(records=tuple(records), faults=tuple(faults), ignored=ignored)
+
+
+class NoTable(Exception):
+    """A file holds no table; ``fault`` says why."""
+
+    def __init__(self, code: str, detail: str, row: int | None = None):
+        super().__init__(detail)
+        self.fault = Fault(code=code, detail=detail, row=row)
+
+
+def open_table(data: bytes, required: Collection[str]) -> tuple[Table, int, list[str]]:
+    """Return the table of a file, the line of its header, and our names of its columns."""
+    text = decoded(data)
+    if isinstance(text, Fault):
+        raise NoTable(text.code, text.detail)
+    table = read_table(text, column_names, required)
+    first = next(table.rows, None)
+    if first is None:
+        raise NoTable("empty_file", "The file is empty.")
+    if isinstance(first, Fault):
+        raise NoTable(first.code, first.detail, first.row)
+    line, header = first
+    if len(header) > MOST_COLUMNS:
+        detail = f"The header has {len(header)} columns; {MOST_COLUMNS} are the most."
+        raise NoTable("malformed_csv", detail, line)
+    return table, line, column_names(header)
 
 
 def column_names(header: Sequence[str]) -> list[str]:
@@ -252,6 +253,14 @@ def _value(column: str, cell: str, table: Table) -> object:
         return int(cell)
     # What is no number stays text, which the schema refuses by name.
     return float(cell) if _NUMBER.fullmatch(cell) else cell
+
+
+def read_json(data: bytes) -> Any:
+    """Return a JSON document; 422 where it is none."""
+    try:
+        return json.loads(data.decode("utf-8-sig"))
+    except (ValueError, RecursionError) as error:
+        raise refuse_one("malformed_json", f"No JSON: {error}"[:200]) from None
 
 
 def read_geojson(data: bytes, known: Collection[str], *, most: int) -> Records:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from datetime import datetime
+from itertools import islice
 from typing import Any, Final
 
 import numpy as np
@@ -12,15 +13,11 @@ import numpy.typing as npt
 from pydantic import TypeAdapter, ValidationError
 
 from planner_core.errors import Fault
-from service.files.records import (
-    MOST_COLUMNS,
-    column_names,
-    faults_of_header,
-)
-from service.files.tables import Table, decoded, read_table
+from service.files.records import NoTable, faults_of_header, open_table
+from service.files.tables import Table
 from service.forecasts.axes import fault_of_axes, unwrapped
 from service.forecasts.fields import WHOLE, ByTarget, Field, Grid, time_ms_of
-from service.problems.faults import refuse
+from service.problems.faults import refuse, refuse_one, require_none
 from service.wire.base import Id, Instant
 
 _GRID: Final = ("time", "lat_deg", "lon_deg", "clear_probability")
@@ -39,41 +36,22 @@ def read_csv(data: bytes) -> tuple[Field, list[str]]:
     ServiceError
         With the faults of the file, up to a hundred of them.
     """
-    text = decoded(data)
-    if isinstance(text, Fault):
-        raise refuse([text])
-    form = read_table(text, column_names, _IN_BOTH)
-    rows = form.rows
-    wanted, positions = _header(rows)
-    table = _Table(wanted, positions, form)
-    for row in rows:
+    try:
+        form, line, columns = open_table(data, _IN_BOTH)
+    except NoTable as error:
+        raise refuse([error.fault]) from None
+    wanted = _BY_TARGET if "target_id" in columns else _GRID
+    require_none(faults_of_header(line, columns, wanted, wanted))
+    table = _Table(wanted, [columns.index(name) for name in wanted], form)
+    for row in islice(form.rows, 1, None):
         table.add(row)
     if not table.faults and not table.lines:
         table.faults.append(
             Fault(code="empty_file", detail="The file has a header and no records.")
         )
-    if table.faults:
-        raise refuse(table.faults)
+    require_none(table.faults)
     field = _grid(table) if wanted is _GRID else _by_target(table)
     return field, [f"Probabilities are kept to 1/{WHOLE:,}."]
-
-
-def _header(rows: Iterator[tuple[int, list[str]] | Fault]) -> tuple[tuple[str, ...], list[int]]:
-    """Return which kind of file it is, and where its columns stand."""
-    first = next(rows, None)
-    if first is None:
-        raise refuse([Fault(code="empty_file", detail="The file is empty.")])
-    if isinstance(first, Fault):
-        raise refuse([first])
-    line, header = first
-    if len(header) > MOST_COLUMNS:
-        detail = f"The header has {len(header)} columns; {MOST_COLUMNS} are the most."
-        raise refuse([Fault(code="malformed_csv", detail=detail, row=line)])
-    columns = column_names(header)
-    wanted = _BY_TARGET if "target_id" in columns else _GRID
-    if faults := faults_of_header(line, columns, wanted, wanted):
-        raise refuse(faults)
-    return wanted, [columns.index(name) for name in wanted]
 
 
 class _Table:
@@ -163,17 +141,12 @@ def _grid(table: _Table) -> Grid:
     number = math.prod(shape)
     if (twice := _first_twice(places, shape)) is not None:
         detail = "This instant and place are given twice."
-        raise refuse([Fault(code="invalid_value", detail=detail, row=table.lines[twice])])
+        raise refuse_one("invalid_value", detail, row=table.lines[twice])
     if number > len(table.lines):
-        raise refuse(
-            [
-                Fault(
-                    code="invalid_value",
-                    detail=f"The grid is not full: {shape[0]} instants, {shape[1]} latitudes and "
-                    f"{shape[2]} longitudes make {number} values, and there are "
-                    f"{len(table.lines)}.",
-                )
-            ]
+        raise refuse_one(
+            "invalid_value",
+            f"The grid is not full: {shape[0]} instants, {shape[1]} latitudes and {shape[2]} "
+            f"longitudes make {number} values, and there are {len(table.lines)}.",
         )
     if (fault := fault_of_axes(axes[1], axes[2])) is not None:
         raise refuse([fault])
@@ -201,7 +174,7 @@ def _by_target(table: _Table) -> ByTarget:
     if len(again):
         row = max(table.lines[order[again[0]]], table.lines[order[again[0] + 1]])
         detail = f"Target {ids[own[again[0]]]!r} has this instant twice."
-        raise refuse([Fault(code="invalid_value", detail=detail, row=row)])
+        raise refuse_one("invalid_value", detail, row=row)
     return ByTarget(
         ids=tuple(ids.tolist()),
         first=np.searchsorted(own, np.arange(len(ids) + 1)).astype(np.int64),

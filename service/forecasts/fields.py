@@ -10,8 +10,8 @@ import io
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
-from typing import Any, Final, Protocol
+from datetime import UTC, datetime, timedelta
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -45,29 +45,6 @@ class Skies:
     target: Longs
     time_ms: Longs
     clear_probability: Floats
-
-
-class Field(Protocol):
-    """Either kind of forecast."""
-
-    @property
-    def first_ms(self) -> int:
-        """Return the first instant."""
-
-    @property
-    def last_ms(self) -> int:
-        """Return the last instant."""
-
-    def columns(self) -> dict[str, npt.NDArray[Any]]:
-        """Return all that it says, as arrays."""
-
-    def describe(self) -> dict[str, Any]:
-        """Return what readers are told of it."""
-
-    def over(
-        self, ids: Sequence[str], lat_deg: Floats, lon_deg: Floats, start_ms: int, end_ms: int
-    ) -> list[Skies]:
-        """Return the skies over targets from one instant to another, as far as known."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -250,6 +227,10 @@ class ByTarget:
         ]
 
 
+Field = Grid | ByTarget
+"""Either kind of forecast."""
+
+
 def within(time_ms: Longs, start_ms: int, end_ms: int) -> slice:
     """Return which ascending instants tell all of a span: those in it, and one on either side."""
     if time_ms[-1] < start_ms or time_ms[0] > end_ms:
@@ -262,6 +243,11 @@ def time_ms_of(instant: datetime) -> int:
     """Return the milliseconds since 1970."""
     since = instant - _EPOCH
     return since.days * 86_400_000 + since.seconds * 1000 + since.microseconds // 1000
+
+
+def instant_of(time_ms: int) -> datetime:
+    """Return the instant so many milliseconds after 1970."""
+    return _EPOCH + timedelta(milliseconds=time_ms)
 
 
 def to_bytes(field: Field) -> bytes:

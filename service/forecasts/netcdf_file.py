@@ -19,10 +19,9 @@ import h5py
 import numpy as np
 import numpy.typing as npt
 
-from planner_core.errors import Fault
 from service.forecasts.axes import fault_of_axes, unwrapped
 from service.forecasts.fields import MISSING, WHOLE, Floats, Grid, Longs, time_ms_of
-from service.problems.faults import refuse
+from service.problems.faults import refuse, refuse_one
 from service.problems.kinds import ServiceError
 
 MOST_VALUES: Final = 20_000_000
@@ -79,7 +78,7 @@ def read_netcdf(data: bytes) -> tuple[Grid, list[str]]:
 
 
 def _refused(detail: str) -> ServiceError:
-    return refuse([Fault(code="malformed_netcdf", detail=detail)])
+    return refuse_one("malformed_netcdf", detail)
 
 
 def _require_plain(file: h5py.File) -> None:

@@ -18,6 +18,7 @@ from service.answers import store as answer_store
 from service.answers.blocks import Block
 from service.db.clock import utc_now
 from service.db.rows import JobRow
+from service.db.session import changed
 from service.jobs.queue import JobQueue
 from service.plans import replans
 from service.stores import usage_store
@@ -69,21 +70,19 @@ def start(session: Session, job_id: str, dispatch: int, *, lease_s: float) -> Le
         JobRow.state == "queued",
         sa.and_(JobRow.state == "running", JobRow.lease_until < utc_now()),
     )
-    run = session.execute(
-        sa.update(JobRow)
-        .where(JobRow.id == job_id, JobRow.dispatch == dispatch, may_start)
-        .values(
-            state="running",
-            run=JobRow.run + 1,
-            lease_until=utc_now(lease_s),
-            started_at=sa.func.coalesce(JobRow.started_at, utc_now()),
-            progress=sa.null(),
-            version=JobRow.version + 1,
-        )
-        .returning(JobRow.run)
-        .execution_options(synchronize_session=False)
-    ).scalar_one_or_none()
-    return None if run is None else Lease(job_id=job_id, dispatch=dispatch, run=run)
+    found = changed(
+        session,
+        JobRow,
+        sa.and_(JobRow.id == job_id, JobRow.dispatch == dispatch, may_start),
+        JobRow.run,
+        state="running",
+        run=JobRow.run + 1,
+        lease_until=utc_now(lease_s),
+        started_at=sa.func.coalesce(JobRow.started_at, utc_now()),
+        progress=sa.null(),
+        version=JobRow.version + 1,
+    )
+    return None if found is None else Lease(job_id=job_id, dispatch=dispatch, run=found.run)
 
 
 def renew(
@@ -103,14 +102,8 @@ def renew(
     changes: dict[str, Any] = {"lease_until": utc_now(lease_s)}
     if progress is not None:
         changes |= {"progress": dict(progress), "version": JobRow.version + 1}
-    state = session.execute(
-        sa.update(JobRow)
-        .where(_held(lease))
-        .values(**changes)
-        .returning(JobRow.state)
-        .execution_options(synchronize_session=False)
-    ).scalar_one_or_none()
-    return cast("JobState | None", state)
+    found = changed(session, JobRow, _held(lease), JobRow.state, **changes)
+    return None if found is None else cast(JobState, found.state)
 
 
 def finish(session: Session, lease: Lease, outcome: Outcome) -> bool:
@@ -121,7 +114,7 @@ def finish(session: Session, lease: Lease, outcome: Outcome) -> bool:
     state: Any = outcome.state
     if state == "succeeded":
         state = sa.case((JobRow.state == "cancelling", "cancelled"), else_="succeeded")
-    changed = _end(
+    is_ended = _end(
         session,
         lease.job_id,
         _held(lease),
@@ -132,13 +125,13 @@ def finish(session: Session, lease: Lease, outcome: Outcome) -> bool:
         validity=None if outcome.figures is None else outcome.figures["validity"],
         warnings=list(outcome.warnings) or None,
     )
-    if changed and outcome.blocks:
+    if is_ended and outcome.blocks:
         answer_store.save(session, lease.job_id, outcome.blocks, outcome.figures)
         _adopt_replan(session, lease.job_id)
         owner = session.scalars(sa.select(JobRow.tenant).where(JobRow.id == lease.job_id)).one()
         num_bytes = outcome.num_shared_bytes + sum(len(block.text) for block in outcome.blocks)
         usage_store.add(session, owner, num_rows=1 + len(outcome.blocks), num_bytes=num_bytes)
-    return changed
+    return is_ended
 
 
 def _adopt_replan(session: Session, job_id: str) -> None:
@@ -172,21 +165,19 @@ def redispatch(
     session: Session, queue: JobQueue, guard: sa.ColumnElement[bool], job_id: str, **changes: Any
 ) -> bool:
     """Queue a job anew under its next dispatch number, if ``guard`` still holds."""
-    found = session.execute(
-        sa.update(JobRow)
-        .where(JobRow.id == job_id, guard)
-        .values(
-            state="queued",
-            dispatch=JobRow.dispatch + 1,
-            dispatched_at=utc_now(),
-            lease_until=None,
-            progress=sa.null(),
-            version=JobRow.version + 1,
-            **changes,
-        )
-        .returning(JobRow.dispatch, JobRow.priority, JobRow.tenant)
-        .execution_options(synchronize_session=False)
-    ).one_or_none()
+    found = changed(
+        session,
+        JobRow,
+        sa.and_(JobRow.id == job_id, guard),
+        *(JobRow.dispatch, JobRow.priority, JobRow.tenant),
+        state="queued",
+        dispatch=JobRow.dispatch + 1,
+        dispatched_at=utc_now(),
+        lease_until=None,
+        progress=sa.null(),
+        version=JobRow.version + 1,
+        **changes,
+    )
     if found is None:
         return False
     dispatch, priority, tenant = found
@@ -241,6 +232,4 @@ def _end(session: Session, job_id: str, guard: sa.ColumnElement[bool], **values:
 
 
 def _update(session: Session, guard: sa.ColumnElement[bool], **values: Any) -> bool:
-    statement = sa.update(JobRow).where(guard).values(**values)
-    result = session.execute(statement.execution_options(synchronize_session=False))
-    return cast("sa.CursorResult[Any]", result).rowcount == 1
+    return changed(session, JobRow, guard, JobRow.id, **values) is not None

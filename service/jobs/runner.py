@@ -8,7 +8,7 @@ import os
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum, auto
 from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
@@ -31,6 +31,7 @@ from service.jobs.child import (
 )
 from service.jobs.grace import Grace
 from service.jobs.plan_request import PlanRequest
+from service.process.parent import held_mb
 
 log = logging.getLogger(__name__)
 
@@ -152,35 +153,27 @@ class Runner:
             _end(process)
 
 
+@dataclass(slots=True)
 class _Run:
     """One running process."""
 
-    def __init__(
-        self,
-        process: BaseProcess,
-        pipe: Connection[Any, Any],
-        limits: Limits,
-        tick_s: float,
-        tick: Callable[[Progress | None], Order],
-        on_phase: Callable[[str], None],
-    ):
-        self._process = process
-        self._pipe = pipe
-        self._limits = limits
-        self._tick_s = tick_s
-        self._tick = tick
-        self._on_phase = on_phase
-        self._phase: str | None = None
-        self._progress: Progress | None = None
-        self._blocks: list[Block] = []
-        self._opportunity_block: bytes | None = None
-        self._is_told = False
-        self._grace: Grace | None = None
-        self._next_tick_s = 0.0
-        self._expire_at_s = math.inf
-        self._started = False
-        self._cancelled = False
-        self._kill_at_s = time.monotonic() + START_S
+    process: BaseProcess
+    pipe: Connection[Any, Any]
+    limits: Limits
+    tick_s: float
+    tick: Callable[[Progress | None], Order]
+    on_phase: Callable[[str], None]
+    _phase: str | None = None
+    _progress: Progress | None = None
+    _blocks: list[Block] = field(default_factory=list)
+    _opportunity_block: bytes | None = None
+    _is_told: bool = False
+    _grace: Grace | None = None
+    _next_tick_s: float = 0.0
+    _expire_at_s: float = math.inf
+    _started: bool = False
+    _cancelled: bool = False
+    _kill_at_s: float = field(default_factory=lambda: time.monotonic() + START_S)
 
     def until_end(self) -> Ending | Abandoned | Lost:
         while True:
@@ -191,10 +184,10 @@ class _Run:
     def _listen(self) -> Ending | Lost | None:
         """Wait a moment for messages and read all there are: an answer may be among them."""
         timeout_s = POLL_S
-        while wait([self._pipe], timeout_s):
+        while wait([self.pipe], timeout_s):
             ending: Ending | Lost | None
             try:
-                ending = self._hear(self._pipe.recv())
+                ending = self._hear(self.pipe.recv())
             except (EOFError, OSError):
                 ending = self._crashed()
             if ending is not None:
@@ -211,10 +204,10 @@ class _Run:
         if isinstance(message, Block):
             self._blocks.append(message)
         elif isinstance(message, OpportunitiesFollow):
-            self._opportunity_block = self._pipe.recv_bytes()
+            self._opportunity_block = self.pipe.recv_bytes()
         elif isinstance(message, Started):
             self._started = True
-            self._expire_at_s = time.monotonic() + self._limits.time_s
+            self._expire_at_s = time.monotonic() + self.limits.time_s
             self._kill_at_s = math.inf
         elif isinstance(message, Progress):
             self._note(message)
@@ -224,7 +217,7 @@ class _Run:
         self._progress = progress
         if progress.phase != self._phase:
             self._phase = progress.phase
-            self._on_phase(progress.phase)
+            self.on_phase(progress.phase)
             if self._is_told:
                 self._grant_grace()
 
@@ -237,7 +230,7 @@ class _Run:
         # Once the search is over there is a plan, which is worth the wait.
         self._kill_at_s = math.inf
         with suppress(psutil.NoSuchProcess):  # it has ended; its last words are still to be read
-            self._grace = Grace(self._process.pid or 0, self._phase or "access")
+            self._grace = Grace(self.process.pid or 0, self._phase or "access")
 
     def _settled(self, ending: Ending) -> Ending:
         if isinstance(ending, Stopped) and not self._cancelled:
@@ -245,19 +238,19 @@ class _Run:
         return ending
 
     def _crashed(self) -> Ending | Lost:
-        self._process.join(_LAST_WORDS_S)
+        self.process.join(_LAST_WORDS_S)
         if self._cancelled:
             return Stopped()
-        code = self._process.exitcode
+        code = self.process.exitcode
         if code == _UNKNOWN_EXIT:
             return Lost()
         how = f"signal {-code}" if code is not None and code < 0 else f"exit status {code}"
         return Refused("solver_crashed", f"The solver's process ended by itself ({how}).")
 
     def _check_limits(self) -> Ending | None:
-        held_mb = self._held_mb()
-        if held_mb > self._limits.memory_mb:
-            detail = f"The solver held {held_mb:.0f} MB; its limit is {self._limits.memory_mb} MB."
+        now_mb = held_mb(self.process.pid)  # 0 where it has ended: it is still heard
+        if now_mb > self.limits.memory_mb:
+            detail = f"The solver held {now_mb:.0f} MB; its limit is {self.limits.memory_mb} MB."
             return Refused("memory_limit", detail)
         now_s = time.monotonic()
         if now_s >= self._expire_at_s:
@@ -275,25 +268,19 @@ class _Run:
         except psutil.NoSuchProcess:
             return False  # it has ended; its last words are still to be read
 
-    def _held_mb(self) -> float:
-        try:
-            return float(psutil.Process(self._process.pid).memory_info().rss) / 1e6
-        except psutil.NoSuchProcess:
-            return 0.0  # it has ended; its last words are still to be read
-
     def _out_of_time(self) -> Refused:
         if not self._started:
             return Refused("solver_crashed", "The solver's process did not start.")
-        detail = f"No plan within the limit of {self._limits.time_s:g} s."
+        detail = f"No plan within the limit of {self.limits.time_s:g} s."
         return Refused("time_limit", detail)
 
     def _tick_if_due(self) -> Abandoned | None:
         now_s = time.monotonic()
         if now_s < self._next_tick_s:
             return None
-        self._next_tick_s = now_s + self._tick_s
+        self._next_tick_s = now_s + self.tick_s
         progress, self._progress = self._progress, None
-        order = self._tick(progress)
+        order = self.tick(progress)
         if order is Order.ABANDON:
             return Abandoned()
         if order is Order.CANCEL and not self._cancelled:
@@ -304,7 +291,7 @@ class _Run:
 
     def _say(self, command: Command) -> None:
         try:
-            self._pipe.send(command)
+            self.pipe.send(command)
         except OSError:
             log.debug("the solver's process ended before it was told %s", command.name)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import sqlalchemy as sa
@@ -25,8 +25,7 @@ class JobSpec:
     solver: str
     params: Mapping[str, Any]
     seed: int
-    time_s: float
-    memory_mb: int
+    limits: Mapping[str, float]
     priority: int
     label: str | None
     owner: str
@@ -37,38 +36,24 @@ class JobSpec:
 
 def spec_again(job: JobRow, owner: str) -> JobSpec:
     """Return the spec of the same frozen question once more, for whoever asks it now."""
-    return JobSpec(
-        scenario_id=job.scenario_id,
-        solver=job.solver,
-        params=job.params,
-        seed=job.seed,
-        time_s=job.limits["time_s"],
-        memory_mb=job.limits["memory_mb"],
-        priority=job.priority,
-        label=job.label,
-        owner=owner,
-        rerun_of=job.id,
-    )
+    names = ("scenario_id", "solver", "params", "seed", "limits", "priority", "label")
+    same = {name: getattr(job, name) for name in names}
+    return JobSpec(**same, owner=owner, rerun_of=job.id)
 
 
 def submit(session: Session, queue: JobQueue, spec: JobSpec) -> JobRow:
     """Store a job and queue it, both or neither."""
     job_id = new_id()
+    asked = asdict(spec)
+    del asked["owner"]
+    if spec.change is None:
+        asked["change"] = sa.null()
     session.execute(
         sa.insert(JobRow).values(
+            **asked,
             id=job_id,
-            scenario_id=spec.scenario_id,
             tenant=spec.owner,
             state="queued",
-            solver=spec.solver,
-            params=dict(spec.params),
-            seed=spec.seed,
-            limits={"time_s": spec.time_s, "memory_mb": spec.memory_mb},
-            priority=spec.priority,
-            label=spec.label,
-            rerun_of=spec.rerun_of,
-            what_if_of=spec.what_if_of,
-            change=sa.null() if spec.change is None else dict(spec.change),
             request_id=request_id.get(),
             traceparent=tracing.note_queued(job_id),
             created_at=utc_now(),

@@ -51,15 +51,7 @@ from planner_core.problem import CONTACT, Problem
 from planner_core.problem.delivery import with_objective
 from planner_core.run import plan_scenario
 from planner_core.solvers.base import Solver
-from planner_core.solvers.registry import (
-    SOLVERS,
-    Certified,
-    ForwardSearch,
-    Graph,
-    Mcts,
-    Milp,
-    Rule,
-)
+from planner_core.solvers.registry import SOLVERS, Certified, ForwardSearch, Graph, Mcts, Milp, Rule
 from service.jobs.compilation_line import CompilationLine
 
 _START: Final = datetime(2026, 1, 1, tzinfo=UTC)

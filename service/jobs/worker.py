@@ -10,7 +10,6 @@ import socket
 import threading
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, TypeVar
 
@@ -133,16 +132,16 @@ class Worker:
             own = lease.start(session, job_id, dispatch, lease_s=self._settings.lease_s)
         if own is None:
             return
-        request, origin = self._insist(
+        request, job = self._insist(
             self._database.reading,
             lambda session: _request(session, job_id, own.run, self._held_in),
         )
         named: dict[str, str | int] = {"job_id": job_id, "run": own.run, "solver": request.solver}
-        if origin.request_id is not None:
-            named["request_id"] = origin.request_id
+        if job.request_id is not None:
+            named["request_id"] = job.request_id
         with (
-            about_job(job_id, origin.request_id),
-            tracing.running(origin.traceparent, **named) as span,
+            about_job(job_id, job.request_id),
+            tracing.running(job.traceparent, **named) as span,
         ):
             self._run(own, request, span)
 
@@ -278,17 +277,10 @@ def outcome_of(ending: Ending) -> Outcome:
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Origin:
-    """Where a job came from, for logs and traces."""
-
-    request_id: str | None
-    traceparent: str | None
-
-
 def _request(
     session: Session, job_id: str, run: int, held_in: Path | None
-) -> tuple[PlanRequest, _Origin]:
+) -> tuple[PlanRequest, JobRow]:
+    """Return what the solver's process is asked, and the job, which says where it came from."""
     wanted = (
         sa.select(JobRow, ScenarioRow.sha256, ScenarioRow.content)
         .join(ScenarioRow, ScenarioRow.id == JobRow.scenario_id)
@@ -309,7 +301,7 @@ def _request(
         parent=_parent(session, job, held_in),
         held_in=None if held_in is None else str(held_in),
     )
-    return request, _Origin(request_id=job.request_id, traceparent=job.traceparent)
+    return request, job
 
 
 def _parent(session: Session, job: JobRow, held_in: Path | None) -> Parent | None:

@@ -11,7 +11,7 @@ from planner_core.errors import Fault
 from service.access.callers import Caller
 from service.db.rows import PlanRow
 from service.plans import store
-from service.problems.faults import refuse
+from service.problems.faults import refuse_one, require_none
 from service.problems.kinds import ServiceError
 from service.webhooks import outbox
 from service.wire.plans import TRANSITIONS, PlanState, TransitionIn
@@ -60,8 +60,7 @@ def _require_fields(body: TransitionIn) -> None:
         )
         if is_given and body.to != wanted
     ]
-    if faults:
-        raise refuse(faults)
+    require_none(faults)
 
 
 def _require_waivers(plan: PlanRow, body: TransitionIn) -> None:
@@ -81,15 +80,14 @@ def _require_waivers(plan: PlanRow, body: TransitionIn) -> None:
         for i, (place, code) in enumerate(places.items())
         if place not in waived and code not in waived
     ]  # fmt: skip
-    if faults:
-        raise refuse(faults)
+    require_none(faults)
 
 
 def _supersede(session: Session, caller: Caller, plan: PlanRow, from_: datetime) -> None:
     """Put the plan in force from an instant on, in place of what is so far."""
     if from_ >= plan.horizon_end:
         detail = "The plan's horizon is over by then."
-        raise refuse([Fault(code="value_out_of_range", detail=detail, pointer="/effective_from")])
+        raise refuse_one("value_out_of_range", detail, "/effective_from")
     rivals = store.in_force(session, plan, from_)
     others = {
         row.plan_id: session.get_one(PlanRow, row.plan_id, with_for_update=True) for row in rivals

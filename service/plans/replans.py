@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Any, Final, cast
+from typing import Any, Final
 
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
 
 from service.access.callers import Caller, Scope
 from service.db.ids import new_id
-from service.db.rows import ExecutionRow, JobRow, PlanActionRow, PlanRow
+from service.db.rows import JobRow, PlanActionRow, PlanRow
 from service.plans import store
 from service.webhooks import outbox
 from service.wire.base import Json
 from service.wire.instants import instant_text
 from service.wire.pins import PinnedActionIn
 from service.wire.plan_before import FlownIn
-from service.wire.plans import Outcome
+from service.wire.stored import from_row
 from service.wire.timelines import TimelineOut
 
 _GONE: Final = ("failed", "skipped")
@@ -28,15 +28,10 @@ def base_of(session: Session, plan_id: str, from_: datetime | None = None) -> li
 
     With an instant those that end after it, as far as they do.
     """
-    gone = failed_actions(session, plan_id)
+    last = store.last_reports(session, plan_id)
+    gone = {own_id for own_id, report in last.items() if report.outcome in _GONE}
     return [
-        PinnedActionIn(
-            satellite_id=row.satellite_id,
-            target_id=row.target_id,
-            station_id=row.station_id,
-            start=row.start if from_ is None else max(row.start, from_),
-            end=row.end,
-        )
+        from_row(PinnedActionIn, row, start=max(row.start, from_ or row.start))
         for row in all_actions(session, plan_id)
         if row.action_id not in gone and (from_ is None or row.end > from_)
     ]
@@ -49,17 +44,9 @@ def flown_of(session: Session, plan_id: str, until: datetime) -> list[FlownIn]:
     for row in all_actions(session, plan_id):
         report = last.get(row.action_id)
         if row.start < until:
-            found.append(
-                FlownIn(
-                    satellite_id=row.satellite_id,
-                    target_id=row.target_id,
-                    station_id=row.station_id,
-                    start=row.start,
-                    end=row.end,
-                    outcome="executed" if report is None else cast(Outcome, report.outcome),
-                    mbit=None if report is None else report.mbit,
-                )
-            )
+            outcome = "executed" if report is None else report.outcome
+            mbit = None if report is None else report.mbit
+            found.append(from_row(FlownIn, row, outcome=outcome, mbit=mbit))
     return found
 
 
@@ -67,13 +54,6 @@ def all_actions(session: Session, plan_id: str) -> list[PlanActionRow]:
     """Return the actions of a plan, in their order."""
     wanted = sa.select(PlanActionRow).where(PlanActionRow.plan_id == plan_id)
     return list(session.scalars(wanted.order_by(PlanActionRow.position)))
-
-
-def failed_actions(session: Session, plan_id: str) -> set[str]:
-    """Return the ids of the actions that were not done, by the last report of each."""
-    wanted = sa.select(ExecutionRow).where(ExecutionRow.plan_id == plan_id)
-    last = {row.action_id: row.outcome for row in session.scalars(wanted.order_by(ExecutionRow.id))}
-    return {action_id for action_id, outcome in last.items() if outcome in _GONE}
 
 
 def note_of(plan: PlanRow, caller: Caller, name: str | None, freeze_until: datetime) -> Json:

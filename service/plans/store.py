@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from datetime import datetime
+from typing import TypeVar
 
 import sqlalchemy as sa
 from sqlalchemy.dialects import postgresql, sqlite
@@ -11,6 +12,7 @@ from sqlalchemy.orm import Session
 
 from service.access.callers import Caller
 from service.db.clock import utc_now
+from service.db.columns import Reported
 from service.db.ids import new_id
 from service.db.rows import (
     ExecutionRow,
@@ -21,11 +23,14 @@ from service.db.rows import (
     PlanStateRow,
     PublisherRow,
 )
-from service.wire.base import dumped
+from service.stores.finding import with_values
+from service.wire.base import Json, dumped
 from service.wire.pins import StateIn
 from service.wire.plans import ExecutionIn, PlanState, WaiverIn
 from service.wire.stored import from_store
 from service.wire.timelines import IDLE_MODES, TimelineOut
+
+R = TypeVar("R", bound=Reported)
 
 
 def now(session: Session) -> datetime:
@@ -114,12 +119,8 @@ def matching(
 
     With an instant, `published` means what was or will be in force then, by what is known now.
     """
-    query = sa.select(PlanRow)
-    for column, value in (
-        (PlanRow.owner, owner), (PlanRow.job_id, job_id), (PlanRow.parent_id, parent_id)
-    ):  # fmt: skip
-        if value is not None:
-            query = query.where(column == value)
+    own = with_values(PlanRow, owner=owner, job_id=job_id, parent_id=parent_id)
+    query = sa.select(PlanRow).where(*own)
     if at is not None and state == "published":
         query = query.where(PlanRow.state.in_(("published", "superseded")))
     elif state is not None:
@@ -201,32 +202,26 @@ def report(
     session: Session, caller: Caller, plan_id: str, reports: Sequence[ExecutionIn]
 ) -> list[ExecutionRow]:
     """Take down what became of some actions."""
-    reported_at = now(session)
-    rows = [
-        ExecutionRow(
-            id=new_id(), plan_id=plan_id, owner=caller.owner, key_name=caller.key_name,
-            reported_at=reported_at, **each.model_dump(),
-        )
-        for each in reports
-    ]  # fmt: skip
-    session.add_all(rows)
-    session.flush()
-    return rows
+    told = (each.model_dump() for each in reports)
+    return _take_down(session, caller, plan_id, ExecutionRow, told)
 
 
 def report_states(
     session: Session, caller: Caller, plan_id: str, states: Sequence[StateIn]
 ) -> list[PlanStateRow]:
     """Take down telemetry."""
-    reported_at = now(session)
-    rows = [
-        PlanStateRow(
-            id=new_id(), plan_id=plan_id, satellite_id=each.satellite_id, at=each.at,
-            body=dumped(each), owner=caller.owner, key_name=caller.key_name,
-            reported_at=reported_at,
-        )
-        for each in states
-    ]  # fmt: skip
+    told = (
+        {"satellite_id": each.satellite_id, "at": each.at, "body": dumped(each)} for each in states
+    )
+    return _take_down(session, caller, plan_id, PlanStateRow, told)
+
+
+def _take_down(
+    session: Session, caller: Caller, plan_id: str, table: type[R], told: Iterable[Json]
+) -> list[R]:
+    shared: Json = {"plan_id": plan_id, "owner": caller.owner, "key_name": caller.key_name}
+    shared["reported_at"] = now(session)
+    rows = [table(id=new_id(), **shared, **own) for own in told]
     session.add_all(rows)
     session.flush()
     return rows

@@ -23,6 +23,7 @@ from service.db.rows import (
     PlanSatelliteRow,
     ScenarioRow,
 )
+from service.wire.stored import from_row
 from service.wire.target_lives import TargetCollectOut, TargetState
 
 _TAKEN: Final = ("executed", "partial")
@@ -165,17 +166,8 @@ def _first(session: Session, wanted: _Found) -> dict[str, TargetCollectOut]:
     found: dict[str, TargetCollectOut] = {}
     for row, satellite_name, outcome in session.execute(wanted):
         if row.target_id is not None and row.target_id not in found:
-            found[row.target_id] = TargetCollectOut.model_validate(
-                {
-                    "plan_id": row.plan_id,
-                    "action_id": row.action_id,
-                    "satellite_id": row.satellite_id,
-                    "satellite_name": satellite_name,
-                    "start": row.start,
-                    "end": row.end,
-                    "outcome": outcome,
-                }
-            )
+            told = {"satellite_name": satellite_name, "outcome": outcome}
+            found[row.target_id] = from_row(TargetCollectOut, row, **told)
     return found
 
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
 from planner_core.errors import Fault
 from service.problems.kinds import ServiceError
+
+M = TypeVar("M", bound=BaseModel)
 
 
 def refuse(faults: Sequence[Fault], *, code: str | None = None) -> ServiceError:
@@ -23,10 +25,44 @@ def refuse(faults: Sequence[Fault], *, code: str | None = None) -> ServiceError:
     return ServiceError(code or common, detail, faults=tuple(faults))
 
 
+def refuse_one(
+    code: str, detail: str, pointer: str | None = None, *, row: int | None = None
+) -> ServiceError:
+    """Return the error for a body in which one thing is wrong."""
+    return refuse([Fault(code=code, detail=detail, pointer=pointer, row=row)])
+
+
+def require_none(faults: Sequence[Fault]) -> None:
+    """Refuse a body in which anything is wrong."""
+    if faults:
+        raise refuse(faults)
+
+
+def validated(shape: type[M], values: object) -> M:
+    """Return a document of this shape; 422 with every fault where it is none."""
+    try:
+        return shape.model_validate(values)
+    except ValidationError as error:
+        raise refuse(faults_of_validation(error, values)) from None
+
+
+def pointer_to(*steps: str | int) -> str:
+    """Return the JSON pointer of these steps.
+
+    >>> pointer_to("rewards", "a/b"), pointer_to()
+    ('/rewards/a~1b', '')
+    """
+    return "".join("/" + str(step).replace("~", "~0").replace("/", "~1") for step in steps)
+
+
 def faults_of(errors: Iterable[Any], body: object) -> list[Fault]:
     """Return what pydantic found, with JSON pointers into ``body``."""
     return [
-        Fault(code=_code(e["type"]), detail=_sentence(e), pointer=_pointer(e["loc"], body))
+        Fault(
+            code=_CODES.get(e["type"], "invalid_value"),
+            detail=_sentence(e),
+            pointer=_pointer(e["loc"], body),
+        )
         for e in errors
     ]
 
@@ -37,6 +73,10 @@ def faults_of_validation(error: ValidationError, body: object) -> list[Fault]:
     return faults_of(found, body)
 
 
+_OUT_OF_RANGE = (
+    "greater_than", "greater_than_equal", "less_than", "less_than_equal",
+    "too_short", "too_long", "string_too_short", "string_too_long",
+)  # fmt: skip
 _CODES = {
     "missing": "missing_field",
     "extra_forbidden": "unknown_field",
@@ -44,22 +84,11 @@ _CODES = {
     "literal_error": "unknown_value",
     "enum": "unknown_value",
     "finite_number": "not_finite",
-    "greater_than": "value_out_of_range",
-    "greater_than_equal": "value_out_of_range",
-    "less_than": "value_out_of_range",
-    "less_than_equal": "value_out_of_range",
-    "too_short": "value_out_of_range",
-    "too_long": "value_out_of_range",
-    "string_too_short": "value_out_of_range",
-    "string_too_long": "value_out_of_range",
+    **dict.fromkeys(_OUT_OF_RANGE, "value_out_of_range"),
     "too_many_fields": "too_many_fields",
     "naive_time": "naive_time",
     "invalid_time": "invalid_time",
 }
-
-
-def _code(pydantic_type: str) -> str:
-    return _CODES.get(pydantic_type, "invalid_value")
 
 
 def _sentence(error: Mapping[str, Any]) -> str:
@@ -80,7 +109,7 @@ def _pointer(loc: Sequence[str | int], body: object) -> str | None:
     # which may be a field that is missing.
     if loc[0] != "body":
         return None
-    parts: list[str] = []
+    parts: list[str | int] = []
     here: object = body
     for number, part in enumerate(loc[1:], start=2):
         if isinstance(here, dict) and (part in here or number == len(loc)):
@@ -89,5 +118,5 @@ def _pointer(loc: Sequence[str | int], body: object) -> str | None:
             here = here[part]
         else:
             continue
-        parts.append(str(part).replace("~", "~0").replace("/", "~1"))
-    return "".join("/" + part for part in parts)
+        parts.append(part)
+    return pointer_to(*parts)

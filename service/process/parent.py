@@ -1,4 +1,4 @@
-"""A process's name, and its end with its parent's."""
+"""A process's name, what it holds, and its end with its parent's."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ import os
 import signal
 import sys
 from typing import Final
+
+import psutil
 
 _PR_SET_PDEATHSIG: Final = 1
 _PR_SET_NAME: Final = 15
@@ -20,6 +22,14 @@ def die_with_parent(number: signal.Signals) -> None:
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, number)
     if os.getppid() != parent:
         os.kill(os.getpid(), number)
+
+
+def held_mb(pid: int | None) -> float:
+    """Return the memory that a process holds; 0 where it has ended."""
+    try:
+        return float(psutil.Process(pid).memory_info().rss) / 1e6
+    except psutil.NoSuchProcess:
+        return 0.0
 
 
 def name_this_process(name: str) -> None:

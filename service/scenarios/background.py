@@ -39,7 +39,7 @@ class Background:
         self._kept = kept
         self._told = told
 
-    def get(self, key: str, work: Callable[[Budget], T]) -> T:
+    def work_out(self, key: str, work: Callable[[Budget], T]) -> T:
         """Return what the work of this key gives; 503 ``still_computing`` where that takes long.
 
         Parameters

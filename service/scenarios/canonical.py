@@ -51,8 +51,7 @@ def canonical_of_file(file: ScenarioFile) -> str:
         del satellite["spacecraft"]
         _without_unset(satellite["sensor"], "sensor_type", "sun_exclusion_deg")
         _without_unset(satellite["agility"], "sun_exclusion_deg")
-        if satellite["agility"]["slew_model"] == "rest":
-            del satellite["agility"]["slew_model"]
+        _without(satellite["agility"], slew_model="rest")
         if isinstance(satellite["resources"], dict):
             _without(satellite["resources"], **_YOUNGER)
     for station in document["ground_stations"]:
@@ -60,8 +59,7 @@ def canonical_of_file(file: ScenarioFile) -> str:
     for target in document["targets"]:
         _without_unset(target, *_UNSET_OF_TARGETS)
     _without_unset(document, "forecast")
-    if document["collect_alignment"] == "access":
-        del document["collect_alignment"]
+    _without(document, collect_alignment="access")
     _without_unset(document, "replan")
     if "replan" in document:
         _plain_replan(document["replan"])
@@ -70,9 +68,7 @@ def canonical_of_file(file: ScenarioFile) -> str:
         _without_unset(outage, "id", "satellite_id", "station_id", "reason")
     for state in document["states"]:
         _plain_state(state)
-    for part in ("outages", "states"):
-        if not document[part]:
-            del document[part]
+    _without(document, outages=[], states=[])
     for part in ("pins", "quality"):
         if not any(document[part].values()):
             del document[part]
@@ -84,16 +80,12 @@ def _plain_replan(replan: dict[str, Any]) -> None:
     for action in replan["base"]:
         _without_unset(action, *tuple(action))
     for promise in replan["promises"]:
-        if promise["deliver_by"] is None:
-            del promise["deliver_by"]
+        _without_unset(promise, "deliver_by")
     for flown in replan["flown"]:
         _without_unset(flown, "target_id", "station_id", "mbit")
     for state in replan["before"]:
         _plain_state(state)
-    for part in ("flown", "before"):
-        if not replan[part]:
-            del replan[part]
-    _without(replan, elements="same")
+    _without(replan, flown=[], before=[], elements="same")
 
 
 def _plain_state(state: dict[str, Any]) -> None:

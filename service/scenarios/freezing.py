@@ -28,6 +28,7 @@ from service.scenarios.scenario_limits import ScenarioLimits
 from service.scenarios.translate import horizon_from, scenario_from_file
 from service.stores import outage_store, satellite_store
 from service.stores import scenario_store as store
+from service.wire.base import fields_of
 from service.wire.pins import PlacedOutage
 from service.wire.scenarios import (
     FileGroundStation,
@@ -173,7 +174,8 @@ def num_targets(session: Session, catalog_ids: Sequence[str]) -> int:
 
 
 def _expanded(session: Session, body: ScenarioIn) -> ScenarioFile:
-    shared = {name: getattr(body, name) for name in Question.model_fields if name != "outages"}
+    shared = fields_of(body, Question)
+    del shared["outages"]
     satellites = satellites_of(session, body.satellite_ids)
     if "objective" not in body.model_fields_set:
         shared["objective"] = default_objective(satellite.spacecraft for satellite in satellites)

@@ -8,24 +8,21 @@ are planned with: two forecasts that say the same of a question make the same qu
 
 from __future__ import annotations
 
-from datetime import UTC, datetime, timedelta
-
 import numpy as np
 from sqlalchemy.orm import Session
 
 from planner_core.errors import InvalidScenario
 from service.db.rows import ForecastRow
-from service.forecasts.fields import from_bytes, time_ms_of
-from service.stores import forecast_store
+from service.forecasts.fields import from_bytes, instant_of, time_ms_of
+from service.stores.finding import find_own
 from service.wire.scenarios import FileForecast, ScenarioFile, SkySeriesIn
 
 _DIGITS = 4
-_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
 
 def find_forecast(session: Session, forecast_id: str, owner: str | None) -> ForecastRow:
     """Return a forecast of an owner's, its block too; ``unknown_forecast`` where there is none."""
-    row = forecast_store.find(session, forecast_id, owner)
+    row = find_own(session, ForecastRow, forecast_id, owner)
     if row is None:
         raise InvalidScenario(
             "unknown_forecast", f"There is no forecast {forecast_id!r}.", pointer="/forecast_id"
@@ -45,15 +42,14 @@ def frozen_forecast(row: ForecastRow, file: ScenarioFile) -> FileForecast:
     )
     series = [
         SkySeriesIn(
-            times=[_EPOCH + timedelta(milliseconds=time) for time in one.time_ms.tolist()],
-            clear_probability={
-                targets[position].id: values
-                for position, values in zip(
-                    one.target.tolist(),
+            times=[instant_of(time_ms) for time_ms in one.time_ms.tolist()],
+            clear_probability=dict(
+                zip(
+                    [targets[position].id for position in one.target.tolist()],
                     np.round(one.clear_probability, _DIGITS).tolist(),
                     strict=True,
                 )
-            },
+            ),
         )
         for one in skies
     ]

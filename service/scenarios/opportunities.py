@@ -28,7 +28,7 @@ class Described:
     computed: ScenarioOpportunities
 
 
-class OpportunityReader:
+class OpportunityReader(Background):
     """Reads or computes opportunities, one scenario at a time, beside the requests.
 
     Scenarios are told apart by their hash, so that what is kept never goes stale.
@@ -36,17 +36,11 @@ class OpportunityReader:
 
     def __init__(self) -> None:
         told = "The opportunities of this scenario are being computed."
-        self._background = Background("opportunities", kept=_KEPT, told=told)
+        super().__init__("opportunities", kept=_KEPT, told=told)
 
     def get(self, database: Database, scenario_id: str, sha256: str) -> Described:
         """Return a scenario's opportunities; 503 ``still_computing`` where that takes long."""
-        return self._background.get(
-            sha256, lambda budget: _read(database, scenario_id, sha256, budget)
-        )
-
-    def close(self) -> None:
-        """Stop the work under way."""
-        self._background.close()
+        return self.work_out(sha256, lambda budget: _read(database, scenario_id, sha256, budget))
 
 
 def _read(database: Database, scenario_id: str, sha256: str, budget: Budget) -> Described:

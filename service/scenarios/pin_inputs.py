@@ -3,20 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import TypeVar
+from dataclasses import asdict
+from typing import Any, TypeVar
 
 from planner_core.domain import Attitude, Flown, OnBoard, Outage, Promise, Replan, Stability, State
 from planner_core.errors import InvalidScenario
 from planner_core.pins import BlockedInterval, PinnedAction, Pins
-from service.wire.pins import (
-    AttitudeIn,
-    BlockedIn,
-    OnBoardIn,
-    OutageIn,
-    PinnedActionIn,
-    PinsIn,
-    StateIn,
-)
+from service.wire.base import fields_of
+from service.wire.pins import AttitudeIn, BlockedIn, OutageIn, PinnedActionIn, PinsIn, StateIn
 from service.wire.plan_before import ReplanOfFile
 from service.wire.scenarios import FileGroundStation, FileSatellite, ScenarioFile
 
@@ -28,46 +22,29 @@ def pins_from(body: PinsIn) -> Pins:
     return Pins(
         keep=tuple(action_from(pinned) for pinned in body.keep),
         skip=tuple(action_from(pinned) for pinned in body.skip),
-        block=tuple(
-            BlockedInterval(
-                satellite_id=blocked.satellite_id,
-                start=blocked.start,
-                end=blocked.end,
-                modes=tuple(dict.fromkeys(blocked.modes)),
-            )
-            for blocked in body.block
-        ),
+        block=tuple(BlockedInterval(**dict(one) | _modes(one)) for one in body.block),
         forbid=tuple(body.forbid),
     )
 
 
 def outage_from(body: OutageIn) -> Outage:
     """Return the outage of one body."""
-    return Outage(
-        satellite_id=body.satellite_id,
-        station_id=body.station_id,
-        start=body.start,
-        end=body.end,
-        modes=tuple(dict.fromkeys(body.modes)),
-        reason=body.reason,
-    )
+    return Outage(**fields_of(body, OutageIn) | _modes(body))
+
+
+def _modes(body: BlockedIn | OutageIn) -> dict[str, Any]:
+    """Return the modes of one body, each once."""
+    return {"modes": tuple(dict.fromkeys(body.modes))}
 
 
 def state_from(body: StateIn) -> State:
     """Return the state of one body."""
-    return State(
-        satellite_id=body.satellite_id,
-        at=body.at,
-        battery_fraction=body.battery_fraction,
-        recorder_fraction=body.recorder_fraction,
-        attitude=None if body.attitude is None else attitude_from(body.attitude),
-        on_board=None
-        if body.on_board is None
-        else tuple(
-            OnBoard(**{name: getattr(image, name) for name in OnBoardIn.model_fields})
-            for image in body.on_board
-        ),
-    )
+    attitude, images = body.attitude, body.on_board
+    parts = {
+        "attitude": None if attitude is None else attitude_from(attitude),
+        "on_board": None if images is None else tuple(OnBoard(**dict(one)) for one in images),
+    }
+    return State(**dict(body) | parts)
 
 
 def attitude_from(body: AttitudeIn) -> Attitude:
@@ -163,28 +140,16 @@ def _refuse_duplicates(body: PinsIn) -> None:
 def pins_in(pins: Pins) -> PinsIn:
     """Return the body of pins: what `pins_from` has made them of."""
     return PinsIn(
-        keep=[_action_in(pinned) for pinned in pins.keep],
-        skip=[_action_in(pinned) for pinned in pins.skip],
-        block=[
-            BlockedIn(
-                satellite_id=blocked.satellite_id,
-                start=blocked.start,
-                end=blocked.end,
-                modes=list(blocked.modes),
-            )
-            for blocked in pins.block
-        ],
+        keep=[PinnedActionIn(**asdict(pinned)) for pinned in pins.keep],
+        skip=[PinnedActionIn(**asdict(pinned)) for pinned in pins.skip],
+        block=[BlockedIn(**asdict(one) | {"modes": list(one.modes)}) for one in pins.block],
         forbid=list(pins.forbid),
     )
 
 
 def action_from(body: PinnedActionIn) -> PinnedAction:
     """Return the action of one body."""
-    return PinnedAction(**{name: getattr(body, name) for name in PinnedActionIn.model_fields})
-
-
-def _action_in(pinned: PinnedAction) -> PinnedActionIn:
-    return PinnedActionIn(**{name: getattr(pinned, name) for name in PinnedActionIn.model_fields})
+    return PinnedAction(**dict(body))
 
 
 def pinned_action(body: str | PinnedActionIn) -> PinnedAction:

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from planner_core.errors import InvalidScenario, PlannerError
+from service.problems.faults import pointer_to
 from service.scenarios.translate import read_file, scenario_from_file
 from service.wire.changes import PART_OF, RelaxIn
 from service.wire.instants import instant_text
@@ -52,11 +53,11 @@ class _Relaxing:
             raise _unknown("satellite", relax.satellite_id, "/relax/satellite_id")
         for own_id in relax.satellites:
             if own_id not in ids:
-                raise _unknown("satellite", own_id, f"/relax/satellites/{_escaped(own_id)}")
+                raise _unknown("satellite", own_id, pointer_to("relax", "satellites", own_id))
         for index, own_id in enumerate(ids):
             if relax.satellite_id in (None, own_id):
                 self._set_satellite(index, relax.settings, "/relax")
-            at = f"/relax/satellites/{_escaped(own_id)}"
+            at = pointer_to("relax", "satellites", own_id)
             self._set_satellite(index, relax.satellites.get(own_id, {}), at)
 
     def _set_satellite(self, index: int, settings: Mapping[str, object], at: str) -> None:
@@ -67,12 +68,12 @@ class _Relaxing:
                 raise _unknown_setting(name, at)
             if isinstance(satellite[part], str):
                 satellite[part] = {"preset": satellite[part]}
-            self.set(("satellites", index, part), name, value, f"{at}/{_escaped(name)}")
+            self.set(("satellites", index, part), name, value, at + pointer_to(name))
 
     def set_targets(self, targets: Mapping[str, Mapping[str, object]]) -> None:
         index = {target["id"]: i for i, target in enumerate(self._document["targets"])}
         for own_id, settings in targets.items():
-            at = f"/relax/targets/{_escaped(own_id)}"
+            at = pointer_to("relax", "targets", own_id)
             if own_id not in index:
                 raise _unknown("target", own_id, at)
             for name, value in settings.items():
@@ -100,9 +101,5 @@ def _unknown(what: str, own_id: str, pointer: str) -> InvalidScenario:
 
 def _unknown_setting(name: str, at: str) -> InvalidScenario:
     return InvalidScenario(
-        "unknown_field", f"There is no setting {name!r}.", pointer=f"{at}/{_escaped(name)}"
+        "unknown_field", f"There is no setting {name!r}.", pointer=at + pointer_to(name)
     )
-
-
-def _escaped(name: str) -> str:
-    return name.replace("~", "~0").replace("/", "~1")

@@ -10,8 +10,9 @@ from datetime import datetime
 from typing import Final
 
 from planner_core.errors import Fault, PlannerError
-from service.problems.faults import refuse
+from service.problems.faults import pointer_to, require_none
 from service.scenarios.translate import scenario_from_file
+from service.wire.base import fields_of
 from service.wire.pins import OutageIn, PinnedActionIn, PinsIn, PlacedOutage, StateIn
 from service.wire.plan_before import FlownIn, PromiseIn, ReplanOfFile
 from service.wire.replans import ReplanIn
@@ -71,20 +72,20 @@ def replan_file(file: ScenarioFile, body: ReplanIn, happened: Happened) -> Scena
         for action in happened.base
         if action.start is not None and action.start < happened.freeze_until
     }
-    faults = [
-        *_faults_of_times(begins, end, happened.freeze_until),
-        *_faults_of_added(file, body, happened),
-        *_faults_of_dropped(file, body, flown),
-        *_faults_of_promises(body, {target.id for target in targets}),
-        *_faults_of_rewards(body, {target.id for target in targets}),
-    ]
-    if faults:
-        raise refuse(faults)
+    require_none(
+        [
+            *_faults_of_times(begins, end, happened.freeze_until),
+            *_faults_of_added(file, body, happened),
+            *_faults_of_dropped(file, body, flown),
+            *_faults_of_unknown(body, {target.id for target in targets}),
+        ]
+    )
     known = {outage.id for outage in file.outages}
+    said = [fields_of(outage, OutageIn) for outage in file.outages]
     outages = [
         *file.outages,
         *(one for one in happened.outages if one.id not in known),
-        *(PlacedOutage(**dict(outage)) for outage in body.outages if not _is_among(outage, file)),
+        *(PlacedOutage(**dict(outage)) for outage in body.outages if dict(outage) not in said),
     ]
     return file.model_copy(
         update={
@@ -194,13 +195,6 @@ def pointing_into(body: ReplanIn) -> Iterator[None]:
         raise
 
 
-def _is_among(outage: OutageIn, file: ScenarioFile) -> bool:
-    return any(
-        dict(outage) == {name: getattr(other, name) for name in OutageIn.model_fields}
-        for other in file.outages
-    )
-
-
 def _promises(file: ScenarioFile, body: ReplanIn) -> list[PromiseIn]:
     """Return the promises of the body, and those made before that it says nothing of."""
     before = [] if file.replan is None else file.replan.promises
@@ -247,19 +241,15 @@ def _faults_of_dropped(
     return faults
 
 
-def _faults_of_promises(body: ReplanIn, known: Collection[str]) -> list[Fault]:
-    return [
-        Fault(code="unknown_target", detail=f"There is no target {promise.target_id!r}.",
-              pointer=f"/promises/{i}/target_id")
+def _faults_of_unknown(body: ReplanIn, known: Collection[str]) -> list[Fault]:
+    """Return which promises and rewards are of targets that there are not."""
+    named = [
+        (pointer_to("promises", i, "target_id"), promise.target_id)
         for i, promise in enumerate(body.promises)
-        if promise.target_id not in known
-    ]  # fmt: skip
-
-
-def _faults_of_rewards(body: ReplanIn, known: Collection[str]) -> list[Fault]:
+    ]
+    named += [(pointer_to("rewards", target_id), target_id) for target_id in body.rewards]
     return [
-        Fault(code="unknown_target", detail=f"There is no target {target_id!r}.",
-              pointer="/rewards/" + target_id.replace("~", "~0").replace("/", "~1"))
-        for target_id in body.rewards
-        if target_id not in known
-    ]  # fmt: skip
+        Fault(code="unknown_target", detail=f"There is no target {own_id!r}.", pointer=pointer)
+        for pointer, own_id in named
+        if own_id not in known
+    ]

@@ -16,7 +16,7 @@ from service.scenarios.freezing import satellites_of
 from service.scenarios.opportunities import Described
 from service.scenarios.scenario_limits import ScenarioLimits
 from service.scenarios.translate import horizon_from, scenario_from_file
-from service.stores import satellite_store
+from service.stores.finding import alive
 from service.wire.scenarios import FileSatellite, FileTarget, HorizonIn, ScenarioFile
 
 _WITHIN_S: Final = 20.0
@@ -24,13 +24,13 @@ _WITHIN_S: Final = 20.0
 
 def types_flown(session: Session) -> list[str]:
     """Return the spacecraft types that satellites are of, by id or built-in name."""
-    wanted = satellite_store.alive().with_only_columns(SatelliteRow.spacecraft).distinct()
+    wanted = alive(SatelliteRow).with_only_columns(SatelliteRow.spacecraft).distinct()
     return sorted(one for one in session.scalars(wanted) if one is not None)
 
 
 def fleet_of(session: Session, spacecraft_id: str) -> list[FileSatellite]:
     """Return the satellites of one type, with the elements in force."""
-    of_type = satellite_store.alive().where(SatelliteRow.spacecraft == spacecraft_id)
+    of_type = alive(SatelliteRow).where(SatelliteRow.spacecraft == spacecraft_id)
     ids = session.scalars(of_type.with_only_columns(SatelliteRow.id).order_by(SatelliteRow.id))
     return satellites_of(session, ids.all())
 

@@ -10,12 +10,7 @@ from collections.abc import Iterator
 from functools import cached_property
 from typing import Any, Final
 
-from planner_core.domain import (
-    GroundStation,
-    Horizon,
-    Satellite,
-    Target,
-)
+from planner_core.domain import GroundStation, Horizon, Satellite, Target
 from service.scenarios.translate import (
     ground_station_from,
     horizon_from,
@@ -45,25 +40,17 @@ class StoredQuestion:
     @cached_property
     def pins(self) -> PinsIn:
         """Return what is pinned."""
-        if '"pins":' not in self._content:
-            return PinsIn()
-        return from_store(PinsIn, self._before_targets[0].get("pins", {}))
+        return from_store(PinsIn, self._part("pins") or {})
 
     @cached_property
     def outages(self) -> tuple[PlacedOutage, ...]:
         """Return what is out."""
-        if '"outages":' not in self._content:
-            return ()
-        found = self._before_targets[0].get("outages", ())
-        return tuple(PlacedOutage.model_validate(one) for one in found)
+        return tuple(PlacedOutage.model_validate(one) for one in self._part("outages") or ())
 
     @cached_property
     def states(self) -> tuple[StateIn, ...]:
         """Return what satellites had before the horizon."""
-        if '"states":' not in self._content:
-            return ()
-        found = self._before_targets[0].get("states", ())
-        return tuple(StateIn.model_validate(one) for one in found)
+        return tuple(StateIn.model_validate(one) for one in self._part("states") or ())
 
     @cached_property
     def replan(self) -> ReplanOfFile | None:
@@ -113,6 +100,10 @@ class StoredQuestion:
         head |= {"objective": "paper", **members, "release": 2, "satellites": satellites}
         text = json.dumps(head, separators=(",", ":"), allow_nan=False)
         return f'{text[:-1]},"{_TARGETS}":[{self._content[at:]}'
+
+    def _part(self, name: str) -> Any:
+        """Return a part that few questions have, None where there is none."""
+        return self._before_targets[0].get(name) if f'"{name}":' in self._content else None
 
     @cached_property
     def _before_targets(self) -> tuple[dict[str, Any], int]:

@@ -5,10 +5,10 @@ A scenario's *content* is a self-contained scenario file (`ScenarioFile`).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
@@ -32,25 +32,28 @@ from planner_core.orbits.tle import read_tle
 from service.problems.faults import faults_of_validation
 from service.scenarios.forecast_inputs import forecast_from
 from service.scenarios.pin_inputs import outage_from, pins_from, replan_from, state_from
+from service.wire.base import fields_of
 from service.wire.places import GroundStationIn, TargetIn
 from service.wire.satellites import (
-    AgilityIn,
     OrbitIn,
     Preset,
     PresetResourcesIn,
     ResourcesIn,
-    SensorIn,
+    TypedFigures,
     WholeSatellite,
 )
 from service.wire.scenarios import (
     FileGroundStation,
     FileSatellite,
-    FileTarget,
     HorizonIn,
     ObjectiveIn,
     QualityIn,
     ScenarioFile,
 )
+from service.wire.spacecraft import WholeSpacecraft
+
+B = TypeVar("B")
+T = TypeVar("T")
 
 _SECONDS_PER_HOUR = 3600.0
 
@@ -79,19 +82,13 @@ def read_file(content: Mapping[str, Any]) -> ScenarioFile:
     except ValidationError as error:
         first = faults_of_validation(error, content)[0]
         raise InvalidScenario(first.code, first.detail, pointer=first.pointer) from None
-    return file.model_copy(
-        update={
-            "satellites": _with_ids(list(_with_tidy_orbits(file.satellites))),
-            "ground_stations": _with_ids(file.ground_stations),
-        }
-    )
+    tidy = _each("satellites", file.satellites, _with_tidy_orbit)
+    stations = _with_ids(file.ground_stations)
+    return file.model_copy(update={"satellites": _with_ids(tidy), "ground_stations": stations})
 
 
-def _with_tidy_orbits(items: Sequence[FileSatellite]) -> Iterator[FileSatellite]:
-    for position, item in enumerate(items):
-        with inside(f"/satellites/{position}"):
-            stored = orbit_from(item).stored
-        yield item.model_copy(update=stored)
+def _with_tidy_orbit(item: FileSatellite) -> FileSatellite:
+    return item.model_copy(update=orbit_from(item).stored)
 
 
 def _with_ids(items: Sequence[FileSatellite | FileGroundStation]) -> list[object]:
@@ -113,9 +110,15 @@ def scenario_from_file(file: ScenarioFile) -> Scenario:
     """Return the scenario of a file that `read_file` has made."""
     return Scenario(
         horizon=horizon_from(file.horizon),
-        satellites=tuple(_satellites(file.satellites)),
-        targets=tuple(_targets(file.targets)),
-        ground_stations=tuple(_ground_stations(file.ground_stations)),
+        satellites=_each(
+            "satellites", file.satellites, lambda one: satellite_from(one, str(one.id))
+        ),
+        targets=_each("targets", file.targets, lambda one: target_from(one, one.catalog_id)),
+        ground_stations=_each(
+            "ground_stations",
+            file.ground_stations,
+            lambda one: ground_station_from(one, str(one.id)),
+        ),
         use_resources=file.use_resources,
         dynamics=file.dynamics,
         collect_spacing_s=file.collect_spacing_s,
@@ -134,32 +137,16 @@ def scenario_from_file(file: ScenarioFile) -> Scenario:
 
 def objective_from(item: ObjectiveIn) -> Objective:
     """Return the domain's objective."""
-    return Objective(
-        collected_share=item.collected_share,
-        half_life_s=item.half_life_s,
-        prefer=tuple(item.prefer),
-    )
+    return Objective(**dict(item) | {"prefer": tuple(item.prefer)})
 
 
-def _satellites(items: Sequence[FileSatellite]) -> Iterator[Satellite]:
+def _each(part: str, items: Sequence[B], build: Callable[[B], T]) -> tuple[T, ...]:
+    """Return what is made of each thing of a part; errors point to the thing."""
+    built = []
     for position, item in enumerate(items):
-        with inside(f"/satellites/{position}"):
-            satellite = satellite_from(item, str(item.id))
-        yield satellite
-
-
-def _targets(items: Sequence[FileTarget]) -> Iterator[Target]:
-    for position, item in enumerate(items):
-        with inside(f"/targets/{position}"):
-            target = target_from(item, item.catalog_id)
-        yield target
-
-
-def _ground_stations(items: Sequence[FileGroundStation]) -> Iterator[GroundStation]:
-    for position, item in enumerate(items):
-        with inside(f"/ground_stations/{position}"):
-            station = ground_station_from(item, str(item.id))
-        yield station
+        with inside(f"/{part}/{position}"):
+            built.append(build(item))
+    return tuple(built)
 
 
 @contextmanager
@@ -236,16 +223,9 @@ def satellite_from(body: WholeSatellite, satellite_id: str) -> Satellite:
     )
 
 
-class _WithFigures(Protocol):
-    @property
-    def agility(self) -> AgilityIn: ...
-    @property
-    def sensor(self) -> SensorIn: ...
-    @property
-    def resources(self) -> Preset | PresetResourcesIn | ResourcesIn: ...
-
-
-def figures_from(body: _WithFigures, period_s: float) -> tuple[Agility, Sensor, Resources]:
+def figures_from(
+    body: TypedFigures | WholeSpacecraft, period_s: float
+) -> tuple[Agility, Sensor, Resources]:
     """Return what a spacecraft in an orbit of this period can do.
 
     Raises
@@ -289,7 +269,8 @@ def resources_from(body: Preset | PresetResourcesIn | ResourcesIn, period_s: flo
     battery_ws = body.battery_capacity_wh * _SECONDS_PER_HOUR
     recorder_mbit = body.recorder_capacity_mbit
     rate = body.downlink_rate_mbit_s
-    knots = tuple((deg, mbit_s / recorder_mbit) for deg, mbit_s in _knots(rate))
+    by_elevation = rate if isinstance(rate, list) else []
+    knots = tuple((deg, mbit_s / recorder_mbit) for deg, mbit_s in by_elevation)
     try:
         return Resources(
             battery_min_fraction=body.battery_min_fraction,
@@ -319,10 +300,6 @@ def resources_from(body: Preset | PresetResourcesIn | ResourcesIn, period_s: flo
         raise
 
 
-def _knots(rate: float | list[list[float]]) -> list[list[float]]:
-    return rate if isinstance(rate, list) else []
-
-
 def target_from(body: TargetIn, catalog_id: str | None = None) -> Target:
     """Return the target of one body."""
     least, most = body.off_nadir_min_deg, body.off_nadir_max_deg
@@ -339,16 +316,15 @@ def target_from(body: TargetIn, catalog_id: str | None = None) -> Target:
             f"{body.release:%Y-%m-%dT%H:%M:%SZ}.",
             pointer="/due",
         )
-    fields = {name: getattr(body, name) for name in TargetIn.model_fields}
-    return Target(**fields, catalog_id=catalog_id)
+    return Target(**fields_of(body, TargetIn), catalog_id=catalog_id)
 
 
 def ground_station_from(body: GroundStationIn, station_id: str) -> GroundStation:
     """Return the ground station of one body."""
     _check_mask(body.elevation_mask)
-    fields = {name: getattr(body, name) for name in GroundStationIn.model_fields}
     mask = tuple((azimuth, elevation) for azimuth, elevation in body.elevation_mask)
-    return GroundStation(**fields | {"elevation_mask": mask}, id=station_id)
+    fields = fields_of(body, GroundStationIn) | {"elevation_mask": mask}
+    return GroundStation(**fields, id=station_id)
 
 
 def _check_mask(mask: Sequence[Sequence[float]]) -> None:

@@ -13,6 +13,7 @@ from typing import Any, Final
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
 
+from service.db.columns import Row
 from service.db.rows import (
     BoundRow,
     ComparisonRow,
@@ -27,7 +28,6 @@ from service.db.rows import (
     PlanRow,
     PlanSatelliteRow,
     PlanStateRow,
-    Row,
     ScenarioOwnerRow,
     ScenarioPartRow,
     ScenarioRow,

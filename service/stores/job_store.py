@@ -29,11 +29,6 @@ def num_waiting(session: Session, owner: str) -> tuple[int, int]:
     return in_all, of_owner
 
 
-def find(session: Session, job_id: str) -> JobRow | None:
-    """Return a job, or None."""
-    return session.get(JobRow, job_id)
-
-
 def owner_of(session: Session, job_id: str) -> str | None:
     """Return whose job this is, or None for no job."""
     return owners_of(session.connection(), [job_id]).get(job_id)
@@ -55,14 +50,6 @@ def versions_of(connection: sa.Connection, job_ids: Collection[str]) -> dict[str
     """Return the number of each of these jobs that grows with its every visible change."""
     rows = connection.execute(_VERSIONS, {"job_ids": list(job_ids)})
     return {row.id: row.version for row in rows}
-
-
-def matching(**wanted: str | None) -> sa.Select[JobRow]:
-    """Return the query of all jobs whose columns have these values; None stands for any."""
-    conditions = [
-        getattr(JobRow, column) == value for column, value in wanted.items() if value is not None
-    ]
-    return sa.select(JobRow).where(*conditions)
 
 
 def scenario_hashes(session: Session, jobs: Iterable[JobRow]) -> dict[str, str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Final, get_args
+from typing import Any, Final, get_args
 
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
@@ -13,6 +13,7 @@ from sqlalchemy.orm import Session
 from service.db.clock import seconds_between, utc_now
 from service.db.rows import JobRow, SatelliteRow, ScenarioRow, WebhookDeliveryRow, WorkerRow
 from service.stores import satellite_store
+from service.stores.finding import alive
 from service.wire.jobs import ACTIVE, JobState
 from service.wire.timelines import Validity
 from service.wire.webhooks import DeliveryState
@@ -75,33 +76,24 @@ def take(session: Session) -> Snapshot:
     waiting_s = sa.select(sa.func.max(seconds_between(JobRow.created_at, utc_now())))
     seen_s = sa.select(WorkerRow.id, seconds_between(WorkerRow.seen_at, utc_now()))
     return Snapshot(
-        num_jobs=_num_jobs(session),
-        num_plans=_num_plans(session),
+        num_jobs=_counted(session, JobRow.state, get_args(JobState)),
+        num_plans=_counted(session, JobRow.validity, get_args(Validity)),
         oldest_waiting_s=session.scalar(waiting_s.where(JobRow.state == "queued")) or 0.0,
         job_times=_job_times(session),
         num_leases_lost=session.scalar(sa.select(sa.func.sum(JobRow.lost_runs))) or 0,
         heartbeat_age_s=dict(session.execute(seen_s).all()),
         orbits=_orbits(session, now),
-        num_deliveries=_num_deliveries(session),
+        num_deliveries=_counted(session, WebhookDeliveryRow.state, get_args(DeliveryState)),
     )
 
 
-def _num_jobs(session: Session) -> dict[str, int]:
-    counted = sa.select(JobRow.state, sa.func.count()).group_by(JobRow.state)
-    found = dict(session.execute(counted).all())
-    return {state: found.get(state, 0) for state in get_args(JobState)}
-
-
-def _num_plans(session: Session) -> dict[str, int]:
-    counted = sa.select(JobRow.validity, sa.func.count()).where(JobRow.validity.is_not(None))
-    found = dict(session.execute(counted.group_by(JobRow.validity)).all())
-    return {validity: found.get(validity, 0) for validity in get_args(Validity)}
-
-
-def _num_deliveries(session: Session) -> dict[str, int]:
-    state = WebhookDeliveryRow.state
-    found = dict(session.execute(sa.select(state, sa.func.count()).group_by(state)).all())
-    return {state: found.get(state, 0) for state in get_args(DeliveryState)}
+def _counted(
+    session: Session, column: sa.SQLColumnExpression[Any], values: Sequence[str]
+) -> dict[str, int]:
+    """Return how many rows have each of these values; those that none has count 0."""
+    counted = sa.select(column, sa.func.count()).where(column.is_not(None)).group_by(column)
+    found: dict[str, int] = dict(session.execute(counted).all())
+    return {value: found.get(value, 0) for value in values}
 
 
 def _job_times(session: Session) -> list[JobTime]:
@@ -129,7 +121,7 @@ def _orbits(session: Session, now: datetime) -> list[OrbitAge]:
     ids = {own_id for summary in summaries for own_id in summary.get("satellite_ids", ())}
     names = {
         row.id: row.name
-        for row in session.scalars(satellite_store.alive().where(SatelliteRow.id.in_(ids)))
+        for row in session.scalars(alive(SatelliteRow).where(SatelliteRow.id.in_(ids)))
     }
     return [
         OrbitAge(

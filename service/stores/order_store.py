@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from datetime import UTC, datetime
 from typing import Any, Final
 
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
 
-from service.db.ids import new_id
 from service.db.rows import OrderRow, TargetCatalogRow, TargetRow
 from service.db.session import take_turns
 from service.wire.places import MAX_TARGETS
@@ -55,7 +53,6 @@ def add(
         catalog_id=catalog.id,
         target=dict(target),
         sent=dict(sent),
-        created_at=datetime.now(UTC),
     )
     session.add(row)
     return row
@@ -74,15 +71,7 @@ def _standing(session: Session, owner: str) -> TargetCatalogRow:
     found = session.scalar(newest)
     if found is not None and found.deleted_at is None and found.num_targets < MAX_TARGETS:
         return found
-    fresh = TargetCatalogRow(
-        id=new_id(), name=CATALOG_NAME, num_targets=0, created_at=datetime.now(UTC)
-    )
+    fresh = TargetCatalogRow(name=CATALOG_NAME, num_targets=0)
     session.add(fresh)
     session.flush()
     return fresh
-
-
-def visible(owner: str | None) -> sa.Select[OrderRow]:
-    """Return the query of an owner's orders, or of all."""
-    wanted = sa.select(OrderRow)
-    return wanted if owner is None else wanted.where(OrderRow.owner == owner)

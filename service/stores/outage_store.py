@@ -9,12 +9,9 @@ import sqlalchemy as sa
 from sqlalchemy.orm import Session
 
 from service.db.rows import OutageRow
+from service.stores.finding import alive
 from service.wire.pins import PlacedOutage
-
-
-def alive() -> sa.Select[OutageRow]:
-    """Return the query of all outages that have not been deleted."""
-    return sa.select(OutageRow).where(OutageRow.deleted_at.is_(None))
+from service.wire.stored import from_row
 
 
 def overlapping(
@@ -37,12 +34,10 @@ def concerning(
 ) -> Sequence[OutageRow]:
     """Return the outages of these satellites and stations in a span, by their start."""
     whose = sa.or_(OutageRow.satellite_id.in_(satellite_ids), OutageRow.station_id.in_(station_ids))
-    wanted = overlapping(alive().where(whose), from_, to)
+    wanted = overlapping(alive(OutageRow).where(whose), from_, to)
     return session.scalars(wanted.order_by(OutageRow.start, OutageRow.id)).all()
 
 
 def placed(row: OutageRow) -> PlacedOutage:
     """Return the outage as scenarios take it along."""
-    return PlacedOutage.model_validate(
-        {name: getattr(row, name) for name in PlacedOutage.model_fields}
-    )
+    return from_row(PlacedOutage, row)

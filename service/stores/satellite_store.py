@@ -12,10 +12,10 @@ from sqlalchemy.orm import Session, aliased
 
 from planner_core.domain import Orbit, OrbitEphemeris
 from planner_core.orbits.ingest import Entry
-from service.db.ids import new_id
 from service.db.rows import ElementSetRow, SatelliteRow
 from service.db.session import take_turns
 from service.problems.kinds import ServiceError
+from service.stores.finding import alive
 from service.wire.satellites import WholeSatellite
 
 FIGURES: Final = ("agility", "sensor", "resources", "spacecraft")
@@ -35,11 +35,6 @@ class ImportedEntry:
     entry: Entry
 
 
-def alive() -> sa.Select[SatelliteRow]:
-    """Return the query of all satellites that have not been deleted."""
-    return sa.select(SatelliteRow).where(SatelliteRow.deleted_at.is_(None))
-
-
 def add_satellite(
     session: Session, body: WholeSatellite, elements: Orbit, orbit: dict[str, Any]
 ) -> SatelliteRow:
@@ -51,14 +46,8 @@ def add_satellite(
         ``duplicate_norad_cat_id`` where there is one of this catalogue number.
     """
     _require_new(session, elements.norad_cat_id)
-    dumped = body.model_dump(mode="json", include=set(FIGURES))
-    row = SatelliteRow(
-        id=new_id(),
-        name=body.name,
-        norad_cat_id=elements.norad_cat_id,
-        created_at=datetime.now(UTC),
-        **dumped,
-    )
+    figures = body.model_dump(mode="json", include=set(FIGURES))
+    row = SatelliteRow(name=body.name, norad_cat_id=elements.norad_cat_id, **figures)
     session.add(row)
     session.flush()
     add_elements(session, row.id, elements.epoch, orbit)
@@ -70,15 +59,11 @@ def _require_new(session: Session, norad_cat_id: int) -> None:
     if norad_cat_id == 0:
         return
     take_turns(session, _TURNS)
-    rival = session.scalar(
-        sa.select(SatelliteRow.id).where(
-            SatelliteRow.norad_cat_id == norad_cat_id, SatelliteRow.deleted_at.is_(None)
-        )
-    )
+    rival = session.scalar(alive(SatelliteRow).where(SatelliteRow.norad_cat_id == norad_cat_id))
     if rival is not None:
         raise ServiceError(
             "duplicate_norad_cat_id",
-            f"The satellite {rival!r} has the catalogue number {norad_cat_id}. "
+            f"The satellite {rival.id!r} has the catalogue number {norad_cat_id}. "
             "Send its new elements there, or import them.",
         )
 
@@ -93,7 +78,7 @@ def add_elements(
     for stored in session.scalars(same_epoch):
         if stored.orbit == orbit:
             return stored
-    row = _element_set(satellite_id, epoch, orbit)
+    row = ElementSetRow(satellite_id=satellite_id, epoch=epoch, orbit=orbit)
     session.add(row)
     session.flush()
     return row
@@ -161,7 +146,8 @@ class _Import:
             key = self._only_one_named(name) or key
         status: Status = "elements_added"
         if key not in self._known:
-            self._known[key] = _new_satellite(name, elements.norad_cat_id, self._figures)
+            norad_cat_id = elements.norad_cat_id
+            self._known[key] = SatelliteRow(name=name, norad_cat_id=norad_cat_id, **self._figures)
             self.new_satellites.append(self._known[key])
             status = "created"
         satellite = self._known[key]
@@ -169,7 +155,9 @@ class _Import:
             status = "unchanged"
         else:
             self._epochs.add((satellite.id, _tick(elements.epoch)))
-            self.new_elements.append(_element_set(satellite.id, elements.epoch, entry.orbit))
+            self.new_elements.append(
+                ElementSetRow(satellite_id=satellite.id, epoch=elements.epoch, orbit=entry.orbit)
+            )
         return ImportedEntry(satellite=satellite, status=status, entry=entry)
 
     def _only_one_named(self, name: str) -> tuple[int, str] | None:
@@ -178,29 +166,9 @@ class _Import:
         return keys[0] if len(keys) == 1 else None
 
 
-def _element_set(satellite_id: str, epoch: datetime, orbit: dict[str, Any]) -> ElementSetRow:
-    return ElementSetRow(
-        id=new_id(),
-        satellite_id=satellite_id,
-        epoch=epoch,
-        orbit=orbit,
-        created_at=datetime.now(UTC),
-    )
-
-
-def _new_satellite(name: str, norad_cat_id: int, figures: Mapping[str, Any]) -> SatelliteRow:
-    return SatelliteRow(
-        id=new_id(),
-        name=name,
-        norad_cat_id=norad_cat_id,
-        created_at=datetime.now(UTC),
-        **figures,
-    )
-
-
 def _known_satellites(session: Session) -> dict[tuple[int, str], SatelliteRow]:
     # Oldest first, so that of several with one number the newest stays in the table.
-    rows = session.scalars(alive().order_by(SatelliteRow.id))
+    rows = session.scalars(alive(SatelliteRow).order_by(SatelliteRow.id))
     return {_key(row.norad_cat_id, row.name): row for row in rows}
 
 

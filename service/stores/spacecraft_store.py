@@ -5,34 +5,22 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, TypeVar
 
-import sqlalchemy as sa
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel
 from sqlalchemy.orm import Session
 
-from planner_core.errors import Fault
 from service.db.rows import SpacecraftRow
-from service.problems.faults import faults_of_validation, refuse
+from service.problems.faults import refuse_one, validated
+from service.stores.finding import find
 from service.wire.spacecraft_types import BUILT_IN, filled, type_named_by
 
 M = TypeVar("M", bound=BaseModel)
-
-
-def alive() -> sa.Select[SpacecraftRow]:
-    """Return the query of all types that have not been deleted."""
-    return sa.select(SpacecraftRow).where(SpacecraftRow.deleted_at.is_(None))
-
-
-def find(session: Session, spacecraft_id: str, *, to_change: bool = False) -> SpacecraftRow | None:
-    """Return a stored type, its row locked where it is to change."""
-    row = session.get(SpacecraftRow, spacecraft_id, with_for_update=to_change)
-    return None if row is None or row.deleted_at is not None else row
 
 
 def figures_of(session: Session, spacecraft_id: str) -> Mapping[str, Any] | None:
     """Return agility, sensor and resources of a type, built in or stored; None for no type."""
     if spacecraft_id in BUILT_IN:
         return BUILT_IN[spacecraft_id]
-    row = find(session, spacecraft_id)
+    row = find(session, SpacecraftRow, spacecraft_id)
     return None if row is None else row.body
 
 
@@ -56,18 +44,6 @@ def completed(
     name = type_named_by(given)
     kind = figures_of(session, name)
     if kind is None:
-        fault = Fault(
-            code="unknown_spacecraft",
-            detail=f"There is no spacecraft type {name!r}.",
-            pointer="/spacecraft",
-        )
-        raise refuse([fault])
-    return validated(filled(given, kind) | ({"spacecraft": name} if names_type else {}), shape)
-
-
-def validated(whole: Mapping[str, Any], shape: type[M]) -> M:
-    """Return a body of this shape; 422 with every fault where it is none."""
-    try:
-        return shape.model_validate(whole)
-    except ValidationError as error:
-        raise refuse(faults_of_validation(error, whole)) from None
+        detail = f"There is no spacecraft type {name!r}."
+        raise refuse_one("unknown_spacecraft", detail, "/spacecraft")
+    return validated(shape, filled(given, kind) | ({"spacecraft": name} if names_type else {}))

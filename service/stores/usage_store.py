@@ -10,6 +10,7 @@ from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
 from service.db.rows import OwnerUsageRow
+from service.db.session import changed
 from service.problems.kinds import ServiceError
 
 MB: Final = 1_000_000
@@ -17,23 +18,16 @@ MB: Final = 1_000_000
 
 def add(session: Session, owner: str, *, num_rows: int, num_bytes: int) -> tuple[int, int]:
     """Add to what an owner has stored; return its rows and bytes in all."""
-    added = (
-        sa.update(OwnerUsageRow)
-        .where(OwnerUsageRow.owner == owner)
-        .values(
-            num_rows=OwnerUsageRow.num_rows + num_rows,
-            num_bytes=OwnerUsageRow.num_bytes + num_bytes,
-        )
-        .returning(OwnerUsageRow.num_rows, OwnerUsageRow.num_bytes)
-        .execution_options(synchronize_session=False)
-    )
-    found = session.execute(added).one_or_none()
+    rows, size = OwnerUsageRow.num_rows, OwnerUsageRow.num_bytes
+    more = {"num_rows": rows + num_rows, "num_bytes": size + num_bytes}
+    found = changed(session, OwnerUsageRow, OwnerUsageRow.owner == owner, rows, size, **more)
     if found is None:
         # Somebody else may be the first at this moment.
         with suppress(IntegrityError), session.begin_nested():
             nothing = {"owner": owner, "num_rows": 0, "num_bytes": 0}
             session.execute(sa.insert(OwnerUsageRow).values(nothing))
-        found = session.execute(added).one()
+        found = changed(session, OwnerUsageRow, OwnerUsageRow.owner == owner, rows, size, **more)
+        assert found is not None
     return found[0], found[1]
 
 
@@ -44,12 +38,8 @@ def give_back(session: Session, owner: str, *, num_rows: int, num_bytes: int) ->
         left = getattr(OwnerUsageRow, column) - number
         # What was stored before anybody counted was never added.
         values[column] = sa.case((left > 0, left), else_=0)
-    session.execute(
-        sa.update(OwnerUsageRow)
-        .where(OwnerUsageRow.owner == owner)
-        .values(**values)
-        .execution_options(synchronize_session=False)
-    )
+    own = OwnerUsageRow.owner == owner
+    changed(session, OwnerUsageRow, own, OwnerUsageRow.owner, **values)
 
 
 def used(session: Session, owner: str) -> tuple[int, int]:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import cast
 
 from service.db.rows import JobRow, PlanRow
-from service.wire.plans import PlanChange, PlanState
+from service.wire.plans import PlanChange
+from service.wire.stored import from_row
 from service.wire.webhooks import JobEnd
 
 
@@ -22,18 +22,8 @@ def event_of(state: str) -> str:
 def end_of(job: JobRow) -> JobEnd:
     """Return what an event tells of a job: enough to decide whether to fetch the rest."""
     address = f"/v1/jobs/{job.id}"
-    return JobEnd(
-        job_id=job.id,
-        state=job.state,
-        termination=job.termination,
-        error=job.error,
-        validity=job.validity,
-        warnings=job.warnings or (),
-        solver=job.solver,
-        label=job.label,
-        scenario_id=job.scenario_id,
-        links={"job": address, "timeline": f"{address}/timeline"},
-    )
+    links = {"job": address, "timeline": f"{address}/timeline"}
+    return from_row(JobEnd, job, job_id=job.id, warnings=job.warnings or (), links=links)
 
 
 def event_of_plan(state: str) -> str:
@@ -47,13 +37,7 @@ def event_of_plan(state: str) -> str:
 
 def change_of(plan: PlanRow, reason: str | None, effective_from: datetime | None) -> PlanChange:
     """Return what an event tells of a plan."""
-    return PlanChange(
-        plan_id=plan.id,
-        state=cast(PlanState, plan.state),
-        name=plan.name,
-        job_id=plan.job_id,
-        parent_id=plan.parent_id,
-        reason=reason,
-        effective_from=effective_from,
-        links={"plan": f"/v1/plans/{plan.id}", "job": f"/v1/jobs/{plan.job_id}"},
+    links = {"plan": f"/v1/plans/{plan.id}", "job": f"/v1/jobs/{plan.job_id}"}
+    return from_row(
+        PlanChange, plan, plan_id=plan.id, reason=reason, effective_from=effective_from, links=links
     )

@@ -20,6 +20,7 @@ from sqlalchemy.orm import Session
 from service.db.clock import utc_now
 from service.db.ids import new_id
 from service.db.rows import JobRow, PlanRow, WebhookDeliveryRow, WebhookRow
+from service.db.session import changed
 from service.webhooks import events
 from service.wire.base import dumped
 from service.wire.plans import PlanChange
@@ -248,15 +249,6 @@ def sweep(session: Session) -> None:
 
 
 def _update(session: Session, delivery_id: str, attempt: int, **values: Any) -> bool:
-    statement = (
-        sa.update(WebhookDeliveryRow)
-        .where(
-            WebhookDeliveryRow.id == delivery_id,
-            WebhookDeliveryRow.attempts == attempt,
-            WebhookDeliveryRow.state == "pending",
-        )
-        .values(**values)
-        .returning(WebhookDeliveryRow.id)
-        .execution_options(synchronize_session=False)
-    )
-    return session.execute(statement).first() is not None
+    row = WebhookDeliveryRow
+    is_own = sa.and_(row.id == delivery_id, row.attempts == attempt, row.state == "pending")
+    return changed(session, row, is_own, row.id, **values) is not None

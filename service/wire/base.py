@@ -186,6 +186,11 @@ def dumped(model: BaseModel, include: set[str] | None = None) -> Json:
     return model.model_dump(mode="json", include=include)
 
 
+def fields_of(body: BaseModel, shape: type[BaseModel]) -> dict[str, Any]:
+    """Return those values of a body that are fields of this shape, as they are."""
+    return {name: getattr(body, name) for name in shape.model_fields}
+
+
 def read(model: type[M], text: str | bytes) -> M:
     """Return what an answer says: fields and words that are not known here do no harm."""
 

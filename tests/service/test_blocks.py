@@ -12,7 +12,6 @@ from service.answers.blocks import (
     NUM_CHARS,
     NUM_ITEMS,
     Block,
-    blocks_of_timeline,
     contents_of,
     head_in,
     holds,
@@ -23,6 +22,7 @@ from service.answers.blocks import (
     targets_text,
     timeline_text,
 )
+from tests.service.answers import blocks_of_timeline
 
 Document = dict[str, Any]
 

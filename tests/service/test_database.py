@@ -13,9 +13,10 @@ import sqlalchemy as sa
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 
+from service.db.columns import Row
 from service.db.ids import new_id
 from service.db.migrate import upgrade
-from service.db.rows import BoundRow, Row, TargetCatalogRow, TargetRow, WorkerRow
+from service.db.rows import BoundRow, TargetCatalogRow, TargetRow, WorkerRow
 from service.db.session import Database, make_engine
 from service.stores import bound_store
 

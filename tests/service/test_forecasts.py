@@ -13,10 +13,11 @@ import numpy as np
 import pytest
 
 from planner_core.errors import InvalidScenario
+from service.db.rows import ForecastRow
 from service.scenarios.canonical import canonical, sha256_of
 from service.scenarios.frozen_forecasts import find_forecast
 from service.scenarios.translate import scenario_from_content
-from service.stores import forecast_store
+from service.stores.finding import find_own
 from tests.missions import drawn_targets, paper_mission
 from tests.service.conftest import Service
 from tests.service.factories import EPOCH, post, send
@@ -141,8 +142,8 @@ def test_a_forecast_that_does_not_cover_the_question_is_refused(client: httpx.Cl
 def test_a_forecast_is_its_owners_alone(service: Service) -> None:
     made = upload(service.client, grid())
     with service.database.reading() as session:
-        assert forecast_store.find(session, made["id"], "somebody else") is None
-        assert forecast_store.find(session, made["id"], None) is not None
+        assert find_own(session, ForecastRow, made["id"], "somebody else") is None
+        assert find_own(session, ForecastRow, made["id"], None) is not None
         with pytest.raises(InvalidScenario, match="There is no forecast"):
             find_forecast(session, made["id"], "somebody else")
 

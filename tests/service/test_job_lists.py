@@ -6,13 +6,13 @@ import pytest
 import sqlalchemy as sa
 
 from service.db.rows import JobRow
-from service.stores import job_store
+from service.stores.finding import with_values
 from tests.service.conftest import Service
 
 
 @pytest.mark.parametrize("column", ["state", "scenario_id", "label", "tenant"])
 def test_a_filtered_list_is_read_in_order_from_an_index(service: Service, column: str) -> None:
-    page = job_store.matching(**{column: "x"}).where(JobRow.id < "y")
+    page = sa.select(JobRow).where(*with_values(JobRow, **{column: "x"}), JobRow.id < "y")
     text = (
         page.order_by(JobRow.id.desc())
         .limit(51)

@@ -17,7 +17,6 @@ from service.answers import store as answer_store
 from service.answers.blocks import (
     TIMELINE,
     Block,
-    blocks_of_timeline,
     contents_of,
     proof_blocks,
     target_blocks,
@@ -26,6 +25,7 @@ from service.answers.rendering import figures_of
 from service.db.migrate import config_on
 from service.db.rows import JobResultRow
 from service.db.session import Database
+from tests.service.answers import blocks_of_timeline
 from tests.service.jobs.conftest import SERVER_URL, create_database
 from tests.service.jobs.work import EMPTY
 from tests.service.test_blocks import target, timeline_of

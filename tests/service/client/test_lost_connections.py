@@ -10,7 +10,6 @@ from typing import Any
 
 import pytest
 
-from service.answers.blocks import blocks_of_timeline
 from service.client import (
     Client,
     JobFailed,
@@ -21,6 +20,7 @@ from service.client import (
 )
 from service.jobs import lease
 from service.jobs.lease import Lease, Outcome
+from tests.service.answers import blocks_of_timeline
 from tests.service.client.trouble import Answer, Cut, LostAnswer, Proxy
 from tests.service.jobs.conftest import Jobs, Workers
 

@@ -19,6 +19,7 @@ from service.db.rows import JobResultRow, JobRow, ScenarioRow
 from service.scenarios.canonical import canonical, sha256_of
 from service.scenarios.translate import scenario_from_content
 from tests.missions import PAPER_ORBIT, Document, drawn_targets, paper_mission
+from tests.service.answers import answered_of
 from tests.service.conftest import Service
 from tests.service.test_plan_job import run
 
@@ -68,12 +69,12 @@ class Mission:
 
     @property
     def answered(self) -> Answered:
-        return Answered.of(self.timeline, self.targets, self.content, FINISHED_AT)
+        return answered_of(self.timeline, self.targets, self.content, FINISHED_AT)
 
     def with_timeline(self, **changes: object) -> Answered:
         """Return the answer with another timeline."""
         timeline = json.dumps(self.document | changes)
-        return Answered.of(timeline, self.targets, self.content, FINISHED_AT)
+        return answered_of(timeline, self.targets, self.content, FINISHED_AT)
 
 
 def mission_file(**flags: object) -> Document:

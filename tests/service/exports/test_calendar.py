@@ -12,6 +12,7 @@ from ical.event import Event
 from service.answers.answered import Answered
 from service.exports import calendar
 from tests.missions import Document
+from tests.service.answers import answered_of
 from tests.service.exports.conftest import FINISHED_AT, Mission
 
 
@@ -42,7 +43,7 @@ def shifted(mission: Mission, shift_s: float, later_s: float = 60.0) -> Answered
                 at = datetime.fromisoformat(action[name]) + timedelta(seconds=shift_s)
                 action[name] = at.isoformat(timespec="milliseconds").replace("+00:00", "Z")
     finished_at = FINISHED_AT + timedelta(seconds=later_s)
-    return Answered.of(json.dumps(timeline), mission.targets, mission.content, finished_at)
+    return answered_of(json.dumps(timeline), mission.targets, mission.content, finished_at)
 
 
 def test_each_contact_is_an_event_that_covers_it(answered: Answered) -> None:
@@ -102,7 +103,7 @@ def test_parts_of_one_pass_are_events_of_their_own(mission: Mission) -> None:
     timeline = mission.document
     (first, *_) = [a for a in timeline["satellites"][0]["actions"] if a["mode"] == "contact"]
     timeline["satellites"][0]["actions"].append(first | {"id": "a9999"})
-    answered = Answered.of(json.dumps(timeline), mission.targets, mission.content, FINISHED_AT)
+    answered = answered_of(json.dumps(timeline), mission.targets, mission.content, FINISHED_AT)
     uids = [event.uid for event in events_of(answered)]
     assert len(set(uids)) == len(uids)
 

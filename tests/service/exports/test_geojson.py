@@ -20,6 +20,7 @@ from service.exports import geojson
 from service.exports.antimeridian import area
 from service.scenarios.canonical import canonical
 from tests.missions import PAPER_ORBIT, Document
+from tests.service.answers import answered_of
 from tests.service.exports.conftest import FINISHED_AT, Mission
 
 LON, LAT = (
@@ -158,7 +159,7 @@ def test_tracks_are_sampled_every_half_minute_and_never_cross_the_map(
 def test_a_track_that_stays_on_the_map_is_one_line(mission: Mission) -> None:
     file = json.loads(mission.content)
     file["horizon"]["end"] = "2019-01-01T00:01:40Z"
-    short = Answered.of(mission.timeline, mission.targets, canonical(file), FINISHED_AT)
+    short = answered_of(mission.timeline, mission.targets, canonical(file), FINISHED_AT)
     collection = json.loads("".join(geojson.write(short)))
     Draft202012Validator(RFC_7946).validate(collection)
     for track in features(collection, "track"):

@@ -16,6 +16,7 @@ from planner_core.spreadsheets import unguarded
 from service.answers.answered import Answered
 from service.exports import calendar, czml, geojson, table
 from service.scenarios.canonical import canonical
+from tests.service.answers import answered_of
 from tests.service.exports.conftest import FINISHED_AT, Mission, mission_file
 from tests.service.test_plan_job import run
 
@@ -38,7 +39,7 @@ def hostile() -> tuple[Mission, Answered]:
     for number, part in enumerate([*file["satellites"], *stations]):
         part |= {"name": HOSTILE[number], "id": HOSTILE[-1 - number]}
     mission = Mission(content=canonical(file), blocks=run(file, "rule").blocks)
-    return mission, Answered.of(mission.timeline, mission.targets, mission.content, FINISHED_AT)
+    return mission, answered_of(mission.timeline, mission.targets, mission.content, FINISHED_AT)
 
 
 def text_of(chunks: Iterator[str]) -> str:

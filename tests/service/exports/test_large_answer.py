@@ -11,10 +11,11 @@ import httpx
 import pytest
 import sqlalchemy as sa
 
-from service.answers.blocks import NUM_ITEMS, blocks_of_timeline, target_blocks
+from service.answers.blocks import NUM_ITEMS, target_blocks
 from service.db.rows import JobBlockRow
 from service.exports.forms import FORMS
 from tests.missions import Document
+from tests.service.answers import blocks_of_timeline
 from tests.service.conftest import Service
 from tests.service.exports.conftest import Mission, store_job
 

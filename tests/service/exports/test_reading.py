@@ -29,6 +29,7 @@ from service.scenarios.translate import scenario_from_content
 from service.wire.base import read as read_wire
 from service.wire.timelines import TimelineOut
 from tests.missions import Document, drawn_targets, paper_mission
+from tests.service.answers import answered_of
 from tests.service.exports.conftest import FINISHED_AT, Mission
 from tests.service.test_plan_job import run
 
@@ -122,7 +123,7 @@ def test_exports_come_back_as_the_same_plan(
 def test_plans_of_every_kind_of_scenario_come_back(solver: str, flags: dict[str, Any]) -> None:
     file = paper_mission(drawn_targets(80), **flags)
     answer = run(file, solver)
-    answered = Answered.of(answer.timeline, answer.targets, canonical(file), FINISHED_AT)
+    answered = answered_of(answer.timeline, answer.targets, canonical(file), FINISHED_AT)
     scenario = scenario_from_content(file)
     problem = compiled(scenario)
     for data, suffix in ((csv_of(answered), ".csv"), (answer.timeline.encode(), ".json")):
@@ -145,7 +146,7 @@ def test_answers_of_the_first_release_are_read_and_exported(
     assert timeline.totals.quality_mean is None
     assert {(a.worth, a.quality) for s in timeline.satellites for a in s.actions} == {(None, None)}
     assert view_of(timeline) == view_of(read_wire(TimelineOut, mission.timeline))
-    old = Answered.of(json.dumps(stored), mission.targets, mission.content, FINISHED_AT)
+    old = answered_of(json.dumps(stored), mission.targets, mission.content, FINISHED_AT)
     now = rows_of(answered)
     assert rows_of(old) == [row | {"worth": "", "quality": ""} for row in now]
     assert any(row["worth"] for row in now)

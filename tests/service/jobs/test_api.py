@@ -13,12 +13,13 @@ import pytest
 import sqlalchemy as sa
 
 from planner_core.solvers.registry import SOLVERS
-from service.answers.blocks import blocks_of_timeline, proof_blocks, target_blocks
+from service.answers.blocks import proof_blocks, target_blocks
 from service.db.rows import JobRow
 from service.jobs import lease
 from service.jobs.lease import Lease, Outcome
 from service.jobs.queue import DbosQueue
 from service.jobs.solver_params import params_of
+from tests.service.answers import blocks_of_timeline
 from tests.service.conftest import checked_client, new_app, serve
 from tests.service.jobs.conftest import Jobs, Workers
 from tests.service.jobs.work import EMPTY

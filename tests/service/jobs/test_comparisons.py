@@ -7,9 +7,9 @@ from typing import Any
 import httpx
 import pytest
 
-from service.answers.blocks import blocks_of_timeline
 from service.answers.rendering import figures_of
 from service.jobs.lease import Outcome
+from tests.service.answers import blocks_of_timeline
 from tests.service.conftest import new_app, serve
 from tests.service.jobs.conftest import Jobs
 from tests.service.jobs.test_api import finish, start

@@ -9,13 +9,13 @@ import pytest
 import sqlalchemy as sa
 from sqlalchemy.exc import IntegrityError
 
-from service.answers.blocks import blocks_of_timeline
 from service.db.clock import utc_now
 from service.db.ids import new_id
 from service.db.rows import JobResultRow, JobRow
 from service.jobs import lease
 from service.jobs.lease import Lease, Outcome
 from service.stores import usage_store
+from tests.service.answers import blocks_of_timeline
 from tests.service.jobs.conftest import Jobs
 
 ANSWERED = Outcome(

@@ -13,7 +13,8 @@ from prometheus_client.parser import text_string_to_metric_families
 
 import planner_core
 from service.db.clock import seconds_between, utc_now
-from service.db.rows import JobRow, UtcDateTime, WorkerRow
+from service.db.columns import UtcDateTime
+from service.db.rows import JobRow, WorkerRow
 from service.db.session import Database
 from service.jobs.lease import Outcome
 from service.wire.timelines import Validity

@@ -11,9 +11,10 @@ import psutil
 
 from planner_core.budget import Budget, Progress
 from planner_core.errors import Cancelled, InvalidScenario
-from service.answers.blocks import blocks_of_timeline, target_blocks
+from service.answers.blocks import target_blocks
 from service.jobs.plan_request import PlanAnswer, PlanRequest
 from service.jobs.runner import Work
+from tests.service.answers import blocks_of_timeline
 
 _SPAN = {"start": "2026-03-01T00:00:00.000Z", "end": "2026-03-02T00:00:00.000Z"}
 EMPTY = {

@@ -10,7 +10,6 @@ import sqlalchemy as sa
 from sqlalchemy.orm import Session
 from standardwebhooks.webhooks import Webhook
 
-from service.answers.blocks import blocks_of_timeline
 from service.db.clock import utc_now
 from service.db.rows import WebhookDeliveryRow, WebhookRow
 from service.jobs import lease
@@ -18,6 +17,7 @@ from service.jobs.lease import Outcome
 from service.jobs.reconcile import Reconciler
 from service.webhooks import outbox
 from tests.patience import PATIENCE_S
+from tests.service.answers import blocks_of_timeline
 from tests.service.jobs.conftest import Jobs, Workers
 from tests.service.jobs.work import EMPTY
 from tests.service.webhooks.conftest import Post, StartCourier
