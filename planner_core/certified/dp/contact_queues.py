@@ -13,19 +13,49 @@ Worth is counted in small units, so that a path is found again from its value al
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from planner_core.bundles import bundle
+from planner_core.certified.dp.completions import Completions, completions_of, fill_backward
+from planner_core.certified.dp.contact_layers import Layers
 from planner_core.certified.dp.data_levels import DataLevels
-from planner_core.certified.dp.energy_labels import EnergyLevels, given_between, raise_to, sink
+from planner_core.certified.dp.energy_labels import EnergyLevels, given_between
 from planner_core.certified.dp.resource_network import Network
 from planner_core.certified.signs import ANYWHERE, AT_START, UNREACHED_UNITS
 from planner_core.certified.sizes import MAX_QUEUE_ENTRIES
-from planner_core.certified.tolerances import LEVEL
-from planner_core.jit import inlined, inner, kernel
-from planner_core.problem import Bytes, Floats, Ints
+from planner_core.certified.tolerances import DOWN, LEVEL
+from planner_core.jit import borrowing_inner, inlined, inner, kernel
+from planner_core.problem import Bytes, Floats, Ints, Longs
+
+
+_UNKNOWN: Final = -2  # units that were not worked out
+_PLENTY: Final = 2**30  # units that suffice for anything: no path gains so many
+
+
+@bundle
+class Fixing(NamedTuple):
+    """What paths that earn too little are told by: a relaxation in which tables are small.
+
+    Attributes
+    ----------
+    layers, weight
+        Those of ``contact_layers``, each contact with a layer of its own, and what tasks are worth
+        in them. The latter of shape ``(num_contacts + 1, m)``, ``(0, 0)`` where nothing is fixed.
+    toll
+        The price of each contact, by volume. Shape ``(num_contacts,)``.
+    after_contact
+        The most that may follow each contact, by energy. Shape ``(num_contacts, width)``.
+    least
+        What a path must gain more than.
+    """
+
+    layers: Layers
+    weight: Floats
+    toll: Floats
+    after_contact: Floats
+    least: float
 
 
 @bundle
@@ -70,6 +100,7 @@ class Queues(NamedTuple):
     network: Network
     energy: EnergyLevels
     data: DataLevels
+    fixing: Fixing
     contact: Ints
     number: Ints
     first: Ints
@@ -100,19 +131,55 @@ class _Tables(NamedTuple):
     Attributes
     ----------
     own
-        Of tasks, each until all may follow it for nothing, or all of a stretch. Shape
+        Of tasks, each until all may follow it for nothing. Shape
         ``(num_tables, most_listed, width)``.
+    span
+        Which entries of a row are told apart, from the first up to the second: all before have the
+        units of the first of them, all from the second on are not reached; 0 in a row without any.
+        Shape ``(num_tables, most_listed, 2)``.
     low, high
         The listed levels reached, by task. Shape ``(m,)``.
     at_contact
         Of contacts, when they end their layers, by what was promised, 0 for nothing. Shape
         ``(num_contacts, num_classes + 1, num_levels, width)``.
+    completions
+        Of the layer at hand, by the relaxation.
+    further
+        Units of the completions of a task, rounded up; 0 where paths are not left out. Shape
+        ``(width,)``.
+    kept, kept_at
+        What is kept of a stretch to go back in it: listed levels from ``low`` up to ``high``, and
+        where those of each task begin. Shapes ``(num_kept, width)`` and ``(m,)``.
     """
 
     own: Ints
+    span: Longs
     low: Ints
     high: Ints
     at_contact: Ints
+    completions: Completions
+    further: Ints
+    kept: Ints
+    kept_at: Longs
+
+
+class _Idle(NamedTuple):
+    """The most units of a path whose last task has ended, as ``_Tables`` have those of a task.
+
+    Attributes
+    ----------
+    units
+        By energy counted from ``base``. Shape ``(num_listed, width)``.
+    span
+        Shape ``(num_listed, 2)``.
+    reached
+        The first and the last row with a path.
+    """
+
+    units: Ints
+    span: Longs
+    reached: Longs
+    base: int
 
 
 @kernel
@@ -129,10 +196,17 @@ def most_by_queues(q: Queues, stop: Bytes) -> tuple[float, Ints]:
     states = (num_contacts, q.num_classes + 1, num_levels, width)
     tables = _Tables(
         np.empty((q.num_tables, num_listed, width), dtype=np.int32),
+        np.zeros((q.num_tables, num_listed, 2), dtype=np.int64),
         np.empty(m, dtype=np.int32),
         np.empty(m, dtype=np.int32),
         np.full(states, UNREACHED_UNITS, dtype=np.int32),
+        completions_of(num_contacts, m if len(q.fixing.weight) > 0 else 1, width),
+        np.zeros(width, dtype=np.int32),
+        np.empty((0, width), dtype=np.int32),
+        np.empty(m, dtype=np.int64),
     )
+    if len(q.fixing.weight) > 0:
+        tables.completions.best[:] = q.fixing.after_contact
     best, last, level = 0, -1, 0
     for layer in range(num_contacts + 1):
         if stop[0]:
@@ -161,8 +235,10 @@ def _level_of(q: Queues, top: int, listed: int) -> tuple[int, int]:
     """Return the level of data that is listed there, and the class of promises; 0 for none."""
     if listed < top:
         return listed, 0
-    beyond = q.data.num_levels - top
-    return top + (listed - top) % beyond, 1 + (listed - top) // beyond
+    promised = 1
+    while listed >= q.data.num_levels:
+        listed, promised = listed - (q.data.num_levels - top), promised + 1
+    return listed, promised
 
 
 @inlined
@@ -179,75 +255,214 @@ def _fill(q: Queues, layer: int, source: int, tables: _Tables) -> tuple[int, int
 
     Return the most units of any path in it, its last task and the level of its data.
     """
-    network, energy, data = q.network, q.energy, q.data
+    network, energy = q.network, q.energy
     own, low, high = tables.own, tables.low, tables.high
-    num_contacts = len(q.contact)
     top, num_listed = _top_of(q, layer), _num_listed(q, layer)
     low[:], high[:] = num_listed, -1
     begin, end = _stretch(q, layer, source)
-    idle = np.full((num_listed, energy.width), UNREACHED_UNITS, dtype=np.int32)
-    reached = np.array([num_listed, -1])
-    base = energy.lowest[begin] if end > begin else 0
-    if begin == 0 and source < 0 and q.first[layer] < 0:
-        for promised in range(1, 1 + (q.num_classes if data.start >= top else 1)):
-            at = _listed(q, top, data.start, promised)
-            idle[at, : max(0, energy.start - base + 1)] = 0
-            reached[0], reached[1] = min(reached[0], at), max(reached[1], at)
-    earned = np.zeros(num_listed, dtype=np.int32)
-    best, last, level, merged, kept = 0, -1, data.start, 0, 0
+    if len(q.fixing.weight) > 0:
+        fixing = q.fixing
+        completions = tables.completions
+        fill_backward(network, energy, fixing.layers, fixing.weight, layer, begin, completions)
+    idle = _at_start(q, layer, source, begin, end)
+    earned, needed = np.zeros(own.shape[1], dtype=np.int32), np.zeros(own.shape[1])
+    best, last, level, merged, kept = 0, -1, q.data.start, 0, 0
     for k in range(begin, end):
-        for y in range(reached[0], reached[1] + 1):
-            sink(idle[y], base - energy.lowest[k])
-        base = energy.lowest[k]
         while merged < len(q.number) and network.idle_from[network.by_idle[merged]] <= k:
             i = network.by_idle[merged]
             merged += 1
-            if i < kept:
-                continue
-            for y in range(low[i], high[i] + 1):
-                raise_to(idle[y], own[i % len(own), y], energy.lowest[i] - base)
-            reached[0], reached[1] = min(reached[0], low[i]), max(reached[1], high[i])
+            if i >= kept:
+                _rest(q, tables, i, idle)
         number, table = q.number[k], own[k % len(own)]
+        tables.span[k % len(own), :, 1] = 0
+        earned[:] = _UNKNOWN
         if number >= 0 and number != layer:
             if source < AT_START or source == number:
                 _begin_with(q, tables, k, number, layer)
                 _spread(q, tables, k, top)
-        elif _earn(q, k, layer, earned):
-            _take(q, k, layer, kept, earned, idle, reached, tables)
+                for at in range(low[k], high[k] + 1):
+                    _know(q, k, layer, at, earned, needed)
+        else:
+            _take(q, k, layer, kept, earned, needed, idle, tables)
+        _settle(q, k, earned, needed, tables)
         if number == layer:
             for at in range(low[k], high[k] + 1):
-                y, promised = at % data.num_levels, at // data.num_levels
+                y, promised = at % q.data.num_levels, at // q.data.num_levels
                 tables.at_contact[number, promised, y] = table[at]
         if network.is_kept[k]:
-            idle[:] = UNREACHED_UNITS
-            reached[0], reached[1] = num_listed, -1
+            idle.span[:, 1] = 0
+            idle.reached[0], idle.reached[1] = num_listed, -1
             best, last, kept = -1, -1, k
         for y in range(low[k], high[k] + 1):
-            if layer == num_contacts and table[y, 0] > best:
+            if layer == len(q.contact) and table[y, 0] > best:
                 best, last, level = table[y, 0], k, y
+            if len(tables.kept) > 0:
+                tables.kept[tables.kept_at[k] + y - low[k]] = table[y]
     return best, last, level
+
+
+@inner
+def _at_start(q: Queues, layer: int, source: int, begin: int, end: int) -> _Idle:
+    """Return what is reached before the first task of a stretch."""
+    energy, top, num_listed = q.energy, _top_of(q, layer), _num_listed(q, layer)
+    base = energy.lowest[end - 1] if end > begin else 0
+    width = energy.width + (energy.lowest[begin] - base if end > begin else 0)
+    idle = _Idle(
+        np.empty((num_listed, width), dtype=np.int32),
+        np.zeros((num_listed, 2), dtype=np.int64),
+        np.array([num_listed, -1]),
+        base,
+    )
+    if begin == 0 and source < 0 and q.first[layer] < 0 and energy.start >= base:
+        x = min(energy.start - base, width - 1)
+        for promised in range(1, 1 + (q.num_classes if q.data.start >= top else 1)):
+            at = _listed(q, top, q.data.start, promised)
+            idle.units[at, x] = 0
+            idle.span[at, 0], idle.span[at, 1] = x, x + 1
+            idle.reached[0] = min(idle.reached[0], at)
+            idle.reached[1] = max(idle.reached[1], at)
+    return idle
+
+
+@inner
+def _rest(q: Queues, tables: _Tables, i: int, idle: _Idle) -> None:
+    """Let paths idle whose last task has ended."""
+    slot, up = i % len(tables.own), q.energy.lowest[i] - idle.base
+    own, span = tables.own[slot], tables.span[slot]
+    for y in range(tables.low[i], tables.high[i] + 1):
+        if span[y, 1] > span[y, 0]:
+            _raise_idle(idle.units, idle.span, own, span, y, up)
+            idle.reached[0], idle.reached[1] = min(idle.reached[0], y), max(idle.reached[1], y)
+
+
+@borrowing_inner
+def _raise_idle(units: Ints, span: Longs, own: Ints, own_span: Longs, y: int, up: int) -> None:
+    """Raise what is idle at a level to what a task has, which is counted from ``up`` higher."""
+    skipped, end = max(own_span[y, 0], 0), own_span[y, 1] + up
+    begin, least = max(skipped + up, 0), own[y, skipped]
+    if span[y, 1] <= span[y, 0]:
+        span[y, 0], span[y, 1] = begin, begin
+    first, last = span[y, 0], max(span[y, 1], 0)
+    for x in range(last, end):
+        units[y, x] = own[y, max(x - up, skipped)]
+    for x in range(begin, first):
+        units[y, x] = units[y, first]
+    for x in range(min(end, last) - begin):
+        units[y, begin + x] = max(units[y, begin + x], own[y, skipped + x])
+    span[y, 0], span[y, 1] = min(first, begin), max(last, end)
+    # Who has more energy has less as well.
+    for x in range(min(begin, last) - 1, first - 1, -1):
+        if units[y, x] >= least:
+            break
+        units[y, x] = least
+
+
+@inner
+def _know(q: Queues, k: int, layer: int, at: int, earned: Ints, needed: Floats) -> None:
+    """Fill in what a task adds at a level after it, and what a whole path must gain more than.
+
+    -1 units where no path needs to take it. What is on board takes a part of contacts, which
+    completions count as a whole.
+    """
+    is_end, num_levels = q.number[k] == layer, q.data.num_levels
+    level, promised = _level_of(q, _top_of(q, layer), at)
+    if is_end:
+        level, promised = at % num_levels, at // num_levels
+    earned[at] = 0
+    if q.number[k] < 0:
+        down_s = _down_s(q, layer, promised, max(0.0, q.data.least[level] + q.queued[k]))
+        worth = q.decaying[k] * 2.0 ** (-max(down_s - q.end_s[k], 0.0) / q.half_life_s)
+        worth = min(q.on_board[k] + worth, q.most[k]) - q.price[k]
+        if worth > 0.0:
+            earned[at] = int(np.ceil(worth / q.unit - LEVEL))
+        elif not (q.takes_worthless or q.network.is_kept[k]):
+            earned[at] = -1
+    if len(q.fixing.weight) > 0:
+        amount = max(0.0, q.data.least[level] + q.queued[k] - 2.0 * DOWN)
+        needed[at] = q.fixing.least + _taken_up(q, layer, is_end, promised, amount)
+
+
+@inlined
+def _taken_up(q: Queues, layer: int, is_end: bool, promised: int, amount: float) -> float:
+    """Return the prices of contacts for what is on board and has to come down in them."""
+    paid = 0.0
+    if not is_end and layer < len(q.contact):
+        first = min(amount, q.volume[layer] - DOWN)
+        paid, amount = q.fixing.toll[layer] * first, amount - first
+    after = layer + promised
+    if 0 < promised < q.num_classes and after < len(q.contact):
+        paid += q.fixing.toll[after] * min(amount, q.volume[after] - DOWN)
+    return paid
+
+
+@inner
+def _settle(q: Queues, k: int, earned: Ints, needed: Floats, tables: _Tables) -> None:
+    """Add what a task earns; leave out paths that no completion lets gain enough."""
+    slot, is_fixing = k % len(tables.own), len(q.fixing.weight) > 0
+    own, span, further = tables.own[slot], tables.span[slot], tables.further
+    first, last = tables.high[k] + 1, -1
+    if is_fixing and tables.low[k] < first:
+        for x in range(len(further)):
+            units = np.ceil(tables.completions.after[k, x] / q.unit)
+            further[x] = int(min(max(units, UNREACHED_UNITS), _PLENTY))
+    for at in range(tables.low[k], tables.high[k] + 1):
+        least = -1
+        if is_fixing:
+            least = int(min(max(np.floor(needed[at] / q.unit), -1.0), _PLENTY - 1))
+        if _close(own, span, at, earned[at], further, least):
+            first, last = min(first, at), at
+    tables.low[k], tables.high[k] = first, last
+
+
+@borrowing_inner
+def _close(own: Ints, span: Longs, at: int, earned: int, further: Ints, least: int) -> bool:
+    """Do so at one level, and say whether any path is left: who has more energy has less as well.
+
+    Parameters
+    ----------
+    further, least
+        Units of completions, and what a path must gain more than.
+    """
+    begin, end = max(span[at, 0], 0), span[at, 1]
+    for j in range(end - begin):
+        units = own[at, begin + j] + earned
+        is_left = own[at, begin + j] >= 0 and units + further[begin + j] > least
+        own[at, begin + j] = units if is_left else UNREACHED_UNITS
+    most, reached, told_apart = UNREACHED_UNITS, 0, 0
+    for j in range(end - begin):
+        x = end - 1 - j
+        if own[at, x] > most:
+            most, told_apart = own[at, x], x
+            reached = max(reached, x + 1)
+        own[at, x] = most
+    for x in range(begin if most >= 0 else own.shape[1]):
+        own[at, x] = most
+    span[at, 0], span[at, 1] = told_apart, reached
+    return bool(most >= 0)
 
 
 @inner
 def _begin_with(q: Queues, tables: _Tables, k: int, number: int, layer: int) -> None:
     """Go on in a layer from the contact that ended an earlier one."""
-    table, states = tables.own[k % len(tables.own)], tables.at_contact[number]
+    slot, states = k % len(tables.own), tables.at_contact[number]
+    table, width = tables.own[slot], q.energy.width
     tables.low[k], tables.high[k] = 0, q.data.num_levels - 1
     promised = min(layer - number, q.num_classes)
     for y in range(q.data.num_levels):
-        for x in range(table.shape[1]):
+        tables.span[slot, y, 0], tables.span[slot, y, 1] = 0, width
+        for x in range(width):
             table[y, x] = max(states[0, y, x], states[promised, y, x])
 
 
 @inner
 def _spread(q: Queues, tables: _Tables, k: int, top: int) -> None:
     """List the higher levels of a table once for each promise."""
-    table, beyond = tables.own[k % len(tables.own)], q.data.num_levels - top
+    slot, beyond = k % len(tables.own), q.data.num_levels - top
     for promised in range(2, q.num_classes + 1):
         first = _listed(q, top, top, promised)
         for y in range(beyond):
-            for x in range(table.shape[1]):
-                table[first + y, x] = table[top + y, x]
+            tables.own[slot, first + y] = tables.own[slot, top + y]
+            tables.span[slot, first + y] = tables.span[slot, top + y]
         tables.high[k] = first + beyond - 1
 
 
@@ -257,28 +472,6 @@ def _stretch(q: Queues, layer: int, source: int) -> tuple[int, int]:
     end = q.contact[layer] + 1 if layer < len(q.contact) else len(q.number)
     begin = q.contact[q.first[layer]] if q.first[layer] >= 0 else 0
     return (q.contact[source] if source >= 0 else begin), end
-
-
-@inner
-def _earn(q: Queues, k: int, layer: int, earned: Ints) -> bool:
-    """Fill in the units that a task adds by the level of data after it, and say whether any may.
-
-    -1 where no path needs to take it.
-    """
-    if q.number[k] >= 0:
-        earned[:] = 0
-        return True
-    is_any, top = False, _top_of(q, layer)
-    for at in range(len(earned)):
-        level, promised = _level_of(q, top, at)
-        down_s = _down_s(q, layer, promised, max(0.0, q.data.least[level] + q.queued[k]))
-        worth = q.decaying[k] * 2.0 ** (-max(down_s - q.end_s[k], 0.0) / q.half_life_s)
-        worth = min(q.on_board[k] + worth, q.most[k]) - q.price[k]
-        earned[at] = int(np.ceil(worth / q.unit - LEVEL)) if worth > 0.0 else 0
-        if earned[at] == 0 and not (q.takes_worthless or q.network.is_kept[k]):
-            earned[at] = -1
-        is_any = is_any or earned[at] >= 0
-    return is_any
 
 
 @inner
@@ -322,64 +515,83 @@ def _take(
     layer: int,
     kept: int,
     earned: Ints,
-    idle: Ints,
-    reached: Ints,
+    needed: Floats,
+    idle: _Idle,
     tables: _Tables,
 ) -> None:
     """Extend all paths by a task, of those that do not leave out the task that they must take."""
     network, energy, data = q.network, q.energy, q.data
-    own, low, high = tables.own, tables.low, tables.high
-    table, base = own[k % len(own)], energy.lowest[k]
-    top, is_end = _top_of(q, layer), q.number[k] >= 0
-    least = max(0, energy.floor[k] - base)
-    most = min(energy.cap[k] - energy.cost[k] - base + 1, energy.width)
+    top, is_end, is_fixing = _top_of(q, layer), q.number[k] >= 0, len(q.fixing.weight) > 0
+    least = max(0, energy.floor[k] - energy.lowest[k])
+    most = min(energy.cap[k] - energy.cost[k] - energy.lowest[k] + 1, energy.width)
     if most <= least:
         return
+    after = tables.completions.after[k * is_fixing]
+    own, own_span = tables.own[k % len(tables.own)], tables.span[k % len(tables.own)]
+    reached_low, reached_high = len(earned), -1
     first = network.straight_first[k]
     for at in range(first - 1, network.straight_first[k + 1]):
         i = network.straight_rows[at] if at >= first else -1
         if 0 <= i < kept:
             continue
-        before_low, before_high = reached[0], reached[1]
-        up = -energy.cost[k]
+        before, span = idle.units, idle.span
+        low, high, up = idle.reached[0], idle.reached[1], idle.base
         if i >= 0:
-            before_low, before_high = low[i], high[i]
-            up += energy.lowest[i] + energy.give[at] - base
-        for listed in range(before_low, before_high + 1):
-            before = own[i % len(own), listed] if i >= 0 else idle[listed]
+            before, span = tables.own[i % len(tables.own)], tables.span[i % len(tables.own)]
+            low, high, up = tables.low[i], tables.high[i], energy.lowest[i] + energy.give[at]
+        up -= energy.cost[k] + energy.lowest[k]
+        for listed in range(low, high + 1):
             y, promised = _level_of(q, top, listed)
-            to = _level_after(data, k, y)
-            if y > data.before[k] or to > data.after[k] or to >= data.num_levels or before[0] < 0:
+            to, end = _level_after(data, k, y), span[listed, 1]
+            if y > data.before[k] or to > data.after[k] or to >= data.num_levels:
                 continue
-            if is_end:
-                _raise(tables, k, to + promised * data.num_levels, before, least, most, up)
+            if end <= span[listed, 0] or end + up <= least:
                 continue
+            units, further = before[listed, span[listed, 0]], 0.0
+            if is_fixing:
+                further = after[min(end + up, most) - 1]
             last = q.num_classes if promised == 0 and to >= top else max(promised, 1)
             for other in range(max(promised, 1), last + 1):
                 target = _listed(q, top, to, other)
-                if earned[target] >= 0:
-                    _raise(tables, k, target, before, least, most, up)
-    for y in range(low[k], high[k] + 1):
-        table[y, :least] = table[y, least]
-        for x in range(most):
-            table[y, x] += 0 if is_end else earned[y]
-        table[y, most:] = UNREACHED_UNITS
+                if is_end:
+                    target = to + promised * data.num_levels
+                if earned[target] == _UNKNOWN:
+                    _know(q, k, layer, target, earned, needed)
+                gained = (units + earned[target]) * q.unit + further
+                if earned[target] >= 0 and not (is_fixing and gained <= needed[target]):
+                    _raise(own, own_span, target, before, span, listed, least, most, up)
+                    reached_low, reached_high = min(reached_low, target), max(reached_high, target)
+                if is_end:
+                    break
+    tables.low[k], tables.high[k] = reached_low, reached_high
 
 
-@inner
-def _raise(tables: _Tables, k: int, to: int, before: Ints, least: int, most: int, up: int) -> None:
+@borrowing_inner
+def _raise(
+    own: Ints,
+    own_span: Longs,
+    to: int,
+    before: Ints,
+    span: Longs,
+    listed: int,
+    least: int,
+    most: int,
+    up: int,
+) -> None:
     """Extend paths at one level by a task, to another level."""
-    table, low, high = tables.own[k % len(tables.own)], tables.low, tables.high
-    if high[k] < 0:
-        low[k], high[k] = to, to
-        table[to] = UNREACHED_UNITS
-    while high[k] < to:
-        high[k] += 1
-        table[high[k]] = UNREACHED_UNITS
-    while low[k] > to:
-        low[k] -= 1
-        table[low[k]] = UNREACHED_UNITS
-    raise_to(table[to, least:most], before, up - least)
+    if own_span[to, 1] == 0:
+        for x in range(own.shape[1]):
+            own[to, x] = UNREACHED_UNITS
+        own_span[to, 0] = most
+    begin, last = max(span[listed, 0], 0), min(span[listed, 1] + up, most)
+    # More energy than there is room for is as much as there is room for.
+    first = max(min(max(begin + up, least), most - 1), 0)
+    skipped = max(first - up, begin)
+    own[to, first] = max(own[to, first], before[listed, skipped])
+    for x in range(1, last - first):
+        own[to, first + x] = max(own[to, first + x], before[listed, skipped + x])
+    own_span[to, 0] = min(own_span[to, 0], first)
+    own_span[to, 1] = max(own_span[to, 1], first + 1, last)
 
 
 @inlined
@@ -395,22 +607,21 @@ def _path_to(q: Queues, tables: _Tables, units: int, last: int, level: int) -> I
     begin with, until the path is among them.
     """
     rows = np.empty(len(q.number), dtype=np.int32)
-    length, layer, num_listed = 0, len(q.contact), tables.own.shape[1]
+    length, layer = 0, len(q.contact)
     at = np.array([last, level, q.energy.lowest[last] if last >= 0 else 0, units])
     while at[0] >= 0:
         source = layer - 1
         while source >= q.first[layer] and not (source < 0 and q.first[layer] >= 0):
-            begin, end = _stretch(q, layer, source)
-            if (end - begin) * num_listed * q.energy.width > MAX_QUEUE_ENTRIES:
-                return rows[:0].copy()
-            stretch = _Tables(
-                np.empty((end - begin, num_listed, q.energy.width), dtype=np.int32),
-                tables.low,
-                tables.high,
-                tables.at_contact.copy(),
-            )
-            _fill(q, layer, source, stretch)
-            if _value_at(q, stretch, at[0], at[1], at[2]) == at[3]:
+            most, last, level = _fill(q, layer, source, tables)
+            is_found = most == at[3] and last == at[0] and level == at[1]
+            if layer < len(q.contact):
+                x = max(0, at[2] - q.energy.lowest[at[0]])
+                is_listed = tables.low[at[0]] <= at[1] <= tables.high[at[0]]
+                is_found = is_listed and tables.own[at[0] % len(tables.own), at[1], x] == at[3]
+            if is_found:
+                stretch = _kept_of(q, layer, source, tables)
+                if len(stretch.kept) * q.energy.width > MAX_QUEUE_ENTRIES:
+                    return rows[:0].copy()
                 length = _trace(q, layer, source, stretch, at, rows, length)
                 break
             source -= 1
@@ -420,6 +631,30 @@ def _path_to(q: Queues, tables: _Tables, units: int, last: int, level: int) -> I
             _look_back(q, tables, layer, source, at)
         layer = source
     return rows[:length][::-1].copy()
+
+
+@inner
+def _kept_of(q: Queues, layer: int, source: int, tables: _Tables) -> _Tables:
+    """Fill the tables of a stretch again and keep them; too many, and unfilled, are a refusal."""
+    begin, end = _stretch(q, layer, source)
+    num_kept = 0
+    for k in range(begin, end):
+        tables.kept_at[k] = num_kept
+        num_kept += max(0, tables.high[k] - tables.low[k] + 1)
+    stretch = _Tables(
+        tables.own,
+        tables.span,
+        tables.low,
+        tables.high,
+        tables.at_contact,
+        tables.completions,
+        tables.further,
+        np.empty((num_kept, q.energy.width), dtype=np.int32),
+        tables.kept_at,
+    )
+    if num_kept * q.energy.width <= MAX_QUEUE_ENTRIES:
+        _fill(q, layer, source, stretch)
+    return stretch
 
 
 @inner
@@ -437,7 +672,7 @@ def _value_at(q: Queues, tables: _Tables, k: int, listed: int, energy: int) -> i
     x = max(0, energy - q.energy.lowest[k])
     if listed < tables.low[k] or listed > tables.high[k] or x >= q.energy.width:
         return UNREACHED_UNITS
-    return int(tables.own[k % len(tables.own), listed, x])
+    return int(tables.kept[tables.kept_at[k] + listed - tables.low[k], x])
 
 
 @inner
@@ -454,9 +689,15 @@ def _trace(
         Where to write the rows, the last first, and how many there are.
     """
     begin, top = q.contact[source] if source >= 0 else 0, _top_of(q, layer)
-    earned = np.zeros(_num_listed(q, layer), dtype=np.int32)
-    while at[0] >= 0 and not (source >= 0 and at[0] == begin):
+    num_listed = max(_num_listed(q, layer), (q.num_classes + 1) * q.data.num_levels)
+    earned, needed = np.empty(num_listed, dtype=np.int32), np.empty(num_listed)
+    while at[0] >= 0:
         k, listed = at[0], at[1]
+        # What was left out at this energy has the units of paths with more.
+        while _value_at(q, tables, k, listed, at[2] + 1) == at[3]:
+            at[2] += 1
+        if source >= 0 and k == begin:
+            break
         rows[length] = k
         length += 1
         if q.number[k] >= 0:
@@ -466,7 +707,7 @@ def _trace(
                 at[3],
             )
         else:
-            _earn(q, k, layer, earned)
+            _know(q, k, layer, listed, earned, needed)
             level, promised = _level_of(q, top, listed)
             units = at[3] - earned[listed]
         energy = max(at[2], q.energy.floor[k]) + q.energy.cost[k]
