@@ -3,7 +3,7 @@
 ``contact_layers`` is the forward pass: the most of any path up to a task in a layer. Here a
 backward pass adds the completion: the most that may follow a task in a layer, by the energy that is
 left. At the contact where a path enters a layer the two add up. Pairs that cannot beat a known plan
-are left out of the exact programme (``contact_queues``).
+are left out of the exact programme (``contact_queues``), and so are its states.
 """
 
 from __future__ import annotations

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from planner_core.certified.dp.contact_layers import layers_of
-from planner_core.certified.dp.contact_queues import Fixing, Queues
 from planner_core.certified.dp.data_levels import data_levels
 from planner_core.certified.dp.energy_labels import energy_levels
+from planner_core.certified.dp.queue_tables import Fixing, Queues
 from planner_core.certified.dp.resource_network import Network, part_of
 from planner_core.certified.sizes import (
     MAX_QUEUE_ENTRIES,

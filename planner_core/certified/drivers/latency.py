@@ -48,7 +48,12 @@ def close_in_on_the_ground(search: ResourceSearch, unit: float) -> None:
     while num_idle < TUNING.patience and not best.is_done:
         before = best.reward
         own = _contacts_of(best.problem, best.plan)
-        offered = (*reversed(named), *reversed(ascent.contact_sets), own, *_near(best.problem, own, rng))
+        offered = (
+            *reversed(named),
+            *reversed(ascent.contact_sets),
+            own,
+            *_near(best.problem, own, rng),
+        )
         contacts = next((one for one in offered if one not in tried), own)
         tried.add(contacts)
         finer = 2 * levels if contacts in named[1:] else levels

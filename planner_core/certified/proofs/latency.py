@@ -26,12 +26,12 @@ import numpy as np
 from planner_core.bundles import bundle
 from planner_core.certified.dp.contact_layers import Layers, layers_of, most_by_contacts
 from planner_core.certified.dp.contact_pairs import most_by_pairs
-from planner_core.certified.dp.contact_queues import Fixing
 from planner_core.certified.dp.energy_labels import (
     EnergyLevels,
     levels_of_estimate,
     levels_of_proof,
 )
+from planner_core.certified.dp.queue_tables import Fixing
 from planner_core.certified.dp.resource_network import Network, network_of
 from planner_core.certified.signs import NEVER
 from planner_core.certified.tolerances import DOWN, DOWN_S
@@ -156,8 +156,9 @@ class LatencyRelaxation:
     def most_by_pairs(self, prices: Floats, tolls: Floats) -> tuple[Floats, Fixing] | None:
         """Return the most that it can gain by each pair of contacts that follow each other.
 
-        As ``contact_pairs.most_by_pairs`` has it, and with what fixes states of the programme
-        over queues; None where contacts share layers. Shape ``(num_contacts + 1, num_contacts + 1)``.
+        As ``contact_pairs.most_by_pairs`` has it, with what leaves out states of the programme
+        over queues; None where contacts share layers. Shape
+        ``(num_contacts + 1, num_contacts + 1)``.
         """
         if len(self.layers.first) <= len(self.contacts):
             return None

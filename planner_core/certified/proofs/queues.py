@@ -69,8 +69,8 @@ def queue_value(
             price,
             per_collect=per_collect,
             num_classes=PROMISES,
-            earliest=own and own.earliest,
-            fixing=own and own.fixing,
+            earliest=own.earliest if own else None,
+            fixing=own.fixing if own else None,
         )
         if queues is None or stop[0]:
             return np.inf, paths[0]
