@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner_core.certified.dp.contact_queues import Queues
+from planner_core.certified.dp.contact_layers import layers_of
 from planner_core.certified.dp.data_levels import data_levels
 from planner_core.certified.dp.energy_labels import energy_levels
+from planner_core.certified.dp.queue_tables import Fixing, Queues
 from planner_core.certified.dp.resource_network import Network, part_of
 from planner_core.certified.sizes import (
     MAX_QUEUE_ENTRIES,
@@ -30,6 +31,7 @@ def queues_of(
     num_classes: int,
     rows: Ints | None = None,
     earliest: Ints | None = None,
+    fixing: Fixing | None = None,
     keeps_battery: bool = False,
     keeps_recorder: bool = False,
 ) -> Queues | None:
@@ -47,9 +49,9 @@ def queues_of(
         Of promises.
     rows
         Those of its tasks that count, ascending; all by default.
-    earliest
-        Direct predecessors of contacts (``latency.earliest_predecessors``); any by default. Shape
-        ``(num_contacts + 1,)``.
+    earliest, fixing
+        Direct predecessors of contacts, and what leaves paths out (``latency.reductions``); any and
+        nothing by default. Shape ``(num_contacts + 1,)``.
     keeps_battery, keeps_recorder
         Whether energy, or data, is rounded so that all paths keep their limits, and not so that no
         plan is lost.
@@ -82,6 +84,7 @@ def queues_of(
         network=network,
         energy=energy,
         data=data,
+        fixing=fixing or _nothing_fixed(network),
         contact=contact,
         number=number,
         first=first,
@@ -100,6 +103,17 @@ def queues_of(
         unit=max(float(problem.worth[table_rows].sum()), 1e-9) / MAX_QUEUE_UNITS,
         num_tables=max(1, num_tables),
         takes_worthless=False,
+    )
+
+
+def _nothing_fixed(network: Network) -> Fixing:
+    none = np.zeros(0)
+    return Fixing(
+        layers=layers_of(network),
+        weight=np.zeros((0, 0)),
+        toll=none,
+        after_contact=np.zeros((0, 0)),
+        least=-np.inf,
     )
 
 

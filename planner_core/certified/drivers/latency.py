@@ -40,20 +40,27 @@ def close_in_on_the_ground(search: ResourceSearch, unit: float) -> None:
     levels, named = TUNING.levels_per_collect, list[tuple[int, ...]]()
     if len(best.problem.satellites) == 1:
         # Coarse levels suffice to name good contacts. A fleet's programmes take too long.
-        named.append(_lower_by_queues(best, ascent, levels // 2, _level(best, ascent)))
+        _lower(best, ascent, 3 * TUNING.rounds // 2)
+        hoped = max(best.reward, (1.0 - 2.0 * TUNING.little) * ascent.value)
+        named.append(_lower_by_queues(best, ascent, levels // 2, hoped))
     if not any(named):
         search.choose(unit)
     while num_idle < TUNING.patience and not best.is_done:
         before = best.reward
         own = _contacts_of(best.problem, best.plan)
-        offered = (*named, *reversed(ascent.contact_sets), own, *_near(best.problem, own, rng))
+        offered = (
+            *reversed(named),
+            *reversed(ascent.contact_sets),
+            own,
+            *_near(best.problem, own, rng),
+        )
         contacts = next((one for one in offered if one not in tried), own)
         tried.add(contacts)
-        _plan_with(best, contacts, ascent.prices, unit, search.seed + number)
+        finer = 2 * levels if contacts in named[1:] else levels
+        _plan_with(best, contacts, ascent.prices, unit, search.seed + number, finer)
         number += 1
         if number == 1 and any(named):
-            _lower(best, ascent, TUNING.rounds // 2)
-            _lower_by_queues(best, ascent, levels // 2, best.reward)
+            named.append(_lower_by_queues(best, ascent, levels, best.reward))
         num_idle = 0 if best.reward > before else num_idle + 1
         _lower(best, ascent, TUNING.several)
     if not best.is_done:
@@ -117,12 +124,18 @@ def _contacts_of(problem: Problem, plan: Plan) -> tuple[int, ...]:
 
 
 def _plan_with(
-    best: Incumbent, contacts: tuple[int, ...], prices: Floats, unit: float, seed: int
+    best: Incumbent,
+    contacts: tuple[int, ...],
+    prices: Floats,
+    unit: float,
+    seed: int,
+    per_collect: int,
 ) -> None:
     """Look for plans that take these contacts, as far as stations can serve them."""
     problem, stop = best.problem, best.budget.stop
     served = _served(problem, contacts)
-    plan = plan_with_queues(_taking(problem, served), prices, np.random.default_rng(seed), stop)
+    rng = np.random.default_rng(seed)
+    plan = plan_with_queues(_taking(problem, served), prices, rng, stop, per_collect)
     is_known = plan is not None
     part = with_contacts(problem, served, plan)
     if plan is None:

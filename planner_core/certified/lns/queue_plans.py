@@ -12,14 +12,13 @@ import numpy as np
 from planner_core.certified.dp.contact_queues import most_by_queues
 from planner_core.certified.dp.queue_terms import queues_of
 from planner_core.certified.dp.resource_network import strict_network_of
-from planner_core.certified.tuning import TUNING
 from planner_core.problem import COLLECT, Bools, Bytes, Floats, Ints, Problem, SatelliteProblem
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
 
 
 def plan_with_queues(
-    problem: Problem, price: Floats, rng: np.random.Generator, stop: Bytes
+    problem: Problem, price: Floats, rng: np.random.Generator, stop: Bytes, per_collect: int
 ) -> Plan | None:
     """Return a good plan that takes no contacts but those that it must; None without programmes.
 
@@ -30,9 +29,12 @@ def plan_with_queues(
     ----------
     price
         Of each target, which keeps satellites from taking it twice. Shape ``(num_targets,)``.
+    per_collect
+        How many levels of energy the cheapest collect takes. Rounded against the plan, they cost it
+        up to one in each orbit.
     """
     for keeps_recorder in (False, True):
-        plan = _plan(problem, price, rng, stop, keeps_recorder=keeps_recorder)
+        plan = _plan(problem, price, rng, stop, per_collect, keeps_recorder=keeps_recorder)
         if plan is None or stop[0] or replay(problem, plan).is_valid:
             break
     return plan
@@ -43,6 +45,7 @@ def _plan(
     price: Floats,
     rng: np.random.Generator,
     stop: Bytes,
+    per_collect: int,
     *,
     keeps_recorder: bool,
 ) -> Plan | None:
@@ -53,7 +56,14 @@ def _plan(
         if len(satellite) == 0:
             continue
         path = _settled(
-            problem, satellite, is_free, price, rng, stop, keeps_recorder=keeps_recorder
+            problem,
+            satellite,
+            is_free,
+            price,
+            rng,
+            stop,
+            per_collect,
+            keeps_recorder=keeps_recorder,
         )
         if path is None:
             return None
@@ -70,6 +80,7 @@ def _settled(
     price: Floats,
     rng: np.random.Generator,
     stop: Bytes,
+    per_collect: int,
     *,
     keeps_recorder: bool,
 ) -> Ints | None:
@@ -86,7 +97,7 @@ def _settled(
             satellite,
             network,
             price,
-            per_collect=TUNING.levels_per_collect,
+            per_collect=per_collect,
             num_classes=1,
             rows=rows,
             keeps_battery=True,
@@ -99,7 +110,8 @@ def _settled(
         _, first, counts = np.unique(satellite.place[images], return_index=True, return_counts=True)
         if counts.max(initial=1) == 1:
             return path
-        twice = images[first[counts > 1]]
-        is_open &= ~(is_image & np.isin(satellite.place, satellite.place[twice]))
-        is_open[twice] = True
+        # Which of the two matters little: hundreds of others can take its place.
+        settled = images[first]
+        is_open &= ~(is_image & np.isin(satellite.place, satellite.place[settled]))
+        is_open[settled] = True
     return None

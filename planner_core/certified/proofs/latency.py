@@ -31,6 +31,7 @@ from planner_core.certified.dp.energy_labels import (
     levels_of_estimate,
     levels_of_proof,
 )
+from planner_core.certified.dp.queue_tables import Fixing
 from planner_core.certified.dp.resource_network import Network, network_of
 from planner_core.certified.signs import NEVER
 from planner_core.certified.tolerances import DOWN, DOWN_S
@@ -104,7 +105,7 @@ class LatencyRelaxation:
 
     @classmethod
     def of(
-        cls, problem: Problem, satellite: SatelliteProblem, *, is_estimate: bool
+        cls, problem: Problem, satellite: SatelliteProblem, per_collect: int, *, is_estimate: bool
     ) -> LatencyRelaxation:
         """Return the relaxation of a satellite that has opportunities."""
         network, rows = network_of(problem, satellite), satellite.rows
@@ -124,7 +125,7 @@ class LatencyRelaxation:
             typical=(float(np.median(size[is_image])) if is_image.any() else 0.0) or 1.0,
             may_need_all=not (is_dear and is_transitive_on(satellite)),
             network=network,
-            levels=levels(network, TUNING.levels_per_collect),
+            levels=levels(network, per_collect),
             layers=layers,
             terms=_Terms(
                 end_s=satellite.end_s,
@@ -152,16 +153,21 @@ class LatencyRelaxation:
         own, num_own = np.empty((m, self.levels.width)), np.zeros(m, dtype=np.int64)
         return most_by_contacts(self.network, self.levels, self.layers, weight, own, num_own)
 
-    def most_by_pairs(self, prices: Floats, tolls: Floats) -> Floats | None:
+    def most_by_pairs(self, prices: Floats, tolls: Floats) -> tuple[Floats, Fixing] | None:
         """Return the most that it can gain by each pair of contacts that follow each other.
 
-        As ``contact_pairs.most_by_pairs`` has it; None where contacts share layers. Shape
+        As ``contact_pairs.most_by_pairs`` has it, with what leaves out states of the programme
+        over queues; None where contacts share layers. Shape
         ``(num_contacts + 1, num_contacts + 1)``.
         """
         if len(self.layers.first) <= len(self.contacts):
             return None
         weight = self._weight(prices, tolls)
-        return most_by_pairs(self.network, self.levels, self.layers, weight)
+        most, after = most_by_pairs(self.network, self.levels, self.layers, weight)
+        fixing = Fixing(
+            layers=self.layers, weight=weight, toll=tolls, after_contact=after, least=-np.inf
+        )
+        return most, fixing
 
     def _weight(self, prices: Floats, tolls: Floats) -> Floats:
         weight = np.empty((len(self.layers.first), len(self.rows)))
@@ -225,7 +231,7 @@ def _weigh(
 
 
 def latency_relaxations(
-    problem: Problem, *, is_estimate: bool = False
+    problem: Problem, *, is_estimate: bool = False, per_collect: int | None = None
 ) -> tuple[LatencyRelaxation, ...]:
     """Return the programmes of all satellites that have anything to do.
 
@@ -233,9 +239,12 @@ def latency_relaxations(
     ----------
     is_estimate
         Whether energy may be rounded so that plans are lost, in a search for multipliers.
+    per_collect
+        How many levels of energy a collect takes; as many as tuning says by default.
     """
+    levels = TUNING.levels_per_collect if per_collect is None else per_collect
     return tuple(
-        LatencyRelaxation.of(problem, satellite, is_estimate=is_estimate)
+        LatencyRelaxation.of(problem, satellite, levels, is_estimate=is_estimate)
         for satellite in problem.satellites
         if len(satellite)
     )
@@ -258,33 +267,61 @@ def latency_value(problem: Problem, prices: Floats, contact_prices: Floats) -> f
     return float(price.sum()) + sum(gained)
 
 
-def earliest_predecessors(
-    problem: Problem, prices: Floats, contact_prices: Floats, level: float, stop: Bytes
-) -> dict[int, Ints]:
-    """Return the earliest direct predecessor of each contact in plans worth more than ``level``.
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Reduction:
+    """What plans worth more than some level have in common, of one satellite.
 
-    Returns
-    -------
-    By satellite, in the order of its contacts, the earliest contact that may come directly before
-    each; the last entry is the earliest that may be a path's last. -1 stands for the start. Empty
-    once ``stop`` is set. Shape ``(num_contacts + 1,)``.
+    Attributes
+    ----------
+    earliest
+        In the order of its contacts, the earliest contact that may come directly before each; the
+        last entry is the earliest that may be a path's last. -1 stands for the start. Shape
+        ``(num_contacts + 1,)``.
+    fixing
+        What leaves out states of the programme over queues.
+    """
+
+    earliest: Ints
+    fixing: Fixing
+
+
+def reductions(
+    problem: Problem,
+    prices: Floats,
+    contact_prices: Floats,
+    level: float,
+    per_collect: int,
+    stop: Bytes,
+) -> dict[int, Reduction]:
+    """Return what prices say of plans worth more than ``level``, by satellite.
+
+    Empty once ``stop`` is set; without satellites whose contacts share layers.
+
+    Parameters
+    ----------
+    per_collect
+        How many levels of energy a collect takes, here and in the programme that this is for.
     """
     price, tolls = _multipliers(problem, prices, contact_prices)
-    most: dict[int, Floats] = {}
-    others = float(price.sum())
+    most: dict[int, tuple[Floats, Fixing]] = {}
+    total = float(price.sum())
     indices = [index for index, one in enumerate(problem.satellites) if len(one)]
-    for index, one in zip(indices, latency_relaxations(problem), strict=True):
+    relaxations = latency_relaxations(problem, per_collect=per_collect)
+    for index, one in zip(indices, relaxations, strict=True):
         if stop[0]:
             return {}
         pairs = one.most_by_pairs(price, tolls[one.contacts])
         if pairs is None:
-            others += one.most(price, tolls[one.contacts])[0]
+            total += one.most(price, tolls[one.contacts])[0]
         else:
             most[index] = pairs
-    total = others + sum(float(pairs.max()) for pairs in most.values())
+            total += float(pairs[0].max())
     return {
-        index: _earliest(total - float(pairs.max()) + pairs > level)
-        for index, pairs in most.items()
+        index: Reduction(
+            earliest=_earliest(total - float(pairs.max()) + pairs > level),
+            fixing=fixing._replace(least=level - total + float(pairs.max())),
+        )
+        for index, (pairs, fixing) in most.items()
     }
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from planner_core.certified.dp.contact_queues import most_by_queues
 from planner_core.certified.dp.queue_terms import queues_of
 from planner_core.certified.dp.resource_network import network_of
-from planner_core.certified.proofs.latency import earliest_predecessors
+from planner_core.certified.proofs.latency import Reduction, reductions
 from planner_core.certified.sizes import PROMISES
 from planner_core.precedence.relation import is_transitive_on
 from planner_core.problem import Bytes, Floats, Ints, Problem, SatelliteProblem
@@ -57,10 +57,11 @@ def queue_value(
     satellites = {index: one for index, one in enumerate(problem.satellites) if len(one)}
     if not all(map(is_supported, satellites.values())):
         return np.inf, paths[0]
-    earliest: dict[int, Ints] = {}
+    reduced: dict[int, Reduction] = {}
     if contact_prices is not None:
-        earliest = earliest_predecessors(problem, prices, contact_prices, level, stop)
+        reduced = reductions(problem, prices, contact_prices, level, per_collect, stop)
     for index, satellite in satellites.items():
+        own = reduced.get(index)
         queues = queues_of(
             problem,
             satellite,
@@ -68,7 +69,8 @@ def queue_value(
             price,
             per_collect=per_collect,
             num_classes=PROMISES,
-            earliest=earliest.get(index),
+            earliest=own.earliest if own else None,
+            fixing=own.fixing if own else None,
         )
         if queues is None or stop[0]:
             return np.inf, paths[0]
