@@ -36,3 +36,9 @@ ANYWHERE: Final = -2
 
 UNREACHED_UNITS: Final = -(2**30)
 """Instead of units that add up to fewer than ``sizes.MAX_QUEUE_UNITS``: below 0 with those too."""
+
+PLENTY_UNITS: Final = 2**30
+"""Units that suffice for anything: more than any path gains."""
+
+UNKNOWN_UNITS: Final = -2
+"""Units that were not worked out."""

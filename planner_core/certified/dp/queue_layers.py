@@ -10,8 +10,6 @@ import numpy as np
 
 from planner_core.certified.dp.completions import fill_backward
 from planner_core.certified.dp.queue_tables import (
-    PLENTY,
-    UNKNOWN,
     Idle,
     Queues,
     Tables,
@@ -23,7 +21,7 @@ from planner_core.certified.dp.queue_tables import (
     top_of,
 )
 from planner_core.certified.dp.queue_worth import know
-from planner_core.certified.signs import AT_START, UNREACHED_UNITS
+from planner_core.certified.signs import AT_START, PLENTY_UNITS, UNKNOWN_UNITS, UNREACHED_UNITS
 from planner_core.jit import borrowing_inner, inner
 from planner_core.problem import Floats, Ints, Longs
 
@@ -54,7 +52,7 @@ def fill(q: Queues, layer: int, source: int, tables: Tables) -> tuple[int, int, 
                 _rest(q, tables, i, idle)
         number, table = q.number[k], own[k % len(own)]
         tables.span[k % len(own), :, 1] = 0
-        earned[:] = UNKNOWN
+        earned[:] = UNKNOWN_UNITS
         if number >= 0 and number != layer:
             if source < AT_START or source == number:
                 _begin_with(q, tables, k, number, layer)
@@ -183,7 +181,7 @@ def _take(
                 target = place_of(q, top, to, other)
                 if is_end:
                     target = to + promised * data.num_levels
-                if earned[target] == UNKNOWN:
+                if earned[target] == UNKNOWN_UNITS:
                     know(q, k, layer, target, earned, needed)
                 gained = (units + earned[target]) * q.unit + further
                 if earned[target] >= 0 and not (is_fixing and gained <= needed[target]):
@@ -231,11 +229,11 @@ def _settle(q: Queues, k: int, earned: Ints, needed: Floats, tables: Tables) -> 
     if is_fixing and tables.low[k] < first:
         for x in range(len(further)):
             units = np.ceil(tables.completions.after[k, x] / q.unit)
-            further[x] = int(min(max(units, UNREACHED_UNITS), PLENTY))
+            further[x] = int(min(max(units, UNREACHED_UNITS), PLENTY_UNITS))
     for at in range(tables.low[k], tables.high[k] + 1):
         least = -1
         if is_fixing:
-            least = int(min(max(np.floor(needed[at] / q.unit), -1.0), PLENTY - 1))
+            least = int(min(max(np.floor(needed[at] / q.unit), -1.0), PLENTY_UNITS - 1))
         if _close(own, span, at, earned[at], further, least):
             first, last = min(first, at), at
     tables.low[k], tables.high[k] = first, last

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 from planner_core.bundles import bundle
 from planner_core.certified.dp.completions import Completions
@@ -12,12 +12,6 @@ from planner_core.certified.dp.energy_labels import EnergyLevels
 from planner_core.certified.dp.resource_network import Network
 from planner_core.jit import inlined, inner
 from planner_core.problem import Floats, Ints, Longs
-
-UNKNOWN: Final = -2
-"""Units that were not worked out."""
-
-PLENTY: Final = 2**30
-"""Units that suffice for anything: no path gains so many."""
 
 
 @bundle

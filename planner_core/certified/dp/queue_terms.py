@@ -56,20 +56,18 @@ def queues_of(
         Whether energy, or data, is rounded so that all paths keep their limits, and not so that no
         plan is lost.
     """
-    if rows is None:
-        rows = np.arange(len(satellite), dtype=np.int32)
-    else:
-        network = part_of(network, rows)
-    kind, table_rows = satellite.kind[rows], satellite.rows[rows]
-    is_image, contact = kind == COLLECT, np.flatnonzero(kind == CONTACT).astype(np.int32)
+    network = network if rows is None else part_of(network, rows)
+    rows = np.arange(len(satellite), dtype=np.int32) if rows is None else rows
+    table_rows, is_image = satellite.rows[rows], satellite.kind[rows] == COLLECT
+    contact = np.flatnonzero(satellite.kind[rows] == CONTACT).astype(np.int32)
     energy = energy_levels(network, per_collect, "pessimistic" if keeps_battery else "optimistic")
     data = data_levels(network, TUNING.coarse, is_optimistic=not keeps_recorder)
     number = np.full(len(rows), -1, dtype=np.int32)
     number[contact] = np.arange(len(contact))
-    first = _must_follow(network, contact)
-    first = first if earliest is None else np.maximum(first, earliest)
+    first = np.maximum(_must_follow(network, contact), -1 if earliest is None else earliest)
     on_board = problem.objective.collected_share * problem.worth_on_ground[table_rows]
-    num_tables = min(len(rows), int((network.idle_from - np.arange(len(rows))).max(initial=0)) + 1)
+    ahead = (network.idle_from - np.arange(len(rows))).max(initial=0)
+    num_tables = max(1, min(len(rows), int(ahead) + 1))
     width = data.num_levels * energy.width
     num_kept = num_classes * (num_tables + len(contact) + 1)
     num_done = _num_extensions(network, contact, first)
@@ -78,8 +76,8 @@ def queues_of(
     level = float(data.least[1] - data.least[0]) if data.num_levels > 1 else 1.0
     volume = satellite.volume[rows[contact]] + DOWN
     step = max(level / QUEUE_STEPS, float(volume.max(initial=0.0)) / MAX_QUEUE_STEPS)
-    prices = np.where(is_image, np.append(price, 0.0)[satellite.place[rows] * is_image], 0.0)
-    setup_s = problem.downlinks.stations.setup_s[satellite.place[rows][contact]]
+    place = satellite.place[rows]
+    setup_s = problem.downlinks.stations.setup_s[place[contact]]
     return Queues(
         network=network,
         energy=energy,
@@ -98,10 +96,10 @@ def queues_of(
         on_board=np.where(is_image, on_board, 0.0),
         decaying=np.where(is_image, problem.worth_on_ground[table_rows] - on_board, 0.0),
         most=problem.worth[table_rows],
-        price=prices,
+        price=np.where(is_image, np.append(price, 0.0)[place * is_image], 0.0),
         half_life_s=float(problem.objective.half_life_s or np.inf),
         unit=max(float(problem.worth[table_rows].sum()), 1e-9) / MAX_QUEUE_UNITS,
-        num_tables=max(1, num_tables),
+        num_tables=num_tables,
         takes_worthless=False,
     )
 
