@@ -10,7 +10,6 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from benchmarks.rolling.__main__ import rows_of
 from benchmarks.rolling.loop import POLICIES
@@ -27,6 +26,8 @@ def compared(rows: list[dict[str, str]]) -> list[str]:
 
 def main(table: str, picture: str) -> None:
     """Draw the table into a picture."""
+    from matplotlib.figure import Figure  # which takes long, and is not wanted by ``compared``
+
     rows = rows_of(Path(table))
     policies = compared(rows)
     figure = Figure(figsize=(8, 3.4), layout="constrained")

@@ -30,7 +30,7 @@ def best_plan(problem: Problem) -> Plan | None:
         for a in range(len(table))
         for b in range(a + 1, len(table))
         if table.satellite[a] != table.satellite[b]
-        or replay(free, Plan.of(problem, (a, b))).is_valid
+        or replay(free, Plan.of(problem, (a, b)), in_detail=False).is_valid
     }
 
     def worth(rows: tuple[int, ...]) -> float:
@@ -47,7 +47,7 @@ def best_plan(problem: Problem) -> Plan | None:
         if best is not None and worth(rows) <= reward:
             break
         plan = Plan.of(problem, rows)
-        timeline = replay(problem, plan)
+        timeline = replay(problem, plan, in_detail=False)
         if timeline.is_valid and (best is None or timeline.reward > reward):
             best, reward = plan, timeline.reward
     return best

@@ -9,6 +9,7 @@ import sqlite3
 import subprocess
 import time
 from contextlib import closing
+from pathlib import Path
 
 import psutil
 import sqlalchemy as sa
@@ -16,7 +17,7 @@ import sqlalchemy as sa
 from service.db.rows import OpportunitySetRow
 from service.jobs import lease
 from service.jobs.supervisor import Supervisor
-from tests.patience import PATIENCE_S
+from tests.patience import PATIENCE_S, wait_until
 from tests.service.jobs.conftest import Jobs, Workers
 from tests.service.jobs.work import WORK
 
@@ -36,6 +37,7 @@ def freeze(jobs: Jobs, process: subprocess.Popen[bytes]) -> None:
     """Stop a process, but not in the middle of a write: SQLite has one lock for all."""
     while True:
         process.send_signal(signal.SIGSTOP)
+        wait_until(lambda: _is_stopped(process.pid))
         if jobs.database.engine.dialect.name != "sqlite":
             return
         try:
@@ -45,6 +47,12 @@ def freeze(jobs: Jobs, process: subprocess.Popen[bytes]) -> None:
         except sqlite3.OperationalError:
             process.send_signal(signal.SIGCONT)
             time.sleep(0.05)
+
+
+def _is_stopped(pid: int) -> bool:
+    """Return whether all threads stand still, which on a busy machine is not at once."""
+    stats = [path.read_text() for path in Path(f"/proc/{pid}/task").glob("*/stat")]
+    return all(stat.rpartition(")")[2].split()[0] == "T" for stat in stats)
 
 
 def test_a_job_survives_its_worker_and_finishes_once(jobs: Jobs) -> None:
