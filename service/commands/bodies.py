@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Final
 
 from planner_core.errors import Cancelled, PlannerError
 from service.access.callers import Scope
-from service.process.importing import lasting_imports
 
 if TYPE_CHECKING:
     from service.settings import Settings
@@ -52,10 +51,9 @@ def why_database_failed(error: BaseException) -> str | None:
 
 def _settings(options: argparse.Namespace) -> Settings:
     """Return the settings of the environment, with the options given on top."""
-    with lasting_imports():
-        from pydantic import SecretStr, ValidationError
+    from pydantic import SecretStr, ValidationError
 
-        from service.settings import Settings
+    from service.settings import Settings
 
     given = {name: value for name, value in vars(options).items() if name in Settings.model_fields}
     try:
@@ -81,8 +79,7 @@ def api(options: argparse.Namespace) -> int:
 
 
 def _run_server(settings: Settings, *, with_workers: bool) -> int:
-    with lasting_imports():
-        from service.server import CannotServe, NoKey, serve
+    from service.server import CannotServe, NoKey, serve
 
     try:
         return serve(settings, with_workers=with_workers)
@@ -94,10 +91,9 @@ def _run_server(settings: Settings, *, with_workers: bool) -> int:
 
 def worker(options: argparse.Namespace) -> int:
     """Run one worker."""
-    with lasting_imports():
-        from service.jobs.__main__ import run_worker
-        from service.jobs.runner import Work
-        from service.process.tracing import CannotTrace
+    from service.jobs.__main__ import run_worker
+    from service.jobs.runner import Work
+    from service.process.tracing import CannotTrace
 
     try:
         run_worker(_settings(options), Work())
@@ -107,8 +103,7 @@ def worker(options: argparse.Namespace) -> int:
 
 def migrate(options: argparse.Namespace) -> int:
     """Create or update the database."""
-    with lasting_imports():
-        from service.server import prepare_database
+    from service.server import prepare_database
 
     prepare_database(_settings(options))
     print("The database is up to date.")
@@ -117,8 +112,7 @@ def migrate(options: argparse.Namespace) -> int:
 
 def backup(options: argparse.Namespace) -> int:
     """Copy a SQLite database that is in use."""
-    with lasting_imports():
-        from service.db.backup import CannotBackUp, back_up
+    from service.db.backup import CannotBackUp, back_up
 
     try:
         back_up(_settings(options).database_url, options.file)
@@ -163,8 +157,7 @@ def revoke_key(options: argparse.Namespace) -> int:
 
 def demo(options: argparse.Namespace) -> int:
     """Plan a real-size mission and print what came out."""
-    with lasting_imports():
-        from service.commands.demo import DemoFailed, run_demo
+    from service.commands.demo import DemoFailed, run_demo
 
     try:
         return run_demo(_settings(options), folder=options.out, keep_serving=options.serve)
@@ -174,8 +167,7 @@ def demo(options: argparse.Namespace) -> int:
 
 def solve(options: argparse.Namespace) -> int:
     """Plan a scenario file, without a service."""
-    with lasting_imports():
-        from service.commands.solve import solve_file
+    from service.commands.solve import solve_file
 
     with _faults_of(options.scenario):
         return solve_file(
@@ -222,9 +214,8 @@ def _faults_of(scenario: Path) -> Iterator[None]:
 
 def check(options: argparse.Namespace) -> int:
     """Have the referee judge a timeline."""
-    with lasting_imports():
-        from service.answers.reading import UnreadableTimeline
-        from service.commands.check import check_file
+    from service.answers.reading import UnreadableTimeline
+    from service.commands.check import check_file
 
     try:
         with _faults_of(options.scenario):
@@ -241,16 +232,14 @@ def check(options: argparse.Namespace) -> int:
 
 def plan(options: argparse.Namespace) -> int:
     """Have a service plan a scenario, and follow it."""
-    with lasting_imports():
-        from service.commands.plan_command import run_plan
+    from service.commands.plan_command import run_plan
 
     return _asked(run_plan, options)
 
 
 def replan(options: argparse.Namespace) -> int:
     """Have a service replan a plan after what happened, and follow it."""
-    with lasting_imports():
-        from service.commands.plan_command import run_replan
+    from service.commands.plan_command import run_replan
 
     return _asked(run_replan, options)
 
@@ -266,8 +255,7 @@ def _asked(ask: Callable[[argparse.Namespace], int], options: argparse.Namespace
 
 def openapi(options: argparse.Namespace) -> int:
     """Print the description of the HTTP API."""
-    with lasting_imports():
-        from service.main import create_app
+    from service.main import create_app
 
     # The application opens its database at the first request: this one never.
     settings = _settings(options).model_copy(update={"database_url": "sqlite:///unused.db"})

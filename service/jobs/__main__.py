@@ -9,15 +9,12 @@ import os
 import signal
 from typing import NoReturn
 
-from service.process.importing import lasting_imports
-
-with lasting_imports():
-    from service.jobs.runner import Work
-    from service.jobs.worker import Worker
-    from service.process.logs import configure_logging
-    from service.process.parent import die_with_parent
-    from service.process.tracing import start_tracing
-    from service.settings import Settings
+from service.jobs.runner import Work
+from service.jobs.worker import Worker
+from service.process.logs import configure_logging
+from service.process.parent import die_with_parent
+from service.process.tracing import start_tracing
+from service.settings import Settings
 
 log = logging.getLogger(__name__)
 

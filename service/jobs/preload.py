@@ -7,14 +7,11 @@ from __future__ import annotations
 
 import logging
 
-from service.process.importing import lasting_imports
+from service.jobs import child, plan_job  # noqa: F401 - what a job's process begins with
+from service.jobs.warm import warm_up
 
-with lasting_imports():
-    from service.jobs import child, plan_job  # noqa: F401 - what a job's process begins with
-    from service.jobs.warm import warm_up
-
-    try:
-        warm_up()
-    except Exception:
-        # An exception here would end the fork server without a word; each job will tell its own.
-        logging.getLogger(__name__).exception("warm-up failed")
+try:
+    warm_up()
+except Exception:
+    # An exception here would end the fork server without a word; each job will tell its own.
+    logging.getLogger(__name__).exception("warm-up failed")
