@@ -23,6 +23,8 @@ _PASSES: Final = {"spaced-1000": 12.0}
 _FREE: Final = {"continuous-1000": 12.0}
 _FLEET: Final = {"fleet-4x2000": 8.0}
 _STATIONS: Final = {"fleet-stations-4x2000": 30.0}
+_AGE: Final = {"half-life-12h-1000": 12.0}
+_DELIVERED: Final = {"delivered-paper-500": 12.0}
 _ROOMS: Final[Mapping[str, Mapping[str, float]]] = {
     "drivers.agility_only": {**_AGILITY, **_PASSES},
     "drivers.resources": _ONE,
@@ -30,12 +32,15 @@ _ROOMS: Final[Mapping[str, Mapping[str, float]]] = {
     "drivers.resource_fleet": _STATIONS,
     "drivers.fleet": _FLEET,
     "drivers.continuous": _FREE,
-    "drivers.commitments": _STATIONS,
+    "drivers.commitments": {**_DELIVERED, **_STATIONS},
+    "drivers.latency": _AGE,
     "lns.alternating": {**_ONE, **_STATIONS},
     "lns.choices": _ONE,
     "lns.continuous_search": _FREE,
+    "lns.downlinks": _DELIVERED,
     "lns.fleet_start": _FLEET,
     "lns.insertion_with_resources": _FREE,
+    "lns.queue_plans": _AGE,
     "lns.resource_search": {**_ONE, **_STATIONS},
     "lns.search": {**_AGILITY, **_FLEET},
     "mip.contact_sets": _ONE,
@@ -46,11 +51,13 @@ _ROOMS: Final[Mapping[str, Mapping[str, float]]] = {
     "multipliers.chains": _FREE,
     "multipliers.elementary": _PASSES,
     "multipliers.energy": _STATIONS,
+    "multipliers.latency": _AGE,
     "multipliers.paths": {**_AGILITY, **_FLEET},
     "multipliers.resources": _ONE,
     "proofs.continuous": _FREE,
     "proofs.lagrangian": _AGILITY,
-    "proofs.resource_bound": _ONE,
+    "proofs.latency": _AGE,
+    "proofs.resource_bound": {**_ONE, **_DELIVERED},
     "proofs.shares": _ONE,
 }
 """Where what a module reads acts: families and CPU seconds."""

@@ -18,6 +18,18 @@ RATIO: Final = 1.1  # of time
 LABELS: Final = tuple(f" {label}" for label in FACTORS)
 """How changes of constants end."""
 
+_CONSTANTS: Final = """\
+One draw of each family, and half and double of each constant that acts there. A change of one image
+is 0.1 to 0.4 points, and on a busy machine times scatter by a third: what counts is a constant that
+is worse on both sides, or by several images. A constant that no line marks has a wide range in
+which its value is as good as another.
+
+Left out: `aimed` and `tie`, which kernels freeze when they are compiled; what acts on
+`continuous-1000` alone, which was not run; and two families in which the last big step of the
+search falls near the end of the time (`weights-1000`, `fleet-stations-4x2000`): run beside other
+work, they said more of that work than of the constants.
+"""
+
 _HEAD: Final = """\
 # What the engine's parts are worth
 
@@ -83,7 +95,7 @@ def page(trials: Sequence[Trial]) -> str:
         strategy_table(about_strategies),
     ]
     if about_constants:
-        parts += ["## Constants\n", constant_table(about_constants)]
+        parts += ["## Constants\n", _CONSTANTS, constant_table(about_constants)]
     return "\n".join(parts)
 
 
