@@ -9,8 +9,10 @@ without resources.
 
 from __future__ import annotations
 
-from planner_core.budget import Budget
-from planner_core.certified.drivers.latency import close_in_on_the_ground
+from dataclasses import replace
+
+from planner_core.budget import Budget, ignored
+from planner_core.certified.drivers.latency import close_in_of_fleet, close_in_on_the_ground
 from planner_core.certified.drivers.resource_fleet import close_in_fleet
 from planner_core.certified.drivers.resource_steps import ResourceSearch
 from planner_core.certified.incumbent import Incumbent
@@ -19,6 +21,7 @@ from planner_core.certified.proofs.lagrangian import lagrangian_bound
 from planner_core.certified.proofs.resource_bound import quick_bound
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import Problem
+from planner_core.problem.plan import Plan
 from planner_core.solvers.base import Solution
 from planner_core.solvers.rule import Rule
 
@@ -37,7 +40,10 @@ def solve_with_resources(problem: Problem, budget: Budget, seed: int, gap: float
     if unit == 0.0 or search.best.bound.value / unit > TUNING.max_units:
         unit = max(search.best.bound.value / TUNING.max_units, 1e-12)
     if has_half_life:
-        close_in_on_the_ground(search, unit)
+        if search.is_shared and not search.best.is_done:
+            close_in_of_fleet(search, _without_half_life(search))
+        else:
+            close_in_on_the_ground(search, unit)
         if not (search.best.is_done or search.is_large):
             search.exhaust()
         return search.best.solution()
@@ -54,6 +60,14 @@ def solve_with_resources(problem: Problem, budget: Budget, seed: int, gap: float
     if not search.best.is_done:
         search.exhaust()
     return search.best.solution()
+
+
+def _without_half_life(search: ResourceSearch) -> Plan:
+    """Return a good plan of the fleet in which images come down, whenever that is."""
+    problem = search.problem
+    lasting = replace(problem, objective=replace(problem.objective, half_life_s=None))
+    quiet = search.budget.part(TUNING.beginning, ignored)
+    return solve_with_resources(lasting, quiet, search.seed, search.best.gap).plan
 
 
 def _close_in(search: ResourceSearch, turns: TurnSearch) -> None:

@@ -2,19 +2,42 @@
 
 With the contacts that a plan must take, the programme over queues has one stretch of tasks between
 two contacts after another, and takes a fraction of a second. It may take a target twice; then one
-of the two is settled on, until there is none.
+of the two is settled on, until there is none. Of a fleet one satellite's day can be planned anew
+beside what the others do.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from planner_core.certified.dp.contact_queues import most_by_queues
 from planner_core.certified.dp.queue_terms import queues_of
-from planner_core.certified.dp.resource_network import strict_network_of
-from planner_core.problem import COLLECT, Bools, Bytes, Floats, Ints, Problem, SatelliteProblem
+from planner_core.certified.dp.resource_network import network_of, strict_network_of
+from planner_core.certified.sizes import PROMISES
+from planner_core.problem import (
+    COLLECT,
+    CONTACT,
+    Bools,
+    Bytes,
+    Floats,
+    Ints,
+    Kept,
+    Problem,
+    SatelliteProblem,
+)
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
+from planner_core.solvers.sequential import blocked_rows
+
+
+def taking(problem: Problem, contacts: Sequence[int]) -> Problem:
+    """Return the problem with contacts that must be taken."""
+    already = {kept.row for kept in problem.pinned.kept}
+    new = tuple(Kept(row=row, pointer="") for row in contacts if row not in already)
+    return replace(problem, pinned=replace(problem.pinned, kept=(*problem.pinned.kept, *new)))
 
 
 def plan_with_queues(
@@ -38,6 +61,69 @@ def plan_with_queues(
         if plan is None or stop[0] or replay(problem, plan).is_valid:
             break
     return plan
+
+
+def replanned_day(
+    problem: Problem,
+    plan: Plan,
+    satellite: SatelliteProblem,
+    rng: np.random.Generator,
+    stop: Bytes,
+    per_collect: int,
+) -> Plan | None:
+    """Return the plan with a satellite's day planned anew beside the others; None if it cannot be.
+
+    Its contacts are those that the programme over queues would take, of those whose antenna is
+    free, with targets that the others leave. Half as many levels of energy suffice to name them.
+    """
+    table = problem.opportunities
+    rows = np.array([action.opportunity for action in plan.actions], dtype=np.int32)
+    others = rows[~np.isin(rows, satellite.rows)]
+    is_free = np.ones(len(problem.target_ids), dtype=np.bool_)
+    is_free[table.place[others[table.kind[others] == COLLECT]]] = False
+    contacts = _named_contacts(problem, satellite, is_free, others, per_collect // 2, stop)
+    part, price = taking(problem, contacts), np.zeros(len(is_free))
+    for keeps_recorder in (False, True):
+        path = _settled(
+            part, satellite, is_free, price, rng, stop, per_collect, keeps_recorder=keeps_recorder
+        )
+        if path is None:
+            return None
+        whole = Plan.of(problem, [*others.tolist(), *satellite.rows[path].tolist()])
+        if stop[0] or replay(problem, whole, in_detail=False).is_valid:
+            return whole
+    return None
+
+
+def _named_contacts(
+    problem: Problem,
+    satellite: SatelliteProblem,
+    is_free: Bools,
+    others: Ints,
+    per_collect: int,
+    stop: Bytes,
+) -> list[int]:
+    """Return the contacts that a satellite would take beside what the others do; perhaps none."""
+    taken = others[problem.opportunities.kind[others] == CONTACT]
+    is_shut = blocked_rows(problem, satellite, taken.tolist()) != 0
+    is_image = satellite.kind == COLLECT
+    is_open = np.where(is_image, is_free[satellite.place * is_image], ~is_shut)
+    network = network_of(problem, satellite)
+    rows = np.flatnonzero(is_open | network.is_kept).astype(np.int32)
+    queues = queues_of(
+        problem,
+        satellite,
+        network,
+        np.zeros(len(is_free)),
+        per_collect=per_collect,
+        num_classes=PROMISES,
+        rows=rows,
+    )
+    if queues is None:
+        return []
+    path = rows[most_by_queues(queues, stop)[1]]
+    named: list[int] = satellite.rows[path[~is_image[path]]].tolist()
+    return named
 
 
 def _plan(
