@@ -10,6 +10,7 @@ import itertools
 import math
 from collections.abc import Iterator
 from datetime import UTC, datetime
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
@@ -30,11 +31,20 @@ def instant(text: str) -> datetime:
 
 
 def record_of(satellite: Document) -> Satrec:
-    """Return python-sgp4's own record of the orbit as the client gave it."""
+    """Return python-sgp4's own record of an orbit as the client gave it, always the same one."""
     if satellite.get("tle"):
-        return Satrec.twoline2rv(*satellite["tle"], WGS72)
-    record = Satrec()
-    fields = {key: str(value) for key, value in satellite["omm"].items()}
+        return _of_tle(*satellite["tle"])
+    return _of_omm(tuple((key, str(value)) for key, value in satellite["omm"].items()))
+
+
+@cache
+def _of_tle(first: str, second: str) -> Satrec:
+    return Satrec.twoline2rv(first, second, WGS72)
+
+
+@cache
+def _of_omm(given: tuple[tuple[str, str], ...]) -> Satrec:
+    record, fields = Satrec(), dict(given)
     fields["EPOCH"] = fields["EPOCH"].removesuffix("Z")
     if "." not in fields["EPOCH"]:
         fields["EPOCH"] += ".0"
@@ -66,10 +76,19 @@ def to_earth(r: Vector, when: datetime) -> Vector:
 
 def place_km(place: Document) -> tuple[Vector, Vector]:
     """Return the Earth-fixed position and the local up direction."""
-    lat, lon = math.radians(place["lat_deg"]), math.radians(place["lon_deg"])
+    return _place_km(*_coordinates(place))
+
+
+def _coordinates(place: Document) -> tuple[float, float, float]:
+    return place["lat_deg"], place["lon_deg"], place.get("alt_m", 0.0)
+
+
+@cache
+def _place_km(lat_deg: float, lon_deg: float, alt_m: float) -> tuple[Vector, Vector]:
+    lat, lon = math.radians(lat_deg), math.radians(lon_deg)
     e2 = FLATTENING * (2 - FLATTENING)
     n = A_KM / math.sqrt(1 - e2 * math.sin(lat) ** 2)
-    h = place.get("alt_m", 0.0) / 1000
+    h = alt_m / 1000
     up = np.array([math.cos(lat) * math.cos(lon), math.cos(lat) * math.sin(lon), math.sin(lat)])
     position = np.array([(n + h) * up[0], (n + h) * up[1], (n * (1 - e2) + h) * up[2]])
     return position, up
@@ -94,8 +113,15 @@ def angle_deg(u: Vector, v: Vector) -> float:
 
 def view(record: Satrec, place: Document, when: datetime) -> tuple[float, float]:
     """Return off-nadir angle at the satellite (geodetic) and elevation at the place."""
+    return _view(record, _coordinates(place), when)
+
+
+@lru_cache(2**17)  # solvers take the same tasks of a mission, and each is looked at every second
+def _view(
+    record: Satrec, coordinates: tuple[float, float, float], when: datetime
+) -> tuple[float, float]:
     r = to_earth(position_km(record, when), when)
-    p, up = place_km(place)
+    p, up = _place_km(*coordinates)
     return angle_deg(geodetic_nadir(r), p - r), 90.0 - angle_deg(up, r - p)
 
 

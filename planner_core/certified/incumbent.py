@@ -13,6 +13,7 @@ from planner_core.certified.proofs.bound import (
     reward_unit,
     rounded_bound,
 )
+from planner_core.certified.sizes import MAX_VERDICTS
 from planner_core.certified.tolerances import LEAST_BOUND, SAME
 from planner_core.problem import CONTACT, Problem
 from planner_core.problem.plan import Plan
@@ -32,29 +33,6 @@ def is_optimal(reward: float, bound: float, unit: float) -> bool:
         An amount of which what any plan earns is a multiple; 0 where there is none.
     """
     return bound < reward + max(unit, SAME * reward, LEAST_BOUND)
-
-
-def _in_its_best_form(
-    problem: Problem, plan: Plan, verdict: Timeline | None = None
-) -> tuple[Plan, Timeline]:
-    """Return a plan without images that only take room and earn nothing, judged by the referee."""
-    timeline = verdict or replay(problem, plan, in_detail=False)
-    if not problem.counts_delivery or not timeline.is_valid:
-        return plan, timeline
-    earning = {image.position for image in timeline.collected.values() if image.worth > 0.0}
-    kind, kept = problem.opportunities.kind, set(problem.kept_rows.tolist())
-    actions = tuple(
-        action
-        for position, action in enumerate(plan.actions)
-        if kind[action.opportunity] == CONTACT or position in earning or action.opportunity in kept
-    )
-    if len(actions) == len(plan.actions):
-        return plan, timeline
-    freed = Plan(actions)
-    judged = replay(problem, freed, in_detail=False)
-    # A slow satellite may turn by way of an image that earns nothing.
-    is_better = judged.is_valid and judged.reward >= timeline.reward
-    return (freed, judged) if is_better else (plan, timeline)
 
 
 class Incumbent:
@@ -94,8 +72,11 @@ class Incumbent:
     ) -> None:
         self.problem, self.budget, self.gap = problem, budget, gap
         self.unit = reward_unit(problem)
+        self._verdicts: dict[Plan, Timeline] = {}
         whole = (plan or Plan()).with_kept(problem)
-        self.plan, timeline = _in_its_best_form(problem, whole, verdict)
+        if verdict is not None:
+            self._verdicts[whole] = verdict
+        self.plan, timeline = self._in_its_best_form(whole)
         self.is_valid, self.reward = timeline.is_valid, timeline.reward
         self.bound = bound or accessible(problem)
         self._is_proof = covers_starts or not problem.continuous_starts
@@ -133,11 +114,44 @@ class Incumbent:
 
         What must be taken is taken as well. A valid plan is better than any other.
         """
-        plan, timeline = _in_its_best_form(self.problem, plan.with_kept(self.problem))
+        plan, timeline = self._in_its_best_form(plan.with_kept(self.problem))
         if (timeline.is_valid, timeline.reward) <= (self.is_valid, self.reward):
             return False
         self.plan, self.is_valid, self.reward = plan, timeline.is_valid, timeline.reward
         return True
+
+    def judge(self, plan: Plan) -> Timeline:
+        """Return what the referee says of a plan, without its curves.
+
+        Searches come to the same plans again and again: of those judged last it is remembered.
+        """
+        timeline = self._verdicts.pop(plan, None) or replay(self.problem, plan, in_detail=False)
+        self._verdicts[plan] = timeline
+        if len(self._verdicts) > MAX_VERDICTS:
+            del self._verdicts[next(iter(self._verdicts))]
+        return timeline
+
+    def _in_its_best_form(self, plan: Plan) -> tuple[Plan, Timeline]:
+        """Return a plan without images that only take room and earn nothing, and its verdict."""
+        problem, timeline = self.problem, self.judge(plan)
+        if not problem.counts_delivery or not timeline.is_valid:
+            return plan, timeline
+        earning = {image.position for image in timeline.collected.values() if image.worth > 0.0}
+        kind, kept = problem.opportunities.kind, set(problem.kept_rows.tolist())
+        actions = tuple(
+            action
+            for position, action in enumerate(plan.actions)
+            if kind[action.opportunity] == CONTACT
+            or position in earning
+            or action.opportunity in kept
+        )
+        if len(actions) == len(plan.actions):
+            return plan, timeline
+        freed = Plan(actions)
+        judged = self.judge(freed)
+        # A slow satellite may turn by way of an image that earns nothing.
+        is_better = judged.is_valid and judged.reward >= timeline.reward
+        return (freed, judged) if is_better else (plan, timeline)
 
     def lower(self, bound: Bound) -> bool:
         """Note what no plan exceeds; return whether that is less than what was known."""

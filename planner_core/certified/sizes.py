@@ -57,6 +57,9 @@ RESOURCE_WINDOW_NODES: Final = 1024
 """The same under battery and recorder, with so many labels for each."""
 LABELS_PER_TASK: Final = 5
 
+MAX_VERDICTS: Final = 32
+"""Of the referee on plans, kept by a search that comes to the same ones again."""
+
 LABELS_PER_CELL: Final = 2
 """Of start times."""
 

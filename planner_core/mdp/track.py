@@ -27,7 +27,7 @@ column              ``physical``                  ``paper`` (event model)
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -119,6 +119,31 @@ class Track(NamedTuple):
     is_guarded: bool
 
 
+class ResourceColumns(NamedTuple):
+    """What a satellite's track tells of battery and recorder; see ``Track``."""
+
+    charge_from_s: Floats
+    charge_to_s: Floats
+    charge_top_s: Floats
+    data_from_s: Floats
+    data_to_s: Floats
+    data_peak_s: Floats
+    battery_full: Floats
+    battery_floor: Floats
+    battery_floor_least: Floats
+    battery_cost: Floats
+    recorder_gain: Floats
+    data_end_s: float
+    charge_per_s: float
+    idle_per_s: float
+    telemetry_per_s: float
+    battery_min: float
+    recorder_max: float
+    battery_start: float
+    recorder_start: float
+    reserve_start: float
+
+
 def compile_track(problem: Problem, satellite: SatelliteProblem, blocked: Bytes) -> Track:
     """Return a satellite's arrays; ``blocked`` rows (shape ``(m,)``) may not be taken."""
     m = len(satellite)
@@ -133,7 +158,7 @@ def compile_track(problem: Problem, satellite: SatelliteProblem, blocked: Bytes)
     ).astype(np.int32)
     _, first_of_access, access_of = np.unique(access, return_index=True, return_inverse=True)
     first_offer = first_of_access[access_of].astype(np.int32)
-    columns = _resource_columns(problem, satellite, is_contact)
+    columns = resource_columns(problem, satellite)
     is_collect = is_contact == 0
     track = Track(
         start_s=satellite.start_s,
@@ -145,12 +170,12 @@ def compile_track(problem: Problem, satellite: SatelliteProblem, blocked: Bytes)
         near_from=near_spans(satellite.transitions)[0],
         transitions=satellite.transitions,
         use_resources=problem.use_resources,
-        **columns,
+        **columns._asdict(),
         next_kept=_next_of(is_kept),
         next_contact=_next_of(~is_collect),
         fill_ahead=_fill_ahead(problem, satellite, first_offer, blocked),
-        least_cost=float(columns["battery_cost"][is_collect].min(initial=np.inf)),
-        least_fill=float(columns["recorder_gain"][is_collect].min(initial=np.inf)),
+        least_cost=float(columns.battery_cost[is_collect].min(initial=np.inf)),
+        least_fill=float(columns.recorder_gain[is_collect].min(initial=np.inf)),
         fallbacks=fallbacks,
         fallback_after=np.searchsorted(fallbacks, np.arange(m + 1)).astype(np.int32),
         fallback_battery=np.full((len(fallbacks), _MAX_LABELS), np.inf),
@@ -206,14 +231,13 @@ def _fill_ahead(
     return r.collect_fill_per_s * written_s + r.telemetry_per_s * wait_s
 
 
-def _resource_columns(
-    problem: Problem, satellite: SatelliteProblem, is_contact: Bytes
-) -> dict[str, Any]:
+def resource_columns(problem: Problem, satellite: SatelliteProblem) -> ResourceColumns:
+    """Return what a satellite's track tells of battery and recorder."""
     satellite = with_counted_resources(problem, satellite)
     r = satellite.resources
     start_s, end_s = satellite.start_s, satellite.end_s
     duration_s = end_s - start_s
-    contact = is_contact == 1
+    contact = satellite.kind == CONTACT
     previous_start_s = satellite.previous_event_s
     telemetry = r.telemetry_per_s * duration_s
     # Telemetry fills the recorder until the setup of a contact is over.
@@ -224,34 +248,34 @@ def _resource_columns(
     sunlit = satellite.sunlight.seconds_until
     idle = idle_energy(satellite, problem.horizon_s)
     charge_to_s = idle.sun_until_s if physical else sunlit(previous_start_s)
-    return {
-        "charge_from_s": idle.sun_from_s if physical else sunlit(start_s),
-        "charge_to_s": charge_to_s,
-        "charge_top_s": np.maximum.accumulate(charge_to_s),
-        "data_from_s": end_s if physical else start_s,
-        "data_to_s": start_s,
-        "data_peak_s": start_s + setup_s if physical else previous_start_s,
-        "battery_full": idle.full,
-        "battery_floor": r.battery_min_fraction + idle.reserve,
-        "battery_floor_least": r.battery_min_fraction + idle.least_reserve,
-        "battery_cost": duration_s
+    return ResourceColumns(
+        charge_from_s=idle.sun_from_s if physical else sunlit(start_s),
+        charge_to_s=charge_to_s,
+        charge_top_s=np.maximum.accumulate(charge_to_s),
+        data_from_s=end_s if physical else start_s,
+        data_to_s=start_s,
+        data_peak_s=start_s + setup_s if physical else previous_start_s,
+        battery_full=idle.full,
+        battery_floor=r.battery_min_fraction + idle.reserve,
+        battery_floor_least=r.battery_min_fraction + idle.least_reserve,
+        battery_cost=duration_s
         * (np.where(contact, r.contact_drain_per_s, r.collect_drain_per_s) + r.idle_drain_per_s),
-        "recorder_gain": np.where(contact, -satellite.volume, duration_s * r.collect_fill_per_s)
+        recorder_gain=np.where(contact, -satellite.volume, duration_s * r.collect_fill_per_s)
         + (telemetry if physical else 0.0),
-        "data_end_s": problem.horizon_s
+        data_end_s=problem.horizon_s
         if physical
         else float(satellite.event_s[-1])
         if len(satellite.event_s)
         else 0.0,
-        "charge_per_s": r.sunpoint_charge_per_s,
-        "idle_per_s": r.idle_drain_per_s,
-        "telemetry_per_s": r.telemetry_per_s,
-        "battery_min": r.battery_min_fraction,
-        "recorder_max": r.recorder_max_fraction,
-        "battery_start": r.initial_battery_fraction,
-        "recorder_start": r.initial_recorder_fraction,
-        "reserve_start": idle.reserve_start,
-    }
+        charge_per_s=r.sunpoint_charge_per_s,
+        idle_per_s=r.idle_drain_per_s,
+        telemetry_per_s=r.telemetry_per_s,
+        battery_min=r.battery_min_fraction,
+        recorder_max=r.recorder_max_fraction,
+        battery_start=r.initial_battery_fraction,
+        recorder_start=r.initial_recorder_fraction,
+        reserve_start=idle.reserve_start,
+    )
 
 
 @inlined

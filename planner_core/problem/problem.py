@@ -284,6 +284,8 @@ class Problem:
 
     def kept_local(self, satellite: SatelliteProblem) -> Ints:
         """Return the local rows that a satellite must take, ascending."""
+        if len(self.kept_rows) == 0:
+            return self.kept_rows
         return np.flatnonzero(np.isin(satellite.rows, self.kept_rows)).astype(np.int32)
 
     def scenario_row(self, row: int) -> int:

@@ -13,7 +13,8 @@ from typing import Final
 
 import numpy as np
 
-from planner_core.problem import CONTACT, Floats, Problem, SatelliteProblem
+from planner_core.jit import kernel
+from planner_core.problem import CONTACT, Floats, Longs, Problem, SatelliteProblem
 from planner_core.problem.plan import Action
 from planner_core.problem.slew import TIME_TOLERANCE_S
 from planner_core.referee.contact_flow import Piece, flow
@@ -90,14 +91,25 @@ def down_s(queued: Floats, time_s: Floats, removed: Floats) -> Floats:
     >>> down_s(np.array([2.0, 5.0]), np.array([0.0, 10.0, 14.0]), np.array([0.0, 0.0, 4.0]))
     array([12., nan])
     """
-    after = np.searchsorted(removed, queued - _AMOUNT_TOLERANCE)
-    is_down = after < len(removed)
-    after = np.clip(after, 1, len(removed) - 1)
-    before = after - 1
-    step = removed[after] - removed[before]
-    share = (queued - removed[before]) / np.where(step > 0.0, step, 1.0)
-    share = np.where(step > 0.0, np.clip(share, 0.0, 1.0), 0.0)
-    return np.where(is_down, time_s[before] + share * (time_s[after] - time_s[before]), np.nan)
+    reached = np.searchsorted(removed, queued - _AMOUNT_TOLERANCE)
+    return _between(queued, time_s, removed, reached)
+
+
+@kernel
+def _between(queued: Floats, time_s: Floats, removed: Floats, reached: Longs) -> Floats:
+    """Return when so much is down, given the first place at which as much is."""
+    found = np.full(len(queued), np.nan)
+    for i in range(len(queued)):
+        if reached[i] == len(removed):
+            continue
+        after = min(max(reached[i], 1), len(removed) - 1)
+        before = max(after - 1, 0)
+        step = removed[after] - removed[before]
+        share = 0.0
+        if step > 0.0:
+            share = min(max((queued[i] - removed[before]) / step, 0.0), 1.0)
+        found[i] = time_s[before] + share * (time_s[after] - time_s[before])
+    return found
 
 
 def _removal(
@@ -113,8 +125,8 @@ def _removal(
             if after.removed > before.removed:
                 pieces = flow(problem, satellite, action)
                 points += _one_after_another(pieces, before.removed, after.removed)
-    time_s, removed_by = np.array(points).T
-    return time_s, removed_by
+    table = np.array(points)
+    return table[:, 0].copy(), table[:, 1].copy()
 
 
 def _one_after_another(

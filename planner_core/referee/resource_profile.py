@@ -18,6 +18,7 @@ import numpy.typing as npt
 from planner_core.jit import inlined, kernel
 from planner_core.problem import (
     CONTACT,
+    Bools,
     Floats,
     Problem,
     SatelliteProblem,
@@ -86,29 +87,16 @@ def _integrate_physical(
     idle = idle_spans(problem, satellite, actions)
     contacts = itertools.compress(actions, is_contact.tolist())
     pieces = np.array([p for a in contacts for p in flow(problem, satellite, a)]).reshape(-1, 3)
-    tasks, flows, sunlit, at_sun = (
-        np.clip(np.array(spans, dtype=np.float64).reshape(-1, 2), 0.0, horizon_s)
-        for spans in (
-            [(action.start_s, action.end_s) for action in actions],
-            pieces[:, :2],
-            np.column_stack((satellite.sunlight.enter_s, satellite.sunlight.exit_s)),
-            [(span.sun_from_s, span.sun_until_s) for span in idle],
-        )
+    tasks = np.array([(a.start_s, a.end_s) for a in actions]).reshape(-1, 2)
+    sunlit = np.array((satellite.sunlight.enter_s, satellite.sunlight.exit_s)).T.copy()
+    at_sun = np.array([(span.sun_from_s, span.sun_until_s) for span in idle]).reshape(-1, 2)
+    each = _Rates(
+        float(r.collect_drain_per_s), float(r.contact_drain_per_s), float(r.idle_drain_per_s),
+        float(r.sunpoint_charge_per_s), float(r.telemetry_per_s), float(r.collect_fill_per_s),
+    )  # fmt: skip
+    times, power, fill, drain = _rates_over(
+        float(horizon_s), tasks, is_contact, pieces, sunlit, at_sun, each
     )
-    ends = (tasks.ravel(), flows.ravel(), sunlit.ravel(), at_sun.ravel())
-    times = np.unique(np.concatenate(((0.0, horizon_s), *ends)))
-    num_collects = _under_way(times, tasks[~is_contact])
-    num_contacts = _under_way(times, tasks[is_contact])
-    is_charging = (_under_way(times, sunlit) > 0) & (_under_way(times, at_sun) > 0)
-    power = np.where(
-        num_collects + num_contacts > 0,
-        -num_collects * r.collect_drain_per_s - num_contacts * r.contact_drain_per_s,
-        np.where(is_charging, r.sunpoint_charge_per_s, 0.0),
-    )
-    power -= r.idle_drain_per_s
-    fill = r.telemetry_per_s + num_collects * r.collect_fill_per_s
-    drain = _under_way(times, flows, pieces[:, 2])
-
     held = r.initial_recorder_fraction
     first = (0.0, r.initial_battery_fraction, held, held, 0.0)
     states, at = states_under(times, power, fill, drain, first)
@@ -124,18 +112,77 @@ def _integrate_physical(
     )
 
 
-def _under_way(times: Floats, spans: Floats, weights: Floats | None = None) -> Floats:
-    """Return how many spans, or what sum of their weights, cover each piece between two times.
+class _Rates(NamedTuple):
+    """What each mode takes and gives, in capacities per second."""
+
+    collect_drain: float
+    contact_drain: float
+    idle_drain: float
+    charge: float
+    telemetry: float
+    fill: float
+
+
+@kernel
+def _rates_over(
+    horizon_s: float,
+    tasks: Floats,
+    is_contact: Bools,
+    flows: Floats,
+    sunlit: Floats,
+    at_sun: Floats,
+    each: _Rates,
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return the times between which rates are constant, and power, fill and drain in each piece.
+
+    Parameters
+    ----------
+    tasks, sunlit, at_sun
+        Spans, which are cut to the horizon in place. Shape ``(n, 2)`` each.
+    flows
+        The same of contacts, and how fast data comes down in them. Shape ``(n, 3)``.
+    """
+    groups = tasks, flows, sunlit, at_sun
+    ends = np.empty(2 + 2 * (len(tasks) + len(flows) + len(sunlit) + len(at_sun)))
+    ends[0], ends[1] = 0.0, horizon_s
+    at = 2
+    for spans in groups:
+        for i in range(len(spans)):
+            for k in range(2):
+                spans[i, k] = ends[at] = min(max(spans[i, k], 0.0), horizon_s)
+                at += 1
+    times = np.unique(ends)
+    num_collects, num_contacts, drain, num_lit, num_at_sun = np.zeros((5, len(times) - 1))
+    for i in range(len(tasks)):
+        _cover(num_contacts if is_contact[i] else num_collects, times, tasks, i, 1.0)
+    for i in range(len(flows)):
+        _cover(drain, times, flows, i, flows[i, 2])
+    for i in range(len(sunlit)):
+        _cover(num_lit, times, sunlit, i, 1.0)
+    for i in range(len(at_sun)):
+        _cover(num_at_sun, times, at_sun, i, 1.0)
+    power = np.empty(len(times) - 1)
+    for piece in range(len(power)):
+        collects, contacts = num_collects[piece], num_contacts[piece]
+        used = 0.0
+        if collects + contacts > 0.0:
+            used = -collects * each.collect_drain - contacts * each.contact_drain
+        elif num_lit[piece] > 0.0 and num_at_sun[piece] > 0.0:
+            used = each.charge
+        power[piece] = used - each.idle_drain
+    return times, power, each.telemetry + num_collects * each.fill, drain
+
+
+@inlined
+def _cover(covered: Floats, times: Floats, spans: Floats, i: int, weight: float) -> None:
+    """Add a weight to each piece between two times that span ``i`` covers.
 
     All ends of spans are among the times. Only what covers a piece is summed: a difference of
     running sums would leave roundings where there is nothing.
     """
-    first, last = np.searchsorted(times, spans).T
-    num_pieces = last - first
-    whole = np.arange(num_pieces.sum()) - np.repeat(np.cumsum(num_pieces) - num_pieces, num_pieces)
-    covered = np.repeat(first, num_pieces) + whole
-    weight = None if weights is None else np.repeat(weights, num_pieces)
-    return np.bincount(covered, weight, minlength=len(times) - 1).astype(np.float64)
+    first, last = np.searchsorted(times, spans[i, 0]), np.searchsorted(times, spans[i, 1])
+    for piece in range(first, last):
+        covered[piece] += weight
 
 
 @kernel

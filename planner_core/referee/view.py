@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,19 +13,34 @@ from planner_core.problem.plan import Action, Plan
 from planner_core.referee.replay import replay
 from planner_core.referee.timeline import Timeline
 
+Judge = Callable[[Plan], Timeline]
+"""What says of a plan what the referee says."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class View:
-    """A plan, judged, and what of it counts."""
+    """A plan, judged, and what of it counts.
+
+    Attributes
+    ----------
+    judge
+        Who judges further plans; the referee, in detail, by default.
+    """
 
     problem: Problem
     plan: Plan
     timeline: Timeline
+    judge: Judge | None = None
 
     @classmethod
-    def of(cls, problem: Problem, plan: Plan) -> View:
+    def of(cls, problem: Problem, plan: Plan, judge: Judge | None = None) -> View:
         """Return the plan, judged."""
-        return cls(problem=problem, plan=plan, timeline=replay(problem, plan))
+        timeline = judge(plan) if judge else replay(problem, plan)
+        return cls(problem=problem, plan=plan, timeline=timeline, judge=judge)
+
+    def of_another(self, plan: Plan) -> View:
+        """Return another plan, judged by who judged this one."""
+        return View.of(self.problem, plan, self.judge)
 
     @cached_property
     def images(self) -> list[Action]:

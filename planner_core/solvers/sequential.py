@@ -112,19 +112,21 @@ def blocked_rows(problem: Problem, satellite: SatelliteProblem, taken: list[int]
     """
     blocked = np.zeros(len(satellite), dtype=np.uint8)
     table = problem.opportunities
-    elsewhere = set(problem.kept_rows.tolist()) - set(satellite.rows.tolist())
+    elsewhere = set(problem.kept_rows.tolist())
+    if elsewhere:
+        elsewhere -= set(satellite.rows.tolist())
     booked: Ints = np.array(
         sorted(i for i in elsewhere.union(taken) if table.kind[i] == CONTACT), dtype=np.int32
     )
     if len(booked) == 0:
         return blocked
-    for row in np.flatnonzero(satellite.kind == CONTACT):
-        overlaps = (
-            (table.place[booked] == satellite.place[row])
-            & (table.start_s[booked] < satellite.end_s[row])
-            & (table.end_s[booked] > satellite.start_s[row])
-        )
-        antennas = problem.station_antennas[satellite.place[row]]
-        blocked[row] = int(overlaps.sum()) >= antennas
+    own = np.flatnonzero(satellite.kind == CONTACT)
+    station = satellite.place[own]
+    overlaps = (
+        (table.place[booked] == station[:, None])
+        & (table.start_s[booked] < satellite.end_s[own][:, None])
+        & (table.end_s[booked] > satellite.start_s[own][:, None])
+    )
+    blocked[own] = np.count_nonzero(overlaps, axis=1) >= problem.station_antennas[station]
     blocked[problem.kept_local(satellite)] = 0
     return blocked

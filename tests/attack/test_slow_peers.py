@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import socket
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from functools import cache
 
 import httpx
 import pytest
@@ -91,6 +91,22 @@ def refused_of(client: httpx.Client, number: int, *, trusted_last: str) -> int:
     return sum(call.status_code == 429 for call in calls)
 
 
+@pytest.fixture(scope="module")
+def limited(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[str], str]]:
+    """Return what says where a service is that takes the word of such proxies; one for each."""
+    limits = {"rate_limit_per_s": "0.001", "rate_limit_burst": "5"}
+    with pytest.MonkeyPatch.context() as patch, ExitStack() as stack:
+
+        @cache
+        def url(trusted: str) -> str:
+            patch.setenv("FORWARDED_ALLOW_IPS", trusted)
+            folder = tmp_path_factory.mktemp("limited")
+            _, line = stack.enter_context(serving(folder, "serve", "--workers", "0", **limits))
+            return line.split()[-1]
+
+        yield url
+
+
 @pytest.mark.parametrize(
     ("trusted", "last", "is_limited"),
     [
@@ -101,12 +117,7 @@ def refused_of(client: httpx.Client, number: int, *, trusted_last: str) -> int:
     ],
 )
 def test_a_made_up_address_moves_no_rate_limit(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, trusted: str, last: str, is_limited: bool
+    limited: Callable[[str], str], trusted: str, last: str, is_limited: bool
 ) -> None:
-    monkeypatch.setenv("FORWARDED_ALLOW_IPS", trusted)
-    limits = {"rate_limit_per_s": "0.001", "rate_limit_burst": "5"}
-    with (
-        serving(tmp_path, "serve", "--workers", "0", **limits) as (_, line),
-        httpx.Client(base_url=line.split()[-1], timeout=60, trust_env=False) as client,
-    ):
+    with httpx.Client(base_url=limited(trusted), timeout=60, trust_env=False) as client:
         assert refused_of(client, 20, trusted_last=last) == (15 if is_limited else 0)

@@ -29,7 +29,7 @@ from planner_core.bundles import bundle
 from planner_core.certified.signs import ANY_LEVEL
 from planner_core.certified.tolerances import ROUNDING
 from planner_core.jit import inlined, kernel
-from planner_core.mdp.track import STRICT, compile_track
+from planner_core.mdp.track import STRICT, resource_columns
 from planner_core.precedence.arcs import Arcs, reversed_arcs
 from planner_core.precedence.relation import (
     Precedence,
@@ -39,6 +39,7 @@ from planner_core.precedence.relation import (
 )
 from planner_core.problem import (
     COLLECT,
+    CONTACT,
     Floats,
     Ints,
     Longs,
@@ -103,7 +104,7 @@ def strict_network_of(problem: Problem, satellite: SatelliteProblem) -> Network:
 
 def _network(problem: Problem, satellite: SatelliteProblem, slack: float) -> Network:
     """Return a network; limits are passed by ``slack`` (negative: kept clear of)."""
-    track = compile_track(problem, satellite, np.zeros(len(satellite), dtype=np.uint8))
+    track = resource_columns(problem, satellite)
     precedence = direct_precedence(satellite)
     charge_from = track.charge_per_s * track.charge_from_s
     charge_to = track.charge_per_s * track.charge_to_s
@@ -124,8 +125,8 @@ def _network(problem: Problem, satellite: SatelliteProblem, slack: float) -> Net
     spent = track.telemetry_per_s * (track.data_from_s - track.data_to_s)
     top = track.recorder_max + slack
     return Network(
-        place=track.place,
-        is_contact=track.is_contact,
+        place=satellite.place,
+        is_contact=(satellite.kind == CONTACT).astype(np.uint8),
         is_kept=np.isin(satellite.rows, problem.kept_rows),
         idle_from=idle_from,
         by_idle=np.argsort(idle_from, kind="stable").astype(np.int32),

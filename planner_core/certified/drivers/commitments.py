@@ -19,7 +19,6 @@ from planner_core.certified.lns.choices import ChoiceSearch
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import COLLECT, Bools, Problem, SatelliteProblem
 from planner_core.problem.plan import Plan
-from planner_core.referee.replay import replay
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -50,7 +49,7 @@ def best_commitment(best: Incumbent, unit: float, first_goal: float, seed: int) 
         choices = ChoiceSearch(part, unit, seed, best.budget.stop)
         choices.start(np.zeros(len(problem.opportunities), dtype=np.bool_), first_goal)
         best.offer(choices.plan)
-        reward = replay(problem, choices.plan).reward
+        reward = best.judge(choices.plan).reward
         idle += 1
         if reward > most:
             found = None if part is problem else Committed(problem=part, plan=choices.plan)

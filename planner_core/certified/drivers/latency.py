@@ -26,6 +26,7 @@ from planner_core.certified.tuning import TUNING
 from planner_core.problem import COLLECT, CONTACT, Floats, Ints, Problem
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
+from planner_core.referee.timeline import Timeline
 from planner_core.worth import share_earned
 
 
@@ -84,7 +85,7 @@ def close_in_of_fleet(search: ResourceSearch, start: Plan) -> None:
     ascent = LatencyAscent(best.problem, search.prices())
     _lower(best, ascent, TUNING.rounds // 2)
     search.offer(start)
-    if not replay(best.problem, start, in_detail=False).is_valid:
+    if not best.judge(start).is_valid:
         start = best.plan
     num_idle = number = 0
     while num_idle < TUNING.patience and not best.is_done:
@@ -102,7 +103,7 @@ def close_in_of_fleet(search: ResourceSearch, start: Plan) -> None:
 
 def _earned(best: Incumbent, plan: Plan) -> float:
     """Return what a plan earns; nothing where time is over or it is not valid."""
-    timeline = replay(best.problem, plan, in_detail=False)
+    timeline = best.judge(plan)
     return timeline.reward if timeline.is_valid and not best.is_done else -np.inf
 
 
@@ -119,7 +120,8 @@ def _replanned(search: ResourceSearch, plan: Plan, seed: int) -> Plan:
         )
         if new is not None and _earned(best, new) > _earned(best, plan):
             plan = new
-    part = with_contacts(problem, list(_contacts_of(problem, plan)), plan)
+    contacts = list(_contacts_of(problem, plan))
+    part = with_contacts(problem, contacts, plan, best.judge(plan))
     bettered = _bettered_by_windows(best, part, plan, seed)
     if _earned(best, bettered) > _earned(best, plan):
         plan = bettered
@@ -204,7 +206,7 @@ def _plan_with(
     rng = np.random.default_rng(seed)
     plan = plan_with_queues(taking(problem, served), prices, rng, stop, per_collect)
     is_known = plan is not None
-    part = with_contacts(problem, served, plan)
+    part = with_contacts(problem, served, plan, best.judge(plan) if plan else None)
     if plan is None:
         choices = ChoiceSearch(part, unit, seed, stop)
         choices.start(np.zeros(len(problem.opportunities), dtype=np.bool_), TUNING.first_goal)
@@ -217,11 +219,11 @@ def _plan_with(
         plan = _bettered(best, part, plan, unit, seed, is_known=is_known)
         best.offer(plan)
         best.report("plans")
-        earned = replay(problem, plan).reward
-        if earned <= reached:
+        timeline = best.judge(plan)
+        if timeline.reward <= reached:
             return
-        reached = earned
-        part = with_contacts(problem, served, plan)
+        reached = timeline.reward
+        part = with_contacts(problem, served, plan, timeline)
 
 
 def _bettered(
@@ -235,32 +237,41 @@ def _bettered(
     return turns.plan
 
 
-def with_contacts(problem: Problem, contacts: list[int], plan: Plan | None) -> Problem:
+def with_contacts(
+    problem: Problem, contacts: list[int], plan: Plan | None, verdict: Timeline | None
+) -> Problem:
     """Return the problem with contacts that must be taken, and what images earn with them.
 
     Parameters
     ----------
-    plan
-        What else is in the queue; nothing by default.
+    plan, verdict
+        What else is in the queue, and what the referee says of it; None for nothing.
     """
     return replace(
         taking(problem, contacts),
-        worth=worth_with(problem, contacts, plan),
+        worth=worth_with(problem, contacts, plan, verdict),
         left_on_board=None if problem.objective.collected_share > 0.0 else 0.0,
     )
 
 
-def worth_with(problem: Problem, contacts: list[int], plan: Plan | None = None) -> Floats:
+def worth_with(
+    problem: Problem,
+    contacts: list[int],
+    plan: Plan | None = None,
+    verdict: Timeline | None = None,
+) -> Floats:
     """Return what each image earns if these contacts are taken, and nothing else changes.
 
     An image comes down after what a plan has taken before it, and in the first contact after it
-    that has time left. One that the plan holds comes down when it does there. Shape ``(n,)``.
+    that has time left. One that the plan holds comes down when it does there, by the verdict that
+    is at hand or the referee is asked for. Shape ``(n,)``.
     """
     table = problem.opportunities
     down_s = np.full(len(table), np.inf)
     taken = np.zeros(0, dtype=np.int64)
     if plan is not None:
-        images = replay(problem, plan).collected.values()
+        verdict = verdict or replay(problem, plan, in_detail=False)
+        images = verdict.collected.values()
         taken = np.array([plan.actions[i.position].opportunity for i in images], dtype=np.int64)
         down_s[taken] = [np.inf if i.delivered_s is None else i.delivered_s for i in images]
     for index, satellite in enumerate(problem.satellites):

@@ -125,7 +125,7 @@ class ResourceSearch:
         if plan in self._brought_down:
             return is_better
         self._brought_down.add(plan)
-        more = brought_down(self.problem, plan, self.budget)
+        more = brought_down(self.problem, plan, self.budget, self.best.judge)
         return (more is not plan and self.best.offer(more)) or is_better
 
     def without_resources(self) -> Bools:

@@ -12,20 +12,25 @@ from planner_core.precedence.conflicts import conflicts
 from planner_core.problem import CONTACT, Ints, Problem, SatelliteProblem
 from planner_core.problem.plan import Plan
 from planner_core.problem.slew import TIME_TOLERANCE_S
-from planner_core.referee.view import View
+from planner_core.referee.view import Judge, View
 
 Accepts = Callable[[View], bool]
 """Whether a plan costs no worth, and comes nearer to the aim."""
 
 
-def brought_down(problem: Problem, plan: Plan, budget: Budget) -> Plan:
+def brought_down(problem: Problem, plan: Plan, budget: Budget, judge: Judge | None = None) -> Plan:
     """Return the plan with its images on the ground, where that earns more.
 
     By contacts that fit beside its tasks, and by other images of the same targets.
+
+    Parameters
+    ----------
+    judge
+        Who judges plans; the referee by default.
     """
     if not problem.counts_delivery:
         return plan
-    view = View.of(problem, plan)
+    view = View.of(problem, plan, judge)
     images = view.timeline.collected.values()
     old = [one for one in view.timeline.brought_down if problem.on_board[one.image].is_waiting]
     are_down = all(i.is_downlinked for i in images) and all(i.delivered_s is not None for i in old)
@@ -69,7 +74,7 @@ def _taken_elsewhere(view: View, accepts: Accepts, budget: Budget) -> View:
             if num_tried == TUNING.patience or budget.is_spent():
                 break
             num_tried += 1
-            trial = View.of(view.problem, Plan.of(view.problem, [*others, row]))
+            trial = view.of_another(Plan.of(view.problem, [*others, row]))
             if accepts(trial):
                 view = trial
                 break
@@ -92,7 +97,7 @@ def _settled(view: View, rows: list[int], budget: Budget) -> View | None:
     table = problem.opportunities
     while rows and not budget.is_spent():
         plan = Plan(tuple(sorted((*view.plan.actions, *Plan.of(problem, rows).actions))))
-        trial = View.of(problem, plan)
+        trial = view.of_another(plan)
         broken = [v for v in trial.timeline.violations if v.code != "duplicate"]
         if trial.timeline.is_valid:
             return trial

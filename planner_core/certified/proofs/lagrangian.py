@@ -10,6 +10,8 @@ an ascent; whatever they are, the bound holds.
 
 from __future__ import annotations
 
+from weakref import WeakKeyDictionary
+
 import numpy as np
 
 from planner_core.certified.multipliers.elementary import ascent_on_passes
@@ -45,6 +47,10 @@ def lagrangian_value(problem: Problem, prices: Floats) -> tuple[float, Ints]:
     return float(total), counts[:-1]
 
 
+# Steps of one search ask again before they know a better plan.
+_latest: WeakKeyDictionary[Problem, tuple[tuple[float, int], Bound]] = WeakKeyDictionary()
+
+
 def lagrangian_bound(problem: Problem, reward: float, num_epochs: int | None = None) -> Bound:
     """Return a bound, tightened by an ascent on the prices until it is down to ``reward``.
 
@@ -58,18 +64,24 @@ def lagrangian_bound(problem: Problem, reward: float, num_epochs: int | None = N
     """
     if num_epochs is None:
         num_epochs = default_epochs(len(problem.opportunities))
+    asked = reward, num_epochs
+    known = _latest.get(problem)
+    if known is not None and known[0] == asked:
+        return known[1]
     is_elementary = problem.offers_choice and num_epochs > 0
     if is_elementary:
         ascent = ascent_on_passes(problem, 0, num_epochs)
     else:
         ascent = ascent_on_paths(problem, network_of(problem), num_epochs, 0)
     ascent.run(reward, np.zeros(1, dtype=np.uint8))
-    return Bound(
+    bound = Bound(
         value=rounded_bound(problem, ascent.value, reward),
         proof="lagrangian",
         prices=ascent.multipliers,
         is_elementary=is_elementary,
     )
+    _latest[problem] = asked, bound
+    return bound
 
 
 def default_epochs(num_nodes: int) -> int:

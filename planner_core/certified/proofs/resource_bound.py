@@ -11,6 +11,7 @@ left out.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -170,6 +171,7 @@ class SatelliteRelaxation:
         num_cells = goal * (len(weight) + len(self.network.near_rows))
         finer = max(1, min(shares.finer(unit), MAX_CELLS // max(1, num_cells)))
 
+        @cache  # both searches for an instant look at the same ones
         def before(since: int) -> int:
             own = shares.weights_before(weight, unit, since, finer)
             most = int(_Needs.of(self.network, self.levels, own, 0.0, finer * goal).top)
