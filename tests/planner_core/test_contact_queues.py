@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from planner_core.certified.dp.contact_queues import most_by_queues
 from planner_core.certified.dp.queue_terms import queues_of
 from planner_core.certified.dp.resource_network import strict_network_of
-from planner_core.certified.lns.queue_plans import plan_with_queues
+from planner_core.certified.lns.queue_plans import plan_with_queues, replanned_day
 from planner_core.certified.proofs import queues
 from planner_core.certified.proofs.bound import Bound, rounded_bound
 from planner_core.certified.proofs.documents import from_json, is_proven, to_json
@@ -207,3 +207,22 @@ def test_plans_take_the_contacts_that_they_must_and_no_target_twice() -> None:
     timeline = replay(problem, plan)
     assert timeline.is_valid
     assert timeline.reward > 0.0
+
+
+def test_a_day_planned_anew_leaves_what_other_satellites_do() -> None:
+    problem = random_problem(
+        3, num_collects=200, num_targets=90, num_contacts=6, span_s=6000.0, resources=TIGHT,
+        num_satellites=2,
+    )  # fmt: skip
+    problem = with_objective(problem, Objective(collected_share=0.0, half_life_s=900.0))
+    rng, table = np.random.default_rng(0), problem.opportunities
+    plan = Plan()
+    for index, satellite in enumerate(problem.satellites):
+        new = replanned_day(problem, plan, satellite, rng, STOP, 24)
+        assert new is not None
+        others = [a for a in new.actions if table.satellite[a.opportunity] != index]
+        assert others == list(plan.actions)
+        timeline = replay(problem, new)
+        assert timeline.is_valid
+        assert timeline.reward > replay(problem, plan).reward
+        plan = new

@@ -31,6 +31,7 @@ from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
 from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
+from tests.planner_core.budgets import bounds_told, expiring
 from tests.planner_core.problems import (
     TIGHT,
     make_problem,
@@ -246,6 +247,23 @@ def test_plans_take_contacts_for_young_images() -> None:
             for a in solution.plan.actions
         )
     assert reward["young"] > reward["late"]
+
+
+@pytest.mark.parametrize("seed", [2, 3])
+def test_a_fleet_earns_more_than_by_a_plan_that_knows_of_no_half_life(seed: int) -> None:
+    problem = random_problem(
+        seed, num_collects=400, num_targets=150, num_contacts=16, span_s=20_000.0,
+        num_satellites=3, num_stations=2, resources=TIGHT,
+    )  # fmt: skip
+    hurried = with_objective(problem, Objective(collected_share=0.0, half_life_s=4000.0))
+    lasting = with_objective(problem, Objective.delivered())
+    told = partial(expiring, bounds_told(25))
+    unhurried = Certified().solve(lasting, told(), 0).plan
+    solution = Certified().solve(hurried, told(), 0)
+    reward = replay(hurried, solution.plan).reward
+    assert reward > replay(hurried, unhurried).reward
+    assert solution.bound is not None
+    assert solution.bound >= reward
 
 
 @pytest.mark.parametrize("fill_per_s", [0.0, ROOMY.collect_fill_per_s])

@@ -64,9 +64,7 @@ def close_in_on_the_ground(search: ResourceSearch, unit: float) -> None:
             named.append(_lower_by_queues(best, ascent, levels, best.reward))
         num_idle = 0 if best.reward > before else num_idle + 1
         _lower(best, ascent, TUNING.several)
-    if not best.is_done:
-        _lower(best, ascent, 0, is_last=True)
-        _lower_by_queues(best, ascent, levels, best.reward)
+    _prove_at_last(best, ascent)
 
 
 def close_in_of_fleet(search: ResourceSearch, start: Plan) -> None:
@@ -97,8 +95,7 @@ def close_in_of_fleet(search: ResourceSearch, start: Plan) -> None:
             number += 1
             _lower(best, ascent, TUNING.rounds)
         num_idle = 0 if best.reward > before else num_idle + 1
-    if not best.is_done:
-        _lower(best, ascent, 0, is_last=True)
+    _prove_at_last(best, ascent)
 
 
 def _earned(best: Incumbent, plan: Plan) -> float:
@@ -139,6 +136,13 @@ def _lower(
     bound = ascent.bound(is_last=is_last)
     best.lower(replace(bound, value=rounded_bound(best.problem, bound.value, best.reward)))
     best.report("prices")
+
+
+def _prove_at_last(best: Incumbent, ascent: LatencyAscent) -> None:
+    """Say what the best multipliers prove, with queues too, if there is time left."""
+    if not best.is_done:
+        _lower(best, ascent, 0, is_last=True)
+        _lower_by_queues(best, ascent, TUNING.levels_per_collect, best.reward)
 
 
 def _level(best: Incumbent, ascent: LatencyAscent) -> float:

@@ -42,7 +42,7 @@ def solve_with_resources(problem: Problem, budget: Budget, seed: int, gap: float
     if has_half_life:
         if search.is_shared and not search.best.is_done:
             close_in_of_fleet(search, _without_half_life(search))
-        else:
+        if not (search.best.is_done or search.is_fleet):
             close_in_on_the_ground(search, unit)
         if not (search.best.is_done or search.is_large):
             search.exhaust()
