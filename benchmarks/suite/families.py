@@ -138,6 +138,10 @@ FAMILIES: Final[Mapping[str, Family]] = {
         num_targets=1000, budget_s=10.0, quick_budget_s=10.0, dynamics="physical",
         objective=_halved_in(12.0),
     ),
+    "half-life-12h-fleet-4x2000": Family(
+        num_satellites=4, num_targets=2000, budget_s=40.0, quick_budget_s=None, dynamics="physical",
+        objective=_halved_in(12.0),
+    ),
     "delivered-fleet-4x2000": Family(
         num_satellites=4, num_targets=2000, budget_s=60.0, quick_budget_s=None, dynamics="physical",
         objective=_DELIVERED,
