@@ -25,10 +25,11 @@ from numba.core import event
 
 from planner_core.budget import Budget
 from planner_core.build import build_problem, compute_opportunities
+from planner_core.certified.drivers.agility_only import FreeSearch
+from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.alternating import TurnSearch
 from planner_core.certified.multipliers.energy import EnergyPaths, ascent_on_energy
 from planner_core.certified.multipliers.latency import LatencyAscent
-from planner_core.certified.multipliers.paths import ascent_on_paths
 from planner_core.certified.proofs.queues import queue_value
 from planner_core.domain import (
     Agility,
@@ -47,7 +48,6 @@ from planner_core.jit import all_stamps, load_stored
 from planner_core.kernel_cache import kernel_folder
 from planner_core.pins import BlockedInterval, PinnedAction, Pins
 from planner_core.precedence.arcs import arc_network_of
-from planner_core.precedence.network import network_of
 from planner_core.precedence.relation import excluded_by
 from planner_core.problem import CONTACT, Problem
 from planner_core.problem.delivery import with_objective
@@ -249,7 +249,9 @@ def _shortage() -> None:
     TurnSearch(problem, plan, problem.typical_worth, Budget(), 0).turn(1)
     paths, nothing = EnergyPaths(problem), np.zeros(len(problem.target_ids))
     ascent_on_energy(problem, paths, nothing, 1, 0).improve(1, Budget().stop)
-    ascent_on_paths(problem, network_of(problem), 1, 0).run(0.0, Budget().stop)
+    free = FreeSearch(Incumbent(replace(problem, use_resources=False), Budget(), 0.0), 0)
+    free.price()
+    free.cut(1)
     Mcts(worthless="sunpoint").solve(problem, Budget(), 0)
     excluded_by(problem.satellites[0], 0)
 

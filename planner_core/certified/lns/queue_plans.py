@@ -75,13 +75,17 @@ def replanned_day(
 
     Its contacts are those that the programme over queues would take, of those whose antenna is
     free, with targets that the others leave. Half as many levels of energy suffice to name them.
+    Where contacts are too many for it they stay as they are.
     """
     table = problem.opportunities
     rows = np.array([action.opportunity for action in plan.actions], dtype=np.int32)
-    others = rows[~np.isin(rows, satellite.rows)]
+    is_own = np.isin(rows, satellite.rows)
+    own, others = rows[is_own], rows[~is_own]
     is_free = np.ones(len(problem.target_ids), dtype=np.bool_)
     is_free[table.place[others[table.kind[others] == COLLECT]]] = False
     contacts = _named_contacts(problem, satellite, is_free, others, per_collect // 2, stop)
+    if contacts is None:
+        contacts = own[table.kind[own] == CONTACT].tolist()
     part, price = taking(problem, contacts), np.zeros(len(is_free))
     for keeps_recorder in (False, True):
         path = _settled(
@@ -102,8 +106,11 @@ def _named_contacts(
     others: Ints,
     per_collect: int,
     stop: Bytes,
-) -> list[int]:
-    """Return the contacts that a satellite would take beside what the others do; perhaps none."""
+) -> list[int] | None:
+    """Return the contacts that a satellite would take beside what the others do.
+
+    None where the programme would take too long.
+    """
     taken = others[problem.opportunities.kind[others] == CONTACT]
     is_shut = blocked_rows(problem, satellite, taken.tolist()) != 0
     is_image = satellite.kind == COLLECT
@@ -120,7 +127,7 @@ def _named_contacts(
         rows=rows,
     )
     if queues is None:
-        return []
+        return None
     path = rows[most_by_queues(queues, stop)[1]]
     named: list[int] = satellite.rows[path[~is_image[path]]].tolist()
     return named
