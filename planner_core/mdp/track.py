@@ -120,7 +120,11 @@ class Track(NamedTuple):
 
 
 class ResourceColumns(NamedTuple):
-    """What a satellite's track tells of battery and recorder; see ``Track``."""
+    """What a satellite's track tells of battery and recorder.
+
+    ``Track`` has the same fields, and says what they are: named tuples inherit none, and kernels
+    read them as its own.
+    """
 
     charge_from_s: Floats
     charge_to_s: Floats

@@ -3,7 +3,8 @@
 The bound's ascent tells which contacts are worth their energy. Where those must be taken an image
 has one worth, that of the time at which it comes down: at first with the contact after it, then, as
 a plan fills the queue of the recorder, with what that plan leaves to be taken down before. The
-searches for plans go by that, the referee says what it has come to.
+searches for plans go by that, the referee says what it has come to. Of a fleet one satellite's day
+after another is planned anew beside the others', from a plan that has all images brought down.
 """
 
 from __future__ import annotations
@@ -67,7 +68,7 @@ def close_in_on_the_ground(search: ResourceSearch, unit: float) -> None:
     _prove_at_last(best, ascent)
 
 
-def close_in_of_fleet(search: ResourceSearch, start: Plan) -> None:
+def close_in_day_by_day(search: ResourceSearch, start: Plan) -> None:
     """Let the satellites of a fleet plan their days in turn, again and again, beside the ascent.
 
     After 20 CPU seconds four satellites that turn to the sun earn 462.7 and 328.7 at half-lives of

@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from planner_core.budget import Budget, ignored
-from planner_core.certified.drivers.latency import close_in_of_fleet, close_in_on_the_ground
+from planner_core.certified.drivers.latency import close_in_day_by_day, close_in_on_the_ground
 from planner_core.certified.drivers.resource_fleet import close_in_fleet
 from planner_core.certified.drivers.resource_steps import ResourceSearch
 from planner_core.certified.incumbent import Incumbent
@@ -41,7 +41,7 @@ def solve_with_resources(problem: Problem, budget: Budget, seed: int, gap: float
         unit = max(search.best.bound.value / TUNING.max_units, 1e-12)
     if has_half_life:
         if search.is_shared and not search.best.is_done:
-            close_in_of_fleet(search, _without_half_life(search))
+            close_in_day_by_day(search, _without_half_life(search))
         if not (search.best.is_done or search.is_fleet):
             close_in_on_the_ground(search, unit)
         if not (search.best.is_done or search.is_large):
