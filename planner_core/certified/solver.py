@@ -65,7 +65,7 @@ class Certified:
                 solution = solve_with_resources(
                     problem, among_opportunities(budget), seed, self.gap
                 )
-                return bounded(problem, solution, budget, self.gap)
+                return bounded(problem, solution, budget, seed, self.gap)
             return solve_with_resources(problem, budget, seed, self.gap)
         if not is_free(problem):
             return Milp(gap=self.gap).solve(problem, budget, seed)

@@ -30,7 +30,8 @@ class Tuning:
     rounds
         Steps of a search that is asked for more than a moment's work.
     fleet_patience
-        Turns of a fleet's searches without a better plan, before the solver ends.
+        Turns of a fleet's searches without a better plan, before the solver ends; windows with free
+        starts under resources.
 
     first_step_of_paths, first_step
         How far multipliers move in the first epoch of an ascent on longest paths and of any other,
@@ -84,8 +85,8 @@ class Tuning:
     tidy_s
         What a label's second is worth less than a target for; and what separates two pieces.
     first_share, beginning
-        Of the time of a job for fixed starts before free ones, and of time or moves for what other
-        searches only begin with.
+        Of the time of a job for fixed starts before free ones, or for plans of a small fleet
+        without its half-life; and of time or moves for what other searches only begin with.
 
     window_tasks
         Tasks between which a window lies, at least and at most.

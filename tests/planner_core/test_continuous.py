@@ -12,6 +12,10 @@ from hypothesis import strategies as st
 from planner_core.budget import Budget, Termination
 from planner_core.certified.drivers.continuous import solve_continuous, with_own_starts
 from planner_core.certified.lns.continuous_search import ContinuousSearch
+from planner_core.certified.lns.insertion_with_resources import (
+    filled_with_resources,
+    replanned_window,
+)
 from planner_core.certified.proofs import documents as proofs
 from planner_core.certified.proofs.bound import accessible
 from planner_core.certified.proofs.continuous import ContinuousDual, continuous_value
@@ -20,6 +24,7 @@ from planner_core.precedence.earliest_starts import follows_at_s
 from planner_core.precedence.time_windows import spans_of, view_of
 from planner_core.problem import (
     COLLECT,
+    CONTACT,
     Blocked,
     Kept,
     Pinned,
@@ -181,6 +186,32 @@ def test_progress_with_resources_tells_no_bound_of_fixed_starts() -> None:
     assert solution.bound is not None
     assert min(told) >= solution.bound
     assert solution.bound >= replay(problem, solution.plan).reward
+
+
+def test_windows_planned_anew_keep_what_must_be_and_often_better_the_plan() -> None:
+    gained = 0.0
+    for seed in range(6):
+        problem = flat_problem(
+            seed, num_targets=40, num_contacts=2, horizon_s=1500.0, use_resources=True,
+            spacing_s=60.0, has_rewards=True,
+        )  # fmt: skip
+        plan = filled_with_resources(problem, Rule().solve(problem, Budget(), 0).plan, Budget())
+        before = replay(problem, plan).reward
+        contacts = {a for a in plan.actions if problem.opportunities.kind[a.opportunity] == CONTACT}
+        image = next(a for a in plan.actions if a not in contacts)
+        kept = Kept(row=image.opportunity, pointer="")
+        problem = replace(problem, pinned=replace(problem.pinned, kept=(kept,)))
+        rng, reward = np.random.default_rng(seed), before
+        for _ in range(30):
+            new = replanned_window(problem, plan, Budget(), rng)
+            judged = replay(problem, new)
+            assert judged.is_valid
+            assert image.opportunity in {a.opportunity for a in new.actions}
+            assert {a.opportunity for a in contacts} <= {a.opportunity for a in new.actions}
+            if judged.reward >= reward:
+                plan, reward = new, judged.reward
+        gained += reward - before
+    assert gained > 0.0
 
 
 def test_a_satellite_slower_than_its_lines_of_sight_has_the_bound_of_all_targets() -> None:

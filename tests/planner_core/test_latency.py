@@ -11,12 +11,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner_core.budget import Budget
+from planner_core.budget import Budget, Progress
 from planner_core.certified.dp import contact_layers
 from planner_core.certified.dp.contact_layers import Layers, layers_of, most_by_contacts
 from planner_core.certified.dp.energy_labels import EnergyLevels, energy_levels
 from planner_core.certified.dp.resource_network import Network, network_of
-from planner_core.certified.drivers.latency import worth_with
+from planner_core.certified.drivers import resources
+from planner_core.certified.drivers.latency import DayByDay, worth_with
+from planner_core.certified.drivers.resource_steps import ResourceSearch
 from planner_core.certified.multipliers.latency import LatencyAscent
 from planner_core.certified.proofs.bound import rounded_bound
 from planner_core.certified.proofs.documents import from_json, is_proven, to_json
@@ -264,6 +266,43 @@ def test_a_fleet_earns_more_than_by_a_plan_that_knows_of_no_half_life(seed: int)
     assert reward > replay(hurried, unhurried).reward
     assert solution.bound is not None
     assert solution.bound >= reward
+
+
+class _Reports(Budget):
+    """A budget whose seconds are progress reports."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(report=self._count)
+        self.left = number
+
+    def _count(self, _: Progress) -> None:
+        self.left -= 1
+
+    def is_spent(self) -> bool:
+        return super().is_spent() or self.left <= 0
+
+    def remaining_s(self) -> float:
+        return float(max(self.left, 0))
+
+
+def test_a_fleet_s_search_for_plans_is_interrupted_for_better_days(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """After a quarter of the time, then after half of what is left, and each time it ends."""
+
+    def told_30_times(search: ResourceSearch, _: float) -> None:
+        for _ in range(30):
+            search.best.report("plans")
+
+    budget, left = _Reports(100), list[int]()
+    monkeypatch.setattr(resources, "_close_in_on_worth", told_30_times)
+    monkeypatch.setattr(DayByDay, "better", lambda *_: left.append(budget.left))
+    problem = random_problem(2, num_collects=40, num_contacts=4, num_satellites=2)
+    hurried = with_objective(problem, Objective(collected_share=0.0, half_life_s=4000.0))
+    solution = Certified().solve(hurried, budget, 0)
+    assert replay(hurried, solution.plan).is_valid
+    # One report comes before.
+    assert left[:4] == [74, 69, 39, 36]
 
 
 @pytest.mark.parametrize("fill_per_s", [0.0, ROOMY.collect_fill_per_s])

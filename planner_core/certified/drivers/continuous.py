@@ -9,7 +9,10 @@ import numpy as np
 from planner_core.budget import Budget, Termination
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.continuous_search import ContinuousSearch
-from planner_core.certified.lns.insertion_with_resources import filled_with_resources
+from planner_core.certified.lns.insertion_with_resources import (
+    filled_with_resources,
+    replanned_window,
+)
 from planner_core.certified.multipliers.chains import ascend_on_chains
 from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.proofs.continuous import quick_bound
@@ -75,13 +78,29 @@ def among_opportunities(budget: Budget) -> Budget:
     )
 
 
-def bounded(problem: Problem, solution: Solution, budget: Budget, gap: float) -> Solution:
+def bounded(
+    problem: Problem, solution: Solution, budget: Budget, seed: int, gap: float
+) -> Solution:
     """Return a plan with resources after insertion, and what bounds it."""
     best = _incumbent(problem, solution.plan, budget, gap)
     best.offer(filled_with_resources(problem, solution.plan, budget))
     best.report("insertion")
     _price(best)
+    _replan_windows(best, seed)
     return best.solution()
+
+
+def _replan_windows(best: Incumbent, seed: int) -> None:
+    """Drop a few images and put in others, again and again, until that gets nowhere."""
+    rng = np.random.default_rng(seed)
+    plan, num_idle = best.plan, 0
+    while num_idle < TUNING.fleet_patience and plan.actions and not best.is_done:
+        new = replanned_window(best.problem, plan, best.budget, rng)
+        if best.judge(new).reward >= best.judge(plan).reward:
+            plan = new
+        is_better = best.offer(plan)
+        num_idle = 0 if is_better else num_idle + 1
+        best.report("window search")
 
 
 def _incumbent(problem: Problem, plan: Plan, budget: Budget, gap: float) -> Incumbent:

@@ -39,12 +39,48 @@ def filled_with_resources(problem: Problem, plan: Plan, budget: Budget) -> Plan:
     for index in range(len(problem.satellites)):
         if budget.is_spent():
             break
-        plan = _filled(problem, plan, index, budget)
+        plan = _filled(problem, plan, index, budget, TUNING.trials)
     return plan
 
 
-def _filled(problem: Problem, plan: Plan, index: int, budget: Budget) -> Plan:
-    """Return the plan with more collects of one satellite."""
+def replanned_window(
+    problem: Problem, plan: Plan, budget: Budget, rng: np.random.Generator
+) -> Plan:
+    """Return the plan with a few images in a row of one satellite dropped, and others put in."""
+    table = problem.opportunities
+    kept = set(problem.kept_rows.tolist())
+    index = int(rng.choice(np.unique(table.satellite[[a.opportunity for a in plan.actions]])))
+    own = [a for a in plan.actions if table.satellite[a.opportunity] == index]
+    least, most = TUNING.window_tasks
+    first = int(rng.integers(len(own)))
+    dropped = {
+        action
+        for action in own[first : first + int(rng.integers(least, most + 1))]
+        if table.kind[action.opportunity] == COLLECT and action.opportunity not in kept
+    }
+    left = Plan(tuple(action for action in plan.actions if action not in dropped))
+    if not replay(problem, left, in_detail=False).is_valid:
+        return plan
+    return _filled(problem, left, index, budget, TUNING.patience, rng)
+
+
+def _filled(
+    problem: Problem,
+    plan: Plan,
+    index: int,
+    budget: Budget,
+    num_trials: int,
+    rng: np.random.Generator | None = None,
+) -> Plan:
+    """Return the plan with more collects of one satellite.
+
+    Parameters
+    ----------
+    num_trials
+        How many in a row may not fit after all.
+    rng
+        To draw the order of images that are worth the same; by default the first come first.
+    """
     table = problem.opportunities
     own = [a for a in plan.actions if table.satellite[a.opportunity] == index]
     others = [a for a in plan.actions if table.satellite[a.opportunity] != index]
@@ -55,7 +91,7 @@ def _filled(problem: Problem, plan: Plan, index: int, budget: Budget) -> Plan:
         return plan
     tasks = [_task_of(problem, spans, action) for action in own]
     reward = replay(problem, plan).reward
-    left = TUNING.trials
+    left = num_trials
     while left > 0 and not budget.is_spent():
         route = _route_of(spans, view, tasks)
         if route is None:
@@ -66,7 +102,8 @@ def _filled(problem: Problem, plan: Plan, index: int, budget: Budget) -> Plan:
                 is_free[table.place[action.opportunity]] = False
         is_free[len(problem.target_ids) :] = False
         task, at = fitting(spans, view, route, is_free)
-        order = np.argsort(-problem.worth[spans.row[task]], kind="stable")
+        drawn = np.arange(len(task)) if rng is None else rng.permutation(len(task))
+        order = drawn[np.argsort(-problem.worth[spans.row[task[drawn]]], kind="stable")]
         is_better = False
         for pick in order.tolist():
             if left == 0 or budget.is_spent():
@@ -76,11 +113,11 @@ def _filled(problem: Problem, plan: Plan, index: int, budget: Budget) -> Plan:
             if actions is None:
                 continue
             tried = Plan(tuple(sorted([*others, *actions])))
-            judged = replay(problem, tried)
+            judged = replay(problem, tried, in_detail=False)
             left -= 1
             if judged.is_valid and judged.reward > reward:
                 plan, reward, tasks, own = tried, judged.reward, trial, actions
-                left, is_better = TUNING.trials, True
+                left, is_better = num_trials, True
                 break
         if not is_better:
             break
