@@ -9,13 +9,9 @@ kernels may be copied with the sources.
 
 from __future__ import annotations
 
-import contextlib
 import enum
 import hashlib
 import inspect
-import os
-import shutil
-import tempfile
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -23,7 +19,6 @@ from types import CodeType, FunctionType, ModuleType
 from typing import IO, Any, Final
 
 import numpy as np
-import platformdirs
 from numba.core.caching import (
     CompileResultCacheImpl,
     FunctionCache,
@@ -31,6 +26,7 @@ from numba.core.caching import (
     _CacheLocator,
 )
 
+from planner_core.kernel_folder import kernel_folder
 from planner_core.sources import PACKAGE, fingerprint
 
 try:
@@ -39,35 +35,6 @@ except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]  # asked for before use
 
 _HOW_KERNELS_ARE_CALLED: Final = ("bundles.py", "jit.py", "kernel_cache.py")
-
-
-@cache
-def kernel_folder() -> Path:
-    """Return where compiled kernels are kept; it need not exist yet."""
-    if "NUMBA_CACHE_DIR" in os.environ:
-        return Path(os.environ["NUMBA_CACHE_DIR"])
-    beside = PACKAGE / "__pycache__"
-    if os.access(beside if beside.is_dir() else PACKAGE, os.W_OK):
-        return beside / "kernels"
-    # Of another version of the package, which shares that folder, nothing is of use.
-    version = fingerprint(PACKAGE, PACKAGE.rglob("*.py"))
-    folder = platformdirs.user_cache_path("slewline") / f"kernels-{version}"
-    _bring_along(beside / "kernels", folder)
-    return folder
-
-
-def _bring_along(installed: Path, folder: Path) -> None:
-    """Copy the kernels of an installation that is read-only: Numba reads only where it can write.
-
-    What was compiled for another processor is compiled again into the copy.
-    """
-    if folder.exists() or not installed.is_dir():
-        return
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=folder.parent) as spare:
-        copy = shutil.copytree(installed, Path(spare) / "kernels")
-        with contextlib.suppress(OSError):  # another process was first
-            copy.rename(folder)
 
 
 class SharedCache(FunctionCache):

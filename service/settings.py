@@ -14,7 +14,7 @@ from pydantic import Field, SecretStr, field_serializer, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from service.access.static_keys import StaticKeys
-from service.db.postgresql import DEFAULT_TIMEOUT_S
+from service.db.timeouts import DEFAULT_TIMEOUT_S
 from service.scenarios.scenario_limits import ScenarioLimits
 
 _REQUESTS_PER_S: Final = 50.0

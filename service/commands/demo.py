@@ -18,7 +18,7 @@ import httpx
 
 from service.commands import demo_mission
 from service.commands.summary import HEADER, LEGEND, summary_row, table
-from service.jobs import warm
+from service.jobs import compiled
 from service.settings import Settings
 
 Json = dict[str, Any]
@@ -56,7 +56,7 @@ def run_demo(settings: Settings, *, folder: Path, keep_serving: bool = False) ->
         Where there are no plans to judge.
     """
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    warm.make_ready(warm.DEMONSTRATION)
+    _compile()
     folder.mkdir(parents=True, exist_ok=True)
     port = settings.port if keep_serving else 0
     with _service(port, settings.workers, folder / "service.log") as url:
@@ -68,6 +68,15 @@ def run_demo(settings: Settings, *, folder: Path, keep_serving: bool = False) ->
             print("Ctrl-C ends it.", flush=True)
             _wait_for_interrupt()
     return status
+
+
+def _compile() -> None:
+    """Compile the kernels that the demonstration needs; import them for that alone."""
+    if compiled.is_ready("all") or compiled.is_ready("demonstration"):
+        return
+    from service.jobs import warm
+
+    warm.make_ready(warm.DEMONSTRATION)
 
 
 def _plan_mission(client: httpx.Client, folder: Path) -> int:

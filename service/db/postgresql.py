@@ -13,8 +13,9 @@ import psycopg
 import sqlalchemy as sa
 from psycopg.errors import _WaitTimeout
 
+from service.db.timeouts import DEFAULT_TIMEOUT_S
+
 CONNECT_WITHIN_S: Final = 5
-DEFAULT_TIMEOUT_S: Final = 10.0
 
 _LATER_THAN_SERVER_S: Final = 2.0
 _IDLE_IN_TRANSACTION_S: Final = 60

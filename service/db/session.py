@@ -11,7 +11,8 @@ import sqlalchemy as sa
 from sqlalchemy.orm import Session
 
 from service.db.columns import Row
-from service.db.postgresql import DEFAULT_TIMEOUT_S, make_postgresql_engine
+from service.db.postgresql import make_postgresql_engine
+from service.db.timeouts import DEFAULT_TIMEOUT_S
 
 _SQLITE_PRAGMAS = ("busy_timeout = 30000", "synchronous = FULL", "foreign_keys = ON")
 _NO_TRANSACTION = "no_transaction"

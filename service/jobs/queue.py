@@ -16,8 +16,9 @@ import sqlalchemy as sa
 from dbos import DBOS, DBOSClient, DBOSConfig, EnqueueOptions
 from sqlalchemy.orm import Session
 
-from service.db.postgresql import DEFAULT_TIMEOUT_S, make_postgresql_engine
+from service.db.postgresql import make_postgresql_engine
 from service.db.sqlite_clock import add_sqlite_clock
+from service.db.timeouts import DEFAULT_TIMEOUT_S
 from service.settings import Settings
 
 add_sqlite_clock()

@@ -17,7 +17,6 @@ from contextlib import suppress
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from multiprocessing.queues import SimpleQueue
-from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -45,7 +44,6 @@ from planner_core.domain import (
 )
 from planner_core.errors import InvalidScenario
 from planner_core.jit import all_stamps, load_stored
-from planner_core.kernel_cache import kernel_folder
 from planner_core.pins import BlockedInterval, PinnedAction, Pins
 from planner_core.precedence.arcs import arc_network_of
 from planner_core.precedence.relation import excluded_by
@@ -54,6 +52,7 @@ from planner_core.problem.delivery import with_objective
 from planner_core.run import plan_scenario
 from planner_core.solvers.base import Solver
 from planner_core.solvers.registry import SOLVERS, Certified, ForwardSearch, Graph, Mcts, Milp, Rule
+from service.jobs import compiled
 from service.jobs.compilation_line import CompilationLine
 
 _START: Final = datetime(2026, 1, 1, tzinfo=UTC)
@@ -106,8 +105,7 @@ def make_ready(parts: Iterable[str]) -> None:
             processes.shutdown(wait=False, cancel_futures=True)
             raise
     line.end()
-    kernel_folder().mkdir(parents=True, exist_ok=True)
-    _marker(parts).write_text(all_stamps())
+    compiled.note(_name(parts), all_stamps())
 
 
 def _run(part: str) -> None:
@@ -119,14 +117,17 @@ def _run(part: str) -> None:
 
 def _is_ready(parts: Iterable[str]) -> bool:
     """Return whether all of some parts are compiled, as their sources are now."""
-    marker = _marker(parts)
-    return marker.is_file() and marker.read_text() == all_stamps()
+    name = _name(parts)
+    if compiled.is_ready(name):
+        return True
+    is_ready = compiled.stamps(name) == all_stamps()
+    if is_ready:  # what was edited since is part of no kernel
+        compiled.note(name, all_stamps())
+    return is_ready
 
 
-def _marker(parts: Iterable[str]) -> Path:
-    """Return the file that tells which kernels were compiled when some parts were."""
-    name = "all" if set(parts) == set(PARTS) else "demonstration"
-    return kernel_folder() / f"{name}.ready"
+def _name(parts: Iterable[str]) -> compiled.Name:
+    return "all" if set(parts) == set(PARTS) else "demonstration"
 
 
 def _tell_compiled(told: SimpleQueue[str]) -> None:

@@ -11,7 +11,7 @@ from planner_core.sources import PACKAGE, fingerprint, opportunity_sources
 _NO_MATTER = {
     # They name what can go wrong or may be spent, make loops fast, or come after opportunities.
     "__init__.py", "budget.py", "bundles.py", "errors.py", "idling.py", "jit.py", "kernel_cache.py",
-    "pins.py", "sorting.py", "sources.py", "valuation.py", "worth.py",
+    "kernel_folder.py", "pins.py", "sorting.py", "sources.py", "valuation.py", "worth.py",
 }  # fmt: skip
 
 
