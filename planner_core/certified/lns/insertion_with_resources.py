@@ -2,7 +2,7 @@
 
 Tasks move as early as those before them allow. Whatever then fits between two of them by agility
 is put in on trial, the images of greatest worth first, and stays in where the whole plan
-remains valid.
+remains valid. A window is planned anew by the same means: a few images in a row are dropped before.
 """
 
 from __future__ import annotations
