@@ -8,6 +8,8 @@ TOOLS := .venv/.tools
 WARM := .venv/.warm
 REWRITTEN := .venv/.rewritten
 KERNELS := $(shell grep -rlE '^@(kernel|inner|borrowing|borrowing_inner|inlined|templated|unbox)' planner_core --include=*.py)
+# How they are called is part of what is compiled.
+KERNELS += planner_core/bundles.py planner_core/jit.py planner_core/kernel_cache.py
 LOCK := $(UV) pip compile --universal --python-version 3.11 --generate-hashes \
 	--no-emit-index-url
 PIP := $(BIN)/python -m pip -qq --disable-pip-version-check
