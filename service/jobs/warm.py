@@ -120,9 +120,10 @@ def _is_ready(parts: Iterable[str]) -> bool:
     name = _name(parts)
     if compiled.is_ready(name):
         return True
-    is_ready = compiled.stamps(name) == all_stamps()
+    stamps = all_stamps()
+    is_ready = compiled.stamps(name) == stamps
     if is_ready:  # what was edited since is part of no kernel
-        compiled.note(name, all_stamps())
+        compiled.note(name, stamps)
     return is_ready
 
 

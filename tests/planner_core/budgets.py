@@ -29,3 +29,20 @@ def bounds_told(number: int) -> Callable[[Progress], bool]:
         return len(told) >= number
 
     return look_at
+
+
+class Reports(Budget):
+    """A budget whose seconds are progress reports."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(report=self._count)
+        self.left = number
+
+    def _count(self, _: Progress) -> None:
+        self.left -= 1
+
+    def is_spent(self) -> bool:
+        return super().is_spent() or self.left <= 0
+
+    def remaining_s(self) -> float:
+        return float(max(self.left, 0))

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner_core.budget import Budget, Progress
+from planner_core.budget import Budget
 from planner_core.certified.dp import contact_layers
 from planner_core.certified.dp.contact_layers import Layers, layers_of, most_by_contacts
 from planner_core.certified.dp.energy_labels import EnergyLevels, energy_levels
@@ -33,7 +33,7 @@ from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
 from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
-from tests.planner_core.budgets import bounds_told, expiring
+from tests.planner_core.budgets import Reports, bounds_told, expiring
 from tests.planner_core.problems import (
     TIGHT,
     make_problem,
@@ -268,23 +268,6 @@ def test_a_fleet_earns_more_than_by_a_plan_that_knows_of_no_half_life(seed: int)
     assert solution.bound >= reward
 
 
-class _Reports(Budget):
-    """A budget whose seconds are progress reports."""
-
-    def __init__(self, number: int) -> None:
-        super().__init__(report=self._count)
-        self.left = number
-
-    def _count(self, _: Progress) -> None:
-        self.left -= 1
-
-    def is_spent(self) -> bool:
-        return super().is_spent() or self.left <= 0
-
-    def remaining_s(self) -> float:
-        return float(max(self.left, 0))
-
-
 def test_a_fleet_s_search_for_plans_is_interrupted_for_better_days(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -294,7 +277,7 @@ def test_a_fleet_s_search_for_plans_is_interrupted_for_better_days(
         for _ in range(30):
             search.best.report("plans")
 
-    budget, left = _Reports(100), list[int]()
+    budget, left = Reports(100), list[int]()
     monkeypatch.setattr(resources, "_close_in_on_worth", told_30_times)
     monkeypatch.setattr(DayByDay, "better", lambda *_: left.append(budget.left))
     problem = random_problem(2, num_collects=40, num_contacts=4, num_satellites=2)

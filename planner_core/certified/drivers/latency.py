@@ -72,8 +72,7 @@ class DayByDay:
     """A fleet's satellites plan their days in turn, beside the ascent on multipliers.
 
     After 20 CPU seconds four satellites that turn to the sun earn 459.9 and 332.8 at half-lives of
-    12 and 3 h, and 413.6 and 304.3 by contacts that the ascent names. Four that charge in all idle
-    time, over 2,000 cities, earn 725 and 574 after 40, and 727 and 572.
+    12 and 3 h, and 413.6 and 304.3 by contacts that the ascent names.
     """
 
     def __init__(self, search: ResourceSearch) -> None:
@@ -94,7 +93,7 @@ class DayByDay:
         self._search.offer(plan)
         if not best.judge(plan).is_valid:
             plan = best.plan
-        reached = 0.0
+        reached = -np.inf
         while (earned := _earned(best, plan)) > reached:
             reached = earned
             plan = _replanned(self._search, plan, self._search.seed + self._number)

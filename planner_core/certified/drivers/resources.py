@@ -79,43 +79,46 @@ def _close_in_on_worth(search: ResourceSearch, unit: float) -> None:
 
 
 def _close_in_day_by_day(search: ResourceSearch) -> None:
-    """Search for plans of a fleet in which images come down whenever, and for better days of them.
+    """Plan a fleet without its half-life, and let its satellites plan their days anew from that.
 
-    The first search is interrupted for the second. Once it has ended it begins afresh. After 40 CPU
-    seconds two of six fleets drawn at random earn 3 and 4 % more than where it had a quarter of the
-    time once, and the others the same.
+    The first search is interrupted for the second. Once it has ended it begins afresh. Two fleets
+    drawn at random earn 277.0 and 204.0 after 40 CPU seconds; with a quarter of the time for the
+    first, once, 267.3 and 197.9.
     """
     problem, best = search.problem, search.best
     plain = replace(problem, worth=problem.worth_on_ground, full_worth=None)
-    lasting = with_objective(plain, replace(problem.objective, half_life_s=None))
+    undecayed = with_objective(plain, replace(problem.objective, half_life_s=None))
     days, breaks = DayByDay(search), _Breaks(search.budget)
     num_idle = number = 0
     while num_idle < TUNING.patience and not best.is_done:
         before = best.reward
-        days.better(_planned(search, lasting, search.seed + number, days, breaks))
+        days.better(_without_half_life(search, undecayed, search.seed + number, days, breaks))
         number += 1
         num_idle = 0 if best.reward > before else num_idle + 1
     days.prove()
 
 
-def _planned(
-    search: ResourceSearch, lasting: Problem, seed: int, days: DayByDay, breaks: _Breaks
+def _without_half_life(
+    search: ResourceSearch, undecayed: Problem, seed: int, days: DayByDay, breaks: _Breaks
 ) -> Plan:
-    """Return the best plan of a problem without the half-life; all on the way are offered."""
+    """Return the best plan of the problem whose images keep their worth.
+
+    All plans on the way to it are offered to the search that counts the half-life.
+    """
 
     def look(_: Progress) -> None:
-        search.offer(whenever.best.plan)
+        search.offer(inner.best.plan)
         search.best.report("plans")
         if breaks.is_due():
-            days.better(whenever.best.plan)
+            days.better(inner.best.plan)
             breaks.end()
 
     # A small fleet goes on with sets of contacts.
     share = 1.0 if search.is_fleet else TUNING.first_share
-    best = Incumbent(lasting, search.budget.part(share, look), search.best.gap)
-    whenever = ResourceSearch(best, seed)
-    _close_in_on_worth(whenever, _begin(whenever))
-    return whenever.best.plan
+    best = Incumbent(undecayed, search.budget.part(share, look), search.best.gap)
+    inner = ResourceSearch(best, seed)
+    _close_in_on_worth(inner, _begin(inner))
+    return inner.best.plan
 
 
 class _Breaks:
