@@ -19,7 +19,7 @@ from planner_core.certified.lns.queue_plans import plan_with_queues, replanned_d
 from planner_core.certified.proofs import queues
 from planner_core.certified.proofs.bound import Bound, rounded_bound
 from planner_core.certified.proofs.documents import from_json, is_proven, to_json
-from planner_core.certified.proofs.latency import latency_relaxations, latency_value
+from planner_core.certified.proofs.latency import Tolls, latency_relaxations, latency_value
 from planner_core.certified.proofs.queues import is_supported, queue_value
 from planner_core.domain import Objective
 from planner_core.problem import CONTACT, Kept, Problem
@@ -95,7 +95,7 @@ def test_what_follows_a_contact_and_what_leads_to_it_add_up_to_a_whole_path(
     (one,) = latency_relaxations(problem)
     rng = np.random.default_rng(seed)
     price = np.append(rng.uniform(0.0, 0.5, len(problem.target_ids)), 0.0)
-    tolls = rng.uniform(0.0, 1.0, len(one.contacts))
+    tolls = Tolls(rng.uniform(0.0, 1.0, len(one.contacts)), np.zeros(len(one.contacts)))
     most, path, _ = one.most(price, tolls)
     found = one.most_by_pairs(price, tolls)
     assert found is not None

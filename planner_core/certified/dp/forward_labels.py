@@ -94,7 +94,8 @@ def most_value(
     Parameters
     ----------
     weight
-        Whole worth of each task, not negative. Shape ``(m,)``.
+        Whole worth of each task, negative where it costs something: a path that has not gained as
+        much by then pays what it has. Shape ``(m,)``.
     end_cost
         What a path that ends at each data level gains less, not falling. Shape ``(num_levels,)``.
     top
@@ -135,7 +136,7 @@ def most_value(
             _tidy(idle, goal.idle[k], goal, best_so_far)
         kept.first[k + 1] = kept.first[k]
         lowest, highest = _span_of(network, levels, k, low, high, own_low, own_high)
-        lowest, highest = lowest + weight[k], min(top, highest + weight[k])
+        lowest, highest = max(0, lowest + weight[k]), max(0, min(top, highest + weight[k]))
         if lowest > highest:
             if network.is_kept[k]:
                 _forget(k, top, idle, own_low, own_high)
@@ -258,8 +259,9 @@ def path_of(
         first_kept += 1
     k, level, energy = m, levels.end, -np.inf
     while True:
+        gained = 0 if k == m else weight[k]
         at_start = value + end_cost[levels.start] if k == m else value
-        is_start = at_start == 0 and k <= first_kept
+        is_start = at_start == max(0, gained) and k <= first_kept
         if is_start and _leads_to(network, levels, k, 0.0, levels.start, network.energy_start,
                                   level, energy):  # fmt: skip
             break
@@ -270,7 +272,7 @@ def path_of(
                 give = give_between(network, i, k)
                 for at in range(labels.first[i], labels.first[i + 1]):
                     ended = end_cost[labels.level[at]] if k == m else 0
-                    if labels.value[at] == value + ended and _leads_to(
+                    if max(0, labels.value[at] + gained) == value + ended and _leads_to(
                         network, levels, k, give, labels.level[at], labels.energy[at],
                         level, energy,
                     ):  # fmt: skip
@@ -283,7 +285,7 @@ def path_of(
         rows[length] = k
         length += 1
         level, energy = labels.level[found], labels.energy[found]
-        value = labels.value[found] - weight[k]
+        value = labels.value[found]
     return rows[:length][::-1].copy()
 
 
@@ -331,6 +333,12 @@ def _take(
         if to > levels.after[row] or to >= levels.num_levels:
             continue
         low, high = source.low[y], min(source.high[y], most - gained)
+        for v in range(low, min(high + 1, -gained)):
+            left = min(source.energy[y, v - source.first] + give, cap) - cost
+            if left >= floor:
+                own.energy[to, 0] = max(own.energy[to, 0], left)
+                own.low[to], own.high[to] = 0, max(own.high[to], 0)
+        low = max(low, -gained)
         if low > high:
             continue
         before = source.energy[y, low - source.first : high - source.first + 1]

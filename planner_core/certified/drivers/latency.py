@@ -79,7 +79,7 @@ class DayByDay:
         self._search, self._best = search, search.best
         self._ascent = LatencyAscent(search.problem, search.prices())
         self._number = 0
-        _lower(self._best, self._ascent, TUNING.rounds // 2)
+        _lower(self._best, self._ascent, TUNING.rounds)
 
     def better(self, plan: Plan) -> None:
         """Plan days anew from a plan, as long as a round of them gains anything.

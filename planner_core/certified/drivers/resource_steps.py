@@ -22,7 +22,7 @@ from planner_core.certified.mip.contact_sets import FixedContacts, Relaxation
 from planner_core.certified.multipliers.ascent import Ascent
 from planner_core.certified.multipliers.energy import EnergyPaths, ascent_on_energy
 from planner_core.certified.multipliers.resources import PriceSearch
-from planner_core.certified.proofs.bound import Bound, rounded_bound
+from planner_core.certified.proofs.bound import rounded_bound
 from planner_core.certified.proofs.lagrangian import lagrangian_bound
 from planner_core.certified.sizes import MAX_PAIRS
 from planner_core.certified.tuning import TUNING
@@ -180,9 +180,7 @@ class ResourceSearch:
             if self.best.is_done or not prices.step(max(self.best.reward, self.relaxed)):
                 return
             self._priced = min(self._priced, prices.value)
-            self.best.lower(
-                Bound(value=prices.value, proof="dp", prices=prices.prices, unit=prices.unit)
-            )
+            self.best.lower(prices.bound())
         self.best.report("prices")
 
     def prices(self) -> Floats:

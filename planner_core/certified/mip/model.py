@@ -11,6 +11,7 @@ import numpy as np
 from planner_core.certified.mip.clique_cuts import antichain_cover, detours, excluding_pairs
 from planner_core.certified.mip.program import Program, Rows
 from planner_core.certified.mip.resources import ResourceTerms, add_resources, resource_terms
+from planner_core.precedence.antennas import antenna_groups
 from planner_core.precedence.relation import (
     Precedence,
     direct_precedence,
@@ -26,7 +27,6 @@ from planner_core.problem import (
     SatelliteProblem,
 )
 from planner_core.problem.restrict import restricted
-from planner_core.problem.slew import TIME_TOLERANCE_S
 
 Formulation = Literal["antichain", "pairwise"]
 
@@ -222,13 +222,7 @@ def _detours(
 
 def _stations(program: Program, problem: Problem, taken: Ints) -> None:
     """Let a station serve no more satellites at a time than it has antennas."""
-    table = problem.opportunities
-    groups, limits = [], []
-    for station, antennas in enumerate(problem.station_antennas):
-        rows = np.flatnonzero((table.kind == CONTACT) & (table.place == station))
-        for at, row in enumerate(rows):
-            running = rows[:at][table.end_s[rows[:at]] > table.start_s[row] + TIME_TOLERANCE_S]
-            if len(running) >= antennas:
-                groups.append(taken[np.append(running, row)])
-                limits.append(float(antennas))
-    program.add_rows(Rows.at_most(groups, limits))
+    groups = antenna_groups(problem)
+    program.add_rows(
+        Rows.at_most([taken[group.rows] for group in groups], [float(g.limit) for g in groups])
+    )

@@ -61,7 +61,7 @@ class ProgramSearch:
     ) -> None:
         self._problem, self._budget, self._seed = problem, budget, seed
         self._pool = pool
-        self._prices, self._unit = prices.prices, prices.unit
+        self._multipliers = prices
         self._satellites = prices.satellites
         self._losses = losses
         self._offered_per_task = TUNING.tasks_per_task
@@ -166,10 +166,10 @@ class ProgramSearch:
     def _draw(self, group: Bools, beside: Rows) -> Rows:
         """Return contacts that satellites would have in turn, at prices that are a little off."""
         most = self._problem.best_worth
-        off = TUNING.near * most * self._rng.standard_normal(len(most)) * (self._prices > 0.0)
-        prices = np.clip(self._prices + off, 0.0, most)
-        prices = leaving_whole_units(self._problem, prices, self._unit)
-        worth = whole_worth(self._problem, prices, self._unit)
+        known, unit = self._multipliers.prices, self._multipliers.unit
+        off = TUNING.near * most * self._rng.standard_normal(len(most)) * (known > 0.0)
+        prices = leaving_whole_units(self._problem, np.clip(known + off, 0.0, most), unit)
+        worth = whole_worth(self._problem, prices, unit, self._multipliers.antenna_prices)
         table = self._problem.opportunities
         taken = [r for r in beside if table.kind[r] == CONTACT]
         drawn: list[int] = []
@@ -182,7 +182,7 @@ class ProgramSearch:
                 return ()
             is_shut = blocked_rows(self._problem, satellite, taken + drawn) != 0
             _, path = relaxation.without(is_shut).most(
-                worth, self._unit, 0, self._budget.stop, keeps_path=True
+                worth, unit, 0, self._budget.stop, keeps_path=True
             )
             if path is None:
                 return ()

@@ -11,9 +11,14 @@ from __future__ import annotations
 import numpy as np
 
 from planner_core.certified.proofs.bound import Bound
-from planner_core.certified.proofs.latency import latency_relaxations, latency_value
+from planner_core.certified.proofs.latency import Tolls, latency_relaxations, latency_value
 from planner_core.certified.tolerances import SAME
 from planner_core.certified.tuning import TUNING
+from planner_core.precedence.antennas import (
+    antenna_groups,
+    antenna_tolls,
+    paid_for_antennas,
+)
 from planner_core.problem import CONTACT, Bytes, Floats, Problem
 
 
@@ -42,7 +47,10 @@ class LatencyAscent:
         self._prices = np.zeros(len(begin) + 1)
         # By typical image, as targets are; contacts of the table, others none.
         self._tolls = np.zeros(len(problem.opportunities))
-        self._best = self._prices, self._tolls
+        self._groups = antenna_groups(problem)
+        self._dues = np.zeros(len(self._groups))
+        self._images_per_contact = self._images_that_contacts_take()
+        self._best = self._prices, self._tolls, self._dues
         self._length, self._num_idle = 1.0, 0
         self.contact_sets: dict[tuple[int, ...], None] = {}
         self.value = float(problem.best_worth.sum())
@@ -67,18 +75,24 @@ class LatencyAscent:
     @property
     def prices(self) -> Floats:
         """The best prices of targets. Shape ``(num_targets,)``."""
-        prices, _ = self._best
+        prices, _, _ = self._best
         return prices[:-1]
 
     @property
     def contact_prices(self) -> Floats:
         """The best prices of contacts, by volume. Shape ``(num_contacts,)``."""
-        _, tolls = self._best
+        _, tolls, _ = self._best
         tolls = tolls.copy()
         for one in self._satellites:
             tolls[one.contacts] /= one.typical
         by_volume: Floats = tolls[self._is_contact]
         return by_volume
+
+    @property
+    def antenna_prices(self) -> Floats | None:
+        """The best prices of antennas, None where there are none. Shape ``(num_groups,)``."""
+        _, _, dues = self._best
+        return dues if dues.any() else None
 
     def bound(self, *, is_last: bool = True) -> Bound:
         """Return the least that was proven so far.
@@ -90,33 +104,41 @@ class LatencyAscent:
         if self.value < self._at_proof - step:
             self._at_proof = value = self.value
             if self._problem.turns_to_the_sun:
-                value = latency_value(self._problem, self.prices, self.contact_prices)
+                value = latency_value(
+                    self._problem, self.prices, self.contact_prices, self.antenna_prices
+                )
             if value < self._proven.value:
                 self._proven = Bound(
                     value=value,
                     proof="dp",
                     prices=self.prices,
                     contact_prices=self.contact_prices,
+                    antenna_prices=self.antenna_prices,
                 )
         return self._proven
 
     def _value(self, prices: Floats) -> float:
         """Return what prices of targets prove alone."""
-        free = (np.zeros(len(one.contacts)) for one in self._satellites)
-        gained = (
-            one.most(prices, tolls)[0] for one, tolls in zip(self._satellites, free, strict=True)
-        )
-        return float(prices.sum()) + sum(gained)
+        value = float(prices.sum())
+        for one in self._satellites:
+            free = np.zeros(len(one.contacts))
+            value += one.most(prices, Tolls(free, free))[0]
+        return value
+
+    def _images_that_contacts_take(self) -> float:
+        volumes = [one.terms.volume / one.typical for one in self._satellites]
+        return float(np.mean(np.maximum(np.concatenate([*volumes, np.ones(1)]), 1.0)))
 
     def _go_round(self, level: float, stop: Bytes) -> None:
-        value = float(self._prices.sum())
+        value = float(self._prices.sum()) + paid_for_antennas(self._problem, self._dues)
+        dues = antenna_tolls(self._problem, self._dues)
         too_many = np.append(-np.ones(len(self._most) - 1), 0.0)
         too_much = np.zeros(len(self._tolls))
         is_taken = np.zeros(len(self._tolls), dtype=np.bool_)
         for one in self._satellites:
             if stop[0]:
                 return
-            tolls = self._tolls[one.contacts] / one.typical
+            tolls = Tolls(self._tolls[one.contacts] / one.typical, dues[one.contacts])
             gained, path, layer = one.most(self._prices, tolls)
             value += gained
             np.add.at(too_many, one.target[path], 1.0)
@@ -127,27 +149,36 @@ class LatencyAscent:
         self.contact_sets.pop(contacts, None)
         self.contact_sets[contacts] = None
         if self._is_hopeful(value):
-            self._move(value - level, too_many, too_much)
+            crowds = np.array([is_taken[g.rows].sum() - g.limit for g in self._groups])
+            self._move(value - level, too_many, too_much, self._images_per_contact * crowds)
 
     def _is_hopeful(self, value: float) -> bool:
         """Note what the prices of the moment prove; go back to better ones after a while."""
         if value < self.value * (1.0 - SAME):
-            self._best, self._num_idle = (self._prices, self._tolls), 0
+            self._best, self._num_idle = (self._prices, self._tolls, self._dues), 0
             self.value = value
             return True
         self._num_idle += 1
         if self._num_idle < TUNING.patience:
             return True
         self._length, self._num_idle = TUNING.shorter * self._length, 0
-        self._prices, self._tolls = self._best
+        self._prices, self._tolls, self._dues = self._best
         return False
 
-    def _move(self, above: float, too_many: Floats, too_much: Floats) -> None:
-        """Move all multipliers against what the answers take too much of."""
+    def _move(self, above: float, too_many: Floats, too_much: Floats, crowds: Floats) -> None:
+        """Move all multipliers against what the answers take too much of.
+
+        Parameters
+        ----------
+        crowds
+            Of each group of contacts, in images that they can bring down. Shape ``(num_groups,)``.
+        """
         too_many = np.where((self._prices <= 0.0) & (too_many < 0.0), 0.0, too_many)
         too_much = np.where((self._tolls <= 0.0) & (too_much < 0.0), 0.0, too_much)
-        squares = sum(float(np.square(each).sum()) for each in (too_many, too_much))
+        crowds = np.where((self._dues <= 0.0) & (crowds < 0.0), 0.0, crowds)
+        squares = sum(float(np.square(each).sum()) for each in (too_many, too_much, crowds))
         above = min(above, TUNING.far_above * self.value)
         step = self._length * above / squares if squares > 0.0 else 0.0
         self._prices = np.clip(self._prices + step * too_many, 0.0, self._most)
         self._tolls = np.maximum(self._tolls + step * too_much, 0.0)
+        self._dues = np.maximum(self._dues + step * self._images_per_contact * crowds, 0.0)

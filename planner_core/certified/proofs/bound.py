@@ -29,6 +29,9 @@ class Bound:
     contact_prices
         What proves a bound with a half-life, with ``prices`` (``latency.latency_value``), one for
         each contact. Shape ``(num_contacts,)``.
+    antenna_prices
+        What proves a bound by dynamic programmes, with ``prices``, where satellites want the same
+        antennas (``planner_core.precedence.antennas``). Shape ``(num_groups,)``.
     queue_levels
         Of energy in a collect, where exact programmes of queues prove a bound with a half-life
         (``queues.queue_value``).
@@ -47,6 +50,7 @@ class Bound:
     proof: Proof
     prices: Floats | None = None
     contact_prices: Floats | None = None
+    antenna_prices: Floats | None = None
     queue_levels: int | None = None
     is_elementary: bool = False
     unit: float | None = None

@@ -41,6 +41,8 @@ def to_json(bound: Bound) -> str:
         document["prices"] = bound.prices.tolist()
     if bound.contact_prices is not None:
         document["contact_prices"] = bound.contact_prices.tolist()
+    if bound.antenna_prices is not None:
+        document["antenna_prices"] = bound.antenna_prices.tolist()
     if bound.queue_levels is not None:
         document["queue_levels"] = bound.queue_levels
     if bound.is_elementary:
@@ -70,6 +72,7 @@ def from_json(text: str) -> Bound:
         proof=cast(Proof, document["proof"]),
         prices=prices("prices"),
         contact_prices=prices("contact_prices"),
+        antenna_prices=prices("antenna_prices"),
         queue_levels=document.get("queue_levels"),
         is_elementary=bool(document.get("elementary", False)),
         unit=document.get("unit"),
@@ -116,9 +119,9 @@ def is_proven(problem: Problem, bound: Bound) -> bool | None:
             level=bound.value,
         )
     elif bound.contact_prices is not None:
-        value = latency_value(problem, bound.prices, bound.contact_prices)
+        value = latency_value(problem, bound.prices, bound.contact_prices, bound.antenna_prices)
     elif bound.unit is not None:
-        value = resource_value(problem, bound.prices, bound.unit)
+        value = resource_value(problem, bound.prices, bound.unit, bound.antenna_prices)
     elif bound.is_elementary:
         value, _ = elementary_value(problem, bound.prices)
     else:

@@ -12,8 +12,9 @@ more than what it is worth on board and the best of its contacts adds,
 and a contact that is taken earns :math:`\mu_c` times what it can take down. No plan earns more
 than :math:`\sum_i \lambda_i` plus, for each satellite, the most that a path under its battery
 gains of :math:`(w_k - \lambda_i)^+` and of contacts. Of an image's contacts the one that the path
-takes next counts, and all later ones (``planner_core.certified.dp.contact_layers``). Left out are
-the order in which bits come down, what telemetry takes of a contact, and stations.
+takes next counts, and all later ones (``planner_core.certified.dp.contact_layers``). Where
+satellites want an antenna at the same time contacts pay for their places, as in ``resource_bound``.
+Left out are the order in which bits come down and what telemetry takes of a contact.
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ from planner_core.certified.signs import NEVER
 from planner_core.certified.tolerances import DOWN, DOWN_S
 from planner_core.certified.tuning import TUNING
 from planner_core.jit import kernel
+from planner_core.precedence.antennas import antenna_tolls, paid_for_antennas
 from planner_core.precedence.relation import is_transitive_on
 from planner_core.problem import (
     COLLECT,
@@ -75,6 +77,21 @@ class _Terms(NamedTuple):
     ready_s: Floats
     volume: Floats
     half_life_s: float
+
+
+class Tolls(NamedTuple):
+    """Prices of some contacts; shape ``(num_contacts,)``.
+
+    Attributes
+    ----------
+    by_volume
+        What images pay to come down in each, and it earns for what it can take.
+    antenna
+        What each pays for its antenna.
+    """
+
+    by_volume: Floats
+    antenna: Floats
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -139,7 +156,7 @@ class LatencyRelaxation:
             ),
         )
 
-    def most(self, prices: Floats, tolls: Floats) -> tuple[float, Ints, Ints]:
+    def most(self, prices: Floats, tolls: Tolls) -> tuple[float, Ints, Ints]:
         """Return the most that the satellite can gain, the rows of a path that does, and layers.
 
         Parameters
@@ -147,13 +164,13 @@ class LatencyRelaxation:
         prices
             Of targets, and none for contacts. Shape ``(num_targets + 1,)``.
         tolls
-            Of its contacts, by volume. Shape ``(num_contacts,)``.
+            Of its contacts.
         """
         m, weight = len(self.rows), self._weight(prices, tolls)
         own, num_own = np.empty((m, self.levels.width)), np.zeros(m, dtype=np.int64)
         return most_by_contacts(self.network, self.levels, self.layers, weight, own, num_own)
 
-    def most_by_pairs(self, prices: Floats, tolls: Floats) -> tuple[Floats, Fixing] | None:
+    def most_by_pairs(self, prices: Floats, tolls: Tolls) -> tuple[Floats, Fixing] | None:
         """Return the most that it can gain by each pair of contacts that follow each other.
 
         As ``contact_pairs.most_by_pairs`` has it, with what leaves out states of the programme
@@ -165,17 +182,24 @@ class LatencyRelaxation:
         weight = self._weight(prices, tolls)
         most, after = most_by_pairs(self.network, self.levels, self.layers, weight)
         fixing = Fixing(
-            layers=self.layers, weight=weight, toll=tolls, after_contact=after, least=-np.inf
+            layers=self.layers,
+            weight=weight,
+            toll=tolls.by_volume,
+            after_contact=after,
+            least=-np.inf,
         )
         return most, fixing
 
-    def _weight(self, prices: Floats, tolls: Floats) -> Floats:
+    def _weight(self, prices: Floats, tolls: Tolls) -> Floats:
         weight = np.empty((len(self.layers.first), len(self.rows)))
         passed = 0.0 if self.may_need_all else NEVER
-        _weigh(self.terms, self.layers, prices[self.target], tolls, passed, weight)
+        earned = tolls.by_volume * self.terms.volume - tolls.antenna
+        _weigh(
+            self.terms, self.layers, prices[self.target], tolls.by_volume, earned, passed, weight
+        )
         return weight
 
-    def loads(self, path: Ints, layer: Ints, tolls: Floats) -> Floats:
+    def loads(self, path: Ints, layer: Ints, tolls: Tolls) -> Floats:
         """Return what a path lets each contact take down more than it can.
 
         Parameters
@@ -197,7 +221,7 @@ class LatencyRelaxation:
         age_s = np.maximum(t.ready_s[None, :] - t.end_s[images, None], 0.0)
         gain = t.decaying[images, None] * np.exp2(-age_s / t.half_life_s)
         gain = np.minimum(gain, (t.most - t.on_board)[images, None])
-        gain -= tolls[None, :] * t.size[images, None]
+        gain -= tolls.by_volume[None, :] * t.size[images, None]
         may_follow = self.layers.contact[None, :] > images[:, None]
         may_follow &= np.arange(len(load))[None, :] >= self.layers.first[own, None]
         gain[~may_follow] = -np.inf
@@ -209,9 +233,23 @@ class LatencyRelaxation:
 
 @kernel
 def _weigh(
-    terms: _Terms, layers: Layers, price: Floats, tolls: Floats, passed: float, weight: Floats
+    terms: _Terms,
+    layers: Layers,
+    price: Floats,
+    tolls: Floats,
+    earned: Floats,
+    passed: float,
+    weight: Floats,
 ) -> None:
-    """Fill in what each task is worth in each layer; ``passed`` where that is nothing."""
+    """Fill in what each task is worth in each layer; ``passed`` where that is nothing.
+
+    Parameters
+    ----------
+    tolls
+        What images pay to each contact, by volume. Shape ``(num_contacts,)``.
+    earned
+        What each contact earns that is taken. Shape ``(num_contacts,)``.
+    """
     num_layers, m = weight.shape
     gain = np.zeros(m)
     for layer in range(num_layers - 1, -1, -1):
@@ -227,7 +265,7 @@ def _weigh(
             weight[layer, k] = worth if worth > 0.0 else passed
         if layer < num_layers - 1:
             for c in range(layers.first[layer], layers.first[layer + 1]):
-                weight[layer, layers.contact[c]] = tolls[c] * terms.volume[c]
+                weight[layer, layers.contact[c]] = earned[c]
 
 
 def latency_relaxations(
@@ -250,8 +288,13 @@ def latency_relaxations(
     )
 
 
-def latency_value(problem: Problem, prices: Floats, contact_prices: Floats) -> float:
-    """Return the bound that prices of targets and of contacts prove.
+def latency_value(
+    problem: Problem,
+    prices: Floats,
+    contact_prices: Floats,
+    antenna_prices: Floats | None = None,
+) -> float:
+    """Return the bound that prices of targets, of contacts and of antennas prove.
 
     This is the whole proof: it needs no search, only the problem.
 
@@ -261,10 +304,13 @@ def latency_value(problem: Problem, prices: Floats, contact_prices: Floats) -> f
         Shape ``(num_targets,)``.
     contact_prices
         By volume, of the table's contacts in order. Shape ``(num_contacts,)``.
+    antenna_prices
+        Of ``antenna_groups``; none by default.
     """
-    price, tolls = _multipliers(problem, prices, contact_prices)
-    gained = (one.most(price, tolls[one.contacts])[0] for one in latency_relaxations(problem))
-    return float(price.sum()) + sum(gained)
+    given = _multipliers(problem, prices, contact_prices, antenna_prices)
+    relaxations = latency_relaxations(problem)
+    gained = (one.most(given.prices, given.tolls_of(one))[0] for one in relaxations)
+    return given.paid + sum(gained)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -302,17 +348,17 @@ def reductions(
     per_collect
         How many levels of energy a collect takes, here and in the programme that this is for.
     """
-    price, tolls = _multipliers(problem, prices, contact_prices)
+    given = _multipliers(problem, prices, contact_prices, None)
     most: dict[int, tuple[Floats, Fixing]] = {}
-    total = float(price.sum())
+    total = given.paid
     indices = [index for index, one in enumerate(problem.satellites) if len(one)]
     relaxations = latency_relaxations(problem, per_collect=per_collect)
     for index, one in zip(indices, relaxations, strict=True):
         if stop[0]:
             return {}
-        pairs = one.most_by_pairs(price, tolls[one.contacts])
+        pairs = one.most_by_pairs(given.prices, given.tolls_of(one))
         if pairs is None:
-            total += one.most(price, tolls[one.contacts])[0]
+            total += one.most(given.prices, given.tolls_of(one))[0]
         else:
             most[index] = pairs
             total += float(pairs[0].max())
@@ -333,9 +379,27 @@ def _earliest(may_follow: Bools) -> Ints:
     return found.astype(np.int32)
 
 
-def _multipliers(problem: Problem, prices: Floats, contact_prices: Floats) -> tuple[Floats, Floats]:
-    """Return prices of targets, a 0 at the end, and of contacts by row of the table."""
+class _Multipliers(NamedTuple):
+    """Prices of targets, a 0 at the end; of contacts, by row of the table; what all come to."""
+
+    prices: Floats
+    by_volume: Floats
+    antenna: Floats
+    paid: float
+
+    def tolls_of(self, one: LatencyRelaxation) -> Tolls:
+        return Tolls(self.by_volume[one.contacts], self.antenna[one.contacts])
+
+
+def _multipliers(
+    problem: Problem, prices: Floats, contact_prices: Floats, antenna_prices: Floats | None
+) -> _Multipliers:
     price = np.append(surplus(prices, problem.best_worth), 0.0)
-    tolls = np.zeros(len(problem.opportunities))
-    tolls[problem.opportunities.kind == CONTACT] = np.maximum(contact_prices, 0.0)
-    return price, tolls
+    by_volume = np.zeros(len(problem.opportunities))
+    by_volume[problem.opportunities.kind == CONTACT] = np.maximum(contact_prices, 0.0)
+    return _Multipliers(
+        prices=price,
+        by_volume=by_volume,
+        antenna=antenna_tolls(problem, antenna_prices),
+        paid=float(price.sum()) + paid_for_antennas(problem, antenna_prices),
+    )

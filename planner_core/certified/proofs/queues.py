@@ -2,7 +2,7 @@ r"""An upper bound where images are worth less the later they come down: queues 
 
 Prices of targets, as in ``latency``: for each satellite an exact programme knows which contact
 comes next and what waits for it (``planner_core.certified.dp.contact_queues``). Left out are
-stations. Prices of contacts say which of them may follow each other in a plan that earns more than
+antennas. Prices of contacts say which of them may follow each other in a plan that earns more than
 some level (``planner_core.certified.dp.contact_pairs``); what is left takes seconds where those
 prices take hundredths, and proves a percent more.
 """

@@ -4,8 +4,9 @@ As in ``planner_core.certified.proofs.lagrangian`` each target has a price :math
 no plan earns more than :math:`\sum_i \lambda_i` plus what each satellite can gain where an image of
 :math:`i` is worth :math:`r_i - \lambda_i`. Here the satellite's gain is the most that its battery
 and its recorder allow, not only its agility. Worth is counted in whole units, rounded up, so the
-bound holds for any unit; prices chosen to leave whole units lose nothing by it. Stations are
-left out.
+bound holds for any unit; prices chosen to leave whole units lose nothing by it. Where satellites
+want the same antennas at a time those have prices, too, which contacts pay
+(``planner_core.precedence.antennas``).
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from planner_core.certified.signs import STOPPED, UNREACHED
 from planner_core.certified.sizes import MAX_CELLS, MAX_STEPS
 from planner_core.certified.tolerances import ROUNDING
 from planner_core.certified.tuning import TUNING
+from planner_core.precedence.antennas import antenna_tolls, paid_for_antennas
 from planner_core.problem import (
     COLLECT,
     Bools,
@@ -350,26 +352,36 @@ def relaxations(
     )
 
 
-def whole_worth(problem: Problem, prices: Floats, unit: float) -> Ints:
-    """Return what each opportunity is worth at these prices, in units, rounded up."""
+def whole_worth(
+    problem: Problem, prices: Floats, unit: float, antenna_prices: Floats | None = None
+) -> Ints:
+    """Return what each opportunity is worth at these prices, in units, rounded up.
+
+    Contacts cost what their antennas do.
+    """
     table = problem.opportunities
     is_collect = table.kind == COLLECT
     units = np.zeros(len(table), dtype=np.int32)
     price = np.maximum(prices[table.place[is_collect]], 0.0)
     worth = weights(problem.worth[is_collect], price)
     units[is_collect] = np.maximum(np.ceil(worth / unit - ROUNDING), 0.0)
+    if antenna_prices is not None:
+        tolls = antenna_tolls(problem, antenna_prices)
+        units[~is_collect] = -np.floor(tolls[~is_collect] / unit + ROUNDING)
     return units
 
 
-def resource_value(problem: Problem, prices: Floats, unit: float) -> float:
-    """Return the bound that ``prices`` and ``unit`` prove.
+def resource_value(
+    problem: Problem, prices: Floats, unit: float, antenna_prices: Floats | None = None
+) -> float:
+    """Return the bound that prices of targets, and of antennas if there are any, prove.
 
     This is the whole proof: it needs no search, only the problem. However finely the recorder is
     counted the bound holds; as neither fineness is always better, the lower bound counts.
     """
     stop = np.zeros(1, dtype=np.uint8)
     return min(
-        _value(problem, relaxations(problem, levels), prices, unit, 0.0, stop)
+        _value(problem, relaxations(problem, levels), prices, unit, 0.0, stop, antenna_prices)
         for levels in (TUNING.fine, TUNING.coarse)
     )
 
@@ -392,11 +404,12 @@ def _value(
     unit: float,
     enough: float,
     stop: Bytes,
+    antenna_prices: Floats | None = None,
 ) -> float:
     """Return the bound of these prices, or ``enough`` where that is more."""
     prices = surplus(prices, problem.best_worth)
-    worth = whole_worth(problem, prices, unit)
-    paid = float(prices.sum())
+    worth = whole_worth(problem, prices, unit, antenna_prices)
+    paid = float(prices.sum()) + paid_for_antennas(problem, antenna_prices)
     # What the other satellites gain is known only afterwards: one alone may stop early.
     units_enough = int(np.floor((enough - paid) / unit)) if len(satellites) == 1 else 0
     units = sum(s.most(worth, unit, max(units_enough, 0), stop)[0] for s in satellites)

@@ -151,7 +151,8 @@ class Shares:
             stays = np.where(may_stay, stays, 0.0)
         # Whoever takes an image for nothing can do without.
         most = np.where((weight > 0) | self.is_kept, np.maximum(worth, stays), 0.0)
-        return np.ceil(most / unit - ROUNDING).astype(np.int32)
+        # Contacts cost what their antennas do.
+        return np.ceil(np.where(weight < 0, worth, most) / unit - ROUNDING).astype(np.int32)
 
     def end_cost(self, levels: DataLevels, unit: float, since: int) -> Ints:
         """Return what a recorder costs that ends at each level, in units."""

@@ -1,0 +1,78 @@
+"""Which contacts want the same antennas at the same time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final, NamedTuple
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from planner_core.problem import CONTACT, Floats, Longs, Problem
+from planner_core.problem.slew import TIME_TOLERANCE_S
+
+
+class AntennaGroup(NamedTuple):
+    """Contacts that a station would have to serve at the same instant, more than it can.
+
+    Attributes
+    ----------
+    rows
+        Opportunities, ascending.
+    limit
+        How many of them a plan may take: the station's antennas.
+    """
+
+    rows: Longs
+    limit: int
+
+
+_known: Final[WeakKeyDictionary[Problem, tuple[AntennaGroup, ...]]] = WeakKeyDictionary()
+
+
+def antenna_groups(problem: Problem) -> tuple[AntennaGroup, ...]:
+    """Return the largest such groups, by station and in order of time.
+
+    A plan that takes no more of each than its limit has an antenna for every contact.
+    """
+    groups = _known.get(problem)
+    if groups is None:
+        groups = _known[problem] = tuple(_groups(problem))
+    return groups
+
+
+def _groups(problem: Problem) -> Iterator[AntennaGroup]:
+    table = problem.opportunities
+    for station, antennas in enumerate(problem.station_antennas.tolist()):
+        rows = np.flatnonzero((table.kind == CONTACT) & (table.place == station))
+        rows = rows[np.argsort(table.start_s[rows], kind="stable")]
+        group: set[int] = set()
+        groups = []
+        for at, row in enumerate(rows.tolist()):
+            still = rows[:at][table.end_s[rows[:at]] > table.start_s[row] + TIME_TOLERANCE_S]
+            running = {row, *still.tolist()}
+            if not group <= running:
+                # One of those before has ended: they are all there is of their group.
+                groups.append(group)
+            group = running
+        for contacts in map(sorted, [*groups, group]):
+            # A satellite has one contact at a time, whatever its station can serve.
+            if len(np.unique(table.satellite[contacts])) > antennas:
+                yield AntennaGroup(np.array(contacts, dtype=np.int64), antennas)
+
+
+def antenna_tolls(problem: Problem, prices: Floats | None) -> Floats:
+    """Return what each opportunity pays where a place in each group has a price. Shape ``(n,)``."""
+    tolls = np.zeros(len(problem.opportunities))
+    if prices is not None:
+        for group, price in zip(antenna_groups(problem), prices.tolist(), strict=True):
+            tolls[group.rows] += max(price, 0.0)
+    return tolls
+
+
+def paid_for_antennas(problem: Problem, prices: Floats | None) -> float:
+    """Return what all places at these prices come to, which no plan pays more than."""
+    if prices is None:
+        return 0.0
+    limits = np.array([group.limit for group in antenna_groups(problem)], dtype=np.float64)
+    return float(limits @ np.maximum(prices, 0.0))

@@ -1,0 +1,174 @@
+"""Prices of antennas that satellites want at the same time: bounds hold, and know of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from planner_core.budget import Budget
+from planner_core.certified.multipliers.latency import LatencyAscent
+from planner_core.certified.multipliers.resources import PriceSearch
+from planner_core.certified.proofs.documents import from_json, is_proven, to_json
+from planner_core.certified.proofs.latency import latency_value
+from planner_core.certified.proofs.resource_bound import relaxations, resource_value, whole_worth
+from planner_core.certified.solver import Certified
+from planner_core.domain import Dynamics, Objective, Resources
+from planner_core.precedence.antennas import antenna_groups, antenna_tolls, paid_for_antennas
+from planner_core.problem import COLLECT, CONTACT, Problem
+from planner_core.problem.delivery import with_objective
+from planner_core.problem.plan import Plan
+from planner_core.referee.replay import replay
+from planner_core.referee.rules import stations
+from tests.examples import examples
+from tests.planner_core.brute_force import best_reward
+from tests.planner_core.problems import Task, make_problem, random_problem, varied_problem
+
+SEEDS = st.integers(0, 10**6)
+NEVER_DECAYS = Objective(collected_share=0.0)
+ROOMY = Resources(
+    battery_min_fraction=0.0,
+    initial_battery_fraction=1.0,
+    sunpoint_charge_per_s=0.0,
+    collect_drain_per_s=0.0,
+    contact_drain_per_s=0.0,
+    recorder_max_fraction=1.0,
+    initial_recorder_fraction=0.0,
+    collect_fill_per_s=0.001,
+    downlink_per_s=0.001,
+    telemetry_per_s=0.0,
+)
+
+
+def crowded(seed: int, dynamics: Dynamics, objective: Objective, antennas: int = 1) -> Problem:
+    """Return three satellites over one station."""
+    problem = varied_problem(seed, dynamics, 3, scarce=ROOMY, num_collects=6, num_contacts=4)
+    problem = replace(problem, station_antennas=np.array([antennas], dtype=np.int32))
+    return with_objective(problem, objective)
+
+
+def shared_pass() -> Problem:
+    """Return two satellites with two images each and one pass at the same time."""
+    tasks = [Task(kind=CONTACT, place=0, satellite=s, start_s=800.0, end_s=900.0) for s in (0, 1)]
+    tasks += [
+        Task(kind=COLLECT, place=2 * s + i, satellite=s, start_s=at_s, end_s=at_s + 30.0)
+        for s in (0, 1)
+        for i, at_s in enumerate((100.0 + s, 400.0 + s))
+    ]
+    problem = make_problem(tasks, num_targets=4, num_satellites=2, resources=ROOMY)
+    return with_objective(problem, NEVER_DECAYS)
+
+
+@examples(100)
+@given(seed=SEEDS, antennas=st.integers(1, 2))
+def test_groups_say_what_the_referee_says_of_stations(seed: int, antennas: int) -> None:
+    problem = random_problem(seed, num_satellites=3, num_collects=1, num_contacts=7, num_stations=2)
+    problem = replace(problem, station_antennas=np.full(2, antennas, dtype=np.int32))
+    groups = antenna_groups(problem)
+    table = problem.opportunities
+    contacts = np.flatnonzero(table.kind == CONTACT).tolist()
+    for size in (2, 3):
+        for rows in combinations(contacts, size):
+            if len(set(table.satellite[list(rows)].tolist())) < size:
+                continue  # one satellite's contacts exclude each other anyway
+            is_crowded = any(np.isin(group.rows, rows).sum() > group.limit for group in groups)
+            assert is_crowded == bool(stations(problem, Plan.of(problem, rows)))
+    sets = [set(group.rows.tolist()) for group in groups]
+    assert not any(one < other for one in sets for other in sets)
+
+
+@pytest.mark.parametrize("dynamics", ["physical", "paper"])
+@examples(300)
+@given(
+    seed=SEEDS,
+    collected_share=st.sampled_from([0.0, 0.5, 1.0]),
+    half_life_s=st.sampled_from([None, 300.0]),
+    antennas=st.integers(1, 2),
+)
+def test_no_plan_beats_any_prices_of_antennas(
+    dynamics: Dynamics,
+    seed: int,
+    collected_share: float,
+    half_life_s: float | None,
+    antennas: int,
+) -> None:
+    if collected_share == 1.0:
+        half_life_s = None
+    objective = Objective(collected_share=collected_share, half_life_s=half_life_s)
+    problem = crowded(seed, dynamics, objective, antennas)
+    best = best_reward(problem)
+    rng = np.random.default_rng(seed)
+    num_contacts = int((problem.opportunities.kind == CONTACT).sum())
+    for _ in range(2):
+        prices = rng.uniform(0.0, 1.0, len(problem.target_ids)) * problem.best_worth
+        antenna = rng.uniform(-0.5, 3.0, len(antenna_groups(problem)))
+        if half_life_s is None:
+            for unit in (1.0, 0.1):
+                assert resource_value(problem, prices, unit, antenna) >= best - 1e-9
+        else:
+            tolls = rng.uniform(0.0, 10.0, num_contacts)
+            assert latency_value(problem, prices, tolls, antenna) >= best - 1e-9
+
+
+def test_prices_tell_that_one_of_two_satellites_is_served() -> None:
+    problem = shared_pass()
+    assert best_reward(problem) == 2.0
+    search = PriceSearch(problem, 4.0, np.zeros(4), np.zeros(1, dtype=np.uint8))
+    search.step(2.0)
+    assert search.value == pytest.approx(4.0)
+    assert search.wants_antennas
+    search.count_in(search.unit, moves_antennas=True)
+    for _ in range(80):
+        search.step(2.0)
+    bound = search.bound()
+    assert bound.value == pytest.approx(2.0)
+    assert bound.antenna_prices is not None
+    assert is_proven(problem, from_json(to_json(bound)))
+    assert not is_proven(problem, replace(bound, antenna_prices=None))
+
+
+def test_prices_tell_so_where_images_age() -> None:
+    problem = with_objective(shared_pass(), Objective(collected_share=0.0, half_life_s=3600.0))
+    best = best_reward(problem)
+    ascent = LatencyAscent(problem, np.zeros(4))
+    ascent.improve(100, best, np.zeros(1, dtype=np.uint8))
+    bound = ascent.bound()
+    assert best <= bound.value < 1.3 * best
+    assert latency_value(problem, ascent.prices, ascent.contact_prices) > 1.5 * best
+    assert is_proven(problem, from_json(to_json(bound)))
+
+
+def test_with_two_antennas_nothing_is_crowded() -> None:
+    problem = replace(shared_pass(), station_antennas=np.array([2], dtype=np.int32))
+    assert antenna_groups(problem) == ()
+    assert replay(problem, Certified().solve(problem, Budget(), 0).plan).reward == 4.0
+
+
+def test_a_path_pays_for_its_contacts() -> None:
+    """Three whole units for two images, less one for the contact that brings them down."""
+    problem = shared_pass()
+    prices, antenna = np.full(4, 0.5), np.array([0.25])
+    worth = whole_worth(problem, prices, 0.25, antenna)
+    stop = np.zeros(1, dtype=np.uint8)
+    for one in relaxations(problem):
+        most, path = one.most(worth, 0.25, 0, stop, keeps_path=True)
+        assert path is not None
+        assert most == 3 == worth[one.satellite.rows[path]].sum()
+        assert len(path) == 3
+    assert paid_for_antennas(problem, antenna) == 0.25
+    assert antenna_tolls(problem, antenna).sum() == 0.5
+    assert resource_value(problem, prices, 0.25, antenna) == pytest.approx(2.0 + 0.25 + 1.5)
+
+
+def test_a_contact_that_costs_more_than_all_it_brings_down_is_not_taken() -> None:
+    problem = shared_pass()
+    worth = whole_worth(problem, np.zeros(4), 1.0, np.array([3.0]))
+    for one in relaxations(problem):
+        most, path = one.most(worth, 1.0, 0, np.zeros(1, dtype=np.uint8), keeps_path=True)
+        assert most == 0
+        assert path is not None
+        assert worth[one.satellite.rows[path]].sum() == 0
