@@ -11,7 +11,9 @@ from hypothesis import event, example, given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget, Termination
-from planner_core.domain import Agility, Dynamics
+from planner_core.certified.lns.choices import ChoiceSearch
+from planner_core.certified.lns.queue_plans import plan_with_queues
+from planner_core.domain import Agility, Dynamics, Objective
 from planner_core.errors import Fault, InvalidScenario
 from planner_core.pinning.apply_pins import apply_pins
 from planner_core.pinning.limits import _keep_best
@@ -23,6 +25,7 @@ from planner_core.problem import (
     Pinned,
     Problem,
 )
+from planner_core.problem.delivery import with_objective
 from planner_core.referee.replay import replay
 from planner_core.solvers.base import Solver
 from planner_core.solvers.registry import (
@@ -35,7 +38,7 @@ from planner_core.solvers.registry import (
 )
 from tests.examples import examples
 from tests.planner_core.brute_force import best_plan
-from tests.planner_core.problems import ECLIPSES, TIGHT, random_problem
+from tests.planner_core.problems import ECLIPSES, TIGHT, Task, make_problem, random_problem
 
 SEEDS = st.integers(0, 10**6)
 DYNAMICS = st.sampled_from(["physical", "paper"])
@@ -255,3 +258,24 @@ def test_states_that_count_as_one_are_no_worse_than_each() -> None:
     assert 0 < num_states <= 200
     for left, filled in found:
         assert ((battery[:num_states] >= left) & (recorder[:num_states] <= filled)).any()
+
+
+def test_two_images_of_a_target_that_must_be_taken_stay() -> None:
+    """A file cannot ask for that, but a problem can."""
+    tasks = [
+        Task(kind=COLLECT, place=place, start_s=start_s, end_s=start_s + 30.0)
+        for place, start_s in ((0, 100.0), (1, 200.0), (0, 300.0), (1, 400.0), (2, 500.0))
+    ]
+    tasks.append(Task(kind=CONTACT, place=0, start_s=800.0, end_s=900.0))
+    roomy = replace(TIGHT, initial_battery_fraction=1.0, initial_recorder_fraction=0.0)
+    problem = make_problem(tasks, num_targets=3, resources=roomy)
+    twice = tuple(Kept(row=row, pointer=f"/pins/keep/{row}") for row in (0, 2))
+    problem = replace(problem, pinned=Pinned(kept=twice))
+    stop = np.zeros(1, dtype=np.uint8)
+    choices = ChoiceSearch(with_objective(problem, Objective.delivered()), 1.0, 0, stop)
+    choices.start(np.zeros(len(tasks), dtype=np.bool_), 0.95)
+    ageing = with_objective(problem, Objective(collected_share=0.0, half_life_s=600.0))
+    by_queues = plan_with_queues(ageing, np.zeros(3), np.random.default_rng(0), stop, 12)
+    assert by_queues is not None
+    for plan in (choices.plan, by_queues):
+        assert {0, 2} <= {action.opportunity for action in plan.actions}

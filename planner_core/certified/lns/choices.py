@@ -223,7 +223,9 @@ class ChoiceSearch:
         num_targets = len(self._problem.target_ids)
         while True:
             value, path = satellite.best(allowed, goal, self._stop)
-            images = path[satellite.target[path] >= 0]
+            # What must be taken stays, even two images of a target.
+            is_open = (satellite.target[path] >= 0) & ~satellite.network.is_kept[path]
+            images = path[is_open]
             counts = np.bincount(satellite.target[images], minlength=num_targets + 1)
             if value < 0 or counts.max() <= 1:
                 return value, path

@@ -199,7 +199,8 @@ def _settled(
         if queues is None:
             return None
         path = rows[most_by_queues(queues, stop)[1]]
-        images = rng.permutation(path[is_image[path]])
+        # What must be taken stays, even two images of a target.
+        images = rng.permutation(path[is_image[path] & ~network.is_kept[path]])
         _, first, counts = np.unique(satellite.place[images], return_index=True, return_counts=True)
         if counts.max(initial=1) == 1:
             return path
