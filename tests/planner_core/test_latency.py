@@ -276,6 +276,8 @@ def test_a_fleet_s_search_for_plans_is_interrupted_for_better_days(
     def told_30_times(search: ResourceSearch, _: float) -> None:
         for _ in range(30):
             search.best.report("plans")
+        # Another plan for each seed.
+        search.best.plan = Plan(search.best.plan.actions[: search.seed])
 
     budget, left = Reports(100), list[int]()
     monkeypatch.setattr(resources, "_close_in_on_worth", told_30_times)
@@ -286,6 +288,19 @@ def test_a_fleet_s_search_for_plans_is_interrupted_for_better_days(
     assert replay(hurried, solution.plan).is_valid
     # One report comes before.
     assert left[:4] == [74, 69, 39, 36]
+
+
+def test_a_fleet_s_search_that_ends_with_the_same_plan_again_is_not_begun_afresh(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    ended = list[int]()
+    monkeypatch.setattr(
+        resources, "_close_in_on_worth", lambda search, _: ended.append(search.seed)
+    )
+    problem = random_problem(2, num_collects=40, num_contacts=4, num_satellites=2)
+    hurried = with_objective(problem, Objective(collected_share=0.0, half_life_s=4000.0))
+    Certified().solve(hurried, Reports(100), 0)
+    assert ended == [0, 1]
 
 
 @pytest.mark.parametrize("fill_per_s", [0.0, ROOMY.collect_fill_per_s])

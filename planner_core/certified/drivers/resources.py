@@ -89,12 +89,15 @@ def _close_in_day_by_day(search: ResourceSearch) -> None:
     plain = replace(problem, worth=problem.worth_on_ground, full_worth=None)
     undecayed = with_objective(plain, replace(problem.objective, half_life_s=None))
     days, breaks = DayByDay(search), _Breaks(search.budget)
-    num_idle = number = 0
+    num_idle, ended = 0, list[Plan]()
     while num_idle < TUNING.patience and not best.is_done:
         before = best.reward
-        days.better(_without_half_life(search, undecayed, search.seed + number, days, breaks))
-        number += 1
+        plan = _without_half_life(search, undecayed, search.seed + len(ended), days, breaks)
+        days.better(plan)
         num_idle = 0 if best.reward > before else num_idle + 1
+        if plan in ended:
+            break  # so few tasks that every search ends with the same
+        ended.append(plan)
     days.prove()
 
 
