@@ -15,7 +15,12 @@ from planner_core.access import opportunities as tasks
 from planner_core.access.eligibility import Eligibility
 from planner_core.access.given import table_of, with_given
 from planner_core.access.limits import Limits, TargetLimits
-from planner_core.access.passes import contacts_of, downlinks_of
+from planner_core.access.passes import (
+    PlacedContacts,
+    contacts_of,
+    downlinks_of,
+    without_halves_of_their_own,
+)
 from planner_core.access.windows import Accesses, find_accesses
 from planner_core.budget import Budget, Progress
 from planner_core.domain import (
@@ -157,8 +162,10 @@ def compute_opportunities(scenario: Scenario, budget: Budget) -> ScenarioOpportu
     kinds = (COLLECT, CONTACT) if scenario.use_resources else (COLLECT,)
     collects = _Collects(scenario, places[COLLECT])
     contact = Limits.of_stations(scenario.ground_stations)
+    contacts: list[PlacedContacts] = []
     parts: list[tasks.Columns] = []
     lit: list[Sunlight] = []
+    numbered: list[int] = []  # the accesses before those to stations, by satellite
     num_accesses = num_rows = 0
     num_steps = 2 * len(scenario.satellites)
     for index, satellite in enumerate(scenario.satellites):
@@ -169,12 +176,20 @@ def compute_opportunities(scenario: Scenario, budget: Budget) -> ScenarioOpportu
                 found, placed = collects.placed(satellite.sensor, path, budget)
             else:
                 found = find_accesses(path, places[kind], contact, budget.stop)
-                placed = contacts_of(scenario, satellite, path, places[kind], found)
+                contacts.append(contacts_of(scenario, satellite, path, places[kind], found))
+                numbered.append(num_accesses)
+                num_accesses += len(found)
+                continue
             parts.append(tasks.rows_of(index, kind, found, num_accesses, placed))
             num_accesses += len(found)
             num_rows += len(placed[0])
             tasks.check_number(num_rows)
         lit.append(sunlight(path))
+    offered = without_halves_of_their_own(contacts, scenario.ground_stations)
+    for index, (own, before, placed) in enumerate(zip(contacts, numbered, offered, strict=True)):
+        parts.append(tasks.rows_of(index, CONTACT, own.passes, before, placed))
+        num_rows += len(placed[0])
+        tasks.check_number(num_rows)
     described = tasks.Described(
         tasks.in_order(
             parts, [t.id for t in scenario.targets], [s.id for s in scenario.ground_stations]

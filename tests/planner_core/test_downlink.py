@@ -21,7 +21,9 @@ from planner_core.pins import PinnedAction, Pins
 from planner_core.problem import (
     COLLECT,
     CONTACT,
+    Bools,
     Downlinks,
+    Opportunities,
     PassRate,
     Problem,
     StationLinks,
@@ -245,6 +247,103 @@ def test_plain_passes_are_offered_whole_alone() -> None:
     lasts_s = table.end_s[contacts] - table.start_s[contacts]
     rate = plain.resources.downlink_per_s
     assert (problem.satellites[0].volume[contacts] == lasts_s * rate).all()
+
+
+def _two(antennas: int = 1, **own: Any) -> Scenario:
+    """Return two plain satellites that pass stations half a minute after each other."""
+    plain = satellite(orbit())
+    ahead = replace(mean_elements(plain.orbit), mean_anomaly_deg=2.0, norad_cat_id=7)
+    both = (plain, replace(plain, id="ahead", name="Ahead", orbit=ahead))
+    return _mission(
+        satellites=tuple(
+            replace(one, resources=replace(Resources.paper(5668.7), **own)) for one in both
+        ),
+        ground_stations=tuple(replace(s, antennas=antennas) for s in (SVALBARD, TROLL)),
+    )
+
+
+@pytest.mark.parametrize("knots", [(), KNOTS])
+def test_passes_that_two_satellites_want_at_a_time_are_offered_in_halves(
+    knots: tuple[tuple[float, float], ...],
+) -> None:
+    problem = _built(_two(downlink_by_elevation=knots))
+    table = problem.opportunities
+    num_shared = 0
+    for index, one in enumerate(problem.satellites):
+        for access in np.unique(table.access[one.rows[one.kind == CONTACT]]):
+            rows = np.flatnonzero(table.access == access)
+            others = (table.place == table.place[rows[0]]) & (table.satellite != index)
+            others &= (table.kind == CONTACT) & (table.access_start_s < table.access_end_s[rows[0]])
+            is_shared = bool((others & (table.access_end_s > table.access_start_s[rows[0]])).any())
+            halves = [
+                row for row in rows.tolist()
+                if (table.start_s[row] == table.access_start_s[row] + 2.0)
+                or ((table.end_s[row] == table.access_end_s[row])
+                and table.start_s[row] > table.access_start_s[row])
+            ]  # fmt: skip
+            num_shared += is_shared
+            # Once a station that needs setup is set up there may be no time for a half.
+            assert len(halves) == 2 * is_shared or (is_shared and table.place[rows[0]] == 1)
+            volume = one.volume[problem.local_row[rows]]
+            for row in halves:
+                share = one.volume[problem.local_row[row]] / volume.max()
+                assert share == pytest.approx(0.5, abs=0.02)
+    assert num_shared >= 4
+
+
+def test_who_has_an_antenna_needs_no_half() -> None:
+    table = _built(_two(antennas=2)).opportunities
+    is_contact = table.kind == CONTACT
+    assert not (table.start_s == table.access_start_s + 2.0)[is_contact].any()
+
+
+def test_a_booking_in_whole_seconds_tells_a_pass_from_its_first_half() -> None:
+    scenario = _two()
+    table = _built(scenario).opportunities
+    half = int(np.flatnonzero(table.start_s == table.access_start_s + 2.0)[0])
+    whole = int(
+        np.flatnonzero(
+            (table.access == table.access[half]) & (table.start_s == table.access_start_s)
+        )[0]
+    )
+    for row in (half, whole):
+        named = PinnedAction(
+            satellite_id=scenario.satellites[int(table.satellite[row])].id,
+            station_id=scenario.ground_stations[int(table.place[row])].id,
+            start=scenario.horizon.instant(float(np.round(table.start_s[row]))),
+        )
+        kept = _built(replace(scenario, pins=Pins(keep=(named,))))
+        (only,) = kept.kept_rows
+        assert kept.opportunities.start_s[only] == table.start_s[row]
+        assert kept.opportunities.end_s[only] == table.end_s[row]
+
+
+def test_two_satellites_share_a_pass() -> None:
+    """With halves both bring an image down in one pass, where one of them did with the whole."""
+    problem = _built(_two(downlink_per_s=0.01))
+    table = problem.opportunities
+    contacts = np.flatnonzero(table.kind == CONTACT)
+    first = next(r for r in contacts if table.start_s[r] == table.access_start_s[r] + 2.0)
+    later = next(
+        r for r in contacts
+        if table.satellite[r] != table.satellite[first] and table.place[r] == table.place[first]
+        and table.access_start_s[r] < table.access_end_s[first] < table.access_end_s[r] + 600.0
+        and table.start_s[r] >= table.end_s[first]
+    )  # fmt: skip
+    assert replay(problem, Plan.of(problem, sorted((int(first), int(later))))).is_valid
+    whole = [
+        int(np.flatnonzero((table.access == table.access[r]) & (contacts_of_pass(table, r)))[0])
+        for r in (int(first), int(later))
+    ]
+    assert not replay(problem, Plan.of(problem, sorted(whole))).is_valid
+
+
+def contacts_of_pass(table: Opportunities, row: int) -> Bools:
+    """Return which contacts are their whole pass, of those of a row's pass."""
+    is_its = table.access == table.access[row]
+    is_whole: Bools = is_its & (table.start_s == table.access_start_s)
+    is_whole &= table.end_s == table.access_end_s
+    return is_whole
 
 
 def test_a_pin_on_a_pass_means_all_of_it() -> None:
