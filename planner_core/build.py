@@ -19,7 +19,7 @@ from planner_core.access.passes import (
     PlacedContacts,
     contacts_of,
     downlinks_of,
-    without_halves_of_their_own,
+    with_halves_to_share,
 )
 from planner_core.access.windows import Accesses, find_accesses
 from planner_core.budget import Budget, Progress
@@ -185,7 +185,7 @@ def compute_opportunities(scenario: Scenario, budget: Budget) -> ScenarioOpportu
             num_rows += len(placed[0])
             tasks.check_number(num_rows)
         lit.append(sunlight(path))
-    offered = without_halves_of_their_own(contacts, scenario.ground_stations)
+    offered = with_halves_to_share(contacts, scenario.ground_stations)
     for index, (own, before, placed) in enumerate(zip(contacts, numbered, offered, strict=True)):
         parts.append(tasks.rows_of(index, CONTACT, own.passes, before, placed))
         num_rows += len(placed[0])

@@ -124,25 +124,28 @@ def _part_ms(one: Pass, station: GroundStation, share: float) -> tuple[int, int]
 def _halves_ms(one: Pass, station: GroundStation) -> list[tuple[int, int]]:
     """Return the halves of a pass by its data, the station's setup before each.
 
-    The first begins a little after the pass: bookings name a contact by its start.
+    The first begins a little after the pass: bookings name a contact by its start. A pass so short
+    that the second would begin with the first has none.
     """
     rate = one.rate
     begin_s, end_s = float(rate.time_s[0]) + _APART_S, float(rate.time_s[-1])
     first, last = rate.until(np.array([begin_s + station.setup_s, end_s])).tolist()
     middle_s = float(rate.when(np.array([0.5 * (first + last)]))[0])
-    later_s = max(begin_s, middle_s - station.setup_s)
+    later_s = middle_s - station.setup_s
+    if later_s < begin_s + _APART_S:
+        return []
     return [
         (math.ceil(from_s * _MS_PER_S), math.floor(to_s * _MS_PER_S))
         for from_s, to_s in ((begin_s, middle_s), (later_s, end_s))
     ]
 
 
-def without_halves_of_their_own(
+def with_halves_to_share(
     contacts: Sequence[PlacedContacts], stations: Sequence[GroundStation]
 ) -> list[Placed]:
-    """Return the contacts of all satellites, with halves of passes alone that several want.
+    """Return the contacts of all satellites, with halves where several want a pass.
 
-    Those are passes that more satellites want at an instant than their station has antennas for.
+    That is where more satellites pass a station at an instant than it has antennas.
     """
     wanted = [np.zeros(len(own.passes), dtype=np.bool_) for own in contacts]
     for place, station in enumerate(stations):
