@@ -163,9 +163,9 @@ def compute_opportunities(scenario: Scenario, budget: Budget) -> ScenarioOpportu
     collects = _Collects(scenario, places[COLLECT])
     contact = Limits.of_stations(scenario.ground_stations)
     contacts: list[PlacedContacts] = []
+    before_contacts: list[int] = []  # how many accesses there are, by satellite
     parts: list[tasks.Columns] = []
     lit: list[Sunlight] = []
-    numbered: list[int] = []  # the accesses before those to stations, by satellite
     num_accesses = num_rows = 0
     num_steps = 2 * len(scenario.satellites)
     for index, satellite in enumerate(scenario.satellites):
@@ -177,7 +177,7 @@ def compute_opportunities(scenario: Scenario, budget: Budget) -> ScenarioOpportu
             else:
                 found = find_accesses(path, places[kind], contact, budget.stop)
                 contacts.append(contacts_of(scenario, satellite, path, places[kind], found))
-                numbered.append(num_accesses)
+                before_contacts.append(num_accesses)
                 num_accesses += len(found)
                 continue
             parts.append(tasks.rows_of(index, kind, found, num_accesses, placed))
@@ -186,8 +186,9 @@ def compute_opportunities(scenario: Scenario, budget: Budget) -> ScenarioOpportu
             tasks.check_number(num_rows)
         lit.append(sunlight(path))
     offered = with_halves_to_share(contacts, scenario.ground_stations)
-    for index, (own, before, placed) in enumerate(zip(contacts, numbered, offered, strict=True)):
-        parts.append(tasks.rows_of(index, CONTACT, own.passes, before, placed))
+    for index, placed in enumerate(offered):
+        passes, before = contacts[index].passes, before_contacts[index]
+        parts.append(tasks.rows_of(index, CONTACT, passes, before, placed))
         num_rows += len(placed[0])
         tasks.check_number(num_rows)
     described = tasks.Described(

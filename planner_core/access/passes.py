@@ -180,6 +180,7 @@ def contacts_of(
     stations, resources = scenario.ground_stations, satellite.resources
     varies = bool(resources.downlink_by_elevation)
     has_parts = varies or any(station.setup_s > 0.0 for station in stations)
+    # Which passes are shared is known once all satellites are, and their paths are not kept.
     has_halves = len(scenario.satellites) > 1
     if not has_parts and not has_halves:
         placed = place_contacts(found, stations)

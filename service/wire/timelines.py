@@ -430,6 +430,13 @@ class ProofOut(Wire):
             "capacity, in the order of the opportunities."
         ),
     )
+    antenna_prices: tuple[float, ...] | None = Field(
+        None,
+        description=(
+            "A multiplier for each group of contacts that want the same antennas at a time, by "
+            "station and in order of time."
+        ),
+    )
     queue_levels: int | None = Field(
         None,
         description=(

@@ -29,19 +29,7 @@ from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import Task, make_problem, random_problem, varied_problem
 
 SEEDS = st.integers(0, 10**6)
-NEVER_DECAYS = Objective(collected_share=0.0)
-ROOMY = Resources(
-    battery_min_fraction=0.0,
-    initial_battery_fraction=1.0,
-    sunpoint_charge_per_s=0.0,
-    collect_drain_per_s=0.0,
-    contact_drain_per_s=0.0,
-    recorder_max_fraction=1.0,
-    initial_recorder_fraction=0.0,
-    collect_fill_per_s=0.001,
-    downlink_per_s=0.001,
-    telemetry_per_s=0.0,
-)
+ROOMY = replace(Resources.limitless(), collect_fill_per_s=0.001, downlink_per_s=0.001)
 
 
 def crowded(seed: int, dynamics: Dynamics, objective: Objective, antennas: int = 1) -> Problem:
@@ -60,7 +48,7 @@ def shared_pass() -> Problem:
         for i, at_s in enumerate((100.0 + s, 400.0 + s))
     ]
     problem = make_problem(tasks, num_targets=4, num_satellites=2, resources=ROOMY)
-    return with_objective(problem, NEVER_DECAYS)
+    return with_objective(problem, Objective.delivered())
 
 
 @examples(100)

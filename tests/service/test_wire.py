@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from dataclasses import fields
 from typing import Any, get_args
 
+import numpy as np
 import pytest
 from fastapi import FastAPI
 from fastapi.routing import APIRoute
@@ -13,6 +15,8 @@ from pydantic import BaseModel, ValidationError, create_model
 
 from planner_core import domain, pins
 from planner_core.budget import Budget
+from planner_core.certified.proofs import documents as proofs
+from planner_core.certified.proofs.bound import Bound
 from planner_core.reasons import reason
 from planner_core.solvers.base import Constraint
 from planner_core.solvers.registry import solver_class
@@ -195,6 +199,24 @@ def test_real_answers_hold_nothing_that_is_not_declared(
     assert any(target["reason"] for target in targets)
     proof = json.loads(answer.proof or "null")
     assert dumped(timelines.ProofOut(**proof)).items() >= proof.items()
+
+
+def test_every_part_of_a_proof_is_declared() -> None:
+    given = Bound(
+        value=3.5,
+        proof="dp",
+        prices=np.array([0.5, 1.0]),
+        contact_prices=np.array([2.0]),
+        antenna_prices=np.array([0.25, 0.0]),
+        queue_levels=12,
+        is_elementary=True,
+        unit=0.5,
+        log="HiGHS",
+        on_board=1.0,
+    )
+    written = json.loads(proofs.to_json(given))
+    assert len(written) == 1 + len(fields(Bound)) - 1  # its version; no refutation
+    assert dumped(timelines.ProofOut(**written)).items() >= written.items()
 
 
 def test_readers_take_fields_and_words_that_are_not_known_yet() -> None:

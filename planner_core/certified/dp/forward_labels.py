@@ -333,6 +333,7 @@ def _take(
         if to > levels.after[row] or to >= levels.num_levels:
             continue
         low, high = source.low[y], min(source.high[y], most - gained)
+        # What a path has not gained yet it cannot pay: it is left with nothing.
         for v in range(low, min(high + 1, -gained)):
             left = min(source.energy[y, v - source.first] + give, cap) - cost
             if left >= floor:

@@ -48,9 +48,9 @@ class LatencyAscent:
         # By typical image, as targets are; contacts of the table, others none.
         self._tolls = np.zeros(len(problem.opportunities))
         self._groups = antenna_groups(problem)
-        self._dues = np.zeros(len(self._groups))
+        self._antenna = np.zeros(len(self._groups))
         self._images_per_contact = self._images_that_contacts_take()
-        self._best = self._prices, self._tolls, self._dues
+        self._best = self._prices, self._tolls, self._antenna
         self._length, self._num_idle = 1.0, 0
         self.contact_sets: dict[tuple[int, ...], None] = {}
         self.value = float(problem.best_worth.sum())
@@ -91,8 +91,8 @@ class LatencyAscent:
     @property
     def antenna_prices(self) -> Floats | None:
         """The best prices of antennas, None where there are none. Shape ``(num_groups,)``."""
-        _, _, dues = self._best
-        return dues if dues.any() else None
+        _, _, antenna = self._best
+        return antenna if antenna.any() else None
 
     def bound(self, *, is_last: bool = True) -> Bound:
         """Return the least that was proven so far.
@@ -130,15 +130,15 @@ class LatencyAscent:
         return float(np.mean(np.maximum(np.concatenate([*volumes, np.ones(1)]), 1.0)))
 
     def _go_round(self, level: float, stop: Bytes) -> None:
-        value = float(self._prices.sum()) + paid_for_antennas(self._problem, self._dues)
-        dues = antenna_tolls(self._problem, self._dues)
+        value = float(self._prices.sum()) + paid_for_antennas(self._problem, self._antenna)
+        antenna = antenna_tolls(self._problem, self._antenna)
         too_many = np.append(-np.ones(len(self._most) - 1), 0.0)
         too_much = np.zeros(len(self._tolls))
         is_taken = np.zeros(len(self._tolls), dtype=np.bool_)
         for one in self._satellites:
             if stop[0]:
                 return
-            tolls = Tolls(self._tolls[one.contacts] / one.typical, dues[one.contacts])
+            tolls = Tolls(self._tolls[one.contacts] / one.typical, antenna[one.contacts])
             gained, path, layer = one.most(self._prices, tolls)
             value += gained
             np.add.at(too_many, one.target[path], 1.0)
@@ -149,36 +149,36 @@ class LatencyAscent:
         self.contact_sets.pop(contacts, None)
         self.contact_sets[contacts] = None
         if self._is_hopeful(value):
-            crowds = np.array([is_taken[g.rows].sum() - g.limit for g in self._groups])
-            self._move(value - level, too_many, too_much, self._images_per_contact * crowds)
+            excess = np.array([is_taken[g.rows].sum() - g.limit for g in self._groups])
+            self._move(value - level, too_many, too_much, self._images_per_contact * excess)
 
     def _is_hopeful(self, value: float) -> bool:
         """Note what the prices of the moment prove; go back to better ones after a while."""
         if value < self.value * (1.0 - SAME):
-            self._best, self._num_idle = (self._prices, self._tolls, self._dues), 0
+            self._best, self._num_idle = (self._prices, self._tolls, self._antenna), 0
             self.value = value
             return True
         self._num_idle += 1
         if self._num_idle < TUNING.patience:
             return True
         self._length, self._num_idle = TUNING.shorter * self._length, 0
-        self._prices, self._tolls, self._dues = self._best
+        self._prices, self._tolls, self._antenna = self._best
         return False
 
-    def _move(self, above: float, too_many: Floats, too_much: Floats, crowds: Floats) -> None:
+    def _move(self, above: float, too_many: Floats, too_much: Floats, excess: Floats) -> None:
         """Move all multipliers against what the answers take too much of.
 
         Parameters
         ----------
-        crowds
+        excess
             Of each group of contacts, in images that they can bring down. Shape ``(num_groups,)``.
         """
         too_many = np.where((self._prices <= 0.0) & (too_many < 0.0), 0.0, too_many)
         too_much = np.where((self._tolls <= 0.0) & (too_much < 0.0), 0.0, too_much)
-        crowds = np.where((self._dues <= 0.0) & (crowds < 0.0), 0.0, crowds)
-        squares = sum(float(np.square(each).sum()) for each in (too_many, too_much, crowds))
+        excess = np.where((self._antenna <= 0.0) & (excess < 0.0), 0.0, excess)
+        squares = sum(float(np.square(each).sum()) for each in (too_many, too_much, excess))
         above = min(above, TUNING.far_above * self.value)
         step = self._length * above / squares if squares > 0.0 else 0.0
         self._prices = np.clip(self._prices + step * too_many, 0.0, self._most)
         self._tolls = np.maximum(self._tolls + step * too_much, 0.0)
-        self._dues = np.maximum(self._dues + step * self._images_per_contact * crowds, 0.0)
+        self._antenna = np.maximum(self._antenna + step * self._images_per_contact * excess, 0.0)

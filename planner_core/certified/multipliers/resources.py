@@ -221,8 +221,8 @@ class PriceSearch:
         images = np.flatnonzero((taken > 0.0) & (table.kind == COLLECT))
         images = images[problem.worth[images] >= prices[table.place[images]]]
         counts = np.bincount(table.place[images], minlength=len(prices))
-        crowds = np.array([taken[group.rows].sum() - group.limit for group in self._groups])
-        self.wants_antennas |= bool(np.any(crowds > 0.0))
+        excess = np.array([taken[group.rows].sum() - group.limit for group in self._groups])
+        self.wants_antennas |= bool(np.any(excess > 0.0))
         paid = float(prices.sum()) + paid_for_antennas(problem, antenna_prices)
         rounded_away = 1e-9 * len(worth) * self.unit
-        return paid + units * self.unit + rounded_away, np.append(counts - 1.0, crowds)
+        return paid + units * self.unit + rounded_away, np.append(counts - 1.0, excess)
