@@ -21,8 +21,9 @@ from typing import Any, Final
 
 from benchmarks.cpu_budget import CpuBudget
 from benchmarks.fleet_missions import Files, fleet_scenario
+from planner_core.access.scenario_opportunities import compute_opportunities
 from planner_core.budget import Budget, Progress
-from planner_core.build import build_problem, compute_opportunities
+from planner_core.build import build_problem
 from planner_core.domain import Dynamics
 from planner_core.referee.replay import replay
 from planner_core.solvers.registry import Certified

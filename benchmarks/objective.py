@@ -21,8 +21,8 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from benchmarks.cpu_budget import CpuBudget
+from planner_core.access.scenario_opportunities import ScenarioOpportunities, compute_opportunities
 from planner_core.budget import Budget
-from planner_core.build import ScenarioOpportunities, compute_opportunities
 from planner_core.certified.solver import Certified
 from planner_core.run import plan_scenario
 from service.commands import demo_mission

@@ -11,8 +11,9 @@ from dataclasses import replace
 from typing import get_args
 
 from benchmarks.missions import paper_scenario
+from planner_core.access.scenario_opportunities import compute_opportunities
 from planner_core.budget import Budget
-from planner_core.build import build_problem, compute_opportunities
+from planner_core.build import build_problem
 from planner_core.certified.solver import Certified
 from planner_core.domain import Objective, Preference
 from planner_core.preferences.polish import polished

@@ -14,8 +14,9 @@ from collections import Counter
 from collections.abc import Callable
 
 from benchmarks.missions import paper_scenario
+from planner_core.access.scenario_opportunities import compute_opportunities
 from planner_core.budget import Budget
-from planner_core.build import build_problem, compute_opportunities
+from planner_core.build import build_problem
 from planner_core.reasons.at_length import explain_target
 from planner_core.reasons.explain import explain
 from planner_core.referee.replay import replay

@@ -28,9 +28,10 @@ import numpy as np
 from benchmarks import fleet_missions
 from benchmarks.cpu_budget import CpuBudget
 from benchmarks.missions import ORBIT, START, paper_scenario, problem_of
+from planner_core.access.opportunities_after import opportunities_after
+from planner_core.access.scenario_opportunities import compute_opportunities
 from planner_core.budget import Budget
-from planner_core.build import build_problem, compute_opportunities
-from planner_core.build_after import PlanBefore, opportunities_after
+from planner_core.build import build_problem
 from planner_core.domain import (
     Outage,
     Replan,
@@ -44,6 +45,7 @@ from planner_core.problem import COLLECT, Problem
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
 from planner_core.replanning.known import KnownPrices, prices_of
+from planner_core.replanning.plan_before import PlanBefore
 from planner_core.replanning.programs import fewest_changes
 from planner_core.replanning.question import Question
 from planner_core.replanning.replan import question_of, solve_replan
@@ -249,7 +251,7 @@ def urgent_requests(files: fleet_missions.Files, number: int) -> Iterator[Asked]
         urgent = replace(target, reward=_URGENT_REWARD)
         asked = replace(scenario, targets=(*scenario.targets, urgent), replan=replan)
         clock = [time.process_time()]
-        table = opportunities_after(asked, before, Budget())
+        table = opportunities_after(asked, scenario, opportunities, Budget())
         clock.append(time.process_time())
         left = build_problem(asked, table, Budget())
         question = question_of(asked, left, before.asked_by(asked))

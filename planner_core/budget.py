@@ -11,6 +11,8 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from planner_core.errors import Cancelled
+
 Bytes = npt.NDArray[np.uint8]
 
 
@@ -89,6 +91,18 @@ class Budget:
     def until_cancelled(self) -> Budget:
         """Return a budget for work that is of use only as a whole: the time does not end it."""
         return _Whole(self)
+
+    def proceed(self, progress: Progress) -> None:
+        """Report the progress of work that is of use only as a whole, unless it has to stop.
+
+        Raises
+        ------
+        Cancelled
+            The budget is spent.
+        """
+        if self.is_spent():
+            raise Cancelled
+        self.report(progress)
 
     def cancel(self) -> None:
         """Ask the work to stop; safe to call from another thread."""

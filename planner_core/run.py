@@ -8,9 +8,9 @@ import time
 from dataclasses import dataclass, replace
 from typing import Final
 
+from planner_core.access.scenario_opportunities import ScenarioOpportunities, compute_opportunities
 from planner_core.budget import Budget, Progress, Termination
-from planner_core.build import ScenarioOpportunities, build_problem, compute_opportunities
-from planner_core.build_after import PlanBefore, opportunities_after
+from planner_core.build import build_problem
 from planner_core.certified.drivers.continuous import with_own_starts
 from planner_core.certified.lns.downlinks import brought_down
 from planner_core.certified.proofs import continuous
@@ -25,6 +25,7 @@ from planner_core.reasons.explain import explain
 from planner_core.reasons.reason import Search, TargetOutcome
 from planner_core.referee.replay import replay
 from planner_core.referee.timeline import Timeline
+from planner_core.replanning.plan_before import PlanBefore
 from planner_core.replanning.relief import flyable, replanned, within_limits
 from planner_core.replanning.replan import question_of
 from planner_core.solvers.base import Solution, Solver
@@ -102,7 +103,7 @@ def plan_scenario(
     preparation = budget.until_cancelled()
     opportunities = computed
     if opportunities is None and before is not None:
-        opportunities = opportunities_after(scenario, before, preparation)
+        opportunities = before.opportunities_of(scenario, preparation)
     opportunities = opportunities or compute_opportunities(scenario, preparation)
     clock.append(time.perf_counter())
     problem = build_problem(scenario, opportunities, preparation)

@@ -10,7 +10,7 @@ from typing import Final
 
 PACKAGE: Final = Path(__file__).parent
 
-_WHAT_MAKES_OPPORTUNITIES: Final = ("build.py", "domain", "access", "data", "orbits", "problem")
+_WHAT_MAKES_OPPORTUNITIES: Final = ("domain", "access", "data", "orbits", "problem")
 
 
 def fingerprint(package: Path, paths: Iterable[Path]) -> str:

@@ -20,8 +20,9 @@ import numpy.typing as npt
 from benchmarks.aeossp.case import Case, Observation
 from benchmarks.aeossp.geometry import Sky, angle_deg, turn_s
 from benchmarks.aeossp.verifier import verify
+from planner_core.access.scenario_opportunities import compute_opportunities
 from planner_core.budget import Budget, Termination
-from planner_core.build import build_problem, compute_opportunities
+from planner_core.build import build_problem
 from planner_core.certified.lns.search import improved
 from planner_core.domain import (
     Agility,

@@ -14,8 +14,9 @@ import numpy as np
 from benchmarks.clouds.forecast import forecast_of
 from benchmarks.clouds.weather import Floats, Places, Weather, position_km
 from benchmarks.missions import paper_scenario
+from planner_core.access.scenario_opportunities import ScenarioOpportunities, compute_opportunities
 from planner_core.budget import Budget
-from planner_core.build import ScenarioOpportunities, build_problem, compute_opportunities
+from planner_core.build import build_problem
 from planner_core.domain import Scenario
 from planner_core.problem import Problem
 from planner_core.referee.replay import replay

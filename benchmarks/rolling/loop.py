@@ -21,9 +21,8 @@ from benchmarks.rolling.world import (
     Luck,
     worth_down,
 )
+from planner_core.access.scenario_opportunities import compute_opportunities
 from planner_core.budget import Budget
-from planner_core.build import compute_opportunities
-from planner_core.build_after import PlanBefore
 from planner_core.domain import (
     Horizon,
     Objective,
@@ -39,6 +38,7 @@ from planner_core.domain import (
 from planner_core.pins import BlockedInterval, PinnedAction, Pins
 from planner_core.problem import COLLECT, Problem
 from planner_core.problem.plan import Plan
+from planner_core.replanning.plan_before import PlanBefore
 from planner_core.run import Judged, plan_scenario
 from planner_core.solvers.registry import Certified
 

@@ -42,7 +42,7 @@ class Scenario:
         What of that it earns when it is taken, and what when it is on the ground. Without
         resources there are no contacts, and images earn all when they are taken.
     allow_old_elements
-        Plan with element sets of any age (see ``build.check_element_age``).
+        Plan with element sets of any age (see ``orbits.checks.check_element_age``).
     outages
         What is known to be out, and when.
     states
@@ -105,6 +105,15 @@ class Scenario:
                 "a plan to go on from has opportunities at fixed starts",
             )
             self.replan.check(satellite_ids, target_ids, station_ids)
+
+    @property
+    def has_continuous_starts(self) -> bool:
+        """Whether collects may start anywhere in their accesses.
+
+        The events of ``dynamics: paper`` are the starts of opportunities: it knows no others.
+        """
+        knows_starts_alone = self.use_resources and self.dynamics == "paper"
+        return self.continuous_starts and not knows_starts_alone
 
     def _check_starts(self) -> None:
         """Refuse starts of collects that other fields say nothing of."""

@@ -12,8 +12,8 @@ from typing import Any, Final
 
 import numpy as np
 
+from planner_core.access.scenario_opportunities import compute_opportunities
 from planner_core.budget import Budget
-from planner_core.build import compute_opportunities
 from planner_core.domain import Scenario, Sensor, Target
 from planner_core.errors import PropagationFailed
 from planner_core.pins import Pins

@@ -6,8 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
+from planner_core.access.scenario_opportunities import ScenarioOpportunities
 from planner_core.budget import Budget, Termination
-from planner_core.build import ScenarioOpportunities, build_problem
+from planner_core.build import build_problem
 from planner_core.domain import Scenario
 from planner_core.problem import Problem
 from planner_core.problem.plan import Plan

@@ -9,7 +9,7 @@ from typing import Final, get_args
 
 import numpy as np
 
-from planner_core.build import view_at
+from planner_core.access.scenario_opportunities import view_at
 from planner_core.domain import Scenario
 from planner_core.mistakes import mistakes_of_accesses, usual_mistakes
 from planner_core.orbits.sgp4_record import GRAVITY

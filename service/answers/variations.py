@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 
 from pydantic import ValidationError
 
+from planner_core.access.scenario_opportunities import ScenarioOpportunities, compute_opportunities
 from planner_core.budget import Budget
-from planner_core.build import ScenarioOpportunities, build_problem, compute_opportunities
+from planner_core.build import build_problem
 from planner_core.domain import Agility, Quality, Resources, Scenario
 from planner_core.errors import InvalidScenario
 from planner_core.pins import PinnedAction, Pins

@@ -10,7 +10,7 @@ import sqlalchemy as sa
 from fastapi import APIRouter, Query, Request, Response
 from sqlalchemy.orm import Session
 
-from planner_core.build import view_at
+from planner_core.access.scenario_opportunities import view_at
 from planner_core.orbits.places import View
 from planner_core.problem import COLLECT, CONTACT, Opportunities
 from service.access.callers import Caller

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
+from planner_core.access.scenario_opportunities import ScenarioOpportunities
 from planner_core.budget import Budget
-from planner_core.build import ScenarioOpportunities
 from planner_core.solvers.registry import solver_class
 from service.commands.scenario_files import read_object, require_folder
 from service.commands.solve import Search, answer_of

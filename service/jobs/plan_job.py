@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import cast
 
 from planner_core import __version__
+from planner_core.access.scenario_opportunities import ScenarioOpportunities
 from planner_core.budget import Budget
-from planner_core.build import ScenarioOpportunities
-from planner_core.build_after import PlanBefore
 from planner_core.certified.proofs import documents as proofs
+from planner_core.replanning.plan_before import PlanBefore
 from planner_core.run import plan_scenario
 from planner_core.solvers.base import Solver
 from planner_core.solvers.registry import solver_class

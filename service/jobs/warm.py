@@ -22,8 +22,9 @@ from typing import Final
 import numpy as np
 from numba.core import event
 
+from planner_core.access.scenario_opportunities import compute_opportunities
 from planner_core.budget import Budget
-from planner_core.build import build_problem, compute_opportunities
+from planner_core.build import build_problem
 from planner_core.certified.drivers.agility_only import FreeSearch
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.alternating import TurnSearch

@@ -14,9 +14,9 @@ from pydantic import BaseModel, ValidationError
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
-from planner_core.build import check_element_age, check_propagation, orbit_warnings
 from planner_core.errors import InvalidScenario, PlannerError
 from planner_core.mistakes import usual_mistakes
+from planner_core.orbits.checks import check_element_age, check_propagation, orbit_warnings
 from service.db.ids import new_id
 from service.db.rows import GroundStationRow, SatelliteRow, ScenarioRow, TargetCatalogRow, TargetRow
 from service.db.session import Database

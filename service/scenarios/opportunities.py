@@ -8,8 +8,8 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 
+from planner_core.access.scenario_opportunities import ScenarioOpportunities, compute_opportunities
 from planner_core.budget import Budget
-from planner_core.build import ScenarioOpportunities, compute_opportunities
 from planner_core.domain import Scenario
 from service.db.rows import ScenarioRow
 from service.db.session import Database

@@ -8,9 +8,10 @@ from typing import Final
 
 from sqlalchemy.orm import Session
 
+from planner_core.access.scenario_opportunities import compute_opportunities
 from planner_core.budget import Budget
-from planner_core.build import check_element_age, check_propagation, compute_opportunities
 from planner_core.errors import Cancelled, InvalidScenario
+from planner_core.orbits.checks import check_element_age, check_propagation
 from service.db.rows import SatelliteRow
 from service.scenarios.freezing import satellites_of
 from service.scenarios.opportunities import Described

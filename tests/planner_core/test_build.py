@@ -10,16 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner_core.budget import Budget, Progress
-from planner_core.build import (
+from planner_core.access.scenario_opportunities import (
     ScenarioOpportunities,
-    build_problem,
-    check_element_age,
-    check_propagation,
     compute_opportunities,
-    orbit_warnings,
     view_at,
 )
+from planner_core.budget import Budget, Progress
+from planner_core.build import build_problem
 from planner_core.domain import (
     GroundStation,
     Horizon,
@@ -30,6 +27,7 @@ from planner_core.domain import (
     mean_elements,
 )
 from planner_core.errors import Cancelled, InvalidScenario, PropagationFailed
+from planner_core.orbits.checks import check_element_age, check_propagation, orbit_warnings
 from planner_core.orbits.places import View
 from planner_core.problem import (
     ACCESS_FOUND,

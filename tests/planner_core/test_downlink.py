@@ -10,8 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from planner_core.access.scenario_opportunities import compute_opportunities
 from planner_core.budget import Budget
-from planner_core.build import build_problem, compute_opportunities
+from planner_core.build import build_problem
 from planner_core.certified.proofs.resource_bound import quick_bound, resource_value
 from planner_core.certified.proofs.totals import totals_bound
 from planner_core.domain import Dynamics, GroundStation, Resources, Scenario, Target, mean_elements

@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from planner_core.access.scenario_opportunities import compute_opportunities
 from planner_core.budget import Budget
-from planner_core.build import build_problem, compute_opportunities
+from planner_core.build import build_problem
 from planner_core.domain import (
     Agility,
     Flown,

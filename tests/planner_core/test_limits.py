@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.access.limits import Limits
+from planner_core.access.scenario_opportunities import compute_opportunities
 from planner_core.access.windows import find_accesses
 from planner_core.budget import Budget
-from planner_core.build import compute_opportunities
 from planner_core.domain import Horizon, Scenario, Sensor, Target
 from planner_core.errors import InvalidScenario
 from planner_core.orbits.ephemeris import Ephemeris, propagate

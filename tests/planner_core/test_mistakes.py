@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from planner_core.access.scenario_opportunities import compute_opportunities
 from planner_core.budget import Budget
-from planner_core.build import compute_opportunities
 from planner_core.domain import GroundStation, Quality, Resources, Scenario
 from planner_core.mistakes import mistakes_of_accesses, usual_mistakes
 from planner_core.problem import CONTACT

@@ -10,8 +10,9 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from planner_core.access.scenario_opportunities import compute_opportunities
 from planner_core.budget import Budget
-from planner_core.build import build_problem, compute_opportunities
+from planner_core.build import build_problem
 from planner_core.certified.proofs.resource_bound import quick_bound, resource_value
 from planner_core.domain import Agility, Horizon, Scenario, Target
 from planner_core.errors import InvalidScenario

@@ -10,8 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from planner_core.access.scenario_opportunities import compute_opportunities
 from planner_core.budget import Budget
-from planner_core.build import build_problem, compute_opportunities
+from planner_core.build import build_problem
 from planner_core.domain import Agility, Scenario, mean_elements
 from planner_core.orbits.ephemeris import propagate
 from planner_core.orbits.places import Places, line_of_sight_teme

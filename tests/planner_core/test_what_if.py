@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 from benchmarks.missions import paper_scenario
+from planner_core.access.scenario_opportunities import ScenarioOpportunities, compute_opportunities
 from planner_core.budget import Budget
-from planner_core.build import ScenarioOpportunities, build_problem, compute_opportunities
+from planner_core.build import build_problem
 from planner_core.domain import Dynamics, Horizon, Scenario
 from planner_core.errors import InvalidScenario
 from planner_core.pins import BlockedInterval, PinnedAction, Pins

@@ -6,8 +6,8 @@ from typing import Any
 
 import httpx
 
+from planner_core.access.scenario_opportunities import compute_opportunities
 from planner_core.budget import Budget
-from planner_core.build import compute_opportunities
 from service.scenarios.canonical import canonical, sha256_of
 from service.scenarios.translate import scenario_from_content
 from tests.planner_core.orbits.test_oem import lines, states, xml_of

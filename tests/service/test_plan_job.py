@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from planner_core.access.scenario_opportunities import ScenarioOpportunities, compute_opportunities
 from planner_core.budget import Budget
-from planner_core.build import ScenarioOpportunities, build_problem, compute_opportunities
+from planner_core.build import build_problem
 from planner_core.certified.proofs import documents as proofs
 from planner_core.certified.proofs.bound import Bound
 from planner_core.solvers.registry import SOLVERS

@@ -11,8 +11,8 @@ import httpx
 import pytest
 import sqlalchemy as sa
 
+from planner_core.access.scenario_opportunities import compute_opportunities
 from planner_core.budget import Budget
-from planner_core.build import compute_opportunities
 from planner_core.errors import InvalidScenario
 from planner_core.problem import Opportunities
 from service.db.rows import OpportunitySetRow, ScenarioRow

@@ -17,11 +17,12 @@ from skyfield.api import load
 from skyfield.sgp4lib import TEME
 
 from benchmarks.missions import ORBIT, paper_scenario
+from planner_core.access.scenario_opportunities import compute_opportunities
 from planner_core.budget import Budget
-from planner_core.build import check_element_age, check_propagation, compute_opportunities
 from planner_core.domain import Horizon, OrbitEphemeris, Satellite
 from planner_core.errors import InvalidElements, InvalidScenario
 from planner_core.orbits import frames
+from planner_core.orbits.checks import check_element_age, check_propagation
 from planner_core.orbits.ephemeris import propagate
 from planner_core.orbits.ingest import read_elements
 from planner_core.orbits.oem import MOST_LINES, Outline, outline_of, read_oem, tidy_lines

@@ -12,8 +12,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from planner_core.access.scenario_opportunities import compute_opportunities
 from planner_core.budget import Budget
-from planner_core.build import build_problem, compute_opportunities
+from planner_core.build import build_problem
 from planner_core.domain import Scenario
 from planner_core.problem import Problem
 from planner_core.referee.replay import plan_sha256, replay

@@ -6,8 +6,9 @@ import csv
 import io
 import json
 
+from planner_core.access.scenario_opportunities import compute_opportunities
 from planner_core.budget import Budget
-from planner_core.build import build_problem, compute_opportunities
+from planner_core.build import build_problem
 from planner_core.certified.proofs.documents import from_json, is_proven
 from service.scenarios.translate import scenario_from_content
 from tests.missions import PAPER_ORBIT, Document, drawn_targets, paper_mission

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-import planner_core.build_after
+import planner_core.access.opportunities_after
 import planner_core.run
+from planner_core.access.scenario_opportunities import ScenarioOpportunities, compute_opportunities
 from planner_core.budget import Budget
-from planner_core.build import ScenarioOpportunities, compute_opportunities
 from planner_core.domain import Scenario
 from planner_core.solvers.registry import Certified
 from service.jobs.held import HeldBlocks, make_folder, remove_folder
@@ -116,7 +116,7 @@ def test_cold_and_warm_workers_give_the_same_plan(
         return compute_opportunities(scenario, budget)
 
     monkeypatch.setattr(planner_core.run, "compute_opportunities", counted)
-    monkeypatch.setattr(planner_core.build_after, "compute_opportunities", counted)
+    monkeypatch.setattr(planner_core.access.opportunities_after, "compute_opportunities", counted)
     document = paper_mission(drawn_targets(60))
     num_targets = len(document["targets"])
     first = request(document, held_in=str(folder))

@@ -10,14 +10,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import planner_core.build_after
+import planner_core.access.opportunities_after
 from benchmarks.missions import ORBIT, paper_scenario
+from planner_core.access.opportunities_after import opportunities_after
+from planner_core.access.scenario_opportunities import ScenarioOpportunities, compute_opportunities
 from planner_core.budget import Budget
-from planner_core.build import ScenarioOpportunities, compute_opportunities
-from planner_core.build_after import PlanBefore, opportunities_after
 from planner_core.domain import Forecast, Horizon, Objective, Replan, Scenario, Target
 from planner_core.pins import PinnedAction
 from planner_core.problem import Opportunities
+from planner_core.replanning.plan_before import PlanBefore
 from tests.examples import examples
 
 
@@ -61,31 +62,31 @@ def test_it_is_bit_for_bit_what_is_computed_from_nothing(
     moved = [replace(t, lat_deg=-t.lat_deg) if i % 11 == 3 else t for i, t in enumerate(dearer)]
     targets: list[Target] = data.draw(st.permutations([*moved, *whole.targets[:num_new]]))
     asked = replace(whole, targets=tuple(targets))
-    earlier = PlanBefore(scenario=before, opportunities=known)
     assert_same(
-        opportunities_after(asked, earlier, Budget()), compute_opportunities(asked, Budget())
+        opportunities_after(asked, before, known, Budget()), compute_opportunities(asked, Budget())
     )
 
 
 def test_only_what_is_new_is_looked_for(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = mission(40)
     before = replace(whole, targets=whole.targets[1:])
-    earlier = PlanBefore(scenario=before, opportunities=compute_opportunities(before, Budget()))
+    known = compute_opportunities(before, Budget())
     computed: list[int] = []
 
     def counted(scenario: Scenario, budget: Budget) -> ScenarioOpportunities:
         computed.append(len(scenario.targets))
         return compute_opportunities(scenario, budget)
 
-    monkeypatch.setattr(planner_core.build_after, "compute_opportunities", counted)
-    opportunities_after(before, earlier, Budget())
+    monkeypatch.setattr(planner_core.access.opportunities_after, "compute_opportunities", counted)
+    opportunities_after(before, before, known, Budget())
     assert computed == []
-    opportunities_after(whole, earlier, Budget())
+    opportunities_after(whole, before, known, Budget())
     assert computed == [1]
     end = whole.horizon.end + timedelta(hours=1)
     longer = replace(whole, horizon=Horizon(start=whole.horizon.start, end=end))
     assert_same(
-        opportunities_after(longer, earlier, Budget()), compute_opportunities(longer, Budget())
+        opportunities_after(longer, before, known, Budget()),
+        compute_opportunities(longer, Budget()),
     )
     assert computed == [1, 40]
 

@@ -6,82 +6,41 @@ those that are new are looked for, and the others are as they were.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 
 import numpy as np
 
 from planner_core.access import opportunities as tasks
+from planner_core.access.scenario_opportunities import ScenarioOpportunities, compute_opportunities
 from planner_core.budget import Budget
-from planner_core.build import ScenarioOpportunities, compute_opportunities, orbit_warnings
-from planner_core.certified.proofs.bound import Bound
 from planner_core.domain import Scenario, Target
+from planner_core.orbits.checks import orbit_warnings
 from planner_core.pins import Pins
-from planner_core.problem import COLLECT, Opportunities
-from planner_core.replanning.known import KnownPrices, prices_of
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class PlanBefore:
-    """What the search for an earlier plan has worked out, for one that follows it.
-
-    Attributes
-    ----------
-    bound
-        What it has proven, if anything.
-    imaged
-        The targets that it images; None where that is not known.
-    """
-
-    scenario: Scenario
-    opportunities: ScenarioOpportunities
-    bound: Bound | None = None
-    imaged: frozenset[str] | None = None
-
-    @property
-    def prices(self) -> KnownPrices | None:
-        """The multipliers of its targets, where it has any."""
-        return prices_of(self.bound, [target.id for target in self.scenario.targets])
-
-    def asked_by(self, scenario: Scenario) -> frozenset[str] | None:
-        """Return the targets that are new in a replan, earn otherwise or have lost their image.
-
-        None where more than that, what is out and what is pinned tells it from the plan before.
-        """
-        replan, before = scenario.replan, self.scenario
-        if replan is None or self.imaged is None or not _is_seen_alike(scenario, before):
-            return None
-        is_counted_alike = (
-            scenario.objective == before.objective
-            and scenario.quality == before.quality
-            and scenario.states == before.states
-            and scenario.forecast is None
-            and before.forecast is None
-        )
-        if not is_counted_alike:
-            return None
-        known = {target.id: target for target in before.targets}
-        asked = {target.id for target in scenario.targets if known.get(target.id) != target}
-        lost = self.imaged - {action.target_id for action in replan.base}
-        return frozenset(asked | (lost & {target.id for target in scenario.targets}))
+from planner_core.problem import COLLECT, Longs, Opportunities
 
 
 def opportunities_after(
-    scenario: Scenario, before: PlanBefore, budget: Budget
+    scenario: Scenario, before: Scenario, known: ScenarioOpportunities, budget: Budget
 ) -> ScenarioOpportunities:
     """Return what ``compute_opportunities`` returns, bit for bit.
+
+    Parameters
+    ----------
+    before, known
+        An earlier scenario, and its opportunities.
 
     Raises
     ------
     PropagationFailed, InvalidScenario, Cancelled
         As there.
     """
-    if not _is_seen_alike(scenario, before.scenario):
+    if not is_seen_alike(scenario, before):
         return compute_opportunities(scenario, budget)
-    known = {target.id: (i, target) for i, target in enumerate(before.scenario.targets)}
+    places = {target.id: (i, target) for i, target in enumerate(before.targets)}
     old = np.array(
         [
-            known[target.id][0]
-            if target.id in known and _is_same_place(target, known[target.id][1])
+            places[target.id][0]
+            if target.id in places and _is_same_place(target, places[target.id][1])
             else -1
             for target in scenario.targets
         ],
@@ -96,15 +55,15 @@ def opportunities_after(
             use_resources=False,
         )
         found = compute_opportunities(new, budget)
-    return _merged(scenario, before.opportunities, old, found, fresh)
+    return _merged(scenario, known, old, found, fresh)
 
 
 def _merged(
     scenario: Scenario,
     known: ScenarioOpportunities,
-    old: np.ndarray,
+    old: Longs,
     found: ScenarioOpportunities | None,
-    fresh: np.ndarray,
+    fresh: Longs,
 ) -> ScenarioOpportunities:
     """Return the rows of targets known before and of new ones, in the order of a table.
 
@@ -163,7 +122,8 @@ def _bare(scenario: Scenario) -> Scenario:
     )
 
 
-def _is_seen_alike(scenario: Scenario, before: Scenario) -> bool:
+def is_seen_alike(scenario: Scenario, before: Scenario) -> bool:
+    """Return whether the same targets would have the same opportunities in both scenarios."""
     return _bare(scenario) == _bare(before)
 
 

@@ -1,0 +1,266 @@
+"""The opportunities of a scenario: found by what geometry has to say, and stored.
+
+They depend on no solver, so that each scenario needs them once. What is stored is told from what
+other code has found by the sources it depends on (``planner_core.sources``).
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from planner_core.access import opportunities as tasks
+from planner_core.access.eligibility import Eligibility
+from planner_core.access.limits import Limits, TargetLimits
+from planner_core.access.passes import PlacedContacts, contacts_of, with_halves_to_share
+from planner_core.access.windows import Accesses, find_accesses
+from planner_core.budget import Budget, Progress
+from planner_core.domain import Scenario, Sensor
+from planner_core.orbits.checks import orbit_warnings
+from planner_core.orbits.eclipse import sunlight
+from planner_core.orbits.ephemeris import Ephemeris, propagate
+from planner_core.orbits.places import Places, View, view
+from planner_core.problem import (
+    ACCESS_FOUND,
+    ACCESS_TOO_SHORT,
+    BETWEEN_STARTS,
+    COLLECT,
+    CONTACT,
+    NEVER_VISIBLE,
+    OUTSIDE_LIMITS,
+    OUTSIDE_TIMES,
+    WRONG_SENSOR_TYPE,
+    Floats,
+    Longs,
+    Opportunities,
+    Sunlight,
+)
+
+Codes = npt.NDArray[np.int8]
+
+_REASONS = np.array(
+    [
+        NEVER_VISIBLE, WRONG_SENSOR_TYPE, OUTSIDE_LIMITS, ACCESS_TOO_SHORT, OUTSIDE_TIMES,
+        BETWEEN_STARTS, ACCESS_FOUND,
+    ],
+    dtype=np.int8,
+)  # fmt: skip
+"""From what is farthest from a collect to what is nearest."""
+_RANK = {int(reason): rank for rank, reason in enumerate(_REASONS)}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ScenarioOpportunities:
+    """All that geometry has to say about a scenario; computed once, stored, used by any solver.
+
+    Attributes
+    ----------
+    opportunities
+        The table that every solver plans with.
+    target_access
+        Why a target has no collect, or ``ACCESS_FOUND``. Shape ``(num_targets,)``.
+    sunlight
+        One per satellite, whether its battery minds the shadow or not.
+    warnings
+        Sentences for people.
+    """
+
+    opportunities: Opportunities
+    target_access: Codes
+    sunlight: tuple[Sunlight, ...]
+    warnings: tuple[str, ...]
+
+    def to_bytes(self, *, compress: bool = True) -> bytes:
+        """Return a form that ``from_bytes`` reads back bit for bit."""
+        lit = self.sunlight
+        columns = {
+            field.name: getattr(self.opportunities, field.name) for field in fields(Opportunities)
+        }
+        columns |= {
+            "target_access": self.target_access,
+            "lit_counts": np.array([len(s.enter_s) for s in lit], dtype=np.int64),
+            "lit_enter_s": np.concatenate([np.empty(0), *(s.enter_s for s in lit)]),
+            "lit_exit_s": np.concatenate([np.empty(0), *(s.exit_s for s in lit)]),
+            "warnings": np.frombuffer(json.dumps(self.warnings).encode(), dtype=np.uint8),
+        }
+        buffer = io.BytesIO()
+        # As np.savez_compressed, in half the time: more effort hardly shrinks such numbers.
+        method = zipfile.ZIP_DEFLATED if compress else zipfile.ZIP_STORED
+        with zipfile.ZipFile(buffer, "w", method, compresslevel=1) as archive:
+            for name, values in columns.items():
+                with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+                    np.lib.format.write_array(member, values, allow_pickle=False)
+        return buffer.getvalue()
+
+    @classmethod
+    def from_bytes(cls, stored: bytes) -> ScenarioOpportunities:
+        """Return what ``to_bytes`` stored."""
+        with np.load(io.BytesIO(stored), allow_pickle=False) as columns:
+            cuts = np.cumsum(columns["lit_counts"])[:-1]
+            enter_s = np.split(columns["lit_enter_s"], cuts)
+            exit_s = np.split(columns["lit_exit_s"], cuts)
+            return cls(
+                opportunities=Opportunities(
+                    **{field.name: columns[field.name] for field in fields(Opportunities)}
+                ),
+                target_access=columns["target_access"],
+                sunlight=tuple(
+                    Sunlight(enter_s=enter, exit_s=leave)
+                    for enter, leave in zip(enter_s, exit_s, strict=True)
+                ),
+                warnings=tuple(json.loads(columns["warnings"].tobytes())),
+            )
+
+
+def compute_opportunities(scenario: Scenario, budget: Budget) -> ScenarioOpportunities:
+    """Return every opportunity of a scenario, worked out satellite by satellite.
+
+    Raises
+    ------
+    PropagationFailed
+        SGP4 stops before the end of the horizon.
+    InvalidScenario
+        There are too many.
+    Cancelled
+        The budget was spent first; there is no partial answer.
+    """
+    places = _places(scenario)
+    kinds = (COLLECT, CONTACT) if scenario.use_resources else (COLLECT,)
+    collects = _Collects(scenario, places[COLLECT])
+    contact = Limits.of_stations(scenario.ground_stations)
+    contacts: list[PlacedContacts] = []
+    before_contacts: list[int] = []  # how many accesses there are, by satellite
+    parts: list[tasks.Columns] = []
+    lit: list[Sunlight] = []
+    num_accesses = num_rows = 0
+    num_steps = 2 * len(scenario.satellites)
+    for index, satellite in enumerate(scenario.satellites):
+        budget.proceed(Progress(phase="access", fraction=index / num_steps))
+        path = propagate(satellite, scenario.horizon)
+        for kind in kinds:
+            if kind == COLLECT:
+                found, placed = collects.placed(satellite.sensor, path, budget)
+            else:
+                found = find_accesses(path, places[kind], contact, budget.stop)
+                contacts.append(contacts_of(scenario, satellite, path, places[kind], found))
+                before_contacts.append(num_accesses)
+                num_accesses += len(found)
+                continue
+            parts.append(tasks.rows_of(index, kind, found, num_accesses, placed))
+            num_accesses += len(found)
+            num_rows += len(placed[0])
+            tasks.check_number(num_rows)
+        lit.append(sunlight(path))
+    offered = with_halves_to_share(contacts, scenario.ground_stations)
+    for index, placed in enumerate(offered):
+        passes, before = contacts[index].passes, before_contacts[index]
+        parts.append(tasks.rows_of(index, CONTACT, passes, before, placed))
+        num_rows += len(placed[0])
+        tasks.check_number(num_rows)
+    described = tasks.Described(
+        tasks.in_order(
+            parts, [t.id for t in scenario.targets], [s.id for s in scenario.ground_stations]
+        )
+    )
+    del parts
+    for index, satellite in enumerate(scenario.satellites):
+        budget.proceed(Progress(phase="access", fraction=0.5 + index / num_steps))
+        # Propagated again rather than kept: a month of a constellation's paths is a gigabyte.
+        path = propagate(satellite, scenario.horizon)
+        for kind in kinds:
+            described.fill(
+                index, kind, path, places[kind], satellite.sensor.nadir,
+                with_rates=satellite.agility.tracks,
+            )  # fmt: skip
+    budget.proceed(Progress(phase="access", fraction=1.0))
+    return ScenarioOpportunities(
+        opportunities=described.table(),
+        target_access=_REASONS[collects.closeness],
+        sunlight=tuple(lit),
+        warnings=orbit_warnings(scenario),
+    )
+
+
+def _places(scenario: Scenario) -> dict[int, Places]:
+    return {
+        COLLECT: Places.of(scenario.targets),
+        CONTACT: Places.of(scenario.ground_stations),
+    }
+
+
+def view_at(scenario: Scenario, table: Opportunities, rows: Longs, t_s: Floats) -> View:
+    """Return what some opportunities look like at other instants than their middle.
+
+    Parameters
+    ----------
+    table, rows
+        The scenario's opportunities, and which of them.
+    t_s
+        One instant for each of the rows, in the horizon.
+    """
+    places = _places(scenario)
+    seen = {field.name: np.empty(len(rows)) for field in fields(View)}
+    for index in np.unique(table.satellite[rows]):
+        satellite = scenario.satellites[index]
+        path = propagate(satellite, scenario.horizon)
+        for kind in (COLLECT, CONTACT):
+            own = np.flatnonzero((table.satellite[rows] == index) & (table.kind[rows] == kind))
+            there = places[kind].at(table.place[rows[own]])
+            part = view(path, there, t_s[own], satellite.sensor.nadir)
+            for name, values in seen.items():
+                values[own] = getattr(part, name)
+    in_eclipse = seen.pop("in_eclipse") > 0.0
+    return View(in_eclipse=in_eclipse, **seen)
+
+
+class _Collects:
+    """Finds and places the collects of one satellite after another.
+
+    ``closeness`` tells, by target, how near any of them has come to one: an index of
+    ``_REASONS``.
+    """
+
+    def __init__(self, scenario: Scenario, places: Places):
+        self.closeness = np.zeros(len(scenario.targets), dtype=np.int64)
+        self._scenario = scenario
+        self._places = places
+        self._limits = TargetLimits.of(scenario.targets)
+        self._eligibility = Eligibility.of(scenario.targets, scenario.horizon)
+
+    def placed(
+        self, sensor: Sensor, path: Ephemeris, budget: Budget
+    ) -> tuple[Accesses, tasks.Placed]:
+        """Return the accesses of a satellite that count, and the collects in them."""
+        scenario, targets = self._scenario, self._scenario.targets
+        served = self._eligibility.served_by(sensor)
+        limits = Limits.of_targets(sensor, self._limits.at(served))
+        found = find_accesses(path, self._places.at(served), limits, budget.stop)
+        found = replace(found, place=served[found.place].astype(np.int32))
+        in_time = self._eligibility.in_time(found)
+        placed = tasks.place_collects(
+            in_time, targets, scenario.collect_spacing_s, scenario.collect_alignment
+        )
+        self._raise_to(ACCESS_TOO_SHORT, found.place)
+        self._raise_to(OUTSIDE_TIMES, found.place[tasks.have_room(found, targets)])
+        self._raise_to(BETWEEN_STARTS, in_time.place[tasks.have_room(in_time, targets)])
+        self._raise_to(ACCESS_FOUND, in_time.place[placed[0]])
+        self._note_visible(served, path)
+        return in_time, placed
+
+    def _note_visible(self, served: Longs, path: Ephemeris) -> None:
+        """Look for bare visibility, where it would bring a target nearer."""
+        is_served = np.zeros(len(self.closeness), dtype=np.bool_)
+        is_served[served] = True
+        best = np.where(is_served, _RANK[OUTSIDE_LIMITS], _RANK[WRONG_SENSOR_TYPE])
+        unseen = np.flatnonzero(self.closeness < best)
+        seen = find_accesses(path, self._places.at(unseen), Limits.above_horizon(len(unseen)))
+        visible = unseen[seen.place]
+        np.maximum.at(self.closeness, visible, best[visible])
+
+    def _raise_to(self, reason: int, targets: npt.NDArray[np.integer]) -> None:
+        np.maximum.at(self.closeness, targets, _RANK[reason])
