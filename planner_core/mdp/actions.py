@@ -6,12 +6,8 @@ The readable model and the compiled search loops share it.
 from __future__ import annotations
 
 from planner_core.jit import borrowing, borrowing_inner, inlined
-from planner_core.mdp.track import (
-    STRICT,
-    Track,
-    is_safe,
-    take,
-)
+from planner_core.mdp.resource_columns import STRICT, take
+from planner_core.mdp.track import Track, is_safe
 from planner_core.problem import (
     Bytes,
     Floats,
@@ -66,7 +62,9 @@ def next_action(
             continue
         # Without a way to keep the limits, what must be taken comes before them.
         if track.use_resources and is_hard and (row != kept or track.is_guarded):
-            battery_after, recorder_after, is_within = take(track, last, row, battery, recorder)
+            battery_after, recorder_after, is_within = take(
+                track.resources, last, row, battery, recorder
+            )
             if not is_within or (
                 track.is_guarded and not is_safe(track, row, row, battery_after, recorder_after)
             ):
@@ -85,7 +83,7 @@ def contact_may_pass(
     """
     if not (track.use_resources and track.is_contact[row] and recorder < contact_above):
         return False
-    if recorder + track.fill_ahead[row] >= track.recorder_max:
+    if recorder + track.fill_ahead[row] >= track.resources.recorder_max:
         return False
     return not track.is_guarded or is_safe(track, last, row, battery, recorder)
 
@@ -100,12 +98,13 @@ def first_affordable(
     leaves out most of the rows of accesses that offer many starts.
     """
     # Idle time never empties the recorder.
-    if recorder + track.least_fill >= track.recorder_max - STRICT:
+    resources = track.resources
+    if recorder + track.least_fill >= resources.recorder_max - STRICT:
         return end
-    charge_from_s = track.charge_from_s[last] if last >= 0 else 0.0
+    charge_from_s = resources.charge_from_s[last] if last >= 0 else 0.0
     return _first_charged(
-        track.charge_top_s, charge_from_s, track.charge_per_s, battery,
-        track.least_cost, track.battery_min + STRICT, first, end,
+        resources.charge_top_s, charge_from_s, resources.charge_per_s, battery,
+        track.least_cost, resources.battery_min + STRICT, first, end,
     )  # fmt: skip
 
 

@@ -11,7 +11,8 @@ import numpy as np
 from planner_core.bundles import bundle
 from planner_core.jit import inlined
 from planner_core.mdp.actions import may_wait, next_action
-from planner_core.mdp.track import NO_TASK, Track, take
+from planner_core.mdp.resource_columns import take
+from planner_core.mdp.track import NO_TASK, Track
 from planner_core.problem import Bytes, Floats
 
 WAIT: Final = -1
@@ -47,7 +48,10 @@ def counts_as_made(
     if guidance.image_needs == 0 or not track.use_resources:
         return True
     if guidance.image_needs == 1:
-        return battery_after > track.battery_min and recorder_after < track.recorder_max
+        return (
+            battery_after > track.resources.battery_min
+            and recorder_after < track.resources.recorder_max
+        )
     return recorder_after < 1.0
 
 
@@ -77,9 +81,9 @@ def task_reward(
     elif not collected[track.place[row]]:
         reward += discount * worth[row]
     if track.use_resources:
-        if battery_after <= track.battery_min:
+        if battery_after <= track.resources.battery_min:
             reward -= guidance.penalty
-        if recorder_after >= track.recorder_max:
+        if recorder_after >= track.resources.recorder_max:
             reward -= guidance.penalty
     return reward
 
@@ -130,8 +134,8 @@ class Model:
         return State(
             cursor=NO_TASK,
             last=NO_TASK,
-            battery=self.track.battery_start,
-            recorder=self.track.recorder_start,
+            battery=self.track.resources.battery_start,
+            recorder=self.track.resources.recorder_start,
             collected=frozenset(),
         )
 
@@ -175,7 +179,9 @@ class Model:
             )
             reward = self.guidance.sunpoint_reward_per_s * sojourn_s
             return Step(state=waited, reward=reward, sojourn_s=sojourn_s)
-        battery, recorder, _ = take(self.track, state.last, row, state.battery, state.recorder)
+        battery, recorder, _ = take(
+            self.track.resources, state.last, row, state.battery, state.recorder
+        )
         reward = task_reward(
             self.track, self.guidance, self.worth, self._mask(state),
             sojourn_s, self.guidance.gamma**sojourn_s, row, battery, recorder,

@@ -13,13 +13,8 @@ import numpy as np
 
 from planner_core.errors import InvalidScenario
 from planner_core.jit import inner, kernel
-from planner_core.mdp.track import (
-    NO_TASK,
-    STRICT,
-    Track,
-    compile_track,
-    take,
-)
+from planner_core.mdp.resource_columns import STRICT, ResourceColumns, take
+from planner_core.mdp.track import NO_TASK, Track, compile_track
 from planner_core.precedence.relation import (
     Precedence,
     comes_before,
@@ -141,7 +136,10 @@ def _has_way(track: Track, precedence: Precedence) -> bool:
     battery = np.empty((num_rows, _MAX_STATES))
     recorder = np.empty((num_rows, _MAX_STATES))
     num_states = np.zeros(num_rows, dtype=np.int64)
-    if track.next_kept[0] == len(track.start_s) and _lasts(track, NO_TASK, track.recorder_start):
+    resources = track.resources
+    if track.next_kept[0] == len(track.start_s) and _lasts(
+        resources, NO_TASK, resources.recorder_start
+    ):
         return True
     for at in range(num_rows):
         row = track.fallbacks[at]
@@ -149,7 +147,7 @@ def _has_way(track: Track, precedence: Precedence) -> bool:
         num_found = 0
         if track.next_kept[0] >= row:
             left, filled, is_within = take(
-                track, NO_TASK, row, track.battery_start, track.recorder_start
+                resources, NO_TASK, row, resources.battery_start, resources.recorder_start
             )
             if is_within:
                 found[0] = (left, filled)
@@ -162,7 +160,7 @@ def _has_way(track: Track, precedence: Precedence) -> bool:
                 continue
             for state in range(num_states[before]):
                 left, filled, is_within = take(
-                    track, last, row, battery[before, state], recorder[before, state]
+                    resources, last, row, battery[before, state], recorder[before, state]
                 )
                 if is_within:
                     found[num_found] = (left, filled)
@@ -171,17 +169,17 @@ def _has_way(track: Track, precedence: Precedence) -> bool:
         if track.next_kept[row + 1] < len(track.start_s):
             continue
         for state in range(num_states[at]):
-            if _lasts(track, row, recorder[at, state]):
+            if _lasts(resources, row, recorder[at, state]):
                 return True
     return False
 
 
 @inner
-def _lasts(track: Track, last: int, recorder: float) -> bool:
+def _lasts(resources: ResourceColumns, last: int, recorder: float) -> bool:
     """Return whether the recorder has room for the telemetry to the end."""
-    data_from_s = track.data_from_s[last] if last >= 0 else 0.0
-    idle_s = max(0.0, track.data_end_s - data_from_s)
-    return recorder + track.telemetry_per_s * idle_s < track.recorder_max - STRICT
+    data_from_s = resources.data_from_s[last] if last >= 0 else 0.0
+    idle_s = max(0.0, resources.data_end_s - data_from_s)
+    return recorder + resources.telemetry_per_s * idle_s < resources.recorder_max - STRICT
 
 
 @kernel

@@ -7,12 +7,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from planner_core.jit import borrowing, borrowing_inner
-from planner_core.mdp.track import (
-    NO_TASK,
-    STRICT,
-    Track,
-    take,
-)
+from planner_core.mdp.resource_columns import STRICT, ResourceColumns, take
+from planner_core.mdp.track import NO_TASK, Track
 from planner_core.problem import Bools, Bytes, Ints
 from planner_core.reasons.forcing import (
     BATTERY,
@@ -88,7 +84,7 @@ def _displace_each(
         if not track.use_resources or forced.broken[c] == FITS:
             continue
         begin, end = first, forced.last[c]
-        at, broken = _first_break(track, plan, dropped, c, row, first, begin, end)
+        at, broken = _first_break(track.resources, plan, dropped, c, row, first, begin, end)
         if at < 0:
             continue
         displaced.broken[c] = broken
@@ -104,7 +100,7 @@ def _displace_each(
             drops[num_drops] = found
             num_drops += 1
             begin, end = min(begin, found), max(end, found + 1)
-            at, broken = _first_break(track, plan, dropped, c, row, first, begin, end)
+            at, broken = _first_break(track.resources, plan, dropped, c, row, first, begin, end)
         displaced.is_settled[c] = is_free and at < 0
         for i in range(num_drops):
             dropped[c, drops[i]] = False
@@ -113,14 +109,23 @@ def _displace_each(
                 continue
             is_needed = not _may_stand(track, plan, dropped, c, row, first, drops[i], True)
             if not is_needed:
-                again, broken = _first_break(track, plan, dropped, c, row, first, begin, end)
+                again, broken = _first_break(
+                    track.resources, plan, dropped, c, row, first, begin, end
+                )
                 is_needed = again >= 0
             dropped[c, drops[i]] = is_needed
 
 
 @borrowing_inner
 def _first_break(
-    track: Track, plan: Sequence, dropped: Bools, c: int, row: int, at: int, begin: int, end: int
+    resources: ResourceColumns,
+    plan: Sequence,
+    dropped: Bools,
+    c: int,
+    row: int,
+    at: int,
+    begin: int,
+    end: int,
 ) -> tuple[int, int]:
     """Return the task at which a limit breaks and which; n for the end, n + 1 for ``row``.
 
@@ -132,25 +137,28 @@ def _first_break(
     last = plan.rows[begin - 1] if begin > 0 else NO_TASK
     for i in range(begin, n + 1):
         if i == at:
-            battery, recorder, is_within = take(track, last, row, battery, recorder)
+            battery, recorder, is_within = take(resources, last, row, battery, recorder)
             if not is_within:
-                is_low = battery <= track.battery_floor[row] + STRICT
+                is_low = battery <= resources.battery_floor[row] + STRICT
                 return n + 1, BATTERY if is_low else RECORDER
             last = row
         if i == n or dropped[c, i]:
             continue
-        battery, recorder, is_within = take(track, last, plan.rows[i], battery, recorder)
+        battery, recorder, is_within = take(resources, last, plan.rows[i], battery, recorder)
         if not is_within:
-            is_low = battery <= track.battery_floor[plan.rows[i]] + STRICT
+            is_low = battery <= resources.battery_floor[plan.rows[i]] + STRICT
             return i, BATTERY if is_low else RECORDER
         last = plan.rows[i]
         if i == max(at, end):
             # Nothing changes from here on.
             lowest = min(plan.cap[i], battery + plan.drop[i])
             highest = max(plan.floor[i], recorder + plan.rise[i])
-            if lowest > track.battery_min + STRICT and highest < track.recorder_max - STRICT:
+            if (
+                lowest > resources.battery_min + STRICT
+                and highest < resources.recorder_max - STRICT
+            ):
                 return -1, FITS
-    if recorder + waited(track, last, track.data_end_s) >= track.recorder_max - STRICT:
+    if recorder + waited(resources, last, resources.data_end_s) >= resources.recorder_max - STRICT:
         return n, RECORDER
     return -1, FITS
 

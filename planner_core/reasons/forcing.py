@@ -18,13 +18,8 @@ import numpy as np
 
 from planner_core.bundles import bundle
 from planner_core.jit import borrowing, inlined, inner, kernel
-from planner_core.mdp.track import (
-    NO_TASK,
-    STRICT,
-    Track,
-    compile_track,
-    take,
-)
+from planner_core.mdp.resource_columns import STRICT, ResourceColumns, take
+from planner_core.mdp.track import NO_TASK, Track, compile_track
 from planner_core.problem import (
     Bools,
     Bytes,
@@ -121,7 +116,7 @@ class PlannedSatellite:
         )
         is_sound = True
         if problem.use_resources:
-            is_sound = bool(_fill(track, sequence))
+            is_sound = bool(_fill(track.resources, sequence))
         return cls(
             index=index,
             track=track,
@@ -134,14 +129,14 @@ class PlannedSatellite:
 
 
 @kernel
-def _fill(track: Track, plan: Sequence) -> bool:
+def _fill(resources: ResourceColumns, plan: Sequence) -> bool:
     """Fill in the levels of the plan as it is; return whether they keep the limits."""
     n = len(plan.rows)
-    plan.battery[0], plan.recorder[0] = track.battery_start, track.recorder_start
+    plan.battery[0], plan.recorder[0] = resources.battery_start, resources.recorder_start
     last, is_sound = NO_TASK, True
     for i in range(n):
         plan.battery[i + 1], plan.recorder[i + 1], is_within = take(
-            track, last, plan.rows[i], plan.battery[i], plan.recorder[i]
+            resources, last, plan.rows[i], plan.battery[i], plan.recorder[i]
         )
         is_sound = is_sound and is_within
         last = plan.rows[i]
@@ -149,21 +144,26 @@ def _fill(track: Track, plan: Sequence) -> bool:
         row = plan.rows[i]
         if i == n - 1:
             plan.cap[i], plan.drop[i], plan.floor[i] = np.inf, np.inf, -np.inf
-            plan.rise[i] = waited(track, row, track.data_end_s)
+            plan.rise[i] = waited(resources, row, resources.data_end_s)
             continue
         after = plan.rows[i + 1]
-        charge = track.charge_per_s * max(0.0, track.charge_to_s[after] - track.charge_from_s[row])
-        waited_s = max(0.0, track.data_to_s[after] - track.data_from_s[row])
-        cost, later = track.battery_cost[after], min(-reserve(track, after), plan.drop[i + 1])
-        plan.cap[i] = min(plan.cap[i + 1], track.battery_full[after] - cost + later)
-        plan.drop[i] = charge - track.idle_per_s * waited_s - cost + later
-        peak_s = max(0.0, track.data_peak_s[after] - track.data_from_s[row])
-        gain = track.telemetry_per_s * waited_s + track.recorder_gain[after]
+        charge = resources.charge_per_s * max(
+            0.0, resources.charge_to_s[after] - resources.charge_from_s[row]
+        )
+        waited_s = max(0.0, resources.data_to_s[after] - resources.data_from_s[row])
+        cost, later = (
+            resources.battery_cost[after],
+            min(-reserve(resources, after), plan.drop[i + 1]),
+        )
+        plan.cap[i] = min(plan.cap[i + 1], resources.battery_full[after] - cost + later)
+        plan.drop[i] = charge - resources.idle_per_s * waited_s - cost + later
+        peak_s = max(0.0, resources.data_peak_s[after] - resources.data_from_s[row])
+        gain = resources.telemetry_per_s * waited_s + resources.recorder_gain[after]
         rise = max(0.0, plan.rise[i + 1])
         plan.floor[i] = max(plan.floor[i + 1], rise)
-        plan.rise[i] = max(track.telemetry_per_s * peak_s, gain + rise)
-    end = plan.recorder[n] + waited(track, last, track.data_end_s)
-    return is_sound and end < track.recorder_max - STRICT
+        plan.rise[i] = max(resources.telemetry_per_s * peak_s, gain + rise)
+    end = plan.recorder[n] + waited(resources, last, resources.data_end_s)
+    return is_sound and end < resources.recorder_max - STRICT
 
 
 class Forced(NamedTuple):
@@ -228,6 +228,7 @@ def _force_each(
     candidates: Ints,
     forced: Forced,
 ) -> None:
+    resources = track.resources
     rows, n = plan.rows, len(plan.rows)
     for c in range(len(candidates)):
         row = candidates[c]
@@ -244,18 +245,21 @@ def _force_each(
         for i in range(first, last):
             forced.loss[c] += np.inf if plan.is_fixed[i] else plan.earned[i]
         if track.use_resources:
-            lowest, highest = _levels(track, plan, row, first, last)
+            lowest, highest = _levels(resources, plan, row, first, last)
             forced.lowest[c], forced.highest[c] = lowest, highest
-            if lowest <= track.battery_min + STRICT:
+            if lowest <= resources.battery_min + STRICT:
                 forced.broken[c] = BATTERY
-            elif highest >= track.recorder_max - STRICT:
+            elif highest >= resources.recorder_max - STRICT:
                 forced.broken[c] = RECORDER
         # What a faster turn from and to moving lines of sight would need is not said.
         if first == last or len(track.transitions.moves) > 0:
             continue
         if track.use_resources:
-            lowest, highest = _levels(track, plan, row, k, k)
-            if lowest <= track.battery_min + STRICT or highest >= track.recorder_max - STRICT:
+            lowest, highest = _levels(resources, plan, row, k, k)
+            if (
+                lowest <= resources.battery_min + STRICT
+                or highest >= resources.recorder_max - STRICT
+            ):
                 continue
         needed, settle = 0.0, np.inf
         for side in range(2):
@@ -277,37 +281,39 @@ def _force_each(
 
 
 @inlined
-def _levels(track: Track, plan: Sequence, row: int, first: int, last: int) -> tuple[float, float]:
+def _levels(
+    resources: ResourceColumns, plan: Sequence, row: int, first: int, last: int
+) -> tuple[float, float]:
     """Return the lowest battery and the fullest recorder from ``row`` on.
 
     It stands in the plan in place of the tasks ``first`` up to ``last``.
     """
     before = plan.rows[first - 1] if first > 0 else NO_TASK
     battery, recorder = plan.battery[first], plan.recorder[first]
-    peak = recorder + waited(track, before, track.data_peak_s[row])
-    battery, recorder, _ = take(track, before, row, battery, recorder)
-    lowest, highest = battery - reserve(track, row), max(peak, recorder)
+    peak = recorder + waited(resources, before, resources.data_peak_s[row])
+    battery, recorder, _ = take(resources, before, row, battery, recorder)
+    lowest, highest = battery - reserve(resources, row), max(peak, recorder)
     if last == len(plan.rows):
-        return lowest, max(highest, recorder + waited(track, row, track.data_end_s))
+        return lowest, max(highest, recorder + waited(resources, row, resources.data_end_s))
     after = plan.rows[last]
-    highest = max(highest, recorder + waited(track, row, track.data_peak_s[after]))
-    battery, recorder, _ = take(track, row, after, battery, recorder)
-    left = battery - reserve(track, after)
+    highest = max(highest, recorder + waited(resources, row, resources.data_peak_s[after]))
+    battery, recorder, _ = take(resources, row, after, battery, recorder)
+    left = battery - reserve(resources, after)
     lowest = min(lowest, left, plan.cap[last], battery + plan.drop[last])
     return lowest, max(highest, recorder, plan.floor[last], recorder + plan.rise[last])
 
 
 @inlined
-def reserve(track: Track, row: int) -> float:
+def reserve(resources: ResourceColumns, row: int) -> float:
     """Return how far above its minimum the battery must be after a task."""
-    return float(track.battery_floor[row] - track.battery_min)
+    return float(resources.battery_floor[row] - resources.battery_min)
 
 
 @inlined
-def waited(track: Track, last: int, until_s: float) -> float:
+def waited(resources: ResourceColumns, last: int, until_s: float) -> float:
     """Return the telemetry from a task's end to an instant."""
-    from_s = track.data_from_s[last] if last >= 0 else 0.0
-    return track.telemetry_per_s * max(0.0, until_s - from_s)
+    from_s = resources.data_from_s[last] if last >= 0 else 0.0
+    return resources.telemetry_per_s * max(0.0, until_s - from_s)
 
 
 @inlined

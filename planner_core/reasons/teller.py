@@ -121,7 +121,7 @@ class Teller:
     def _break_s(self, c: int) -> float:
         row = int(self.displaced.break_row[c])
         track = self.planned.track
-        return float(track.data_end_s if row == AT_END else track.start_s[row])
+        return float(track.resources.data_end_s if row == AT_END else track.start_s[row])
 
     def _detail(self, c: int, limit: str | None, delta: float | None, num_blocking: int) -> str:
         said = []

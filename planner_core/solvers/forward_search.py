@@ -25,7 +25,8 @@ from planner_core.mdp.model import (
     counts_as_made,
     task_reward,
 )
-from planner_core.mdp.track import NO_TASK, Track, take
+from planner_core.mdp.resource_columns import take
+from planner_core.mdp.track import NO_TASK, Track
 from planner_core.problem import (
     Bytes,
     Floats,
@@ -140,7 +141,7 @@ def _select_action(
         first = min(first, row)
         battery_after, recorder_after = battery, recorder
         if track.use_resources:
-            battery_after, recorder_after, _ = take(track, last, row, battery, recorder)
+            battery_after, recorder_after, _ = take(track.resources, last, row, battery, recorder)
         waited_s = track.start_s[row] - now_s
         discount = guidance.gamma**waited_s
         v = task_reward(
@@ -335,7 +336,7 @@ class ForwardSearch:
     ) -> list[int]:
         track, collected = turn.track, turn.collected
         cursor, last = NO_TASK, NO_TASK
-        battery, recorder = track.battery_start, track.recorder_start
+        battery, recorder = track.resources.battery_start, track.resources.recorder_start
         breadth = self.breadth + (self.breadth_counts == "one_more")
         rules = Rules(
             breadth=breadth,
@@ -357,7 +358,7 @@ class ForwardSearch:
                 cursor = first
                 continue
             if track.use_resources:
-                battery, recorder, _ = take(track, last, action, battery, recorder)
+                battery, recorder, _ = take(track.resources, last, action, battery, recorder)
             cursor = last = action
             taken.append(action)
             place = track.place[action]

@@ -255,7 +255,9 @@ class Mcts:
         num_edges = (num_nodes + 2) * (rules.breadth + 1) + 2
         trees = [empty_tree(num_nodes, num_edges) for _ in range(2)]
         tree, spare = trees
-        new_node(tree, NO_TASK, NO_TASK, track.battery_start, track.recorder_start)
+        new_node(
+            tree, NO_TASK, NO_TASK, track.resources.battery_start, track.resources.recorder_start
+        )
         step = step_for(track, rules, guidance, worth, collected, seed)
         taken: list[int] = []
         reward = 0.0

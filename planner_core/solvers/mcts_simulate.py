@@ -11,7 +11,7 @@ from planner_core.mdp.model import (
     counts_as_made,
     task_reward,
 )
-from planner_core.mdp.track import take
+from planner_core.mdp.resource_columns import take
 from planner_core.problem import Bytes
 from planner_core.solvers.mcts_choices import (
     Step,
@@ -84,7 +84,7 @@ def _simulate(tree: Tree, step: Step) -> None:
             path.reward[d] = guidance.sunpoint_reward_per_s * sojourn_s
         else:
             if track.use_resources:
-                battery, recorder, _ = take(track, last, row, battery, recorder)
+                battery, recorder, _ = take(track.resources, last, row, battery, recorder)
             path.reward[d] = task_reward(
                 track, guidance, worth, collected, sojourn_s, discount,
                 row, battery, recorder,
@@ -163,7 +163,7 @@ def sunpoint_instead(tree: Tree, step: Step, edge: int) -> int:
     last, battery, recorder = tree.last[0], tree.battery[0], tree.recorder[0]
     battery_after, recorder_after = battery, recorder
     if track.use_resources:
-        battery_after, recorder_after, _ = take(track, last, row, battery, recorder)
+        battery_after, recorder_after, _ = take(track.resources, last, row, battery, recorder)
     now_s = track.start_s[tree.cursor[0]] if tree.cursor[0] >= 0 else 0.0
     reward = task_reward(
         track, guidance, step.worth, step.collected, track.start_s[row] - now_s, 1.0,

@@ -25,7 +25,8 @@ from planner_core.certified.dp.resource_network import Network, strict_network_o
 from planner_core.certified.lns.choices import ChoiceSearch
 from planner_core.jit import inlined, kernel
 from planner_core.mdp.actions import next_action
-from planner_core.mdp.track import NO_TASK, Track, take
+from planner_core.mdp.resource_columns import take
+from planner_core.mdp.track import NO_TASK, Track
 from planner_core.problem import Bytes, Floats, Ints, Problem
 from planner_core.referee.replay import replay
 from planner_core.solvers.base import Solution
@@ -113,7 +114,7 @@ def _typical(track: Track, worth: Floats, is_new: Bytes) -> tuple[float, float]:
     offered = np.flatnonzero(is_new & (worth > 0.0))
     if len(offered) == 0:
         return 1.0, 1.0
-    draw = float(np.median(track.battery_cost[offered]))
+    draw = float(np.median(track.resources.battery_cost[offered]))
     return max(draw, 1e-9), float(worth[offered].mean())
 
 
@@ -169,7 +170,7 @@ def priced_plan(
     rows = np.empty(m, dtype=np.int32)
     count = 0
     cursor, last = NO_TASK, NO_TASK
-    battery, recorder = track.battery_start, track.recorder_start
+    battery, recorder = track.resources.battery_start, track.resources.recorder_start
     while True:
         price = per_energy * math.exp(following * (_NEUTRAL - battery))
         row, is_chosen, best = cursor, -1, -np.inf
@@ -192,7 +193,7 @@ def priced_plan(
                 break
         if is_chosen < 0:
             return rows[:count]
-        battery, recorder, _ = take(track, last, is_chosen, battery, recorder)
+        battery, recorder, _ = take(track.resources, last, is_chosen, battery, recorder)
         if not track.is_contact[is_chosen]:
             collected[track.place[is_chosen]] = 1
         rows[count] = is_chosen
@@ -203,11 +204,13 @@ def priced_plan(
 @inlined
 def energy_of(track: Track, last: int, row: int) -> float:
     """Return the energy that taking a task costs: its draw, and the charge forgone for it."""
-    charge_from_s = track.charge_from_s[last] if last >= 0 else 0.0
+    resources = track.resources
+    charge_from_s = resources.charge_from_s[last] if last >= 0 else 0.0
     # Beyond the departure the charge is forgone until the sun is reached again.
-    until_s = max(track.charge_to_s[row], charge_from_s)
+    until_s = max(resources.charge_to_s[row], charge_from_s)
     return float(
-        track.battery_cost[row] + track.charge_per_s * (track.charge_from_s[row] - until_s)
+        resources.battery_cost[row]
+        + resources.charge_per_s * (resources.charge_from_s[row] - until_s)
     )
 
 

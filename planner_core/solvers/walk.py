@@ -11,7 +11,8 @@ import numpy as np
 
 from planner_core.jit import inlined, kernel
 from planner_core.mdp.actions import next_action
-from planner_core.mdp.track import NO_TASK, Track, take
+from planner_core.mdp.resource_columns import take
+from planner_core.mdp.track import NO_TASK, Track
 from planner_core.problem import Bytes, Ints
 
 CONTACT_ABOVE: Final = 0.45
@@ -64,13 +65,16 @@ def naive_select_action(
         )  # fmt: skip
         if row == m or not track.use_resources or row == track.next_kept[last + 1]:
             break
-        battery_after, recorder_after, _ = take(track, last, row, battery, recorder)
+        battery_after, recorder_after, _ = take(track.resources, last, row, battery, recorder)
         if follows_code:
             if battery_after <= 0.0 or recorder_after >= 1.0:
                 continue
             if not track.is_contact[row] and recorder >= CODE_COLLECTS_BELOW:
                 continue
-        elif battery_after <= track.battery_min or recorder_after > track.recorder_max:
+        elif (
+            battery_after <= track.resources.battery_min
+            or recorder_after > track.resources.recorder_max
+        ):
             continue
         break
     return row
@@ -94,10 +98,10 @@ def rule_plan(
     rows = np.empty(m, dtype=np.int32)
     count = 0
     last = NO_TASK
-    battery, recorder = track.battery_start, track.recorder_start
+    battery, recorder = track.resources.battery_start, track.resources.recorder_start
     for row in taken:
         if track.use_resources:
-            battery, recorder, _ = take(track, last, row, battery, recorder)
+            battery, recorder, _ = take(track.resources, last, row, battery, recorder)
         if not track.is_contact[row]:
             collected[track.place[row]] = 1
         last = row
@@ -109,7 +113,7 @@ def rule_plan(
         if row == m:
             return rows[:count]
         if track.use_resources:
-            battery, recorder, _ = take(track, last, row, battery, recorder)
+            battery, recorder, _ = take(track.resources, last, row, battery, recorder)
         if not track.is_contact[row]:
             collected[track.place[row]] = 1
         rows[count] = row

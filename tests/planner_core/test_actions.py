@@ -12,12 +12,8 @@ from hypothesis import strategies as st
 from planner_core.budget import Budget
 from planner_core.domain import Dynamics
 from planner_core.mdp.actions import next_action
-from planner_core.mdp.track import (
-    Track,
-    compile_track,
-    is_safe,
-    take,
-)
+from planner_core.mdp.resource_columns import take
+from planner_core.mdp.track import Track, compile_track, is_safe
 from planner_core.problem import (
     COLLECT,
     CONTACT,
@@ -119,7 +115,9 @@ def test_the_next_action_is_the_first_that_the_definition_allows(
                 if is_spare and can_pass:
                     return False
         if use_resources and is_hard and (row != next_must or track.is_guarded):
-            battery_after, recorder_after, is_within = take(track, last, row, battery, recorder)
+            battery_after, recorder_after, is_within = take(
+                track.resources, last, row, battery, recorder
+            )
             if not is_within:
                 return False
             return not track.is_guarded or is_safe(track, row, row, battery_after, recorder_after)

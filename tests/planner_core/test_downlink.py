@@ -17,7 +17,8 @@ from planner_core.certified.proofs.resource_bound import quick_bound, resource_v
 from planner_core.certified.proofs.totals import totals_bound
 from planner_core.domain import Dynamics, GroundStation, Resources, Scenario, Target, mean_elements
 from planner_core.errors import InvalidScenario
-from planner_core.mdp.track import NO_TASK, STRICT, compile_track, take
+from planner_core.mdp.resource_columns import STRICT, take
+from planner_core.mdp.track import NO_TASK, compile_track
 from planner_core.pins import PinnedAction, Pins
 from planner_core.problem import (
     COLLECT,
@@ -134,12 +135,13 @@ def test_steps_and_referee_agree_on_the_recorder(dynamics: Dynamics, seed: int) 
     timeline = replay(problem, Plan.of(problem, [int(own.rows[row]) for row in chosen]))
     judged = [a for a in timeline.satellites[0].actions if a.opportunity is not None]
     track = compile_track(problem, own, np.zeros(len(own), dtype=np.uint8))
-    last, battery, recorder = NO_TASK, track.battery_start, track.recorder_start
+    resources = track.resources
+    last, battery, recorder = NO_TASK, resources.battery_start, resources.recorder_start
     stays_within = True
     for action in judged:
         assert action.opportunity is not None
         row = int(problem.local_row[action.opportunity])
-        battery, recorder, is_within = take(track, last, row, battery, recorder)
+        battery, recorder, is_within = take(track.resources, last, row, battery, recorder)
         stays_within = stays_within and is_within
         last = row
         assert recorder == pytest.approx(action.recorder_end, abs=1e-9)
@@ -147,8 +149,8 @@ def test_steps_and_referee_agree_on_the_recorder(dynamics: Dynamics, seed: int) 
             # Far beyond the limit: no planner goes on from a recorder that has overflowed.
             assert not stays_within
             return
-    waits_s = track.data_end_s - (track.data_from_s[last] if last >= 0 else 0.0)
-    stays_within &= recorder + track.telemetry_per_s * waits_s < track.recorder_max - STRICT
+    waits_s = resources.data_end_s - (resources.data_from_s[last] if last >= 0 else 0.0)
+    stays_within &= recorder + resources.telemetry_per_s * waits_s < resources.recorder_max - STRICT
     if stays_within:
         assert timeline.is_valid
     if any(v.code == "recorder" for v in timeline.violations):
@@ -408,6 +410,12 @@ def test_telemetry_may_fill_the_recorder_while_a_contact_is_set_up() -> None:
             horizon_s=200.0,
         )
         track = compile_track(problem, problem.satellites[0], np.zeros(1, dtype=np.uint8))
-        step = take(track, NO_TASK, 0, track.battery_start, track.recorder_start)
+        step = take(
+            track.resources,
+            NO_TASK,
+            0,
+            track.resources.battery_start,
+            track.resources.recorder_start,
+        )
         assert step[2] == is_within
         assert replay(problem, Plan.of(problem, (0,))).is_valid == is_within

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from planner_core.budget import Budget, Progress, Termination
 from planner_core.domain import Dynamics
 from planner_core.mdp.model import WAIT, Model
-from planner_core.mdp.track import NO_TASK, compile_track, take
+from planner_core.mdp.resource_columns import take
+from planner_core.mdp.track import NO_TASK, compile_track
 from planner_core.problem import Problem
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import plan_sha256, replay
@@ -196,10 +197,10 @@ def test_a_step_of_the_model_agrees_with_the_referees_integral(
     satellite = problem.satellites[0]
     track = compile_track(problem, satellite, (satellite.rows * 0).astype("uint8"))
     judged = [a for a in replay(problem, plan).satellites[0].actions if a.mode != "sunpoint"]
-    last, battery, recorder = NO_TASK, track.battery_start, track.recorder_start
+    last, battery, recorder = NO_TASK, track.resources.battery_start, track.resources.recorder_start
     for action, expected in zip(plan.actions, judged, strict=True):
         row = int(problem.local_row[action.opportunity])
-        battery, recorder, is_within = take(track, last, row, battery, recorder)
+        battery, recorder, is_within = take(track.resources, last, row, battery, recorder)
         last = row
         assert is_within
         assert battery == pytest.approx(expected.battery_end, abs=1e-9)

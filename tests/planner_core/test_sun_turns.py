@@ -17,7 +17,8 @@ from planner_core.certified.proofs.lagrangian import lagrangian_bound
 from planner_core.certified.proofs.resource_bound import quick_bound, resource_value
 from planner_core.domain import Agility, Horizon, Resources, Scenario
 from planner_core.errors import InvalidScenario
-from planner_core.mdp.track import NO_TASK, STRICT, compile_track, take
+from planner_core.mdp.resource_columns import STRICT, take
+from planner_core.mdp.track import NO_TASK, compile_track
 from planner_core.orbits.sun import sun_direction_teme, sun_path
 from planner_core.problem import COLLECT, Problem
 from planner_core.problem.plan import Plan
@@ -103,22 +104,23 @@ def test_steps_and_referee_agree_on_levels_and_limits(seed: int) -> None:
     satellite = problem.satellites[0]
     plan = _drawn_plan(problem, seed)
     track = compile_track(problem, satellite, np.zeros(len(satellite), dtype=np.uint8))
+    resources = track.resources
     timeline = replay(problem, plan)
     judged = [a for a in timeline.satellites[0].actions if a.opportunity is not None]
-    last, battery, recorder = NO_TASK, track.battery_start, track.recorder_start
-    stays_within = battery > track.battery_min + track.reserve_start + STRICT
+    last, battery, recorder = NO_TASK, resources.battery_start, resources.recorder_start
+    stays_within = battery > resources.battery_min + resources.reserve_start + STRICT
     for action in judged:
         assert action.opportunity is not None
         row = int(problem.local_row[action.opportunity])
-        battery, recorder, is_within = take(track, last, row, battery, recorder)
+        battery, recorder, is_within = take(track.resources, last, row, battery, recorder)
         stays_within = stays_within and is_within
         last = row
         if battery > 0.0 and all(v.code != "battery" for v in timeline.violations):
             assert battery == pytest.approx(action.battery_end, abs=1e-8)
-    telemetry = track.telemetry_per_s * (
-        track.data_end_s - (track.data_from_s[last] if last >= 0 else 0.0)
+    telemetry = resources.telemetry_per_s * (
+        resources.data_end_s - (resources.data_from_s[last] if last >= 0 else 0.0)
     )
-    if stays_within and recorder + telemetry < track.recorder_max - STRICT:
+    if stays_within and recorder + telemetry < resources.recorder_max - STRICT:
         assert timeline.is_valid
     if any(v.code == "battery" for v in timeline.violations):
         assert not stays_within
@@ -275,14 +277,15 @@ def test_energy_paid_for_is_what_the_satellite_lacks_back_at_the_sun(seed: int) 
     problem = sunny_problem(seed)
     own = problem.satellites[0]
     track = compile_track(problem, own, np.zeros(len(own), dtype=np.uint8))
-    first, second = track.charge_from_s, track.charge_to_s
+    resources = track.resources
+    first, second = resources.charge_from_s, resources.charge_to_s
     for i in range(len(own)):
         for j in range(i + 1, len(own)):
             if not own.transitions.allows(i, j):
                 continue
             charged_s = max(0.0, second[j] - first[i])
-            with_it = charged_s * track.charge_per_s - track.battery_cost[j]
-            without = (first[j] - first[i]) * track.charge_per_s
+            with_it = charged_s * resources.charge_per_s - resources.battery_cost[j]
+            without = (first[j] - first[i]) * resources.charge_per_s
             assert energy_of(track, i, j) == pytest.approx(without - with_it, abs=1e-12)
 
 

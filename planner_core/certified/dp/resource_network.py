@@ -29,7 +29,7 @@ from planner_core.bundles import bundle
 from planner_core.certified.signs import ANY_LEVEL
 from planner_core.certified.tolerances import ROUNDING
 from planner_core.jit import inlined, kernel
-from planner_core.mdp.track import STRICT, resource_columns
+from planner_core.mdp.resource_columns import STRICT, resource_columns
 from planner_core.precedence.arcs import Arcs, reversed_arcs
 from planner_core.precedence.relation import (
     Precedence,
