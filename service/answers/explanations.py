@@ -14,7 +14,8 @@ from service.scenarios.background import Background
 from service.scenarios.opportunities import Described
 from service.wire.base import Json, read
 from service.wire.instants import instant_text
-from service.wire.timelines import AttemptOut, ExplanationOut, TimelineOut
+from service.wire.outcomes import AttemptOut, ExplanationOut
+from service.wire.timelines import TimelineOut
 
 _KEPT = 200
 _KEPT_JOBS = 2

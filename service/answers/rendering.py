@@ -24,6 +24,7 @@ from service.answers.figures import ages_of, in_mbit, num_delivered, satellite_t
 from service.answers.image_figures import ImageFigures
 from service.wire.base import Json
 from service.wire.jobs import FiguresOut
+from service.wire.outcomes import ReasonOut, TargetItem
 from service.wire.scenarios import HorizonOut
 from service.wire.timelines import (
     ActionOut,
@@ -31,13 +32,11 @@ from service.wire.timelines import (
     OnBoardOut,
     Outcome,
     PreferredOut,
-    ReasonOut,
     ResourceCurvesOut,
     RuntimeOut,
     SatelliteTimelineOut,
     SlewOut,
     SolverUsed,
-    TargetItem,
     TimelineHead,
     TotalsOut,
     ViolationOut,

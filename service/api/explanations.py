@@ -13,7 +13,7 @@ from service.api.deps import CallDep, own_job_only
 from service.problems.kinds import ServiceError
 from service.scenarios.opportunities import OpportunityReader
 from service.stores.job_store import hashes_of
-from service.wire.timelines import ExplanationOut
+from service.wire.outcomes import ExplanationOut
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[Depends(own_job_only)])
 

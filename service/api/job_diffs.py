@@ -14,7 +14,8 @@ from service.api.deps import CallDep, own_job_only
 from service.stores import job_store as store
 from service.stores.finding import no_such
 from service.wire.base import read
-from service.wire.timelines import Difference, DiffOut, MovedOut, PlannedOut, TimelineOut, TotalDiff
+from service.wire.plan_diffs import Difference, DiffOut, MovedOut, PlannedOut, TotalDiff
+from service.wire.timelines import TimelineOut
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[Depends(own_job_only)])
 

@@ -19,7 +19,8 @@ from service.api.guard import is_limited, is_open
 from service.api.links import add_links
 from service.wire.operations import ProblemOut
 from service.wire.places import TargetCatalogIn
-from service.wire.timelines import ProofOut, TimelineOut
+from service.wire.proofs import ProofOut
+from service.wire.timelines import TimelineOut
 
 router = APIRouter(include_in_schema=False)
 

@@ -27,7 +27,8 @@ from service.exports.forms import FORMS, Form
 from service.problems.kinds import ServiceError
 from service.stores import job_store as store
 from service.wire.base import Listed
-from service.wire.timelines import Outcome, TargetItem
+from service.wire.outcomes import TargetItem
+from service.wire.timelines import Outcome
 
 router = APIRouter(prefix="/v1/jobs", tags=["timelines"], dependencies=[Depends(own_job_only)])
 

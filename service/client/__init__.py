@@ -23,11 +23,15 @@ from service.wire.jobs import ComparisonOut as Comparison
 from service.wire.jobs import ProgressOut as Progress
 from service.wire.operations import FaultOut as Fault
 from service.wire.operations import SolverOut as Solver
+from service.wire.outcomes import AttemptOut as Attempt
+from service.wire.outcomes import ExplanationOut as Explanation
+from service.wire.outcomes import TargetItem as TargetOutcome
 from service.wire.passes import PassOut as Pass
 from service.wire.pins import OutageOut as Outage
 from service.wire.places import GroundStationOut as GroundStation
 from service.wire.places import TargetCatalogOut as TargetCatalog
 from service.wire.places import TargetIn as Target
+from service.wire.plan_diffs import DiffOut as PlanDiff
 from service.wire.plans import ExecutionOut as Execution
 from service.wire.plans import PlanActionOut as PlanAction
 from service.wire.plans import PlanEventOut as PlanEvent
@@ -39,11 +43,7 @@ from service.wire.scenarios import ScenarioOut as Scenario
 from service.wire.scenarios import ScenarioSummary
 from service.wire.target_lives import TargetLifeOut as TargetLife
 from service.wire.timelines import ActionOut as Action
-from service.wire.timelines import AttemptOut as Attempt
-from service.wire.timelines import DiffOut as PlanDiff
-from service.wire.timelines import ExplanationOut as Explanation
 from service.wire.timelines import SatelliteTimelineOut as SatelliteTimeline
-from service.wire.timelines import TargetItem as TargetOutcome
 from service.wire.timelines import TimelineOut as Timeline
 from service.wire.timelines import TotalsOut as Totals
 from service.wire.timelines import ViolationOut as Violation

@@ -15,10 +15,10 @@ from service.client.following import follow, polled
 from service.client.transport import parsed, path_of, said
 from service.wire.base import Json
 from service.wire.jobs import JobOut
+from service.wire.outcomes import ExplanationOut as Explanation
+from service.wire.outcomes import TargetItem as TargetOutcome
+from service.wire.plan_diffs import DiffOut as PlanDiff
 from service.wire.scenarios import ScenarioOut as Scenario
-from service.wire.timelines import DiffOut as PlanDiff
-from service.wire.timelines import ExplanationOut as Explanation
-from service.wire.timelines import TargetItem as TargetOutcome
 from service.wire.timelines import TimelineOut as Timeline
 
 _OPENMCT = ".openmct.json"

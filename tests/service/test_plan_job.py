@@ -20,7 +20,7 @@ from service.jobs.plan_job import run_plan_job
 from service.jobs.plan_request import Parcel, PlanAnswer, PlanRequest
 from service.scenarios.canonical import canonical, sha256_of
 from service.scenarios.translate import scenario_from_content
-from service.wire.timelines import ProofOut
+from service.wire.proofs import ProofOut
 from tests import independent
 from tests.missions import Document, drawn_targets, paper_mission
 

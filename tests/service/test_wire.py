@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from dataclasses import fields
+from importlib import import_module
+from pkgutil import iter_modules
 from typing import Any, get_args
 
 import numpy as np
@@ -15,12 +17,12 @@ from pydantic import BaseModel, ValidationError, create_model
 
 from planner_core import domain, pins
 from planner_core.budget import Budget
-from planner_core.certified.proofs import documents as proofs
+from planner_core.certified.proofs import documents
 from planner_core.certified.proofs.bound import Bound
 from planner_core.reasons import reason
 from planner_core.solvers.base import Constraint
 from planner_core.solvers.registry import solver_class
-from service import client
+from service import client, wire
 from service.access.callers import Scope
 from service.api import stapi
 from service.jobs.plan_job import run_plan_job
@@ -30,23 +32,14 @@ from service.main import ROUTERS, create_app
 from service.scenarios.canonical import canonical, sha256_of
 from service.settings import Settings
 from service.wire import (
-    base,
     changes,
-    forecasts,
-    imports,
     jobs,
     operations,
-    passes,
-    places,
-    plan_before,
-    plans,
-    replans,
+    outcomes,
+    proofs,
     satellites,
     scenarios,
-    spacecraft,
-    target_lives,
     timelines,
-    webhooks,
 )
 from service.wire import (
     pins as wire_pins,
@@ -54,10 +47,7 @@ from service.wire import (
 from service.wire.base import Wire, dumped, read
 from tests.service.jobs.mission import small_mission
 
-MODULES = (
-    base, changes, forecasts, imports, jobs, operations, wire_pins, passes, places, plan_before,
-    plans, replans, satellites, scenarios, spacecraft, target_lives, timelines, webhooks,
-)  # fmt: skip
+MODULES = [import_module(f"service.wire.{found.name}") for found in iter_modules(wire.__path__)]
 NOW = "2026-03-01T00:00:00.000Z"
 ACTION = {
     "id": "a1", "mode": "collect", "start": NOW, "end": NOW, "target_id": "t1", "station_id": None,
@@ -83,7 +73,7 @@ REASON = {
 DOCUMENTS: list[tuple[type[Wire], dict[str, Any]]] = [
     (timelines.ActionOut, ACTION),
     (jobs.JobOut, JOB),
-    (timelines.ReasonOut, REASON),
+    (outcomes.ReasonOut, REASON),
 ]
 
 
@@ -195,10 +185,10 @@ def test_real_answers_hold_nothing_that_is_not_declared(
     assert timeline["satellites"][0]["eclipses"]
     assert dumped(timelines.TimelineOut(**timeline)) == timeline
     targets = json.loads(answer.targets)
-    assert [dumped(timelines.TargetItem(**target)) for target in targets] == targets
+    assert [dumped(outcomes.TargetItem(**target)) for target in targets] == targets
     assert any(target["reason"] for target in targets)
     proof = json.loads(answer.proof or "null")
-    assert dumped(timelines.ProofOut(**proof)).items() >= proof.items()
+    assert dumped(proofs.ProofOut(**proof)).items() >= proof.items()
 
 
 def test_every_part_of_a_proof_is_declared() -> None:
@@ -214,9 +204,9 @@ def test_every_part_of_a_proof_is_declared() -> None:
         log="HiGHS",
         on_board=1.0,
     )
-    written = json.loads(proofs.to_json(given))
+    written = json.loads(documents.to_json(given))
     assert len(written) == 1 + len(fields(Bound)) - 1  # its version; no refutation
-    assert dumped(timelines.ProofOut(**written)).items() >= written.items()
+    assert dumped(proofs.ProofOut(**written)).items() >= written.items()
 
 
 def test_readers_take_fields_and_words_that_are_not_known_yet() -> None:
