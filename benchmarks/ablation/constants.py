@@ -58,6 +58,7 @@ _ROOMS: Final[Mapping[str, Mapping[str, float]]] = {
     "proofs.lagrangian": _AGILITY,
     "proofs.latency": _AGE,
     "proofs.resource_bound": {**_ONE, **_DELIVERED},
+    "proofs.satellite_relaxation": {**_ONE, **_DELIVERED},
     "proofs.shares": _ONE,
 }
 """Where what a module reads acts: families and CPU seconds."""

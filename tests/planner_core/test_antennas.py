@@ -15,7 +15,8 @@ from planner_core.certified.multipliers.latency import LatencyAscent
 from planner_core.certified.multipliers.resources import PriceSearch
 from planner_core.certified.proofs.documents import from_json, is_proven, to_json
 from planner_core.certified.proofs.latency import latency_value
-from planner_core.certified.proofs.resource_bound import relaxations, resource_value, whole_worth
+from planner_core.certified.proofs.resource_bound import resource_value, whole_worth
+from planner_core.certified.proofs.satellite_relaxation import relaxations
 from planner_core.certified.solver import Certified
 from planner_core.domain import Dynamics, Objective, Resources
 from planner_core.precedence.antennas import antenna_groups, antenna_tolls, paid_for_antennas

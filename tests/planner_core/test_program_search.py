@@ -16,7 +16,8 @@ from planner_core.certified.mip.program_search import ProgramSearch
 from planner_core.certified.mip.solution_pool import PlanPool, rows_of
 from planner_core.certified.multipliers.energy import EnergyPaths, ascent_on_energy
 from planner_core.certified.multipliers.resources import PriceSearch
-from planner_core.certified.proofs.resource_bound import relaxations, whole_worth
+from planner_core.certified.proofs.resource_bound import whole_worth
+from planner_core.certified.proofs.satellite_relaxation import relaxations
 from planner_core.certified.tuning import tuned
 from planner_core.domain import Dynamics
 from planner_core.problem import CONTACT, Problem

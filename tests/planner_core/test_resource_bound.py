@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from planner_core.certified.proofs import resource_bound
 from planner_core.certified.proofs.documents import is_proven
 from planner_core.certified.proofs.lagrangian import lagrangian_bound
-from planner_core.certified.proofs.resource_bound import quick_bound, relaxations, resource_value
+from planner_core.certified.proofs.resource_bound import quick_bound, resource_value
+from planner_core.certified.proofs.satellite_relaxation import relaxations
 from planner_core.problem import CONTACT
 from tests.examples import examples
 from tests.planner_core.brute_force import best_reward

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from planner_core.budget import Budget
-from planner_core.certified.lns.moves import Ground, Taken, make_moves, room_for
+from planner_core.certified.lns.moves import Ground, Taken, make_moves
+from planner_core.certified.lns.window_chains import room_for
 from planner_core.certified.signs import FREE
 from planner_core.certified.tuning import TUNING
 from planner_core.draws import draws_of

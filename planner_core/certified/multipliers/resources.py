@@ -8,11 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from planner_core.certified.proofs.bound import Bound
-from planner_core.certified.proofs.resource_bound import (
-    leaving_whole_units,
-    relaxations,
-    whole_worth,
-)
+from planner_core.certified.proofs.resource_bound import leaving_whole_units, whole_worth
+from planner_core.certified.proofs.satellite_relaxation import relaxations
 from planner_core.certified.sizes import MAX_CELLS
 from planner_core.certified.tolerances import NOTHING
 from planner_core.certified.tuning import TUNING
