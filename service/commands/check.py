@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 from collections import Counter
 from collections.abc import Iterator, Mapping
@@ -15,35 +16,37 @@ from planner_core.domain import Scenario
 from planner_core.problem import COLLECT, Problem
 from planner_core.referee.replay import plan_sha256, replay
 from planner_core.referee.timeline import Timeline
-from service.answers.reading import READERS, Reading, plan_in
-from service.commands.scenario_files import read_object
+from service.answers.reading import READERS, Reading, UnreadableTimeline, plan_in
+from service.commands.outcome import FAILED, OK, WrongInput
+from service.commands.scenario_files import read_object, told_of
 from service.commands.summary import table
 from service.scenarios.canonical import canonical, sha256_of
 from service.scenarios.translate import scenario_from_content
 from service.wire.instants import instant_text
 
 _AGREED = 1e-6
+_MOST_FAULTS = 20
 
 
-def check_file(scenario_path: Path, timeline_path: Path) -> int:
+def check(options: argparse.Namespace) -> int:
     """Judge the plan in a file, print the verdict, and return 0 where it is valid, else 1.
 
-    Parameters
-    ----------
-    scenario_path
-        A self-contained scenario file.
-    timeline_path
-        A timeline as ``.json`` or ``.csv``: this service's own, an edited or a foreign one.
-
-    Raises
-    ------
-    PlannerError
-        Where the scenario is wrong.
-    UnreadableTimeline
-        Where the timeline is.
-    OSError
-        Where a file cannot be read.
+    It is a timeline as ``.json`` or ``.csv``: this service's own, an edited or a foreign one.
     """
+    try:
+        with told_of(options.scenario):
+            return _judged(options.scenario, options.timeline)
+    except UnreadableTimeline as error:
+        lines = [
+            f"{options.timeline} {f'line {f.row}' if f.row else f.pointer or ''}".strip()
+            + f": {f.detail}"
+            for f in error.faults[:_MOST_FAULTS]
+        ]
+        left = len(error.faults) - len(lines)
+        raise WrongInput("\n".join(lines + [f"{left} more"] * (left > 0))) from error
+
+
+def _judged(scenario_path: Path, timeline_path: Path) -> int:
     content = canonical(read_object(scenario_path))
     data = timeline_path.read_bytes()
     suffix = timeline_path.suffix.lower()
@@ -63,7 +66,7 @@ def check_file(scenario_path: Path, timeline_path: Path) -> int:
         claimed = json.loads(data)
         for line in _differences(claimed, sha256_of(content), own_hash, verdict.reward):
             print(line)
-    return 0 if validity != "violations" else 1
+    return OK if validity != "violations" else FAILED
 
 
 _HEADER = ("validity", "reward", "collects", "contacts", "battery", "recorder")

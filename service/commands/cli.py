@@ -5,37 +5,53 @@ from __future__ import annotations
 import argparse
 import json
 import math
-from collections.abc import Callable, Sequence
+import sys
+from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import planner_core
 from service.access.callers import Scope, is_plain_name
-from service.commands import bodies
-from service.commands.bodies import FAILED, WRONG_INPUT, Stopped, WrongInput, complain
+from service.commands.outcome import FAILED, WRONG_INPUT, Failed, WrongInput
 
 _LONGEST_DAYS = 3650
-
-Command = Callable[[argparse.Namespace], int]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status: 0 well, 1 failed, 2 wrong input."""
     options = _parser().parse_args(arguments)
-    command: Command = options.command
+    module, _, function = options.command.partition(":")
     try:
-        return command(options)
+        # Only now: some take long to import what they need.
+        status: int = getattr(import_module(f"service.commands.{module}"), function)(options)
+        return status
     except WrongInput as error:
-        return complain(str(error), WRONG_INPUT)
-    except Stopped as error:
-        return complain(str(error), FAILED)
+        return _complain(str(error), WRONG_INPUT)
+    except Failed as error:
+        return _complain(str(error), FAILED)
     except KeyboardInterrupt:
-        return complain("interrupted", FAILED)
+        return _complain("interrupted", FAILED)
     except Exception as error:
-        reason = bodies.why_database_failed(error)
+        reason = _why_database_failed(error)
         if reason is None:
             raise
-        return complain(reason, FAILED)
+        return _complain(reason, FAILED)
+
+
+def _complain(message: str, status: int) -> int:
+    """Say what went wrong; return the status."""
+    print(f"slewline: {message}", file=sys.stderr)
+    return status
+
+
+def _why_database_failed(error: BaseException) -> str | None:
+    """Return why the database could not serve, or None where something else went wrong."""
+    if "sqlalchemy" not in sys.modules:
+        return None
+    from service.db.failures import why_unavailable
+
+    return why_unavailable(error)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -47,41 +63,43 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=planner_core.__version__)
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
 
-    serve = _command(commands, "serve", bodies.serve, "run the API and local workers")
+    serve = _command(commands, "serve", "serving:serve", "run the API and local workers")
     _add_address(serve)
     serve.add_argument("--workers", type=int, help="worker processes (2)")
     _add_database(serve)
 
-    api = _command(commands, "api", bodies.api, "run the API alone")
+    api = _command(commands, "api", "serving:api", "run the API alone")
     _add_address(api)
     _add_database(api)
 
-    worker = _command(commands, "worker", bodies.worker, "run one worker")
+    worker = _command(commands, "worker", "serving:worker", "run one worker")
     _add_database(worker)
 
-    migrate = _command(commands, "migrate", bodies.migrate, "create or update the database")
+    migrate = _command(commands, "migrate", "serving:migrate", "create or update the database")
     _add_database(migrate)
 
-    backup = _command(commands, "backup", bodies.backup, "copy a SQLite database that is in use")
+    backup = _command(commands, "backup", "serving:backup", "copy a SQLite database that is in use")
     backup.add_argument("file", type=Path, metavar="FILE", help="a new file")
     _add_database(backup)
 
     demo = _command(
-        commands, "demo", bodies.demo, "plan a real-size mission and print what came out"
+        commands, "demo", "demo:demo", "plan a real-size mission and print what came out"
     )
     demo.add_argument("--serve", action="store_true", help="keep serving afterwards")
     demo.add_argument("--out", type=Path, default=Path("demo-output"), help="folder for timelines")
 
-    _add_solve(_command(commands, "solve", bodies.solve, "plan a scenario file, without a service"))
+    _add_solve(
+        _command(commands, "solve", "solve:solve", "plan a scenario file, without a service")
+    )
 
     check = _command(
-        commands, "check", bodies.check, "have the referee judge a timeline of any origin"
+        commands, "check", "check:check", "have the referee judge a timeline of any origin"
     )
     check.add_argument("scenario", type=Path, metavar="SCENARIO.json")
     check.add_argument("timeline", type=_timeline_file, metavar="TIMELINE.{json,csv}")
 
     spacing = _command(
-        commands, "compare-spacing", bodies.compare_spacing,
+        commands, "compare-spacing", "compare_spacing:compare_spacing",
         "see what more starts in each access gain on a scenario file",
     )  # fmt: skip
     spacing.add_argument(
@@ -91,24 +109,29 @@ def _parser() -> argparse.ArgumentParser:
     spacing.add_argument("scenario", type=Path, metavar="SCENARIO.json")
     _add_search(spacing, solver="certified", time_s=60.0, out="write the table here, as CSV")
 
-    _add_keys(_command(commands, "keys", None, "make, list and revoke API keys"))
+    _add_keys(_command(commands, "keys", "", "make, list and revoke API keys"))
     _add_plan(
-        _command(commands, "plan", bodies.plan, "have a service plan a scenario, and follow it")
+        _command(
+            commands, "plan", "plan_command:plan", "have a service plan a scenario, and follow it"
+        )
     )
     _add_replan(
-        _command(commands, "replan", bodies.replan, "have a service replan after what happened")
+        _command(
+            commands, "replan", "plan_command:replan", "have a service replan after what happened"
+        )
     )
 
-    _command(commands, "openapi", bodies.openapi, "print the description of the HTTP API")
+    _command(commands, "openapi", "serving:openapi", "print the description of the HTTP API")
     return parser
 
 
 def _command(
     commands: Any,
     name: str,
-    run: Command | None,
+    run: str,
     help: str,  # noqa: A002 - as argparse names it
 ) -> argparse.ArgumentParser:
+    """Add a command; it is run by the function ``module:function`` of this package."""
     parser: argparse.ArgumentParser = commands.add_parser(name, help=help, description=help)
     parser.set_defaults(command=run)
     return parser
@@ -125,15 +148,19 @@ def _add_database(parser: argparse.ArgumentParser) -> None:
 
 def _add_keys(parser: argparse.ArgumentParser) -> None:
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
-    create = _command(commands, "create", bodies.create_key, "make a key and print it, this once")
+    create = _command(
+        commands, "create", "key_commands:create_key", "make a key and print it, this once"
+    )
     create.add_argument("--name", required=True, type=_plain_name, help="what the key is for")
     create.add_argument("--owner", required=True, type=_plain_name, help="whose jobs it sees")
     create.add_argument("--scope", required=True, choices=[scope.value for scope in Scope])
     create.add_argument("--expires-days", type=_days, default=365.0, metavar="DAYS", help="(365)")
     _add_database(create)
-    listing = _command(commands, "list", bodies.list_keys, "list all keys, without their secrets")
+    listing = _command(
+        commands, "list", "key_commands:list_keys", "list all keys, without their secrets"
+    )
     _add_database(listing)
-    revoke = _command(commands, "revoke", bodies.revoke_key, "make a key worthless at once")
+    revoke = _command(commands, "revoke", "key_commands:revoke_key", "make a key worthless at once")
     revoke.add_argument("key_id", metavar="ID", help="the twelve digits after slw_")
     _add_database(revoke)
 

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
+import argparse
 import csv
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any, Final
 
 from planner_core.access.scenario_opportunities import ScenarioOpportunities
 from planner_core.budget import Budget
-from planner_core.solvers.registry import solver_class
-from service.commands.scenario_files import read_object, require_folder
+from service.commands.outcome import FAILED, OK
+from service.commands.scenario_files import read_object, require_folder, told_of
 from service.commands.solve import Search, answer_of
-from service.jobs.solver_params import params_of, parse_params
 from service.scenarios.translate import quality_from, read_file
 
 SPACINGS_S: Final = (60.0, 30.0, 15.0)
@@ -95,50 +94,37 @@ class _Search(Search):
         return row if row.reward >= above.reward else row.with_plan_of(above)
 
 
-def compare_spacing(
-    path: Path,
-    *,
-    spacings_s: Sequence[float],
-    solver: str,
-    params: Mapping[str, Any],
-    seed: int = 0,
-    time_s: float,
-    out: Path | None = None,
-) -> int:
+def compare_spacing(options: argparse.Namespace) -> int:
     """Plan a scenario file with ever more starts, print a line for each; return 0 if all are valid.
 
-    No row is worse than the one above it. Where a search ends before it gets so far, another one
-    starts from the plan above; that plan itself may be flown in any case.
-
-    Parameters
-    ----------
-    path
-        A self-contained scenario file; what it says of spacing and continuous starts is varied.
-        With ``quality`` its collects do not start anywhere.
-    spacings_s
-        Seconds between the starts of an access's collects.
-    solver, params, seed
-        As in ``POST /v1/jobs``.
-    time_s
-        Of each search; Ctrl-C ends the one that runs, and the comparison.
-    out
-        Where to write the table, as CSV.
-
-    Raises what ``solve_file`` does.
+    What the file says of spacing and continuous starts is varied. With ``quality`` its collects do
+    not start anywhere. No row is worse than the one above it: where a search ends before it gets so
+    far, another one starts from the plan above; that plan itself may be flown in any case. Ctrl-C
+    ends the search that runs, and the comparison.
     """
-    if out is not None:
-        require_folder(out)
-    content = read_object(path)
-    has_quality = bool(quality_from(read_file(content).quality))
-    chosen = params_of(parse_params(solver_class(solver), params))
-    search = _Search(solver=solver, params=chosen, seed=seed, time_s=time_s)
+    with told_of(options.scenario):
+        if options.out is not None:
+            require_folder(options.out)
+        content = read_object(options.scenario)
+        has_quality = bool(quality_from(read_file(content).quality))
+        search = _Search.of(options)
+        rows, all_valid = _table(search, content, options.spacing_s or SPACINGS_S, not has_quality)
+        if options.out is not None:
+            with options.out.open("w", newline="", encoding="utf-8") as file:
+                csv.writer(file).writerows([_HEADER, *rows])
+    return OK if all_valid else FAILED
 
+
+def _table(
+    search: _Search, content: dict[str, Any], spacings_s: Sequence[float], anywhere: bool
+) -> tuple[list[tuple[str, ...]], bool]:
+    """Print the rows as they come; return them, and whether every plan is valid."""
     print(_line(_HEADER))
     rows: list[tuple[str, ...]] = []
     first: float | None = None
     above: _Row | None = None
     all_valid = True
-    for starts, change in _variants(spacings_s, anywhere=not has_quality):
+    for starts, change in _variants(spacings_s, anywhere=anywhere):
         row = search.row(starts, content | change)
         if above is not None and not row.is_cancelled and row.reward < above.reward:
             row = search.row_from(above, row, content | change)
@@ -149,10 +135,7 @@ def compare_spacing(
         print(_line(rows[-1]), flush=True)
         if row.is_cancelled:
             break
-    if out is not None:
-        with out.open("w", newline="", encoding="utf-8") as file:
-            csv.writer(file).writerows([_HEADER, *rows])
-    return 0 if all_valid else 1
+    return rows, all_valid
 
 
 def _variants(

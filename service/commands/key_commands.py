@@ -2,77 +2,74 @@
 
 from __future__ import annotations
 
+import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from datetime import datetime
 
 from service.access import key_store
 from service.access.audit import BY_COMMAND_LINE
 from service.access.callers import Scope
+from service.commands.outcome import OK, WrongInput
+from service.commands.serving import settings_of
 from service.commands.summary import table
 from service.db.migrate import upgrade
 from service.db.rows import ApiKeyRow
 from service.db.session import Database
-from service.settings import Settings
 
 _HEADER = ("id", "name", "owner", "scope", "made", "expires", "state")
 
 
-class NoSuchKey(Exception):
-    """There is no key of this id."""
-
-
-def create_key(
-    settings: Settings, *, name: str, owner: str, scope: Scope, expires_days: float
-) -> None:
+def create_key(options: argparse.Namespace) -> int:
     """Store a key and print its token, this once: the token alone on standard output."""
-    database = _migrated(settings)
-    with database.transaction() as session:
+    with _database(options) as database, database.transaction() as session:
         key_id, token = key_store.create(
-            session, name=name, owner=owner, scope=scope, expires_days=expires_days
-        )
+            session, name=options.name, owner=options.owner, scope=Scope(options.scope),
+            expires_days=options.expires_days,
+        )  # fmt: skip
         BY_COMMAND_LINE.record(session, "create", "key", key_id)
-    database.close()
     print(token, flush=True)
     print(
-        f"This is key {key_id} of {owner}, good for {expires_days:g} days. "
+        f"This is key {key_id} of {options.owner}, good for {options.expires_days:g} days. "
         "Keep it safe: it is not shown again.",
         file=sys.stderr,
     )
+    return OK
 
 
-def list_keys(settings: Settings) -> None:
+def list_keys(options: argparse.Namespace) -> int:
     """Print a table of all keys, those that are no longer good included."""
-    database = _migrated(settings)
-    with database.reading() as session:
+    with _database(options) as database, database.reading() as session:
         keys = key_store.every_key(session)
-    database.close()
     print(table([_HEADER, *_lines(keys)]))
+    return OK
 
 
-def revoke_key(settings: Settings, key_id: str) -> None:
-    """Make a key worthless at once.
-
-    Raises
-    ------
-    NoSuchKey
-        Where there never was one of this id.
-    """
-    database = _migrated(settings)
-    with database.transaction() as session:
+def revoke_key(options: argparse.Namespace) -> int:
+    """Make a key worthless at once."""
+    key_id = options.key_id
+    with _database(options) as database, database.transaction() as session:
         is_new = key_store.revoke(session, key_id)
         if is_new:
             BY_COMMAND_LINE.record(session, "revoke", "key", key_id)
         is_known = key_store.has_key(session, key_id)
-    database.close()
     if not is_known:
-        raise NoSuchKey
+        raise WrongInput(f"there is no key {key_id!r}; see slewline keys list")
     print(f"Key {key_id} is revoked." if is_new else f"Key {key_id} was revoked before.")
+    return OK
 
 
-def _migrated(settings: Settings) -> Database:
-    upgrade(settings.database_url)
-    return Database(settings.database_url)
+@contextmanager
+def _database(options: argparse.Namespace) -> Iterator[Database]:
+    """Yield the database, which has its tables by then."""
+    url = settings_of(options).database_url
+    upgrade(url)
+    database = Database(url)
+    try:
+        yield database
+    finally:
+        database.close()
 
 
 def _lines(keys: Sequence[tuple[ApiKeyRow, bool]]) -> list[tuple[str, ...]]:

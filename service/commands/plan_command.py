@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import Final
 
 from planner_core.errors import PlannerError
-from service.client import Client, ServiceError
-from service.commands.bodies import WrongInput
+from service.client import Client, ClientError, ServiceError
+from service.commands.outcome import Failed, WrongInput
 from service.commands.plan import follow_to_plan
-from service.commands.replan import replan
+from service.commands.replan import follow_to_draft
 from service.commands.scenario_files import place_of, read_object, require_folder
 
 _SUFFIXES: Final = (".json", ".csv", ".geojson", ".czml", ".ics")  # the service has the last word
@@ -31,16 +31,8 @@ _OPTIONS: Final = {
 _OF_THE_INPUT: Final = (413, 422)
 
 
-def run_plan(options: argparse.Namespace) -> int:
-    """Run ``slewline plan`` and return its exit status.
-
-    Raises
-    ------
-    WrongInput
-        Where something is.
-    ClientError
-        Where the service does not do what was asked.
-    """
+def plan(options: argparse.Namespace) -> int:
+    """Have a service plan a scenario, and follow it."""
     with _placed(options.scenario):
         _check(options)
         scenario = options.scenario_id or read_object(options.scenario)
@@ -59,8 +51,8 @@ def run_plan(options: argparse.Namespace) -> int:
             return follow_to_plan(client, submit, out=options.out, detach=options.detach)
 
 
-def run_replan(options: argparse.Namespace) -> int:
-    """Run ``slewline replan``; returns and raises what ``run_plan`` does."""
+def replan(options: argparse.Namespace) -> int:
+    """Have a service replan a plan after what happened, and follow it."""
     with _placed(options.happened):
         _check_out(options)
         happened = {} if options.happened is None else read_object(options.happened)
@@ -74,7 +66,9 @@ def run_replan(options: argparse.Namespace) -> int:
             others = limits if isinstance(limits, dict) else {}
             happened["limits"] = {**others, "time_s": options.time_s}
         with _client(options) as client:
-            return replan(client, options.plan_id, happened, out=options.out, detach=options.detach)
+            return follow_to_draft(
+                client, options.plan_id, happened, out=options.out, detach=options.detach
+            )
 
 
 def _client(options: argparse.Namespace) -> Client:
@@ -109,8 +103,10 @@ def _placed(scenario: Path | None) -> Iterator[None]:
         yield
     except ServiceError as error:
         if error.status not in _OF_THE_INPUT:
-            raise
+            raise Failed(str(error)) from error
         raise WrongInput(_faults(error, scenario)) from error
+    except ClientError as error:
+        raise Failed(str(error)) from error
     except PlannerError as error:
         raise WrongInput(f"{scenario}: {error.detail}") from error
     except OSError as error:

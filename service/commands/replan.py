@@ -16,7 +16,7 @@ from service.wire.instants import instant_text
 _HEADER = ("change", "cause", "satellite", "action", "of", "was at", "is at")
 
 
-def replan(
+def follow_to_draft(
     client: Client, plan_id: str, happened: Mapping[str, Any], *, out: Path | None, detach: bool
 ) -> int:
     """Have a plan replanned; print a summary, the draft and its changes.

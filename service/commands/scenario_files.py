@@ -4,10 +4,27 @@ from __future__ import annotations
 
 import errno
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from planner_core.errors import InvalidScenario
+from planner_core.errors import Cancelled, InvalidScenario, PlannerError
+from service.commands.outcome import Failed, WrongInput
+
+
+@contextmanager
+def told_of(scenario: Path) -> Iterator[None]:
+    """Tell what is wrong with a scenario file, or with the search that it is given to."""
+    try:
+        yield
+    except PlannerError as error:
+        place = place_of(error.fault.pointer or "", scenario)
+        raise WrongInput(f"{place}: {error.detail}") from error
+    except Cancelled as error:
+        raise Failed("stopped before there was a plan") from error
+    except OSError as error:
+        raise WrongInput(f"{error.filename}: {error.strerror}") from error
 
 
 def read_object(path: Path) -> dict[str, Any]:

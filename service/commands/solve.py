@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import signal
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Self
 
 from planner_core.budget import Budget
 from planner_core.solvers.registry import solver_class
-from service.commands.scenario_files import read_object, require_folder
+from service.commands.outcome import FAILED, OK
+from service.commands.scenario_files import read_object, require_folder, told_of
 from service.commands.summary import summary
 from service.jobs.plan_job import run_plan_job
 from service.jobs.plan_request import PlanAnswer, PlanRequest
@@ -22,43 +23,20 @@ from service.scenarios.canonical import canonical, sha256_of
 _LOOK_EVERY_S: Final = 0.05
 
 
-def solve_file(
-    path: Path,
-    *,
-    solver: str,
-    params: Mapping[str, Any],
-    seed: int = 0,
-    time_s: float | None = None,
-    out: Path | None = None,
-) -> int:
+def solve(options: argparse.Namespace) -> int:
     """Plan a scenario file, print a summary, and return 0 where the plan is valid, else 1.
 
-    Parameters
-    ----------
-    path
-        A self-contained scenario file, as ``GET /v1/scenarios/{id}?expand=true`` answers it.
-    solver, params, seed
-        As in ``POST /v1/jobs``; ``params`` are completed with the solver's defaults.
-    time_s
-        When to stop the search and keep the best plan so far; Ctrl-C does the same.
-    out
-        Where to write the timeline.
-
-    Raises
-    ------
-    PlannerError, OSError, Cancelled
-        Where input is wrong, a file cannot be read or written, or there was no plan in time.
+    At the end of its time, or by Ctrl-C, the search ends with its best plan so far.
     """
-    if out is not None:
-        require_folder(out)
-    chosen = parse_params(solver_class(solver), params)
-    search = Search(solver=solver, params=params_of(chosen), seed=seed, time_s=time_s)
-    answer = answer_of(search.request(read_object(path)), Budget(time_s))
-    timeline = json.loads(answer.timeline)
-    if out is not None:
-        out.write_text(json.dumps(timeline, indent=1) + "\n", encoding="utf-8")
+    with told_of(options.scenario):
+        if options.out is not None:
+            require_folder(options.out)
+        request = Search.of(options).request(read_object(options.scenario))
+        timeline = json.loads(answer_of(request, Budget(options.time_s)).timeline)
+        if options.out is not None:
+            options.out.write_text(json.dumps(timeline, indent=1) + "\n", encoding="utf-8")
     print(summary(timeline))
-    return 0 if timeline["validity"] != "violations" else 1
+    return OK if timeline["validity"] != "violations" else FAILED
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,6 +47,12 @@ class Search:
     params: Mapping[str, Any]
     seed: int
     time_s: float | None
+
+    @classmethod
+    def of(cls, options: argparse.Namespace) -> Self:
+        """Return the search of a command line, the solver's defaults filled in."""
+        params = params_of(parse_params(solver_class(options.solver), dict(options.param)))
+        return cls(solver=options.solver, params=params, seed=options.seed, time_s=options.time_s)
 
     def request(self, scenario: Mapping[str, Any]) -> PlanRequest:
         """Return the question of a scenario file."""

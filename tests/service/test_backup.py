@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from service.commands.bodies import FAILED, OK
 from service.commands.cli import main
+from service.commands.outcome import FAILED, OK
 from service.db.session import Database
 from service.settings import Settings
 

@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 import sqlalchemy as sa
 
-from service.commands.bodies import FAILED, OK, WRONG_INPUT
 from service.commands.cli import main
+from service.commands.outcome import FAILED, OK, WRONG_INPUT
 
 COMMANDS = (
     "serve", "api", "worker", "migrate", "backup", "demo", "solve", "compare-spacing", "plan",

@@ -11,8 +11,8 @@ import pytest
 
 from planner_core.budget import Budget
 from service.commands import compare_spacing
-from service.commands.bodies import OK, WRONG_INPUT
 from service.commands.cli import main
+from service.commands.outcome import OK, WRONG_INPUT
 from service.commands.solve import answer_of
 from service.jobs.plan_request import PlanAnswer, PlanRequest
 from service.scenarios.canonical import canonical

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from service.commands.demo import DemoFailed, _url_when_ready
+from service.commands.demo import _url_when_ready
+from service.commands.outcome import Failed
 
 
 def started(code: str) -> subprocess.Popen[str]:
@@ -25,7 +26,7 @@ def test_a_service_that_ends_is_told_with_its_status_and_last_words(tmp_path: Pa
     log.write_text("".join(f"line {number}\n" for number in range(100)))
     with (
         started("print('a banner'); raise SystemExit(3)") as process,
-        pytest.raises(DemoFailed, match=r"(?s)status 3; see .*line 80.*line 99") as caught,
+        pytest.raises(Failed, match=r"(?s)status 3; see .*line 80.*line 99") as caught,
     ):
         _url_when_ready(process, log)
     assert "line 79" not in str(caught.value)

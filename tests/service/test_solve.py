@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 
 from service.commands import demo_mission
-from service.commands.bodies import OK, WRONG_INPUT
 from service.commands.cli import main
+from service.commands.outcome import OK, WRONG_INPUT
 from service.scenarios.canonical import canonical, sha256_of
 
 

@@ -9,8 +9,8 @@ import httpx
 import pytest
 import sqlalchemy as sa
 
-from service.commands.bodies import OK, WRONG_INPUT
 from service.commands.cli import main
+from service.commands.outcome import OK, WRONG_INPUT
 from service.db.rows import AuditEventRow
 from service.db.session import Database
 from service.server import NoKey, require_key

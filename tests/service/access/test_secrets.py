@@ -9,8 +9,8 @@ import pytest
 
 from service.access.static_keys import StaticKeys
 from service.access.tokens import new_token
-from service.commands.bodies import WRONG_INPUT
 from service.commands.cli import main
+from service.commands.outcome import WRONG_INPUT
 from service.jobs.supervisor import environment_of
 from service.process.logs import JsonFormatter
 from service.settings import Settings

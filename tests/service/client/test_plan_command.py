@@ -17,8 +17,8 @@ import pytest
 
 from service.client import Client
 from service.commands import demo_mission
-from service.commands.bodies import FAILED, OK, WRONG_INPUT
 from service.commands.cli import main
+from service.commands.outcome import FAILED, OK, WRONG_INPUT
 from service.scenarios.canonical import canonical, sha256_of
 from tests.service.client.trouble import Answer, proxy_before
 

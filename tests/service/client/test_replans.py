@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from service.client import Client, JobFailed, Plan, PlanAction, ServiceError
-from service.commands.bodies import OK, WRONG_INPUT
 from service.commands.cli import main
+from service.commands.outcome import OK, WRONG_INPUT
 from service.wire.instants import instant_text
 from tests.missions import drawn_targets, paper_mission
 

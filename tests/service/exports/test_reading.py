@@ -22,8 +22,8 @@ from planner_core.spreadsheets import guarded, unguarded
 from service.answers.answered import Answered
 from service.answers.reading import READERS, Reading, UnreadableTimeline, plan_in
 from service.answers.rebuilt import view_of
-from service.commands.bodies import FAILED, OK, WRONG_INPUT
 from service.commands.cli import main
+from service.commands.outcome import FAILED, OK, WRONG_INPUT
 from service.exports import table
 from service.scenarios.canonical import canonical
 from service.scenarios.translate import scenario_from_content

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from service.commands.solve import solve_file
+from service.commands.cli import main
 from tests.missions import Document
 from tests.service.jobs.mission import HIDDEN, ODD, Mission, small_mission
 from tests.service.problems import assert_problem
@@ -118,7 +118,9 @@ def test_fractions_of_a_preset_are_frozen_and_can_be_solved_without_the_service(
     assert file["horizon"]["end"] == "2019-01-01T10:00:00.000Z"
     (tmp_path / "day.json").write_text(json.dumps(file))
     out = tmp_path / "out.json"
-    solve_file(tmp_path / "day.json", solver="rule", params=job["params"], seed=3, out=out)
+    given = [f"--param={name}={json.dumps(value)}" for name, value in job["params"].items()]
+    asked = ["solve", str(tmp_path / "day.json"), "--solver", "rule", "--seed", "3", *given]
+    assert main([*asked, "--out", str(out)]) == 0
     alone, timeline = json.loads(out.read_text()), mission.timeline(job)
     assert alone["scenario_sha256"] == timeline["scenario_sha256"] == job["scenario"]["sha256"]
     assert alone["plan_sha256"] == timeline["plan_sha256"]

@@ -7,6 +7,7 @@ from typing import Any
 
 import httpx
 
+from service.client import Client
 from service.commands import demo, demo_mission
 from tests.service.factories import post, satellite, tle
 
@@ -19,7 +20,8 @@ def small_mission(api: httpx.Client) -> str:
     name = {"name": demo_mission.SATELLITE["name"]}
     # Tests share a service, which knows a catalogue number once.
     if not api.get("/v1/satellites", params=name).json()["items"]:
-        return str(demo.create_mission(api)["id"])
+        with Client(str(api.base_url), key="") as client:
+            return demo.create_mission(client).id
     stored = api.get("/v1/scenarios", params={"name": "Day of a polar satellite"}).json()["items"]
     return str(stored[-1]["id"])
 

@@ -1,0 +1,17 @@
+"""How a command ends: its exit status, and what is said where it is not 0."""
+
+from __future__ import annotations
+
+from typing import Final
+
+OK: Final = 0
+FAILED: Final = 1
+WRONG_INPUT: Final = 2
+
+
+class WrongInput(Exception):
+    """Something on the command line, in the environment or in a file; the message names it."""
+
+
+class Failed(Exception):
+    """The command cannot do what it is for; the message says why."""

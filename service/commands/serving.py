@@ -1,0 +1,99 @@
+"""Commands that run the service or a part of it, and what they share: the settings.
+
+Whatever takes long to import is imported by the command that needs it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from typing import TYPE_CHECKING
+
+from service.commands.outcome import OK, Failed, WrongInput
+
+if TYPE_CHECKING:
+    from service.settings import Settings
+
+
+def settings_of(options: argparse.Namespace) -> Settings:
+    """Return the settings of the environment, with the options given on top."""
+    from pydantic import SecretStr, ValidationError
+
+    from service.settings import Settings
+
+    given = {name: value for name, value in vars(options).items() if name in Settings.model_fields}
+    try:
+        return Settings(**{name: value for name, value in given.items() if value is not None})
+    except ValidationError as error:
+        first = error.errors()[0]
+        name = str(first["loc"][0])
+        option = f"--{name.replace('_', '-')}" if name in given else f"SLEWLINE_{name.upper()}"
+        # A setting with secrets in it is never repeated.
+        is_secret = Settings.model_fields[name].annotation is SecretStr
+        instead = "" if is_secret else f", not {first['input']!r}"
+        raise WrongInput(f"{option}: {first['msg']}{instead}") from error
+
+
+def serve(options: argparse.Namespace) -> int:
+    """Run the API and local workers."""
+    return _run_server(settings_of(options), with_workers=True)
+
+
+def api(options: argparse.Namespace) -> int:
+    """Run the API alone."""
+    return _run_server(settings_of(options), with_workers=False)
+
+
+def _run_server(settings: Settings, *, with_workers: bool) -> int:
+    from service.server import CannotServe, NoKey, serve
+
+    try:
+        return serve(settings, with_workers=with_workers)
+    except NoKey as error:
+        raise WrongInput(str(error)) from error
+    except CannotServe as error:
+        raise Failed(str(error)) from error
+
+
+def worker(options: argparse.Namespace) -> int:
+    """Run one worker."""
+    from service.jobs.__main__ import run_worker
+    from service.jobs.runner import Work
+    from service.process.tracing import CannotTrace
+
+    try:
+        run_worker(settings_of(options), Work())
+    except CannotTrace as error:
+        raise Failed(str(error)) from error
+
+
+def migrate(options: argparse.Namespace) -> int:
+    """Create or update the database."""
+    from service.server import prepare_database
+
+    prepare_database(settings_of(options))
+    print("The database is up to date.")
+    return OK
+
+
+def backup(options: argparse.Namespace) -> int:
+    """Copy a SQLite database that is in use."""
+    from service.db.backup import CannotBackUp, back_up
+
+    try:
+        back_up(settings_of(options).database_url, options.file)
+    except CannotBackUp as error:
+        raise Failed(str(error)) from error
+    print(f"The database is in {options.file}.")
+    return OK
+
+
+def openapi(options: argparse.Namespace) -> int:
+    """Print the description of the HTTP API."""
+    from service.main import create_app
+
+    # The application opens its database at the first request: this one never.
+    settings = settings_of(options).model_copy(update={"database_url": "sqlite:///unused.db"})
+    app = create_app(settings)
+    print(json.dumps(app.openapi(), indent=2))
+    return OK
