@@ -26,13 +26,13 @@ from prometheus_client.core import (
     Metric,
     SummaryMetricFamily,
 )
+from sqlalchemy.orm import Session
 from starlette.types import Scope
 
 import planner_core
 from service.api.deps import DatabaseDep
 from service.db.session import Database
-from service.stores import metrics_store
-from service.stores.metrics_store import Snapshot
+from service.stores import metrics_store as store
 
 router = APIRouter(tags=["operations"])
 
@@ -103,61 +103,59 @@ class _Collected:
 
 def _families(database: Database) -> Iterator[Metric]:
     yield InfoMetricFamily("slewline_build", "What runs.", {"version": planner_core.__version__})
+    stored: list[Metric] = []
     try:
         with database.reading() as session:
-            snapshot = metrics_store.take(session)
+            stored = [*_of_jobs(session), *_of_others(session)]
     except sa.exc.DatabaseError:
-        snapshot = None
-    up = 0.0 if snapshot is None else 1.0
+        pass  # told by the next family
+    up = 1.0 if stored else 0.0
     yield GaugeMetricFamily("slewline_database_up", "1 where the database answers.", up)
-    if snapshot is not None:
-        yield from _of_jobs(snapshot)
-        yield from _of_others(snapshot)
+    yield from stored
 
 
-def _of_jobs(snapshot: Snapshot) -> Iterator[Metric]:
-    yield _gauge("slewline_jobs", "Jobs by state.", "state", snapshot.num_jobs)
+def _of_jobs(session: Session) -> Iterator[Metric]:
+    yield _gauge("slewline_jobs", "Jobs by state.", "state", store.num_jobs(session))
     about = "Plans that jobs have found, by validity."
-    yield _gauge("slewline_job_plans", about, "validity", snapshot.num_plans)
+    yield _gauge("slewline_job_plans", about, "validity", store.num_plans(session))
     yield GaugeMetricFamily(
         "slewline_queue_oldest_seconds",
         "How long the oldest waiting job has waited.",
-        snapshot.oldest_waiting_s,
+        store.oldest_waiting_s(session),
     )
     times = SummaryMetricFamily(
         "slewline_job_seconds",
         "From first start to end of the jobs that have ended.",
         labels=["solver", "state", "termination"],
     )
-    for one in snapshot.job_times:
-        labels = [one.solver, one.state, one.termination]
-        times.add_metric(labels, count_value=one.num_jobs, sum_value=one.total_s)
+    for labels, num_jobs, total_s in store.job_times(session):
+        times.add_metric(labels, count_value=num_jobs, sum_value=total_s)
     yield times
     yield CounterMetricFamily(
-        "slewline_leases_lost", "Runs whose worker died.", snapshot.num_leases_lost
+        "slewline_leases_lost", "Runs whose worker died.", store.num_leases_lost(session)
     )
 
 
-def _of_others(snapshot: Snapshot) -> Iterator[Metric]:
+def _of_others(session: Session) -> Iterator[Metric]:
     yield _gauge(
         "slewline_worker_heartbeat_age_seconds",
         "Since the last sign of life of each worker of the last day.",
         "worker",
-        snapshot.heartbeat_age_s,
+        store.heartbeat_age_s(session),
     )
     orbits = GaugeMetricFamily(
         "slewline_orbit_age_seconds",
         "Since the epoch of the newest elements of each satellite planned in the last 7 days.",
         labels=["satellite_id", "name"],
     )
-    for orbit in snapshot.orbits:
-        orbits.add_metric([orbit.satellite_id, orbit.name], orbit.age_s)
+    for labels, age_s in store.orbit_ages(session):
+        orbits.add_metric(labels, age_s)
     yield orbits
     yield _gauge(
         "slewline_webhook_deliveries",
         "Messages of webhooks by state; ended ones of the last 30 days.",
         "state",
-        snapshot.num_deliveries,
+        store.num_deliveries(session),
     )
 
 

@@ -17,6 +17,7 @@ from service.api.guard import require_scope
 from service.api.idempotency import OnceDep
 from service.api.paging import PagingDep, newest_first
 from service.api.timelines import Suffix, timeline_answer, timeline_responses
+from service.db import clock
 from service.db.rows import JobRow, PlanActionRow, PlanRow, PlanSatelliteRow
 from service.exports.forms import FORMS
 from service.plans import lifecycle
@@ -96,7 +97,7 @@ def _instant(session: Session, at: str | None) -> datetime | None:
     if at is None:
         return None
     if at == "now":
-        return plan_store.now(session)
+        return clock.now(session)
     try:
         return parse_instant(at)
     except ValueError as error:

@@ -21,6 +21,7 @@ from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
 from service.api.plans import action_out, find_plan
 from service.api.telemetry import faults_of_states, take_down
+from service.db import clock
 from service.db.rows import JobRow, PlanActionRow, PlanRow, SatelliteRow, ScenarioRow
 from service.plans import replans
 from service.plans import store as plan_store
@@ -61,7 +62,7 @@ def create_replan(plan_id: str, body: ReplanIn, call: CallDep, once: OnceDep) ->
         plan = find_plan(session, plan_id, call.caller)
         if body.executions:
             take_down(session, call, plan, body.executions, "/executions")
-        now = _to_the_millisecond(body.now or plan_store.now(session))
+        now = _to_the_millisecond(body.now or clock.now(session))
         freeze_until = max(body.freeze_until or now, now)
         happened = _happened(session, plan, body, file, now, freeze_until)
         asked = replanning.replan_file(file, body, happened)

@@ -13,8 +13,8 @@ from sqlalchemy.orm import Session
 
 from service.api.deps import CallDep
 from service.api.paging import PagingDep, invalid_cursor
+from service.db import clock
 from service.db.rows import TargetCatalogRow, TargetRow
-from service.plans import store as plan_store
 from service.plans.target_lives import lives_of, plans_by_catalog
 from service.wire.base import Listed
 from service.wire.places import TargetIn
@@ -44,7 +44,7 @@ def list_target_lives(
     with call.database.reading() as session:
         catalogs = _catalogs(session, catalog_id, after[0])
         plans = plans_by_catalog(session, call.caller.visible_owner)
-        now = plan_store.now(session)
+        now = clock.now(session)
         found = (
             numbered
             for catalog in catalogs

@@ -16,7 +16,7 @@ from service.api.deps import CallDep
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
 from service.api.paging import PagingDep, newest_first
-from service.db.clock import utc_now
+from service.db import clock
 from service.db.rows import WebhookDeliveryRow, WebhookRow
 from service.problems.faults import refuse_one
 from service.problems.kinds import ServiceError
@@ -58,7 +58,7 @@ def create_webhook(body: WebhookIn, call: CallDep, once: OnceDep) -> CreatedWebh
             url=body.url,
             events=[event for event in EVENTS if event in body.events],
             secret="whsec_" + base64.b64encode(secrets.token_bytes(_SECRET_BYTES)).decode(),
-            created_at=session.execute(sa.select(utc_now())).scalar_one(),
+            created_at=clock.now(session),
         )
         session.add(row)
         session.flush()

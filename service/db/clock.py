@@ -7,6 +7,7 @@ from typing import Any
 
 import sqlalchemy as sa
 from sqlalchemy.ext.compiler import compiles
+from sqlalchemy.orm import Session
 from sqlalchemy.sql.compiler import SQLCompiler
 from sqlalchemy.sql.functions import FunctionElement
 
@@ -24,6 +25,11 @@ class utc_now(FunctionElement[datetime]):  # noqa: N801 - reads as an SQL functi
 
     def __init__(self, offset_s: float = 0.0):
         super().__init__(sa.literal(float(offset_s), sa.Float))
+
+
+def now(session: Session, offset_s: float = 0.0) -> datetime:
+    """Return the database's time, or so many seconds from it."""
+    return session.execute(sa.select(utc_now(offset_s))).scalar_one()
 
 
 @compiles(utc_now, "sqlite")

@@ -11,6 +11,7 @@ from datetime import datetime, timedelta
 
 import sqlalchemy as sa
 
+from service.db import clock
 from service.db.clock import utc_now
 from service.db.rows import JobRow
 from service.db.session import Database
@@ -53,7 +54,8 @@ class Reconciler:
 
     def run(self) -> None:
         """Look at everything once."""
-        now = self._now()
+        with self._database.reading() as session:
+            now = clock.now(session)
         if self._may_judge(now):
             for job_id in self._expired():
                 self._recover(job_id)
@@ -69,10 +71,6 @@ class Reconciler:
                 self._queue.cancel(claim.job_id, claim.dispatch)
         for job_id, dispatch in sorted(self._queue.lost(self._next_waiting())):
             self._return(job_id, dispatch)
-
-    def _now(self) -> datetime:
-        with self._database.reading() as session:
-            return session.execute(sa.select(utc_now())).scalar_one()
 
     def _may_judge(self, now: datetime) -> bool:
         """Say whether a lapsed lease means a dead worker.

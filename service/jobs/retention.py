@@ -5,9 +5,7 @@ from __future__ import annotations
 import time
 from typing import Final
 
-import sqlalchemy as sa
-
-from service.db.clock import utc_now
+from service.db import clock
 from service.db.session import Database
 from service.stores import deletion
 
@@ -29,8 +27,7 @@ class Retention:
         if self._days is None or time.monotonic() < self._next_s:
             return
         with self._database.transaction() as session:
-            before = session.scalar(sa.select(utc_now(-self._days * _DAY_S)))
-            assert before is not None
+            before = clock.now(session, -self._days * _DAY_S)
             num_deleted = deletion.sweep(session, before)
         if num_deleted == 0:
             self._next_s = time.monotonic() + _PAUSE_S

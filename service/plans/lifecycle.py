@@ -9,6 +9,7 @@ from sqlalchemy.orm import Session
 
 from planner_core.errors import Fault
 from service.access.callers import Caller
+from service.db import clock
 from service.db.rows import PlanRow
 from service.plans import store
 from service.problems.faults import refuse_one, require_none
@@ -37,10 +38,10 @@ def move(session: Session, caller: Caller, plan: PlanRow, body: TransitionIn) ->
     if body.to == "approved":
         _require_waivers(plan, body)
     elif body.to == "published":
-        effective_from = max(body.effective_from or store.now(session), plan.horizon_start)
+        effective_from = max(body.effective_from or clock.now(session), plan.horizon_start)
         _supersede(session, caller, plan, effective_from)
     else:
-        ends_at = store.now(session)
+        ends_at = clock.now(session)
         for row in store.satellites(session, [plan.id])[plan.id]:
             if row.in_force_from is not None and row.in_force_until is None:
                 row.in_force_until = max(ends_at, row.in_force_from)

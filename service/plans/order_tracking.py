@@ -10,8 +10,8 @@ from typing import Final, Literal
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
 
+from service.db import clock
 from service.db.rows import OrderRow, PlanActionRow, PlanEventRow, TargetCatalogRow
-from service.plans import store as plan_store
 from service.plans.target_lives import Lives, lives_of, plans_by_catalog
 from service.wire.places import TargetIn
 from service.wire.stored import from_store
@@ -40,7 +40,7 @@ class Step:
 
 def steps_of(session: Session, orders: Sequence[OrderRow]) -> list[list[Step]]:
     """Return the statuses of each order, in order of time; the last one holds."""
-    now = plan_store.now(session)
+    now = clock.now(session)
     known: dict[tuple[str, str], tuple[list[str], Lives]] = {}
     found = []
     for order in orders:

@@ -11,7 +11,7 @@ from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.orm import Session
 
 from service.access.callers import Caller
-from service.db.clock import utc_now
+from service.db.clock import now
 from service.db.columns import Reported
 from service.db.ids import new_id
 from service.db.rows import (
@@ -31,11 +31,6 @@ from service.wire.stored import from_store
 from service.wire.timelines import IDLE_MODES, TimelineOut
 
 R = TypeVar("R", bound=Reported)
-
-
-def now(session: Session) -> datetime:
-    """Return the database's time."""
-    return session.execute(sa.select(utc_now())).scalar_one()
 
 
 def add(

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from datetime import datetime
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final, get_args
 
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
 
-from service.db.clock import seconds_between, utc_now
+from service.db.clock import now, seconds_between, utc_now
 from service.db.rows import JobRow, SatelliteRow, ScenarioRow, WebhookDeliveryRow, WorkerRow
 from service.stores import satellite_store
 from service.stores.finding import alive
@@ -22,81 +20,52 @@ ORBITS_OF_LAST_S: Final = 7 * 86400.0
 """A satellite is in use while a job active or newer than this plans it."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class JobTime:
-    """How many jobs of one kind have ended, and how long they ran from first start to end."""
-
-    solver: str
-    state: str
-    termination: str
-    num_jobs: int
-    total_s: float
+def num_jobs(session: Session) -> Mapping[str, float]:
+    """Return how many jobs there are, by state, states without a job included."""
+    return _counted(session, JobRow.state, get_args(JobState))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OrbitAge:
-    """How long ago the epoch of a satellite's element set in force was; below 0 in the future."""
-
-    satellite_id: str
-    name: str
-    age_s: float
+def num_plans(session: Session) -> Mapping[str, float]:
+    """Return how many plans jobs have found, by validity."""
+    return _counted(session, JobRow.validity, get_args(Validity))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Snapshot:
-    """The service at one instant of the database's clock.
-
-    Attributes
-    ----------
-    num_jobs
-        By state, states without a job included.
-    num_plans
-        Those that jobs have found, by validity.
-    oldest_waiting_s
-        How long the oldest waiting job has waited; 0 where none waits.
-    heartbeat_age_s
-        By worker, dead ones of the last day included.
-    num_deliveries
-        Of webhooks, by state; ended ones of the last 30 days.
-    """
-
-    num_jobs: Mapping[str, int]
-    num_plans: Mapping[str, int]
-    oldest_waiting_s: float
-    job_times: Sequence[JobTime]
-    num_leases_lost: int
-    heartbeat_age_s: Mapping[str, float]
-    orbits: Sequence[OrbitAge]
-    num_deliveries: Mapping[str, int]
+def num_deliveries(session: Session) -> Mapping[str, float]:
+    """Return how many messages webhooks have, by state; ended ones of the last 30 days."""
+    return _counted(session, WebhookDeliveryRow.state, get_args(DeliveryState))
 
 
-def take(session: Session) -> Snapshot:
-    """Return how the service stands."""
-    now = session.execute(sa.select(utc_now())).scalar_one()
+def num_leases_lost(session: Session) -> int:
+    """Return how many runs have lost their worker."""
+    return session.scalar(sa.select(sa.func.sum(JobRow.lost_runs))) or 0
+
+
+def oldest_waiting_s(session: Session) -> float:
+    """Return how long the oldest waiting job has waited; 0 where none waits."""
     waiting_s = sa.select(sa.func.max(seconds_between(JobRow.created_at, utc_now())))
+    return session.scalar(waiting_s.where(JobRow.state == "queued")) or 0.0
+
+
+def heartbeat_age_s(session: Session) -> Mapping[str, float]:
+    """Return the age of the last sign of life by worker, dead ones of the last day included."""
     seen_s = sa.select(WorkerRow.id, seconds_between(WorkerRow.seen_at, utc_now()))
-    return Snapshot(
-        num_jobs=_counted(session, JobRow.state, get_args(JobState)),
-        num_plans=_counted(session, JobRow.validity, get_args(Validity)),
-        oldest_waiting_s=session.scalar(waiting_s.where(JobRow.state == "queued")) or 0.0,
-        job_times=_job_times(session),
-        num_leases_lost=session.scalar(sa.select(sa.func.sum(JobRow.lost_runs))) or 0,
-        heartbeat_age_s=dict(session.execute(seen_s).all()),
-        orbits=_orbits(session, now),
-        num_deliveries=_counted(session, WebhookDeliveryRow.state, get_args(DeliveryState)),
-    )
+    return dict(session.execute(seen_s).all())
 
 
 def _counted(
     session: Session, column: sa.SQLColumnExpression[Any], values: Sequence[str]
-) -> dict[str, int]:
+) -> dict[str, float]:
     """Return how many rows have each of these values; those that none has count 0."""
     counted = sa.select(column, sa.func.count()).where(column.is_not(None)).group_by(column)
     found: dict[str, int] = dict(session.execute(counted).all())
     return {value: found.get(value, 0) for value in values}
 
 
-def _job_times(session: Session) -> list[JobTime]:
+def job_times(session: Session) -> Iterator[tuple[Sequence[str], int, float]]:
+    """Yield solver, state and termination, how many jobs have ended so, and how long they ran.
+
+    That is from first start to end, in seconds.
+    """
     termination = sa.func.coalesce(JobRow.termination, "none")
     total_s = sa.func.sum(seconds_between(JobRow.started_at, JobRow.finished_at))
     wanted = (
@@ -105,13 +74,15 @@ def _job_times(session: Session) -> list[JobTime]:
         .group_by(JobRow.solver, JobRow.state, termination)
         .order_by(JobRow.solver, JobRow.state, termination)
     )
-    return [
-        JobTime(solver=solver, state=state, termination=ended, num_jobs=number, total_s=seconds)
-        for solver, state, ended, number, seconds in session.execute(wanted)
-    ]
+    for *how, number, seconds in session.execute(wanted):
+        yield how, number, seconds
 
 
-def _orbits(session: Session, now: datetime) -> list[OrbitAge]:
+def orbit_ages(session: Session) -> Iterator[tuple[tuple[str, str], float]]:
+    """Yield id and name of each satellite in use, and the seconds since its orbit's epoch.
+
+    They are below 0 where that lies in the future.
+    """
     is_in_use = sa.or_(JobRow.state.in_(ACTIVE), JobRow.created_at >= utc_now(-ORBITS_OF_LAST_S))
     planned = sa.select(JobRow.scenario_id).where(is_in_use)
     summaries = session.scalars(
@@ -123,11 +94,6 @@ def _orbits(session: Session, now: datetime) -> list[OrbitAge]:
         row.id: row.name
         for row in session.scalars(alive(SatelliteRow).where(SatelliteRow.id.in_(ids)))
     }
-    return [
-        OrbitAge(
-            satellite_id=own_id,
-            name=names[own_id],
-            age_s=(now - elements.epoch).total_seconds(),
-        )
-        for own_id, elements in sorted(satellite_store.in_force(session, names).items())
-    ]
+    at = now(session)
+    for own_id, elements in sorted(satellite_store.in_force(session, names).items()):
+        yield (own_id, names[own_id]), (at - elements.epoch).total_seconds()

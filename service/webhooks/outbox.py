@@ -17,7 +17,7 @@ from typing import Any, Final
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
 
-from service.db.clock import utc_now
+from service.db.clock import now, utc_now
 from service.db.ids import new_id
 from service.db.rows import JobRow, PlanRow, WebhookDeliveryRow, WebhookRow
 from service.db.session import changed
@@ -89,9 +89,8 @@ def queue(
     job_id: str | None,
 ) -> str:
     """Queue one delivery and return its id."""
-    now = session.execute(sa.select(utc_now())).scalar_one()
     # Frozen here: each attempt signs and sends the same bytes.
-    payload = json.dumps(dumped(EventOut(type=event, timestamp=now, data=data)))
+    payload = json.dumps(dumped(EventOut(type=event, timestamp=now(session), data=data)))
     return _add(session, webhook, event, payload, job_id)
 
 

@@ -9,7 +9,7 @@ from pydantic import Discriminator, Field, Tag
 from service.wire.base import Body, Free, Id, Instant, Json, Name, Open, Stored, Wire
 from service.wire.changes import ChangeIn
 from service.wire.scenarios import ScenarioFile, ScenarioIn
-from service.wire.timelines import AgesOut
+from service.wire.timelines import AgesOut, Validity
 
 JobState = Literal["queued", "running", "cancelling", "succeeded", "failed", "cancelled", "expired"]
 ACTIVE: Final[tuple[JobState, ...]] = ("queued", "running", "cancelling")
@@ -135,7 +135,7 @@ class JobOut(Stored):
     finished_at: Instant | None
     termination: str | None = Field(description="Why the search ended.")
     error: ErrorOut | None
-    validity: Open[Literal["valid", "inherited", "violations"]] | None = Field(
+    validity: Open[Validity] | None = Field(
         None,
         description="Of its plan, by the referee; `inherited`: only what it began with breaks "
         "limits. Null without a plan.",

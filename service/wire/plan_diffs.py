@@ -7,6 +7,7 @@ from typing import Literal
 from pydantic import Field
 
 from service.wire.base import Instant, Open, Wire
+from service.wire.pins import PinnedMode
 
 Difference = Literal["scenario", "horizon", "satellites", "use_resources", "dynamics"]
 
@@ -16,7 +17,7 @@ class PlannedOut(Wire):
 
     satellite_id: str
     satellite_name: str | None = None
-    mode: Open[Literal["collect", "contact"]]
+    mode: Open[PinnedMode]
     target_id: str | None
     target_name: str | None = Field(None, description="Of a collect whose target has one.")
     station_id: str | None

@@ -7,9 +7,9 @@ from typing import Final, Literal
 from pydantic import Field
 
 from service.wire.base import Body, Id, Instant, Name, Open, Reason, Stored, Wire
-from service.wire.pins import AttitudeIn, OnBoardIn
+from service.wire.pins import AttitudeIn, OnBoardIn, PinnedMode
 from service.wire.scenarios import HorizonOut
-from service.wire.timelines import ViolationOut
+from service.wire.timelines import Validity, ViolationOut
 
 PlanState = Literal["draft", "approved", "published", "superseded", "withdrawn"]
 Outcome = Literal["executed", "failed", "skipped", "partial"]
@@ -85,7 +85,7 @@ class PlanOut(Stored):
     parent_id: str | None = Field(description="The plan that this one changes.")
     plan_sha256: str
     horizon: HorizonOut
-    validity: Open[Literal["valid", "inherited", "violations"]]
+    validity: Open[Validity]
     violations: tuple[ViolationOut, ...] = Field(description="To be waived on approval.")
     satellites: tuple[PlanSatelliteOut, ...]
     allowed: tuple[Open[PlanState], ...] = Field(description="Where it can go from here.")
@@ -99,7 +99,7 @@ class PlanActionOut(Wire):
     id: str = Field(description="As in the timeline; executions name it.")
     satellite_id: str
     satellite_name: str | None
-    mode: Open[Literal["collect", "contact"]]
+    mode: Open[PinnedMode]
     start: Instant
     end: Instant
     target_id: str | None

@@ -9,6 +9,7 @@ from pydantic import Field, StringConstraints
 from service.wire.base import Body, Instant, Name, Open, Stored, Wire
 from service.wire.jobs import ErrorOut, JobState
 from service.wire.plans import PlanChange
+from service.wire.timelines import Validity
 
 LONGEST_URL: Final = 2000
 JobEvent = Literal["job.succeeded", "job.failed", "job.cancelled", "job.expired"]
@@ -89,9 +90,7 @@ class JobEnd(Wire):
     state: Open[JobState]
     termination: str | None
     error: ErrorOut | None
-    validity: Open[Literal["valid", "inherited", "violations"]] | None = Field(
-        None, description="Of its plan; null without one."
-    )
+    validity: Open[Validity] | None = Field(None, description="Of its plan; null without one.")
     warnings: tuple[str, ...] = ()
     solver: str
     label: str | None
