@@ -142,19 +142,16 @@ def compute_opportunities(scenario: Scenario, budget: Budget) -> ScenarioOpportu
     for index, satellite in enumerate(scenario.satellites):
         budget.proceed(Progress(phase="access", fraction=index / num_steps))
         path = propagate(satellite, scenario.horizon)
-        for kind in kinds:
-            if kind == COLLECT:
-                found, placed = collects.placed(satellite.sensor, path, budget)
-            else:
-                found = find_accesses(path, places[kind], contact, budget.stop)
-                contacts.append(contacts_of(scenario, satellite, path, places[kind], found))
-                before_contacts.append(num_accesses)
-                num_accesses += len(found)
-                continue
-            parts.append(tasks.rows_of(index, kind, found, num_accesses, placed))
+        found, placed = collects.placed(satellite.sensor, path, budget)
+        parts.append(tasks.rows_of(index, COLLECT, found, num_accesses, placed))
+        num_accesses += len(found)
+        num_rows += len(placed[0])
+        tasks.check_number(num_rows)
+        if scenario.use_resources:
+            found = find_accesses(path, places[CONTACT], contact, budget.stop)
+            contacts.append(contacts_of(scenario, satellite, path, places[CONTACT], found))
+            before_contacts.append(num_accesses)
             num_accesses += len(found)
-            num_rows += len(placed[0])
-            tasks.check_number(num_rows)
         lit.append(sunlight(path))
     offered = with_halves_to_share(contacts, scenario.ground_stations)
     for index, placed in enumerate(offered):
