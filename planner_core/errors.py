@@ -6,7 +6,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass, replace
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,6 +84,21 @@ class PropagationFailed(PlannerError):
         super().__init__("propagation_failed", detail)
         self.satellite = satellite
         self.sgp4_code = sgp4_code
+
+
+@contextmanager
+def pointing(place: Callable[[Fault], str | None]) -> Iterator[None]:
+    """Let errors raised within point elsewhere: to what ``place`` returns for their fault."""
+    try:
+        yield
+    except PlannerError as error:
+        error.fault = replace(error.fault, pointer=place(error.fault))
+        raise
+
+
+def inside(pointer: str) -> AbstractContextManager[None]:
+    """Put a pointer in front of those of the errors raised within."""
+    return pointing(lambda fault: pointer + (fault.pointer or ""))
 
 
 class Cancelled(Exception):

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from planner_core.domain import Satellite, Scenario
-from planner_core.errors import InvalidScenario
+from planner_core.errors import InvalidScenario, inside
 from planner_core.pins import PinnedAction, Pins
 from planner_core.problem import Problem
 from planner_core.problem.plan import Plan
@@ -111,11 +111,8 @@ def _set_satellite(satellite: Satellite, settings: Settings, pointer: str) -> Sa
 
 def _set(part: Any, settings: Settings, pointer: str) -> Any:
     _check_names(settings, {f.name for f in fields(part)} - {"id"}, pointer)
-    try:
+    with inside(pointer):
         return replace(part, **settings)
-    except InvalidScenario as error:
-        error.fault = replace(error.fault, pointer=pointer + (error.fault.pointer or ""))
-        raise
 
 
 def _check_names(settings: Settings, known: set[str], pointer: str) -> None:

@@ -11,14 +11,14 @@ from planner_core.access.scenario_opportunities import ScenarioOpportunities, co
 from planner_core.budget import Budget
 from planner_core.build import build_problem
 from planner_core.domain import Agility, Quality, Resources, Scenario
-from planner_core.errors import InvalidScenario
+from planner_core.errors import InvalidScenario, pointing
 from planner_core.pins import PinnedAction, Pins
 from planner_core.problem.plan import Plan
 from planner_core.reasons.what_if import Change, what_if
 from service.answers.rebuilt import stored_plan
 from service.scenarios.background import Background
 from service.scenarios.canonical import sha256_of
-from service.scenarios.change_pointers import Places, pointing_into, pointing_into_relax
+from service.scenarios.change_pointers import Places, place_in_relax, pointing_into
 from service.scenarios.freezing import FrozenScenario, freeze_file
 from service.scenarios.opportunities import Described
 from service.scenarios.pin_inputs import pinned_action, pins_in
@@ -81,7 +81,7 @@ def vary(asked: Asked, described: Described, budget: Budget) -> Variation:
     file = relaxed_file(read_file(json.loads(asked.content)), change.relax)
     scenario = scenario_from_file(file)
     # Whether the satellites can be carried so far is known only after this.
-    with pointing_into_relax():
+    with pointing(place_in_relax):
         _freeze(file, asked)
         computed = _opportunities(scenario, described, budget)
     force = tuple(pinned_action(action) for action in change.force)

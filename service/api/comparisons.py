@@ -8,6 +8,7 @@ import sqlalchemy as sa
 from fastapi import APIRouter, Response
 from sqlalchemy.orm import Session
 
+from planner_core.errors import inside
 from service.api import ask_again
 from service.api import job_intake as intake
 from service.api.conditional import created, readable, require_match, unless_known
@@ -17,7 +18,6 @@ from service.api.idempotency import OnceDep
 from service.api.paging import PagingDep, newest_first
 from service.db.rows import ComparisonRow
 from service.jobs import submission
-from service.scenarios.translate import inside
 from service.stores import comparison_store as store
 from service.stores import deletion, job_store
 from service.stores.comparison_store import Run

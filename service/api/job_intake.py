@@ -10,6 +10,7 @@ from typing import Any, Final
 from fastapi import Request, Response
 from sqlalchemy.orm import Session
 
+from planner_core.errors import inside
 from planner_core.solvers.registry import solver_class
 from service.answers import store as answer_store
 from service.api import ask_again, bulkhead
@@ -25,7 +26,7 @@ from service.problems.kinds import ServiceError
 from service.scenarios import freezing
 from service.scenarios.freezing import FrozenScenario
 from service.scenarios.pin_inputs import with_settled_pins
-from service.scenarios.translate import inside, read_file
+from service.scenarios.translate import read_file
 from service.settings import Settings
 from service.stores import job_store as store
 from service.stores import scenario_store

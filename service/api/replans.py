@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from datetime import datetime
+from functools import partial
 
 import sqlalchemy as sa
 from fastapi import APIRouter
 from sqlalchemy.orm import Session
 
 from planner_core.domain import Agility
-from planner_core.errors import Fault
+from planner_core.errors import Fault, pointing
 from planner_core.problem.slew import INSTANT, slew_s
 from planner_core.referee.plan_diff import PlannedAction
 from planner_core.replanning.changes import Changed, changes_of, share_of
@@ -66,7 +67,7 @@ def create_replan(plan_id: str, body: ReplanIn, call: CallDep, once: OnceDep) ->
         freeze_until = max(body.freeze_until or now, now)
         happened = _happened(session, plan, body, file, now, freeze_until)
         asked = replanning.replan_file(file, body, happened)
-        with replanning.pointing_into(body):
+        with pointing(partial(replanning.place_in, body)):
             if body.keep or body.skip:
                 asked = with_settled_pins(asked)
             frozen = freezing.freeze_file(asked, call.settings.scenario_limits)

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
-from planner_core.errors import PlannerError
+from planner_core.errors import Fault, PlannerError
 from planner_core.pins import PinnedAction, Pins
 from planner_core.reasons.what_if import is_any_image
 from service.wire.changes import ChangeIn
@@ -73,16 +73,10 @@ def pointing_into(change: ChangeIn, places: Places) -> Iterator[None]:
         raise
 
 
-@contextmanager
-def pointing_into_relax() -> Iterator[None]:
-    """Let faults of a relaxed file point into ``relax``."""
-    try:
-        yield
-    except PlannerError as error:
-        of_horizon = (error.fault.pointer or "").startswith("/horizon")
-        pointer = "/relax/horizon_end" if of_horizon else "/relax"
-        error.fault = replace(error.fault, pointer=pointer)
-        raise
+def place_in_relax(fault: Fault) -> str:
+    """Return where a fault of a relaxed file stands in ``relax``."""
+    of_horizon = (fault.pointer or "").startswith("/horizon")
+    return "/relax/horizon_end" if of_horizon else "/relax"
 
 
 def _is_object(change: ChangeIn, pointer: str) -> bool:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import Any, TypeVar
@@ -14,7 +14,7 @@ from pydantic import BaseModel, ValidationError
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
-from planner_core.errors import InvalidScenario, PlannerError
+from planner_core.errors import Fault, InvalidScenario, pointing
 from planner_core.mistakes import usual_mistakes
 from planner_core.orbits.checks import check_element_age, check_propagation, orbit_warnings
 from service.db.ids import new_id
@@ -91,7 +91,7 @@ def freeze(
         if body.forecast_id is not None:
             stored = find_forecast(session, body.forecast_id, owner)
             file = file.model_copy(update={"forecast": frozen_forecast(stored, file)})
-    with _named_by_ids():
+    with pointing(_in_ids):
         frozen = freeze_file(with_settled_pins(file), limits)
     return replace(frozen, summary=frozen.summary | {"forecast_id": body.forecast_id})
 
@@ -153,17 +153,11 @@ def _insert(session: Session, own_id: str, frozen: FrozenScenario, owner: str | 
         store.let_see(session, own_id, owner)
 
 
-@contextmanager
-def _named_by_ids() -> Iterator[None]:
-    """Let errors point into lists of ids, where the file would hold the things themselves."""
-    try:
-        yield
-    except PlannerError as error:
-        pointer = re.sub(r"^/satellites/(\d+).*", r"/satellite_ids/\1", error.fault.pointer or "")
-        if error.fault.code == "forecast_does_not_cover":
-            pointer = "/forecast_id"
-        error.fault = replace(error.fault, pointer=pointer)
-        raise
+def _in_ids(fault: Fault) -> str:
+    """Return the place in lists of ids, where the file would hold the things themselves."""
+    if fault.code == "forecast_does_not_cover":
+        return "/forecast_id"
+    return re.sub(r"^/satellites/(\d+).*", r"/satellite_ids/\1", fault.pointer or "")
 
 
 def num_targets(session: Session, catalog_ids: Sequence[str]) -> int:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
-from planner_core.errors import InvalidScenario, PlannerError
+from planner_core.errors import Fault, InvalidScenario, pointing
 from service.problems.faults import pointer_to
 from service.scenarios.translate import read_file, scenario_from_file
 from service.wire.changes import PART_OF, RelaxIn
@@ -82,15 +81,14 @@ class _Relaxing:
                 self.set(("targets", index[own_id]), name, value, f"{at}/{name}")
 
     def checked(self) -> ScenarioFile:
-        try:
+        with pointing(self._place):
             file = read_file(self._document)
             scenario_from_file(file)
-        except PlannerError as error:
-            pointer = error.fault.pointer or ""
-            if not pointer.startswith("/pins"):
-                error.fault = replace(error.fault, pointer=self._places.get(pointer, "/relax"))
-            raise
-        return file
+            return file
+
+    def _place(self, fault: Fault) -> str:
+        pointer = fault.pointer or ""
+        return pointer if pointer.startswith("/pins") else self._places.get(pointer, "/relax")
 
 
 def _unknown(what: str, own_id: str, pointer: str) -> InvalidScenario:

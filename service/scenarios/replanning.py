@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Final
 
-from planner_core.errors import Fault, PlannerError
+from planner_core.errors import Fault
 from service.problems.faults import pointer_to, require_none
 from service.scenarios.translate import scenario_from_file
 from service.wire.base import fields_of
@@ -181,18 +180,12 @@ def _pins(before: PinsIn, body: ReplanIn) -> PinsIn:
     )
 
 
-@contextmanager
-def pointing_into(body: ReplanIn) -> Iterator[None]:
-    """Let faults of the body's pins point to where they stand in it."""
-    try:
-        yield
-    except PlannerError as error:
-        pointer = error.fault.pointer or ""
-        pin = _PIN.match(pointer)
-        if pin is not None and int(pin[2]) < len(getattr(body, pin[1])):
-            placed = f"/{pin[1]}/{pin[2]}{pointer[pin.end() :]}"
-            error.fault = replace(error.fault, pointer=placed)
-        raise
+def place_in(body: ReplanIn, fault: Fault) -> str | None:
+    """Return where a fault of a pin stands in the body, if it is one of the body's pins."""
+    pin = _PIN.match(fault.pointer or "")
+    if pin is None or int(pin[2]) >= len(getattr(body, pin[1])):
+        return fault.pointer
+    return f"/{pin[1]}/{pin[2]}{pin.string[pin.end() :]}"
 
 
 def _promises(file: ScenarioFile, body: ReplanIn) -> list[PromiseIn]:

@@ -5,8 +5,7 @@ A scenario's *content* is a self-contained scenario file (`ScenarioFile`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
@@ -25,7 +24,7 @@ from planner_core.domain import (
     Target,
 )
 from planner_core.domain import Orbit as Elements
-from planner_core.errors import InvalidElements, InvalidScenario, PlannerError
+from planner_core.errors import Fault, InvalidElements, InvalidScenario, inside, pointing
 from planner_core.orbits.oem import read_oem, tidy_lines
 from planner_core.orbits.omm import elements_from_omm, omm_from_elements
 from planner_core.orbits.tle import read_tle
@@ -149,16 +148,6 @@ def _each(part: str, items: Sequence[B], build: Callable[[B], T]) -> tuple[T, ..
     return tuple(built)
 
 
-@contextmanager
-def inside(pointer: str) -> Iterator[None]:
-    """Put a pointer in front of those of the planner's errors raised within."""
-    try:
-        yield
-    except PlannerError as error:
-        error.fault = replace(error.fault, pointer=pointer + (error.fault.pointer or ""))
-        raise
-
-
 def horizon_from(body: HorizonIn) -> Horizon:
     """Return the horizon; `InvalidScenario` ``horizon_inverted`` where it has no length."""
     if body.end <= body.start:
@@ -271,7 +260,7 @@ def resources_from(body: Preset | PresetResourcesIn | ResourcesIn, period_s: flo
     rate = body.downlink_rate_mbit_s
     by_elevation = rate if isinstance(rate, list) else []
     knots = tuple((deg, mbit_s / recorder_mbit) for deg, mbit_s in by_elevation)
-    try:
+    with pointing(_in_figures):
         return Resources(
             battery_min_fraction=body.battery_min_fraction,
             initial_battery_fraction=body.initial_battery_fraction,
@@ -292,12 +281,12 @@ def resources_from(body: Preset | PresetResourcesIn | ResourcesIn, period_s: flo
             panel_angle_deg=body.panel_angle_deg,
             idle_drain_per_s=body.idle_power_w / battery_ws,
         )
-    except InvalidScenario as error:
-        pointer = (error.fault.pointer or "").replace(
-            "/downlink_by_elevation", "/downlink_rate_mbit_s"
-        )
-        error.fault = replace(error.fault, pointer=_FIELDS_OF_RATES.get(pointer, pointer))
-        raise
+
+
+def _in_figures(fault: Fault) -> str:
+    """Return which figure of a body makes the rate that is wrong."""
+    pointer = (fault.pointer or "").replace("/downlink_by_elevation", "/downlink_rate_mbit_s")
+    return _FIELDS_OF_RATES.get(pointer, pointer)
 
 
 def target_from(body: TargetIn, catalog_id: str | None = None) -> Target:
