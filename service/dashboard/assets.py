@@ -44,18 +44,18 @@ class Assets:
     pages: dict[str, Asset]
 
 
-_TITLES: Final = {
-    "jobs": "Jobs",
-    "new": "New plan",
-    "job": "Job",
-    "plans": "Plans",
-    "plan": "Plan",
-    "fleet": "Fleet",
-    "targets": "Targets",
-    "wall": "Wall",
-    "comparison": "Comparison",
+PAGES: Final = {
+    "jobs": ("/", "Jobs"),
+    "new": ("/new", "New plan"),
+    "job": ("/jobs/{job_id}", "Job"),
+    "comparison": ("/comparisons/{comparison_id}", "Comparison"),
+    "plans": ("/plans", "Plans"),
+    "plan": ("/plans/{plan_id}", "Plan"),
+    "fleet": ("/fleet", "Fleet"),
+    "targets": ("/targets", "Targets"),
+    "wall": ("/wall", "Wall"),
 }
-"""Of the pages, each of which has a script of its name."""
+"""Address and title of each page, which has a script of its name."""
 
 
 @cache
@@ -70,7 +70,7 @@ def load_assets() -> Assets:
     for name, asset in static.items():
         digest.update(f"{name} {len(asset.content)}\n".encode() + asset.content)
     version = digest.hexdigest()[:16]
-    pages = {name: _page(name, version) for name in _TITLES}
+    pages = {name: _page(name, version) for name in PAGES}
     return Assets(version=version, static=static, pages=pages)
 
 
@@ -78,7 +78,7 @@ def _page(name: str, version: str) -> Asset:
     layout = Template((_HERE / "pages" / "layout.html").read_text(encoding="utf-8"))
     main = (_HERE / "pages" / f"{name}.html").read_text(encoding="utf-8")
     filled = layout.substitute(
-        title=_TITLES[name],
+        title=PAGES[name][1],
         static=f"/static/{version}",
         script=f"{name}_page.js",
         main=main.strip(),

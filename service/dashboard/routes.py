@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
 from typing import Final
 
 from fastapi import APIRouter, Request, Response
 
-from service.api.conditional import sent
-from service.dashboard.assets import load_assets
+from service.api.conditional import etag_of, sent
+from service.dashboard.assets import PAGES, load_assets
 from service.problems.kinds import ServiceError
 
 router = APIRouter(include_in_schema=False)
@@ -19,19 +18,6 @@ PAGE_POLICY: Final = (
     "frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
 )
 """Own files only, nothing inline, and no text that becomes markup."""
-
-_ADDRESSES: Final = {
-    "/": "jobs",
-    "/new": "new",
-    "/jobs/{job_id}": "job",
-    "/comparisons/{comparison_id}": "comparison",
-    "/plans": "plans",
-    "/plans/{plan_id}": "plan",
-    "/fleet": "fleet",
-    "/targets": "targets",
-    "/wall": "wall",
-}
-"""Each page, by the name that `assets.py` knows it by."""
 
 _FOR_EVER: Final = "public, max-age=31536000, immutable"
 
@@ -48,23 +34,19 @@ def static_file(version: str, name: str) -> Response:
     )
 
 
-def _page(request: Request, name: str) -> Response:
-    page = load_assets().pages[name]
-    etag = f'"{hashlib.sha256(page.content).hexdigest()[:16]}"'
-    headers = {
-        "ETag": etag, "Cache-Control": "no-cache", "Content-Security-Policy": PAGE_POLICY,
-    }  # fmt: skip
-    return sent(request, page.content, page.media_type, headers)
-
-
-def _show(path: str, name: str) -> None:
+def _show(name: str, path: str) -> None:
     """Serve a page under an address; whether there is what it is about, the API will say."""
 
     def page(request: Request) -> Response:
-        return _page(request, name)
+        found = load_assets().pages[name]
+        headers = {
+            "ETag": etag_of(found.content.decode()), "Cache-Control": "no-cache",
+            "Content-Security-Policy": PAGE_POLICY,
+        }  # fmt: skip
+        return sent(request, found.content, found.media_type, headers)
 
     router.add_api_route(path, page, name=name)
 
 
-for _path, _name in _ADDRESSES.items():
-    _show(_path, _name)
+for _name, (_path, _) in PAGES.items():
+    _show(_name, _path)

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Literal
 
 from pydantic import Field
 
-from service.wire.base import Body, Id, Instant, NonNegative
+from service.wire.base import Body, Fraction, Id, Instant, NonNegative
 from service.wire.pins import PinnedActionIn, StateIn
-
-Share = Annotated[float, Field(ge=0, le=1)]
 
 
 class PromiseIn(Body):
@@ -23,12 +21,12 @@ class PromiseIn(Body):
 class StabilityIn(Body):
     """How dear it is to leave an action of the plan before."""
 
-    weight: Share = Field(
+    weight: Fraction = Field(
         0.03,
         description="What keeping a collect counts in the search: a share of a typical reward.",
     )
-    contact_weight: Share = Field(0.05, description="The same of a contact.")
-    max_changed_share: Share | None = Field(
+    contact_weight: Fraction = Field(0.05, description="The same of a contact.")
+    max_changed_share: Fraction | None = Field(
         None, description="Of the actions after the freeze, the most that may be moved or removed."
     )
 

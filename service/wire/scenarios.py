@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, FailFast, Field, GetJsonSchemaHandler, mod
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from service.wire.base import Body, Duration, Id, Instant, Name, Open, Stored, Wire
+from service.wire.base import Body, Duration, Fraction, Id, Instant, Name, Open, Stored, Wire
 from service.wire.pins import PinsIn, PlacedOutage, StateIn
 from service.wire.places import GroundStationIn, TargetIn
 from service.wire.plan_before import ReplanOfFile
@@ -211,12 +211,12 @@ class SkySeriesIn(Body):
     times: Annotated[list[Instant], FailFast()] = Field(
         min_length=1, max_length=100_000, description="Ascending."
     )
-    clear_probability: Annotated[
-        dict[Id, Annotated[list[Annotated[float, Field(ge=0, le=1)]], FailFast()]], FailFast()
-    ] = Field(
-        min_length=1,
-        max_length=1_000_000,
-        description="By id of the target, one for each of `times`.",
+    clear_probability: Annotated[dict[Id, Annotated[list[Fraction], FailFast()]], FailFast()] = (
+        Field(
+            min_length=1,
+            max_length=1_000_000,
+            description="By id of the target, one for each of `times`.",
+        )
     )
 
 
