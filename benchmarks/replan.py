@@ -47,8 +47,8 @@ from planner_core.referee.replay import replay
 from planner_core.replanning.known import KnownPrices, prices_of
 from planner_core.replanning.plan_before import PlanBefore
 from planner_core.replanning.programs import fewest_changes
-from planner_core.replanning.question import Question
-from planner_core.replanning.replan import question_of, solve_replan
+from planner_core.replanning.question import Question, question_of
+from planner_core.replanning.replan import solve_replan
 from planner_core.solvers.registry import Certified
 
 LIMIT_S: Final = 2.0

@@ -26,8 +26,8 @@ from planner_core.reasons.reason import Search, TargetOutcome
 from planner_core.referee.replay import replay
 from planner_core.referee.timeline import Timeline
 from planner_core.replanning.plan_before import PlanBefore
+from planner_core.replanning.question import question_of
 from planner_core.replanning.relief import flyable, replanned, within_limits
-from planner_core.replanning.replan import question_of
 from planner_core.solvers.base import Solution, Solver
 
 log = logging.getLogger(__name__)

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Final
 
 import numpy as np
 
-from planner_core.domain import Stability
+from planner_core.domain import Replan, Scenario, Stability
+from planner_core.pinning.rows_meant import rows_of_base
 from planner_core.problem import (
     COLLECT,
     CONTACT,
@@ -20,6 +21,7 @@ from planner_core.problem import (
     Ints,
     Problem,
 )
+from planner_core.problem.on_board import without_on_board
 from planner_core.problem.plan import Plan
 from planner_core.problem.slew import TIME_TOLERANCE_S
 from planner_core.referee.replay import replay
@@ -187,3 +189,61 @@ class Question:
             elif one.delivered_s is not None:
                 found[one.target] = min(one.delivered_s, found.get(one.target, math.inf))
         return found
+
+
+def question_of(
+    scenario: Scenario, problem: Problem, asked: Collection[str] | None = None
+) -> Question:
+    """Return the replan of a scenario in terms of its problem.
+
+    Parameters
+    ----------
+    asked
+        Targets that are new, or worth otherwise, or open again, where nothing else than that and
+        what is out or pinned tells the scenario from that of the plan before; None where it does.
+    """
+    replan = scenario.replan
+    assert replan is not None
+    freeze_s = scenario.horizon.offset_s(replan.freeze_until)
+    rows = rows_of_base(scenario, problem.opportunities, replan)
+    later = [
+        action
+        for action in replan.base
+        if action.start is not None and scenario.horizon.offset_s(action.start) >= freeze_s
+    ]
+    targets = {target.id: i for i, target in enumerate(scenario.targets)}
+    news = None
+    if asked is not None:
+        news = News(
+            targets=frozenset(targets[name] for name in asked),
+            lost=tuple(_lost_of(scenario, replan, targets, rows)),
+        )
+    return Question(
+        problem=without_on_board(problem),
+        deadline_s={
+            targets[promise.target_id]: scenario.horizon.offset_s(promise.deliver_by)
+            for promise in replan.promises
+            if promise.deliver_by is not None
+        },
+        on_board=problem.on_board,
+        base=np.array(sorted(set(rows.values())), dtype=np.int32),
+        num_base=len(later),
+        promised=tuple(targets[promise.target_id] for promise in replan.promises),
+        stability=replan.stability,
+        news=news,
+    )
+
+
+def _lost_of(
+    scenario: Scenario, replan: Replan, targets: Mapping[str, int], rows: Mapping[int, int]
+) -> Iterator[Lost]:
+    """Yield the actions of the base after the freeze that are no longer offered."""
+    satellites = {satellite.id: i for i, satellite in enumerate(scenario.satellites)}
+    for i, action in enumerate(replan.base):
+        if i in rows or action.start is None or action.start < replan.freeze_until:
+            continue
+        yield Lost(
+            satellite=satellites[action.satellite_id or ""],
+            start_s=scenario.horizon.offset_s(action.start),
+            target=None if action.target_id is None else targets[action.target_id],
+        )

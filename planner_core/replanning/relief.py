@@ -23,14 +23,10 @@ from planner_core.referee.replay import replay
 from planner_core.referee.resource_profile import Point, integrate
 from planner_core.referee.unavoidable import beyond_from_s
 from planner_core.replanning.known import KnownPrices
+from planner_core.replanning.promises import require_promises, with_promised
 from planner_core.replanning.question import Question
 from planner_core.replanning.repair import repaired
-from planner_core.replanning.replan import (
-    differences,
-    require_promises,
-    solve_replan,
-    with_promised,
-)
+from planner_core.replanning.replan import differences, solve_replan
 from planner_core.replanning.undo import undone
 from planner_core.solvers.base import Solution, Solver
 

@@ -7,7 +7,7 @@ for is proven afterwards, on the problem as it is: the bound is of the reward al
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -20,18 +20,14 @@ from planner_core.certified.lns.search import WindowSearch
 from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.proofs.lagrangian import lagrangian_bound
 from planner_core.certified.proofs.resource_bound import quick_bound
-from planner_core.domain import Replan, Scenario
-from planner_core.errors import InvalidScenario
-from planner_core.pinning.rows_meant import rows_of_base
-from planner_core.precedence.conflicts import conflicts
-from planner_core.problem import COLLECT, CONTACT, Problem
-from planner_core.problem.on_board import without_on_board
+from planner_core.problem import Problem
 from planner_core.problem.plan import Plan
 from planner_core.replanning.days import has_days, with_days_replanned
 from planner_core.replanning.known import KnownPrices, bound_at
 from planner_core.replanning.nearby import nearby
 from planner_core.replanning.programs import fewest_changes, mixed
-from planner_core.replanning.question import Lost, News, Question
+from planner_core.replanning.promises import require_promises, with_promised
+from planner_core.replanning.question import Question
 from planner_core.replanning.repair import LIMITS, repaired
 from planner_core.replanning.undo import parts_of, undone, value, within_share
 from planner_core.solvers.base import Solution, Solver
@@ -51,64 +47,6 @@ _TRIES: Final = 8
 """Of moves near what is new, each from the same start: of 16 urgent requests of reward 10 at
 24 x 10,000 the first try gained 8.2 on average, the best of four 8.6, the best of eight 8.9;
 with 3,500 moves a try in place of 600 no more, in eight times the time."""
-
-
-def question_of(
-    scenario: Scenario, problem: Problem, asked: Collection[str] | None = None
-) -> Question:
-    """Return the replan of a scenario in terms of its problem.
-
-    Parameters
-    ----------
-    asked
-        Targets that are new, or worth otherwise, or open again, where nothing else than that and
-        what is out or pinned tells the scenario from that of the plan before; None where it does.
-    """
-    replan = scenario.replan
-    assert replan is not None
-    freeze_s = scenario.horizon.offset_s(replan.freeze_until)
-    rows = rows_of_base(scenario, problem.opportunities, replan)
-    later = [
-        action
-        for action in replan.base
-        if action.start is not None and scenario.horizon.offset_s(action.start) >= freeze_s
-    ]
-    targets = {target.id: i for i, target in enumerate(scenario.targets)}
-    news = None
-    if asked is not None:
-        news = News(
-            targets=frozenset(targets[name] for name in asked),
-            lost=tuple(_lost_of(scenario, replan, targets, rows)),
-        )
-    return Question(
-        problem=without_on_board(problem),
-        deadline_s={
-            targets[promise.target_id]: scenario.horizon.offset_s(promise.deliver_by)
-            for promise in replan.promises
-            if promise.deliver_by is not None
-        },
-        on_board=problem.on_board,
-        base=np.array(sorted(set(rows.values())), dtype=np.int32),
-        num_base=len(later),
-        promised=tuple(targets[promise.target_id] for promise in replan.promises),
-        stability=replan.stability,
-        news=news,
-    )
-
-
-def _lost_of(
-    scenario: Scenario, replan: Replan, targets: Mapping[str, int], rows: Mapping[int, int]
-) -> Iterator[Lost]:
-    """Yield the actions of the base after the freeze that are no longer offered."""
-    satellites = {satellite.id: i for i, satellite in enumerate(scenario.satellites)}
-    for i, action in enumerate(replan.base):
-        if i in rows or action.start is None or action.start < replan.freeze_until:
-            continue
-        yield Lost(
-            satellite=satellites[action.satellite_id or ""],
-            start_s=scenario.horizon.offset_s(action.start),
-            target=None if action.target_id is None else targets[action.target_id],
-        )
 
 
 def solve_replan(
@@ -281,101 +219,6 @@ def _best(question: Question, *plans: Plan) -> Plan:
         if other[:2] > mine[:2] or (other[:2] == mine[:2] and other[2] > mine[2] + _EQUAL):
             best = plan
     return best
-
-
-def with_promised(question: Question, plan: Plan) -> Plan:
-    """Return the plan with an image of each promised target, where one can be made room for."""
-    problem = question.problem
-    kept = set(problem.kept_rows.tolist())
-    protected = set(np.flatnonzero(question.is_promised).tolist())
-    for target in sorted(question.missing(plan)):
-        taken = [action.opportunity for action in plan.actions]
-        trials = []
-        for row in problem.collects_of(target).tolist():
-            gone = set(conflicts(problem, row, taken))
-            if gone & (kept | protected):
-                continue
-            trial = repaired(problem, [*(set(taken) - gone), row], protected)
-            if target not in question.missing(trial) and question.may_fly(trial):
-                trials.append(trial)
-        fewer = [t for t in trials if len(question.missing(t)) < len(question.missing(plan))]
-        plan = max(fewer, key=lambda trial: value(question, trial), default=plan)
-    for target in sorted(question.missing(plan) & question.deadline_s.keys()):
-        plan = _with_downlink(question, plan, target)
-    return plan
-
-
-def _with_downlink(question: Question, plan: Plan, target: int) -> Plan:
-    """Return the plan with a contact by which an image of a target is down in time, if any.
-
-    With another image of it where the one at hand is too late.
-    """
-    problem = question.problem
-    table, kept = problem.opportunities, set(problem.kept_rows.tolist())
-    taken = [action.opportunity for action in plan.actions]
-    own = [row for row in taken if table.kind[row] == COLLECT and table.place[row] == target]
-    images = [*own, *(row for row in problem.collects_of(target).tolist() if row not in own)]
-    holders = [(int(table.satellite[row]), float(table.end_s[row]), [row]) for row in images]
-    holders += [(i.satellite, 0.0, []) for i in question.on_board if i.target == target]
-    deadline_s = question.deadline_s[target]
-    best, fewest = plan, len(question.missing(plan))
-    for satellite, from_s, rows in holders:
-        others = [row for row in taken if row not in own or row in kept or row in rows]
-        for contact in problem.satellites[satellite].rows.tolist():
-            start_s = table.start_s[contact]
-            if table.kind[contact] != CONTACT or not from_s <= start_s <= deadline_s:
-                continue
-            new = [row for row in (*rows, contact) if row not in others]
-            gone = {other for row in new for other in conflicts(problem, row, others)}
-            if gone & kept:
-                continue
-            protected = {*np.flatnonzero(question.is_promised).tolist(), contact}
-            trial = repaired(problem, [*(set(others) - gone), *new], protected)
-            num_missing = len(question.missing(trial))
-            if num_missing < fewest and question.may_fly(trial):
-                best, fewest = trial, num_missing
-        if fewest < len(question.missing(plan)):
-            return best
-    return best
-
-
-def require_promises(question: Question, plan: Plan) -> None:
-    """Raise ``promise_not_kept`` where a plan misses something promised."""
-    problem, missing = question.problem, question.missing(plan)
-    for i, target in enumerate(question.promised):
-        if target not in missing:
-            continue
-        if target in question.deadline_s and target not in replace(question, deadline_s={}).missing(
-            plan
-        ):
-            raise _late(question, plan, target, i)
-        why = (
-            "each of its opportunities takes the place of something else promised or flown, or "
-            "breaks battery or recorder"
-            if len(problem.collects_of(target)) > 0
-            else "nothing is left that could image it"
-        )
-        raise InvalidScenario(
-            "promise_not_kept",
-            f"The promised target {problem.target_ids[target]!r} is not imaged: {why}.",
-            pointer=f"/replan/promises/{i}",
-        )
-
-
-def _late(question: Question, plan: Plan, target: int, number: int) -> InvalidScenario:
-    down_s = question.down_s(plan).get(target)
-    name = question.problem.target_ids[target]
-    said = (
-        "its image is never on the ground"
-        if down_s is None
-        else f"it is on the ground {down_s - question.deadline_s[target]:.0f} s too late"
-    )
-    return InvalidScenario(
-        "promise_not_kept",
-        f"The promised target {name!r} is not delivered in time: {said}, and no contact before "
-        "would do that leaves what is promised and flown.",
-        pointer=f"/replan/promises/{number}/deliver_by",
-    )
 
 
 def _first_bound(problem: Problem, known: KnownPrices | None, reward: float) -> Bound:
