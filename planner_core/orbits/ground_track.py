@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 import numpy.typing as npt
 
@@ -12,6 +14,8 @@ from planner_core.orbits.mask import mask_elevation_deg
 from planner_core.orbits.places import Places
 
 Floats = npt.NDArray[np.float64]
+
+_NUM_DIRECTIONS: Final = 72  # of the compass
 
 
 def sub_points(ephemeris: Ephemeris, t_s: Floats) -> tuple[Floats, Floats, Floats]:
@@ -26,9 +30,7 @@ def sub_points(ephemeris: Ephemeris, t_s: Floats) -> tuple[Floats, Floats, Float
     return frames.itrf_to_geodetic(position_m)
 
 
-def visibility_ring(
-    station: GroundStation, altitude_m: float, num_points: int = 72
-) -> tuple[Floats, Floats]:
+def visibility_ring(station: GroundStation, altitude_m: float) -> tuple[Floats, Floats]:
     """Return the border of the points over which a satellite stands within a station's limits.
 
     Parameters
@@ -37,16 +39,14 @@ def visibility_ring(
         Its elevation mask and its least elevation both count.
     altitude_m
         Of the satellite above the ellipsoid; above the station's own.
-    num_points
-        How many directions of the compass to look in, from north over west.
 
     Returns
     -------
-    Longitude and latitude in degrees, counter-clockwise; the first point is not repeated.
-    Shape ``(num_points,)``.
+    Longitude and latitude in degrees, counter-clockwise from north; the first point is not
+    repeated. Shape ``(72,)``.
     """
-    azimuth_deg = np.linspace(0.0, -360.0, num_points, endpoint=False)
-    elevation_deg = np.full(num_points, station.min_elevation_deg)
+    azimuth_deg = np.linspace(0.0, -360.0, _NUM_DIRECTIONS, endpoint=False)
+    elevation_deg = np.full(_NUM_DIRECTIONS, station.min_elevation_deg)
     if station.elevation_mask:
         above = mask_elevation_deg(station.elevation_mask, azimuth_deg)
         elevation_deg = np.maximum(elevation_deg, above)

@@ -21,10 +21,10 @@ from service.api.imports import BYTES, request_body
 from service.api.paging import PagingDep, newest_first
 from service.db.rows import TargetCatalogRow, TargetRow
 from service.files.records import (
+    Checked,
     Record,
     Records,
     check,
-    first_of_each,
     read_csv,
     read_geojson,
     read_json,
@@ -137,9 +137,24 @@ def _read_json(data: bytes) -> Records:
 def _checked(found: Records) -> list[TargetIn]:
     good, faults = check(found.records, TargetIn, target_from)
     faults += found.faults
-    faults += first_of_each(good, lambda target: target.id, "duplicate_target_id", "id")
+    faults += _faults_of_repeated(good)
     require_none(sorted(faults, key=lambda fault: fault.row or 0))
     return [one.body for one in good]
+
+
+def _faults_of_repeated(good: Sequence[Checked[TargetIn]]) -> list[Fault]:
+    """Return a fault for each target whose id an earlier one has."""
+    seen: dict[str, Record] = {}
+    faults = []
+    for one in good:
+        own_id = one.body.id
+        first = seen.setdefault(own_id, one.record)
+        if first is not one.record:
+            where = f", as in line {first.row}" if first.row else ""
+            detail = f"{own_id!r} appears twice{where}."
+            fault = Fault(code="duplicate_target_id", detail=detail, pointer="/id")
+            faults.append(one.record.place(fault))
+    return faults
 
 
 def _add(session: Session, name: str, targets: Sequence[TargetIn]) -> TargetCatalogRow:

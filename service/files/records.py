@@ -127,22 +127,6 @@ def _with_hint(fault: Fault, fields: Mapping[str, object]) -> Fault:
     return fault
 
 
-def first_of_each(
-    checked: Sequence[Checked[B]], key: Callable[[B], str], code: str, name: str
-) -> list[Fault]:
-    """Return a fault for each record whose key an earlier one has."""
-    seen: dict[str, Record] = {}
-    faults = []
-    for one in checked:
-        value = key(one.body)
-        first = seen.setdefault(value, one.record)
-        if first is not one.record:
-            where = f", as in line {first.row}" if first.row else ""
-            fault = Fault(code=code, detail=f"{value!r} appears twice{where}.", pointer=f"/{name}")
-            faults.append(one.record.place(fault))
-    return faults
-
-
 def read_csv(
     data: bytes, known: Collection[str], required: Collection[str], *, most: int
 ) -> Records:

@@ -61,11 +61,11 @@ class JsonFormatter(logging.Formatter):
         return masked(json.dumps(kept, default=str, ensure_ascii=False))
 
 
-def configure_logging(level: str = "INFO") -> None:
+def configure_logging() -> None:
     """Send all logs of this process to standard error as JSON lines, and crashes with stacks."""
     faulthandler.enable(STDERR)
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(JsonFormatter())
-    logging.basicConfig(level=level, handlers=[handler], force=True)
+    logging.basicConfig(level=logging.INFO, handlers=[handler], force=True)
     # Each call of its own that the service makes would be a line.
     logging.getLogger("httpx").setLevel(logging.WARNING)

@@ -137,7 +137,7 @@ class Engine:
         """
         if self._is_abandoned:
             # HiGHS is still in its last relaxation, and must not be touched.
-            return self._so_far(None)
+            return self._so_far()
         highs = self._highs
         integer = np.flatnonzero(self._is_integer).astype(np.int32)
         kinds = np.full(len(integer), int(highspy.HighsVarType.kInteger), dtype=np.uint8)
@@ -166,9 +166,7 @@ class Engine:
         highs.cbMipInterrupt += on_interrupt
         highs.cbMipImprovingSolution += on_improved
         if not self._run():
-            return Outcome(
-                columns=self._incumbent, bound=self._bound, is_infeasible=False, log=self.log
-            )
+            return self._so_far()
         info, status = highs.getInfo(), highs.getModelStatus()
         has_point = info.primal_solution_status == highspy.SolutionStatus.kSolutionStatusFeasible
         return Outcome(
@@ -178,8 +176,9 @@ class Engine:
             log=self.log,
         )
 
-    def _so_far(self, columns: Floats | None) -> Outcome:
-        return Outcome(columns=columns, bound=self._bound, is_infeasible=False, log=self.log)
+    def _so_far(self) -> Outcome:
+        columns, bound = self._incumbent, self._bound
+        return Outcome(columns=columns, bound=bound, is_infeasible=False, log=self.log)
 
     def _run(self) -> bool:
         """Run HiGHS; return whether it ended in time, and may be asked what it found."""
