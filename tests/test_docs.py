@@ -26,3 +26,23 @@ def test_the_index_names_every_page() -> None:
     index = (_ROOT / "docs" / "README.md").read_text()
     pages = [p for p in (_ROOT / "docs").glob("*.md") if p.name != "README.md"]
     assert [p.name for p in pages if f"({p.name})" not in index] == []
+
+
+def test_every_module_that_docstrings_and_comments_name_exists() -> None:
+    files = [path for root in ("planner_core", "service") for path in (_ROOT / root).rglob("*.py")]
+    named = {
+        (path.relative_to(_ROOT).as_posix(), name)
+        for path in files
+        for name in re.findall(r"`((?:planner_core|service)(?:\.\w+)+)`", path.read_text())
+    }
+    assert len(named) > 20
+    assert [place for place in sorted(named) if not _is_there(place[1].split("."))] == []
+
+
+def _is_there(parts: list[str]) -> bool:
+    """Return whether that is a folder, a module, or a name in one."""
+    whole, owner = _ROOT.joinpath(*parts), _ROOT.joinpath(*parts[:-1])
+    if whole.is_dir() or whole.with_suffix(".py").is_file():
+        return True
+    held = [owner.with_suffix(".py"), owner / "__init__.py"]
+    return any(parts[-1] in path.read_text() for path in held if path.is_file())

@@ -2,7 +2,7 @@
 
 A pair costs two loads of a line of sight and one look into a small table of slews. So there is
 no table of pairs, which would grow with the square of how many targets are in view; whoever asks
-for each pair many times makes itself one (``planner_core.precedence.pairs``).
+for each pair many times makes itself one (``planner_core.precedence.relation``).
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The solver's process: what happens between fork and exit.
 
-It talks to its worker over one pipe: ``Cancel`` and ``Expire`` come in, progress, the blocks of
+It talks to its worker over one pipe: ``CANCEL`` and ``EXPIRE`` come in, progress, the blocks of
 an answer and at last one ending go out. When the worker's end closes, the process is gone at once.
 """
 

@@ -64,7 +64,7 @@ class PlanRequest:
     parent
         Of a replan: the plan before.
     held_in
-        The worker's folder of ``HeldOpportunities``; None where nothing is held.
+        The worker's folder of ``HeldBlocks``; None where nothing is held.
     """
 
     job_id: str
