@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from array import array
 from collections import Counter
 from collections.abc import Iterator
 from datetime import datetime, timedelta
@@ -22,7 +21,9 @@ from service.wire.instants import instant_text
 TRACK_STEP_S = 30.0
 _DECIMALS = 4  # of a degree: eleven metres
 _CLASS_KM = 10.0
-_OF_IMAGES = ("quality", "clear_probability")  # from 0 to 1
+_INSTANTS: Final = ("start", "end", "delivered_at")
+_OF_IMAGES: Final = ("quality", "clear_probability")  # from 0 to 1
+_TOLD: Final = np.dtype([(n, "u4") for n in _INSTANTS] + [(n, "u2") for n in _OF_IMAGES])
 _SHARE: Final = 10_000
 _UNKNOWN: Final = 65_535
 _NEVER: Final = 2**32 - 1
@@ -73,11 +74,11 @@ def _point(lon_deg: float, lat_deg: float) -> Document:
 
 
 def _targets(answered: Answered) -> Iterator[Document]:
-    spans = _Spans(answered)
+    actions = _Actions(answered)
     names = {satellite["id"]: satellite["name"] for satellite in answered.satellites}
     before = {one["target_id"]: one["delivered_at"] for one in answered.each_image_on_board()}
     for target, told in zip(answered.question.each_target(), answered.each_target(), strict=True):
-        start, end = spans.of(told["action_id"])
+        done = actions.of(told["action_id"])
         reason = told["reason"]
         yield _feature(
             "target",
@@ -93,18 +94,18 @@ def _targets(answered: Answered) -> Iterator[Document]:
                 "action_id": told["action_id"],
                 "satellite_id": told["satellite_id"],
                 "satellite_name": names.get(told["satellite_id"]),
-                "start": start,
-                "end": end,
-                "delivered_at": before.get(target.id) or spans.delivered(told["action_id"]),
+                "start": done["start"],
+                "end": done["end"],
+                "delivered_at": before.get(target.id) or done["delivered_at"],
                 "reward": target.reward,
                 "worth": told.get("worth"),
-                **spans.image_of(told["action_id"]),
+                **{name: done[name] for name in _OF_IMAGES},
             },
         )
 
 
-class _Spans:
-    """When each action begins and ends, how good its image is, and when it is on the ground.
+class _Actions:
+    """When actions begin and end, how good their images are, and when those are on the ground.
 
     As small numbers alone, for there may be very many: milliseconds from the horizon's start, and
     shares in ten thousandths.
@@ -112,49 +113,36 @@ class _Spans:
 
     def __init__(self, answered: Answered):
         self._start = answered.question.horizon.start
-        self._spans = spans = array("I")
-        self._images = images = array("H")
-        self._delivered = delivered = array("I")
         # Action ids count through all satellites: a1, a2, ...
-        for _, action in answered.each_action():
-            spans.extend(self._ms(action[name]) for name in ("start", "end"))
-            down = action.get("delivered_at")
-            delivered.append(_NEVER if down is None else self._ms(down))
-            # Answers of the first release say nothing of it.
-            values = (action.get(name) for name in _OF_IMAGES)
-            images.extend(_UNKNOWN if v is None else round(v * _SHARE) for v in values)
+        each = (self._numbers(action) for _, action in answered.each_action())
+        self._told = np.fromiter(each, dtype=_TOLD)
 
-    def of(self, action_id: str | None) -> tuple[str | None, str | None]:
-        """Return the instants of an action, None of none."""
+    def of(self, action_id: str | None) -> Document:
+        """Return what is told of an action; null where nothing is known, or there is none."""
         if action_id is None:
-            return None, None
-        at = 2 * (int(action_id.removeprefix("a")) - 1)
-        start, end = map(self._text, self._spans[at : at + 2])
-        return start, end
+            return dict.fromkeys(_INSTANTS + _OF_IMAGES)
+        numbers = self._told[int(action_id.removeprefix("a")) - 1].item()
+        told = dict(zip(_INSTANTS + _OF_IMAGES, numbers, strict=True))
+        instants = {name: self._instant(told[name]) for name in _INSTANTS}
+        return instants | {name: _share(told[name]) for name in _OF_IMAGES}
 
-    def delivered(self, action_id: str | None) -> str | None:
-        """Return when the image of an action is on the ground, None for never."""
-        if action_id is None:
-            return None
-        ms = self._delivered[int(action_id.removeprefix("a")) - 1]
-        return None if ms == _NEVER else self._text(ms)
+    def _numbers(self, action: Document) -> tuple[int, ...]:
+        # Answers of the first release say nothing of images.
+        instants, shares = ([action.get(n) for n in names] for names in (_INSTANTS, _OF_IMAGES))
+        return (
+            *(_NEVER if at is None else self._ms(at) for at in instants),
+            *(_UNKNOWN if share is None else round(share * _SHARE) for share in shares),
+        )
 
     def _ms(self, instant: str) -> int:
         return (datetime.fromisoformat(instant) - self._start) // _MILLISECOND
 
-    def _text(self, ms: int) -> str:
-        return instant_text(self._start + ms * _MILLISECOND)
+    def _instant(self, ms: int) -> str | None:
+        return None if ms == _NEVER else instant_text(self._start + ms * _MILLISECOND)
 
-    def image_of(self, action_id: str | None) -> Document:
-        """Return how good the image of an action is; null where nothing is known of it."""
-        if action_id is None:
-            return dict.fromkeys(_OF_IMAGES)
-        at = len(_OF_IMAGES) * (int(action_id.removeprefix("a")) - 1)
-        values = self._images[at : at + len(_OF_IMAGES)]
-        return {
-            name: None if value == _UNKNOWN else value / _SHARE
-            for name, value in zip(_OF_IMAGES, values, strict=True)
-        }
+
+def _share(number: int) -> float | None:
+    return None if number == _UNKNOWN else number / _SHARE
 
 
 def _stations(answered: Answered) -> Iterator[Document]:
