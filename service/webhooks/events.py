@@ -1,4 +1,4 @@
-"""What is told: the events, and how each reads."""
+"""What events tell of jobs and of plans."""
 
 from __future__ import annotations
 
@@ -10,29 +10,11 @@ from service.wire.stored import from_row
 from service.wire.webhooks import JobEnd
 
 
-def event_of(state: str) -> str:
-    """Return the event of a job that has reached this final state.
-
-    >>> event_of("failed")
-    'job.failed'
-    """
-    return f"job.{state}"
-
-
 def end_of(job: JobRow) -> JobEnd:
     """Return what an event tells of a job: enough to decide whether to fetch the rest."""
     address = f"/v1/jobs/{job.id}"
     links = {"job": address, "timeline": f"{address}/timeline"}
     return from_row(JobEnd, job, job_id=job.id, warnings=job.warnings or (), links=links)
-
-
-def event_of_plan(state: str) -> str:
-    """Return the event of a plan that has come to this state.
-
-    >>> event_of_plan("published")
-    'plan.published'
-    """
-    return f"plan.{state}"
 
 
 def change_of(plan: PlanRow, reason: str | None, effective_from: datetime | None) -> PlanChange:

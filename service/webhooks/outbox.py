@@ -54,30 +54,27 @@ class Parcel:
 
 def tell_end_of(session: Session, job_id: str) -> None:
     """Queue a delivery for each webhook of the job's owner that asked for this end."""
-    wanted = (
-        sa.select(JobRow, WebhookRow)
-        .join(WebhookRow, WebhookRow.owner == JobRow.tenant)
-        .where(JobRow.id == job_id, WebhookRow.disabled_at.is_(None))
-        .execution_options(populate_existing=True)
-    )
-    for job, webhook in session.execute(wanted):
-        event = events.event_of(job.state)
-        if event in webhook.events:
-            queue(session, webhook, event, events.end_of(job), job_id=job_id)
+    job = session.get_one(JobRow, job_id, populate_existing=True)
+    _tell(session, job.tenant, f"job.{job.state}", events.end_of(job), job_id)
 
 
 def tell_plan(
     session: Session, plan: PlanRow, reason: str | None, effective_from: datetime | None
 ) -> None:
     """Queue a delivery for each webhook of the plan's owner that asked for this transition."""
-    event = events.event_of_plan(plan.state)
     data = events.change_of(plan, reason, effective_from)
+    _tell(session, plan.owner, f"plan.{plan.state}", data, None)
+
+
+def _tell(
+    session: Session, owner: str, event: str, data: JobEnd | PlanChange, job_id: str | None
+) -> None:
     wanted = sa.select(WebhookRow).where(
-        WebhookRow.owner == plan.owner, WebhookRow.disabled_at.is_(None)
+        WebhookRow.owner == owner, WebhookRow.disabled_at.is_(None)
     )
     for webhook in session.scalars(wanted):
         if event in webhook.events:
-            queue(session, webhook, event, data, job_id=None)
+            queue(session, webhook, event, data, job_id=job_id)
 
 
 def queue(
