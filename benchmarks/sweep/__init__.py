@@ -1,0 +1,1 @@
+"""Missions drawn at random over all options, planned in every way that there is."""
