@@ -79,8 +79,6 @@ class DayByDay:
         self._search, self._best = search, search.best
         self._ascent = LatencyAscent(search.problem, search.prices())
         self._number = 0
-        # Half as many prove 0.3 % more where antennas are short (965.3, 962.8 in the end).
-        _lower(self._best, self._ascent, TUNING.rounds)
 
     def better(self, plan: Plan) -> None:
         """Plan days anew from a plan, as long as a round of them gains anything.
@@ -94,6 +92,8 @@ class DayByDay:
         self._search.offer(plan)
         if not best.judge(plan).is_valid:
             plan = best.plan
+        if self._number == 0:
+            _lower(best, self._ascent, TUNING.rounds)
         reached = -np.inf
         while (earned := _earned(best, plan)) > reached:
             reached = earned
@@ -118,6 +118,8 @@ def _replanned(search: ResourceSearch, plan: Plan, seed: int) -> Plan:
     rng = np.random.default_rng(seed)
     for index in rng.permutation(len(problem.satellites)).tolist():
         satellite = problem.satellites[index]
+        if best.is_done:
+            break
         if len(satellite) == 0:
             continue
         new = replanned_day(
@@ -138,8 +140,11 @@ def _replanned(search: ResourceSearch, plan: Plan, seed: int) -> Plan:
 def _lower(
     best: Incumbent, ascent: LatencyAscent, num_rounds: int, *, is_last: bool = False
 ) -> None:
-    """Go on with the ascent for a while."""
+    """Go on with the ascent for a while, at most for a part of the time that is left."""
+    part = best.budget.part(TUNING.beginning)
     for _ in range(num_rounds):
+        if part.is_spent():
+            break
         ascent.improve(1, _level(best, ascent), best.budget.stop)
     bound = ascent.bound(is_last=is_last)
     best.lower(replace(bound, value=rounded_bound(best.problem, bound.value, best.reward)))
