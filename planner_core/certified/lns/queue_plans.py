@@ -17,6 +17,7 @@ from planner_core.certified.dp.contact_queues import most_by_queues
 from planner_core.certified.dp.queue_terms import queues_of
 from planner_core.certified.dp.resource_network import network_of, strict_network_of
 from planner_core.certified.sizes import PROMISES
+from planner_core.certified.tuning import TUNING
 from planner_core.problem import (
     COLLECT,
     CONTACT,
@@ -73,9 +74,11 @@ def replanned_day(
 ) -> Plan | None:
     """Return the plan with a satellite's day planned anew beside the others; None if it cannot be.
 
-    Its contacts are those that the programme over queues would take, of those whose antenna is
-    free, with targets that the others leave. Half as many levels of energy suffice to name them.
-    Where contacts are too many for it they stay as they are.
+    Its contacts are those that the programme over queues would take, of its own and half of the
+    others whose antenna is free, drawn at random, with targets that the other satellites leave. A
+    quarter of the levels of energy suffices to name them. With all contacts and half of the levels
+    to name them takes three times as long, and two fleets earn 912.6 and 972.0 after 40 CPU seconds
+    in place of 930.1 and 970.2. Where contacts are too many for it they stay as they are.
     """
     table = problem.opportunities
     rows = np.array([action.opportunity for action in plan.actions], dtype=np.int32)
@@ -83,7 +86,10 @@ def replanned_day(
     own, others = rows[is_own], rows[~is_own]
     is_free = np.ones(len(problem.target_ids), dtype=np.bool_)
     is_free[table.place[others[table.kind[others] == COLLECT]]] = False
-    contacts = _named_contacts(problem, satellite, is_free, others, per_collect // 2, stop)
+    is_tried = rng.integers(2, size=len(table)).astype(np.bool_)
+    is_tried[own] = True
+    levels = per_collect // TUNING.several
+    contacts = _named_contacts(problem, satellite, is_free, is_tried, others, levels, stop)
     if contacts is None:
         contacts = own[table.kind[own] == CONTACT].tolist()
     part, price = taking(problem, contacts), np.zeros(len(is_free))
@@ -103,6 +109,7 @@ def _named_contacts(
     problem: Problem,
     satellite: SatelliteProblem,
     is_free: Bools,
+    is_tried: Bools,
     others: Ints,
     per_collect: int,
     stop: Bytes,
@@ -110,11 +117,18 @@ def _named_contacts(
     """Return the contacts that a satellite would take beside what the others do.
 
     None where the programme would take too long.
+
+    Parameters
+    ----------
+    is_free, is_tried
+        The targets that it may image, and the contacts that it may take. Shapes
+        ``(num_targets,)`` and ``(n,)``.
     """
     taken = others[problem.opportunities.kind[others] == CONTACT]
     is_shut = blocked_rows(problem, satellite, taken.tolist()) != 0
     is_image = satellite.kind == COLLECT
-    is_open = np.where(is_image, is_free[satellite.place * is_image], ~is_shut)
+    is_contact_open = ~is_shut & is_tried[satellite.rows]
+    is_open = np.where(is_image, is_free[satellite.place * is_image], is_contact_open)
     network = network_of(problem, satellite)
     rows = np.flatnonzero(is_open | network.is_kept).astype(np.int32)
     queues = queues_of(
