@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from datetime import timedelta
-from typing import Final, cast
+from typing import Final
 
 import numpy as np
 
@@ -141,7 +141,7 @@ def _objective(rng: np.random.Generator) -> Objective:
     return Objective(
         collected_share=float(rng.choice(_SHARES)),
         half_life_s=3600.0 * float(rng.choice(_HALF_LIVES_H)) if halves else None,
-        prefer=cast("tuple[Preference, ...]", prefer),
+        prefer=prefer,
     )
 
 
@@ -168,9 +168,7 @@ def _with_starts(rng: np.random.Generator, scenario: Scenario) -> Scenario:
     if kind == "quality":
         curve = ((0.0, 1.0), (30.0, 0.8), (60.0, 0.3))
         spacing_s = 30.0 if rng.random() < 0.5 else None
-        return replace(
-            scenario, quality=Quality(off_nadir_deg=curve), collect_spacing_s=spacing_s
-        )
+        return replace(scenario, quality=Quality(off_nadir_deg=curve), collect_spacing_s=spacing_s)
     moves = any(satellite.agility.tracks for satellite in scenario.satellites)
     fades = any(target.reward_half_life_s for target in scenario.targets)
     return replace(scenario, continuous_starts=kind == "free" and not moves and not fades)
