@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Final
 
 from planner_core.errors import Cancelled, PlannerError
 from service.access.callers import Scope
+from service.process.imports import importing
 
 if TYPE_CHECKING:
     from service.settings import Settings
@@ -79,7 +80,8 @@ def api(options: argparse.Namespace) -> int:
 
 
 def _run_server(settings: Settings, *, with_workers: bool) -> int:
-    from service.server import CannotServe, NoKey, serve
+    with importing():
+        from service.server import CannotServe, NoKey, serve
 
     try:
         return serve(settings, with_workers=with_workers)
@@ -167,7 +169,8 @@ def demo(options: argparse.Namespace) -> int:
 
 def solve(options: argparse.Namespace) -> int:
     """Plan a scenario file, without a service."""
-    from service.commands.solve import solve_file
+    with importing():
+        from service.commands.solve import solve_file
 
     with _faults_of(options.scenario):
         return solve_file(
