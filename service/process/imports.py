@@ -18,6 +18,6 @@ def importing() -> Iterator[None]:
     try:
         yield
     finally:
-        gc.freeze()
-        if was_looking:
+        if was_looking:  # else whoever imports this does the same for all of it
+            gc.freeze()
             gc.enable()
