@@ -18,6 +18,16 @@ from tests.service.prepared import Prepared
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="elsewhere nothing is forked")
 
 
+@pytest.fixture(autouse=True)
+def _environment_of_the_server(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Other tests may have left variables in this process: then it would fork nothing."""
+    _, environment = prepared._server()
+    for name in os.environ.keys() - environment.keys():
+        monkeypatch.delenv(name)
+    for name, value in environment.items():
+        monkeypatch.setenv(name, value)
+
+
 def test_it_has_streams_and_a_status_of_its_own(tmp_path: Path) -> None:
     process = prepared.start(["service", "--version"], os.environ)
     assert isinstance(process, Prepared)
