@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import copy
 import csv
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from service.catalogs.wrs2 import Scene, load_wrs2_land
+from service.catalogs.wrs2 import load_wrs2_land
 
 Document = dict[str, Any]
 
@@ -41,14 +40,9 @@ STATIONS: list[Document] = [
 ]
 
 
-@cache
-def _scenes() -> list[Scene]:
-    return load_wrs2_land()
-
-
 def drawn_targets(number: int, seed: int = 0) -> list[Document]:
     """Return targets drawn from the shipped WRS-2 catalogue."""
-    scenes = _scenes()
+    scenes = load_wrs2_land()
     picked = np.random.default_rng(seed).choice(len(scenes), number, replace=False)
     return [
         {"id": scenes[i].id, "lat_deg": scenes[i].lat_deg, "lon_deg": scenes[i].lon_deg}

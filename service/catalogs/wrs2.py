@@ -11,6 +11,7 @@ import csv
 import io
 import math
 from dataclasses import dataclass
+from functools import cache
 from importlib import resources
 
 import numpy as np
@@ -98,9 +99,10 @@ def wrs2_land_csv() -> str:
     return resources.files(__package__).joinpath(CATALOG_FILE).read_text(encoding="utf-8")
 
 
-def load_wrs2_land() -> list[Scene]:
+@cache
+def load_wrs2_land() -> tuple[Scene, ...]:
     """Return the shipped land and coast scenes, in the order of the file."""
-    return [
+    return tuple(
         Scene(id=line["id"], lat_deg=float(line["lat_deg"]), lon_deg=float(line["lon_deg"]))
         for line in csv.DictReader(io.StringIO(wrs2_land_csv()))
-    ]
+    )

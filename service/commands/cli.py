@@ -14,6 +14,7 @@ from typing import Any
 import planner_core
 from service.access.callers import Scope, is_plain_name
 from service.commands.outcome import FAILED, WRONG_INPUT, Failed, WrongInput
+from service.process.imports import importing
 
 _LONGEST_DAYS = 3650
 
@@ -24,7 +25,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     module, _, function = options.command.partition(":")
     try:
         # Only now: some take long to import what they need.
-        status: int = getattr(import_module(f"service.commands.{module}"), function)(options)
+        with importing():
+            command = import_module(f"service.commands.{module}")
+        status: int = getattr(command, function)(options)
         return status
     except WrongInput as error:
         return _complain(str(error), WRONG_INPUT)

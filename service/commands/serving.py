@@ -10,6 +10,7 @@ import json
 from typing import TYPE_CHECKING
 
 from service.commands.outcome import OK, Failed, WrongInput
+from service.process.imports import importing
 
 if TYPE_CHECKING:
     from service.settings import Settings
@@ -45,7 +46,8 @@ def api(options: argparse.Namespace) -> int:
 
 
 def _run_server(settings: Settings, *, with_workers: bool) -> int:
-    from service.server import CannotServe, NoKey, serve
+    with importing():
+        from service.server import CannotServe, NoKey, serve
 
     try:
         return serve(settings, with_workers=with_workers)

@@ -9,12 +9,15 @@ import os
 import signal
 from typing import NoReturn
 
-from service.jobs.runner import Work
-from service.jobs.worker import Worker
-from service.process.logs import configure_logging
-from service.process.parent import die_with_parent
-from service.process.tracing import start_tracing
-from service.settings import Settings
+from service.process.imports import importing
+
+with importing():
+    from service.jobs.runner import Work
+    from service.jobs.worker import Worker
+    from service.process.logs import configure_logging
+    from service.process.parent import die_with_parent
+    from service.process.tracing import start_tracing
+    from service.settings import Settings
 
 log = logging.getLogger(__name__)
 

@@ -7,11 +7,14 @@ from __future__ import annotations
 
 import logging
 
-from service.jobs import child, plan_job  # noqa: F401 - what a job's process begins with
-from service.jobs.warm import warm_up
+from service.process.imports import importing
 
-try:
-    warm_up()
-except Exception:
-    # An exception here would end the fork server without a word; each job will tell its own.
-    logging.getLogger(__name__).exception("warm-up failed")
+with importing():
+    from service.jobs import child, plan_job  # noqa: F401 - what a job's process begins with
+    from service.jobs.warm import warm_up
+
+    try:
+        warm_up()
+    except Exception:
+        # An exception here would end the fork server without a word; each job will tell its own.
+        logging.getLogger(__name__).exception("warm-up failed")

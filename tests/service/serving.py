@@ -9,30 +9,50 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from tests.service import prepared
+from tests.service.prepared import Program
+
 
 @contextmanager
 def serving(
     tmp_path: Path, command: str, *options: str, **settings: str
-) -> Iterator[tuple[subprocess.Popen[str], str]]:
+) -> Iterator[tuple[Program, str]]:
     """Run the program on the folder's database; yield the process and its first line.
 
     Its log stands in the folder too, under the command's name. ``settings`` go into its
     environment.
     """
-    database = f"sqlite:///{tmp_path / 'slewline.db'}"
-    words = ["-m", "service", command, "--port", "0", "--database-url", database, *options]
+    words = _words(tmp_path, command, options)
     variables = {f"SLEWLINE_{name}".upper(): value for name, value in settings.items()}
     with (tmp_path / f"{command}.log").open("wb") as log:
-        process = subprocess.Popen(
-            [sys.executable, *words],
-            env=os.environ | variables,
-            stdout=subprocess.PIPE,
-            stderr=log,
-            text=True,
-        )
+        process = prepared.start(words, os.environ | variables, stderr=log.fileno())
+    with _first_line(process) as line:
+        yield process, line
+
+
+@contextmanager
+def serving_as_installed(
+    tmp_path: Path, command: str, *options: str
+) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """Do the same as ``serving``, by a start as a user's: for tests of just that."""
+    words = [sys.executable, "-m", *_words(tmp_path, command, options)]
+    with (tmp_path / f"{command}.log").open("wb") as log:
+        process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=log, text=True)
+    with _first_line(process) as line:
+        yield process, line
+
+
+def _words(folder: Path, command: str, options: tuple[str, ...]) -> list[str]:
+    database = f"sqlite:///{folder / 'slewline.db'}"
+    return ["service", command, "--port", "0", "--database-url", database, *options]
+
+
+@contextmanager
+def _first_line(process: Program) -> Iterator[str]:
+    """Yield what a process says first, and end it."""
     assert process.stdout is not None
     try:
-        yield process, process.stdout.readline()
+        yield process.stdout.readline()
     finally:
         process.kill()
         process.wait()

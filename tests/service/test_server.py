@@ -16,14 +16,14 @@ import pytest
 from service.server import listen
 from tests.patience import PATIENCE_S, wait_until
 from tests.plain_http import NO_TLS
-from tests.service.serving import serving
+from tests.service.serving import serving_as_installed
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_serve_says_once_when_it_is_ready_and_ends_cleanly(
     tmp_path: Path, number: signal.Signals
 ) -> None:
-    with serving(tmp_path, "serve", "--workers", "1") as (process, line):
+    with serving_as_installed(tmp_path, "serve", "--workers", "1") as (process, line):
         url = line.split()[-1]
         assert line.startswith("Slewline is ready at http://127.0.0.1:")
         assert httpx.get(f"{url}/health/ready").json()["workers"] == 1
@@ -47,7 +47,7 @@ def test_the_body_of_an_answer_does_not_wait_for_the_acknowledgement_of_its_head
 
 
 def test_api_alone_runs_no_worker_and_ends_without_its_fork_server(tmp_path: Path) -> None:
-    with serving(tmp_path, "api") as (process, line):
+    with serving_as_installed(tmp_path, "api") as (process, line):
         url = line.split()[-1]
         assert httpx.get(f"{url}/health/live").status_code == 200
         assert httpx.get(f"{url}/health/ready").status_code == 503
@@ -62,7 +62,7 @@ def test_api_alone_runs_no_worker_and_ends_without_its_fork_server(tmp_path: Pat
 
 
 def test_a_worker_process_serves_the_jobs_of_an_api_process(tmp_path: Path) -> None:
-    with serving(tmp_path, "api") as (_, line):
+    with serving_as_installed(tmp_path, "api") as (_, line):
         url = line.split()[-1]
         database = f"sqlite:///{tmp_path / 'slewline.db'}"
         worker = subprocess.Popen(

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import subprocess
-import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -28,9 +26,11 @@ from service.jobs.supervisor import environment_of
 from service.settings import Settings
 from tests.missions import Document
 from tests.patience import wait_until
+from tests.service import prepared
 from tests.service.conftest import checked_client, new_app, serve
 from tests.service.jobs.mission import Mission, running, small_mission
 from tests.service.jobs.work import WORK
+from tests.service.prepared import Program
 
 SUMMARY = {
     "horizon": {"start": "2026-03-01T00:00:00Z", "end": "2026-03-02T00:00:00Z"},
@@ -132,17 +132,14 @@ class Workers:
     """Worker processes of one test."""
 
     jobs: Jobs
-    processes: list[subprocess.Popen[bytes]] = field(default_factory=list)
+    processes: list[Program] = field(default_factory=list)
 
-    def start(
-        self, environment: Mapping[str, str] = MappingProxyType({})
-    ) -> subprocess.Popen[bytes]:
+    def start(self, environment: Mapping[str, str] = MappingProxyType({})) -> Program:
         """Start a worker and return when it is ready to claim jobs."""
         before = len(self.jobs.workers())
-        command = [sys.executable, "-m", "service.jobs"]
-        command += ["--work", WORK.function, "--preload", WORK.preload]
+        words = ["service.jobs", "--work", WORK.function, "--preload", WORK.preload]
         whole = os.environ | environment_of(self.jobs.settings) | dict(environment)
-        process = subprocess.Popen(command, env=whole)
+        process = prepared.start(words, whole, stdout=1)
         self.processes.append(process)
         self.jobs.until(lambda: process.poll() is not None or len(self.jobs.workers()) > before)
         assert process.returncode is None, "the worker ended at once"

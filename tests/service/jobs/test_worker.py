@@ -6,7 +6,6 @@ import json
 import os
 import signal
 import sqlite3
-import subprocess
 import time
 from contextlib import closing
 from pathlib import Path
@@ -20,6 +19,7 @@ from service.jobs.supervisor import Supervisor
 from tests.patience import PATIENCE_S, wait_until
 from tests.service.jobs.conftest import Jobs, Workers
 from tests.service.jobs.work import WORK
+from tests.service.prepared import Program
 
 
 def solver_pid(jobs: Jobs, job_id: str) -> int:
@@ -33,7 +33,7 @@ def cancel(jobs: Jobs, job_id: str) -> None:
         assert lease.request_cancel(session, job_id)
 
 
-def freeze(jobs: Jobs, process: subprocess.Popen[bytes]) -> None:
+def freeze(jobs: Jobs, process: Program) -> None:
     """Stop a process, but not in the middle of a write: SQLite has one lock for all."""
     while True:
         process.send_signal(signal.SIGSTOP)

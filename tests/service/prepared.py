@@ -1,0 +1,196 @@
+"""Starts programs as forks of a process that has imported the service: in a tenth of the time.
+
+Such a program is a process of its own that runs what ``python -m`` would run, with its own
+arguments, environment and streams; it can be signalled, killed and waited for. Only imports are
+shared, and done before any thread begins. What is started with other settings than those of
+Slewline is started as a user would, since libraries may read theirs while they are imported.
+"""
+
+from __future__ import annotations
+
+import atexit
+import json
+import os
+import runpy
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from functools import cache
+from typing import IO, Any, Final, NoReturn
+
+from service.process.imports import importing
+
+_MOST_BYTES: Final = 1 << 17
+
+
+class Prepared:
+    """A program that runs: of ``subprocess.Popen`` what tests need."""
+
+    def __init__(self, pid: int, told: socket.socket, stdout: IO[str] | None) -> None:
+        self.pid = pid
+        self.stdout = stdout
+        self.returncode: int | None = None
+        self._told = told
+
+    def poll(self) -> int | None:
+        """Return how it ended, or None while it runs."""
+        return self._status(0.0)
+
+    def wait(self, timeout: float | None = None) -> int:
+        """Return how it ended, as soon as it has."""
+        status = self._status(timeout)
+        if status is None:
+            raise subprocess.TimeoutExpired("a prepared program", timeout or 0.0)
+        return status
+
+    def send_signal(self, number: int) -> None:
+        """Send a signal, unless it has ended."""
+        if self.poll() is None:
+            os.kill(self.pid, number)
+
+    def terminate(self) -> None:
+        """Send SIGTERM."""
+        self.send_signal(signal.SIGTERM)
+
+    def kill(self) -> None:
+        """Send SIGKILL."""
+        self.send_signal(signal.SIGKILL)
+
+    def _status(self, timeout_s: float | None) -> int | None:
+        if self.returncode is None:
+            self._told.settimeout(timeout_s)
+            try:
+                self.returncode = int(self._told.recv(32))
+            except (BlockingIOError, TimeoutError):
+                return None
+            self._told.close()
+        return self.returncode
+
+
+Program = Prepared | subprocess.Popen[str]
+
+
+def start(
+    words: Sequence[str],
+    env: Mapping[str, str],
+    *,
+    stdout: int = subprocess.PIPE,
+    stderr: int = 2,
+) -> Program:
+    """Run ``python -m`` with these words.
+
+    Parameters
+    ----------
+    env
+        The whole environment.
+    stdout, stderr
+        Descriptors; the first may be ``subprocess.PIPE``.
+    """
+    if sys.platform != "linux" or not _differs_in_own_settings_alone(env):
+        command = [sys.executable, "-m", *words]
+        return subprocess.Popen(command, env=env, stdout=stdout, stderr=stderr, text=True)
+    if stdout != subprocess.PIPE:
+        return _forked(words, env, (stdout, stderr), None)
+    read, write = os.pipe()
+    try:
+        return _forked(words, env, (write, stderr), os.fdopen(read))
+    finally:
+        os.close(write)
+
+
+def _forked(
+    words: Sequence[str], env: Mapping[str, str], streams: tuple[int, int], stdout: IO[str] | None
+) -> Prepared:
+    told, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    asked = {"words": list(words), "env": dict(env), "folder": os.getcwd()}
+    server, _ = _server()
+    with theirs:
+        socket.send_fds(server, [json.dumps(asked).encode()], [theirs.fileno(), *streams])
+    return Prepared(int(told.recv(32)), told, stdout)
+
+
+def _differs_in_own_settings_alone(env: Mapping[str, str]) -> bool:
+    _, environment = _server()
+    names = {name for name, _ in env.items() ^ environment.items()}
+    return all(name.startswith(("SLEWLINE_", "PYTEST_")) for name in names)
+
+
+@cache
+def _server() -> tuple[socket.socket, dict[str, str]]:
+    """Start the process that programs are forked from, and return its environment too.
+
+    It ends with this process.
+    """
+    environment = dict(os.environ)
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    with theirs:
+        process = subprocess.Popen([sys.executable, "-m", __name__], stdin=theirs.fileno())
+
+    def end() -> None:
+        ours.close()
+        process.wait()
+
+    atexit.register(end)
+    return ours, environment
+
+
+# In the process that programs are forked from -------------------------------------------------
+
+
+def main() -> None:
+    """Import the service, and start what is asked for until nobody can ask any more."""
+    with importing():
+        import service.commands.cli
+        import service.commands.serving
+        import service.jobs.worker
+        import service.server  # noqa: F401
+    requests = socket.socket(fileno=os.dup(0))
+    # Who minds a program is collected by nobody; Ctrl-C is for the programs.
+    signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    while True:
+        data, descriptors, _, _ = socket.recv_fds(requests, _MOST_BYTES, 3)
+        if not data:
+            return
+        if os.fork() == 0:
+            requests.close()
+            _mind(json.loads(data), *descriptors)
+        for descriptor in descriptors:
+            os.close(descriptor)
+
+
+def _mind(asked: dict[str, Any], told: int, stdout: int, stderr: int) -> NoReturn:
+    """Start a program, tell its process id, and how it ended."""
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+    pid = os.fork()
+    if pid == 0:
+        os.close(told)
+        _become(asked, stdout, stderr)
+    os.close(stdout)
+    os.close(stderr)
+    os.write(told, str(pid).encode())
+    _, status = os.waitpid(pid, 0)
+    os.write(told, str(os.waitstatus_to_exitcode(status)).encode())
+    os._exit(0)
+
+
+def _become(asked: dict[str, Any], stdout: int, stderr: int) -> NoReturn:
+    """Run the program in this process, as ``python -m`` does."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    nothing = os.open(os.devnull, os.O_RDONLY)
+    for descriptor, number in ((nothing, 0), (stdout, 1), (stderr, 2)):
+        os.dup2(descriptor, number)
+        if descriptor > 2:
+            os.close(descriptor)
+    os.environ.clear()
+    os.environ.update(asked["env"])
+    os.chdir(asked["folder"])
+    module, *sys.argv[1:] = asked["words"]
+    runpy.run_module(module, run_name="__main__", alter_sys=True)
+    sys.exit()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,71 @@
+"""What ``prepared`` starts is a process like any other."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import psutil
+import pytest
+
+import planner_core
+from tests.service import prepared
+from tests.service.prepared import Prepared
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="elsewhere nothing is forked")
+
+
+@pytest.fixture(autouse=True)
+def _environment_of_the_server(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Other tests may have left variables in this process: then it would fork nothing."""
+    _, environment = prepared._server()
+    for name in os.environ.keys() - environment.keys():
+        monkeypatch.delenv(name)
+    for name, value in environment.items():
+        monkeypatch.setenv(name, value)
+
+
+def test_it_has_streams_and_a_status_of_its_own(tmp_path: Path) -> None:
+    process = prepared.start(["service", "--version"], os.environ)
+    assert isinstance(process, Prepared)
+    assert process.stdout is not None
+    with process.stdout as output:
+        assert output.read() == f"{planner_core.__version__}\n"
+    assert process.wait() == process.poll() == process.returncode == 0
+    with (tmp_path / "said").open("wb") as said:
+        refused = prepared.start(
+            ["service", "fly"], os.environ, stdout=said.fileno(), stderr=said.fileno()
+        )
+    assert refused.wait() == 2
+    assert "invalid choice: 'fly'" in (tmp_path / "said").read_text()
+
+
+def test_it_is_waited_for_and_killed(tmp_path: Path) -> None:
+    words = ["service", "api", "--port", "0", "--database-url", f"sqlite:///{tmp_path / 'own.db'}"]
+    with (tmp_path / "log").open("wb") as log:
+        process = prepared.start(words, os.environ, stderr=log.fileno())
+    assert process.stdout is not None
+    with process.stdout as output:
+        assert output.readline().startswith("Slewline is ready at ")
+        assert process.poll() is None
+        with pytest.raises(subprocess.TimeoutExpired):
+            process.wait(0.0)
+        (fork_server,) = psutil.Process(process.pid).children()
+        process.kill()
+        assert process.wait() == -signal.SIGKILL
+        process.terminate()  # nobody is left to be told
+        psutil.wait_procs([fork_server])
+
+
+def test_settings_of_libraries_want_a_start_from_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    own = prepared.start(["service", "--version"], os.environ | {"SLEWLINE_PORT": "0"}, stdout=1)
+    assert isinstance(own, Prepared)
+    assert own.wait() == 0
+    monkeypatch.setenv("OTEL_SERVICE_NAME", "other")
+    process = prepared.start(["service", "--version"], os.environ)
+    assert not isinstance(process, Prepared)
+    output, _ = process.communicate()
+    assert output == f"{planner_core.__version__}\n"
