@@ -78,7 +78,7 @@ def replanned_day(
     (where they are many) whose antenna is free, with targets that the other satellites leave. A
     quarter of the levels of energy suffices to name them. With all contacts and half of the levels
     to name them takes three times as long, and two fleets earn 912.6 and 972.0 after 40 CPU seconds
-    in place of 931.3 and 972.1. Where contacts are too many for it they stay as they are.
+    in place of 931.3 and 970.1. Where contacts are too many for it they stay as they are.
     """
     table = problem.opportunities
     rows = np.array([action.opportunity for action in plan.actions], dtype=np.int32)
