@@ -2,7 +2,8 @@
 
 Every solver plans each mission, and ``certified`` under other objectives too; all plans are judged
 under the mission's own. A fault is a plan that the referee refuses, a bound below a plan, a plan
-that is better than that of ``certified`` by more than half a percent, or half as much time again.
+that is better than that of ``certified`` by more than half a percent, or an answer of ``certified``
+that took half as long again as it was given.
 
     python -m benchmarks.sweep --first 1 --last 40 --cpu-s 10 build/sweep.csv
 """

@@ -43,6 +43,9 @@ PROMISES: Final = 3
 """Of which contact brings down what the next one has no time for. With 1 bounds were 0.3 and 0.4 %
 higher at half-lives of 3 and 12 h, with 5 the same."""
 
+FEW_CONTACTS: Final = 20
+"""Of a satellite, among which a programme of queues finds the best in a second or less."""
+
 MEMORY_BITS: Final = 128
 """Targets that a label may remember."""
 

@@ -16,7 +16,7 @@ import numpy as np
 from planner_core.certified.dp.contact_queues import most_by_queues
 from planner_core.certified.dp.queue_terms import queues_of
 from planner_core.certified.dp.resource_network import network_of, strict_network_of
-from planner_core.certified.sizes import PROMISES
+from planner_core.certified.sizes import FEW_CONTACTS, PROMISES
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import (
     COLLECT,
@@ -74,11 +74,11 @@ def replanned_day(
 ) -> Plan | None:
     """Return the plan with a satellite's day planned anew beside the others; None if it cannot be.
 
-    Its contacts are those that the programme over queues would take, of its own and half of all
-    (where they are many) whose antenna is free, with targets that the other satellites leave. A
-    quarter of the levels of energy suffices to name them. With all contacts and half of the levels
-    to name them takes three times as long, and two fleets earn 912.6 and 972.0 after 40 CPU seconds
-    in place of 931.3 and 970.1. Where contacts are too many for it they stay as they are.
+    The programme over queues names its contacts, among those that the plan has and others whose
+    antenna is free: half of them, drawn at random, where they are many. A quarter of the levels of
+    energy suffices. With all contacts and half of the levels that takes three times as long, and
+    two fleets earn 912.6 and 972.0 after 40 CPU seconds in place of 931.3 and 970.1. Where the
+    programme would take too long contacts stay as they are.
     """
     table = problem.opportunities
     rows = np.array([action.opportunity for action in plan.actions], dtype=np.int32)
@@ -108,7 +108,7 @@ def replanned_day(
 def _some_contacts(satellite: SatelliteProblem, num_rows: int, rng: np.random.Generator) -> Bools:
     """Return half of a satellite's contacts, or all where they are few. Shape ``(num_rows,)``."""
     contacts = satellite.rows[satellite.kind == CONTACT]
-    number = max(len(contacts) // 2, min(len(contacts), TUNING.rounds))
+    number = max(len(contacts) // 2, min(len(contacts), FEW_CONTACTS))
     some = np.zeros(num_rows, dtype=np.bool_)
     some[rng.choice(contacts, number, replace=False)] = True
     return some
