@@ -66,7 +66,7 @@ class Tuning:
         energy is an estimate.
     fine, coarse
         Levels of the recorder that the smallest collect fills, where a proof counts and where many
-        prices are tried.
+        prices are tried; the first also of energy, where contacts are named at first.
     units_per_reward
         In which exact programmes count a typical target's worth, where many prices are tried.
     max_units

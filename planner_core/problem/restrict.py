@@ -1,4 +1,4 @@
-"""A problem with some of its opportunities left out."""
+"""A problem with some of its opportunities left out, or some that must be taken."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy.typing as npt
 from planner_core.problem import (
     Floats,
     Ints,
+    Kept,
     Opportunities,
     Pinned,
     Problem,
@@ -41,6 +42,13 @@ def restricted(problem: Problem, rows: npt.NDArray[np.integer]) -> Problem:
         origin=rows,
         events=[(s.event_s, s.event[is_left[s.rows]]) for s in problem.satellites],
     )
+
+
+def taking(problem: Problem, contacts: Sequence[int]) -> Problem:
+    """Return the problem with contacts that must be taken."""
+    already = {kept.row for kept in problem.pinned.kept}
+    new = tuple(Kept(row=row, pointer="") for row in contacts if row not in already)
+    return replace(problem, pinned=replace(problem.pinned, kept=(*problem.pinned.kept, *new)))
 
 
 def with_table(

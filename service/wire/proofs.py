@@ -54,6 +54,13 @@ class ProofOut(Wire):
             "queue of the recorder prove the bound."
         ),
     )
+    exact_contacts: tuple[int, ...] | None = Field(
+        None,
+        description=(
+            "With `queue_levels`: the contacts, by their place among the opportunities, whose "
+            "energy the programmes do not round."
+        ),
+    )
     elementary: bool | None = Field(
         None, description="Whether the prices are for paths that take a target once in each pass."
     )

@@ -16,15 +16,17 @@ from planner_core.certified.dp.contact_queues import most_by_queues
 from planner_core.certified.dp.queue_terms import queues_of
 from planner_core.certified.dp.resource_network import strict_network_of
 from planner_core.certified.lns.queue_plans import plan_with_queues, replanned_day
+from planner_core.certified.multipliers.queues import priced_by_queues
 from planner_core.certified.proofs import queues
 from planner_core.certified.proofs.bound import Bound, rounded_bound
 from planner_core.certified.proofs.documents import from_json, is_proven, to_json
 from planner_core.certified.proofs.latency import Tolls, latency_relaxations, latency_value
 from planner_core.certified.proofs.queues import is_supported, queue_value
 from planner_core.domain import Objective
-from planner_core.problem import CONTACT, Kept, Problem
+from planner_core.problem import CONTACT, Floats, Problem
 from planner_core.problem.delivery import with_objective
 from planner_core.problem.plan import Plan
+from planner_core.problem.restrict import taking
 from planner_core.referee.replay import replay
 from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
@@ -71,13 +73,20 @@ def test_no_plan_beats_any_prices(
     free = np.zeros(len(problem.target_ids))
     some = np.maximum(rng.uniform(-0.5, 1.0, len(free)) * problem.best_worth, 0.0)
     of_contacts = rng.uniform(0.0, 3.0, num_contacts(problem)) * (rng.random() < 0.7)
+    contacts = np.flatnonzero(problem.opportunities.kind == CONTACT)
+    exact = contacts[rng.random(len(contacts)) < 0.5].tolist()
     for prices in (free, some):
-        whole, _ = queue_value(problem, prices, per_collect)
+        whole, _ = queue_value(problem, prices, per_collect, exact_contacts=exact)
         assert whole >= best - 1e-9
         # Paths may be left out, as long as no plan is among them that is better.
         level = float(rng.uniform(0.5, 1.0)) * best
         value, found = queue_value(
-            problem, prices, per_collect, contact_prices=of_contacts, level=level
+            problem,
+            prices,
+            per_collect,
+            contact_prices=of_contacts,
+            exact_contacts=exact,
+            level=level,
         )
         assert best - 1e-9 <= value <= max(whole, level) + 1e-6
         if num_satellites == 1 and prices is free and value > level + 1e-6:
@@ -163,6 +172,77 @@ def test_queues_bound_plans_better_than_prices_of_contacts() -> None:
     assert not is_proven(problem, replace(read, value=0.99 * read.value))
 
 
+def _crowded(seed: int, num_targets: int, num_collects: int) -> Problem:
+    problem = random_problem(
+        seed,
+        num_collects=num_collects,
+        num_targets=num_targets,
+        num_contacts=6,
+        span_s=6000.0,
+        resources=TIGHT,
+    )
+    return with_objective(problem, Objective(collected_share=0.0, half_life_s=900.0))
+
+
+def test_contacts_whose_energy_is_not_rounded_lower_the_bound() -> None:
+    rounded, lowered = list[float](), list[float]()
+    for seed in range(12):
+        problem = _crowded(seed, num_targets=90, num_collects=200)
+        prices = np.zeros(90)
+        value, rows = queue_value(problem, prices, 2)
+        contacts = rows[problem.opportunities.kind[rows] == CONTACT].tolist()
+        lower, _ = queue_value(problem, prices, 2, exact_contacts=contacts)
+        rounded.append(value)
+        lowered.append(lower)
+        bound = Bound(
+            value=lower, proof="dp", prices=prices, queue_levels=2, exact_contacts=tuple(contacts)
+        )
+        read = from_json(to_json(bound))
+        assert read.exact_contacts == bound.exact_contacts
+        assert is_proven(problem, read)
+        assert is_proven(problem, replace(read, exact_contacts=())) == (value <= lower + 1e-6)
+    assert sum(lowered) < 0.99 * sum(rounded)
+
+
+def test_multipliers_that_suit_given_contacts_lower_the_bound_of_their_plans() -> None:
+    at_first, at_last = list[float](), list[float]()
+    for seed in range(12):
+        problem = _crowded(seed, num_targets=6, num_collects=40)
+        none = np.zeros(6)
+        _, rows = queue_value(problem, none, 24)
+        contacts = rows[problem.opportunities.kind[rows] == CONTACT].tolist()
+        prices = priced_by_queues(problem, contacts, none, 20, STOP)
+        assert np.all(prices >= 0.0)
+        part = taking(problem, contacts)
+        at_first.append(queue_value(part, none, 24)[0])
+        at_last.append(queue_value(part, prices, 24)[0])
+        assert replay(problem, _plan_with(problem, contacts, prices)).reward <= at_last[-1] + 1e-9
+        assert priced_by_queues(problem, contacts, none, 20, np.ones(1, dtype=np.uint8)) is none
+    assert sum(at_last) < 0.995 * sum(at_first)
+
+
+def _plan_with(problem: Problem, contacts: list[int], prices: Floats) -> Plan:
+    plan = plan_with_queues(taking(problem, contacts), prices, np.random.default_rng(0), STOP, 24)
+    assert plan is not None
+    return plan
+
+
+@examples(60)
+@given(seed=SEEDS, half_life_s=st.floats(60.0, 2000.0))
+def test_contacts_that_must_be_taken_cost_their_energy_and_no_more(
+    seed: int, half_life_s: float
+) -> None:
+    """Where every path takes them plans keep their limits all the same."""
+    problem = _problem(seed, "physical", 1, num_contacts=3)
+    problem = with_objective(problem, Objective(collected_share=0.0, half_life_s=half_life_s))
+    contacts = np.flatnonzero(problem.opportunities.kind == CONTACT)[:1].tolist()
+    prices = np.zeros(len(problem.target_ids))
+    plan = plan_with_queues(taking(problem, contacts), prices, np.random.default_rng(seed), STOP, 2)
+    if plan is not None and plan.actions:
+        codes = {violation.code for violation in replay(problem, plan).violations}
+        assert codes <= {"station_conflict"}
+
+
 @pytest.mark.parametrize("dynamics", ["physical", "paper"])
 @examples(150)
 @given(seed=SEEDS, half_life_s=st.floats(60.0, 2000.0), per_collect=st.sampled_from([3, 24]))
@@ -197,11 +277,7 @@ def test_plans_take_the_contacts_that_they_must_and_no_target_twice() -> None:
     )
     problem = with_objective(problem, Objective(collected_share=0.0, half_life_s=900.0))
     contacts = np.flatnonzero(problem.opportunities.kind == CONTACT)[[1, 4]].tolist()
-    kept = tuple(Kept(row=row, pointer="") for row in contacts)
-    taking = replace(problem, pinned=replace(problem.pinned, kept=kept))
-    rng = np.random.default_rng(0)
-    plan = plan_with_queues(taking, np.zeros(len(problem.target_ids)), rng, STOP, 24)
-    assert plan is not None
+    plan = _plan_with(problem, contacts, np.zeros(len(problem.target_ids)))
     rows = [action.opportunity for action in plan.actions]
     assert [r for r in rows if problem.opportunities.kind[r] == CONTACT] == contacts
     timeline = replay(problem, plan)

@@ -18,7 +18,7 @@ from planner_core.certified.dp.resource_network import Network
 from planner_core.certified.sizes import MAX_ENERGY_LEVELS
 from planner_core.certified.tolerances import LEVEL
 from planner_core.jit import inlined, inner, kernel, templated
-from planner_core.problem import Floats, Ints, Longs
+from planner_core.problem import Bools, Floats, Ints, Longs
 
 Rounding = Literal["optimistic", "pessimistic", "nearest"]
 """No plan is lost, every path keeps its limits, or neither."""
@@ -49,9 +49,21 @@ class EnergyLevels(NamedTuple):
 
 
 def energy_levels(
-    network: Network, per_collect: int, rounding: Rounding = "optimistic"
+    network: Network,
+    per_collect: int,
+    rounding: Rounding = "optimistic",
+    exact: Bools | None = None,
 ) -> EnergyLevels:
-    """Return levels of which the cheapest collect costs ``per_collect``, unless they are many."""
+    """Return levels of which the cheapest collect costs ``per_collect``, unless they are many.
+
+    Parameters
+    ----------
+    exact
+        Tasks whose own costs are not rounded; only such as every path takes where every path must
+        keep its limits. With each of them levels are counted from a point that lies lower by what
+        its cost is short of whole levels: paths that take it gain nothing by rounding, and others
+        are given that little. Shape ``(m,)``.
+    """
     collects = network.energy_cost[~network.is_contact.astype(np.bool_)]
     positive = collects[collects > 0.0]
     step = float(positive.min()) / per_collect if len(positive) else 1.0
@@ -62,9 +74,14 @@ def energy_levels(
     if _gives(network) and rounding != "pessimistic":
         cap, cost, floor, give = _rounded_potentials(network, step, down, up)
     else:
+        short = np.zeros(len(network.energy_cost))
+        if exact is not None:
+            short[exact] = step * _up(network.energy_cost[exact], step) - network.energy_cost[exact]
+        lower = np.cumsum(short)
         # Where every path must keep its limits, what arcs give back is left out.
-        cap = up(network.energy_cap, step)
-        cost, floor = down(network.energy_cost, step), down(network.energy_floor, step)
+        cap = up(network.energy_cap - lower + short, step)
+        cost = down(network.energy_cost + short, step)
+        floor = down(network.energy_floor - lower, step)
         give = np.zeros(len(network.straight_give), dtype=np.int32)
     lowest = np.minimum.accumulate(np.minimum(floor, cap - cost)).astype(np.int32)
     return EnergyLevels(
@@ -78,13 +95,14 @@ def energy_levels(
     )
 
 
-def levels_of_proof(network: Network, per_collect: int) -> EnergyLevels:
+def levels_of_proof(network: Network, per_collect: int, exact: Bools | None = None) -> EnergyLevels:
     """Return levels that lose no plan: with turns to the sun as many as tables may have.
 
     No two costs are alike there, and what is rounded adds up: on the paper's satellite with a
     half-life 24 levels to an image proved 203.2, 192 of them 193.6.
     """
-    return energy_levels(network, MAX_ENERGY_LEVELS if _gives(network) else per_collect)
+    levels = MAX_ENERGY_LEVELS if _gives(network) else per_collect
+    return energy_levels(network, levels, exact=exact)
 
 
 def levels_of_estimate(network: Network, per_collect: int) -> EnergyLevels:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from planner_core.certified.dp.contact_layers import layers_of
-from planner_core.certified.dp.data_levels import data_levels
-from planner_core.certified.dp.energy_labels import energy_levels
+from planner_core.certified.dp.data_levels import DataLevels, data_levels
+from planner_core.certified.dp.energy_labels import Rounding, energy_levels
 from planner_core.certified.dp.queue_tables import Fixing, Queues
 from planner_core.certified.dp.resource_network import Network, part_of
 from planner_core.certified.sizes import (
@@ -18,7 +18,7 @@ from planner_core.certified.sizes import (
 )
 from planner_core.certified.tolerances import DOWN, DOWN_S
 from planner_core.certified.tuning import TUNING
-from planner_core.problem import COLLECT, CONTACT, Floats, Ints, Problem, SatelliteProblem
+from planner_core.problem import COLLECT, CONTACT, Bools, Floats, Ints, Problem, SatelliteProblem
 
 
 def queues_of(
@@ -29,9 +29,11 @@ def queues_of(
     *,
     per_collect: int,
     num_classes: int,
+    data_per_collect: int | None = None,
     rows: Ints | None = None,
     earliest: Ints | None = None,
     fixing: Fixing | None = None,
+    exact: Bools | None = None,
     keeps_battery: bool = False,
     keeps_recorder: bool = False,
 ) -> Queues | None:
@@ -47,11 +49,16 @@ def queues_of(
         How many levels of energy the cheapest collect takes.
     num_classes
         Of promises.
+    data_per_collect
+        How many levels of data the smallest image takes; as many as tuning says by default.
     rows
         Those of its tasks that count, ascending; all by default.
     earliest, fixing
         Direct predecessors of contacts, and what leaves paths out (``latency.reductions``); any and
         nothing by default. Shape ``(num_contacts + 1,)``.
+    exact
+        Tasks whose energy is not rounded, as ``energy_levels`` takes them; by default those that
+        must be taken. Shape ``(m,)``, of those that count.
     keeps_battery, keeps_recorder
         Whether energy, or data, is rounded so that all paths keep their limits, and not so that no
         plan is lost.
@@ -60,24 +67,22 @@ def queues_of(
     rows = np.arange(len(satellite), dtype=np.int32) if rows is None else rows
     table_rows, is_image = satellite.rows[rows], satellite.kind[rows] == COLLECT
     contact = np.flatnonzero(satellite.kind[rows] == CONTACT).astype(np.int32)
-    energy = energy_levels(network, per_collect, "pessimistic" if keeps_battery else "optimistic")
-    data = data_levels(network, TUNING.coarse, is_optimistic=not keeps_recorder)
+    exact = network.is_kept.astype(np.bool_) if exact is None else exact
+    rounding: Rounding = "pessimistic" if keeps_battery else "optimistic"
+    energy = energy_levels(network, per_collect, rounding, exact)
+    data = data_levels(network, data_per_collect or TUNING.coarse, is_optimistic=not keeps_recorder)
     number = np.full(len(rows), -1, dtype=np.int32)
     number[contact] = np.arange(len(contact))
     first = np.maximum(_must_follow(network, contact), -1 if earliest is None else earliest)
     on_board = problem.objective.collected_share * problem.worth_on_ground[table_rows]
-    ahead = (network.idle_from - np.arange(len(rows))).max(initial=0)
-    num_tables = max(1, min(len(rows), int(ahead) + 1))
+    num_tables = _num_tables(network)
     width = data.num_levels * energy.width
     num_kept = num_classes * (num_tables + len(contact) + 1)
     num_done = _num_extensions(network, contact, first)
     if width * num_done > MAX_QUEUE_WORK or width * num_kept > MAX_QUEUE_ENTRIES:
         return None
-    level = float(data.least[1] - data.least[0]) if data.num_levels > 1 else 1.0
-    volume = satellite.volume[rows[contact]] + DOWN
-    step = max(level / QUEUE_STEPS, float(volume.max(initial=0.0)) / MAX_QUEUE_STEPS)
-    place = satellite.place[rows]
-    setup_s = problem.downlinks.stations.setup_s[place[contact]]
+    volume, place = satellite.volume[rows[contact]] + DOWN, satellite.place[rows]
+    step = _step_of(data, volume)
     return Queues(
         network=network,
         energy=energy,
@@ -88,7 +93,7 @@ def queues_of(
         first=first,
         down_s=_down_s(problem, satellite, rows[contact], volume, step),
         step=step,
-        ready_s=satellite.start_s[rows][contact] + setup_s - DOWN_S,
+        ready_s=_ready_s(problem, satellite, rows[contact]) - DOWN_S,
         volume=volume,
         num_classes=num_classes,
         queued=-network.data_floor - DOWN,
@@ -102,6 +107,26 @@ def queues_of(
         num_tables=num_tables,
         takes_worthless=False,
     )
+
+
+def _num_tables(network: Network) -> int:
+    """Return of how many tasks the paths are worked on at a time."""
+    num_rows = len(network.idle_from)
+    ahead = (network.idle_from - np.arange(num_rows)).max(initial=0)
+    return max(1, min(num_rows, int(ahead) + 1))
+
+
+def _step_of(data: DataLevels, volume: Floats) -> float:
+    """Return the amount of data in which the times at which contacts take it down are listed."""
+    level = float(data.least[1] - data.least[0]) if data.num_levels > 1 else 1.0
+    return max(level / QUEUE_STEPS, float(volume.max(initial=0.0)) / MAX_QUEUE_STEPS)
+
+
+def _ready_s(problem: Problem, satellite: SatelliteProblem, contacts: Ints) -> Floats:
+    """Return from when on contacts take down data. Shape ``(num_contacts,)``."""
+    setup_s = problem.downlinks.stations.setup_s[satellite.place[contacts]]
+    ready_s: Floats = satellite.start_s[contacts] + setup_s
+    return ready_s
 
 
 def _nothing_fixed(network: Network) -> Fixing:
@@ -140,8 +165,8 @@ def _down_s(
     links, access = problem.downlinks, problem.opportunities.access[satellite.rows[contacts]]
     amounts = step * np.arange(int(volume.max(initial=0.0) / step) + 2)
     found = np.full((len(contacts), len(amounts)), np.inf)
-    for at, row in enumerate(contacts.tolist()):
-        ready_s = satellite.start_s[row] + float(links.stations.setup_s[satellite.place[row]])
+    begins_s = _ready_s(problem, satellite, contacts).tolist()
+    for at, (row, ready_s) in enumerate(zip(contacts.tolist(), begins_s, strict=True)):
         fits = amounts <= volume[at]
         passing = links.passes.get(int(access[at]))
         if passing is None:

@@ -18,14 +18,16 @@ from planner_core.certified.drivers.resource_steps import ResourceSearch
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.alternating import TurnSearch
 from planner_core.certified.lns.choices import ChoiceSearch
-from planner_core.certified.lns.queue_plans import plan_with_queues, replanned_day, taking
+from planner_core.certified.lns.queue_plans import plan_with_queues, replanned_day
 from planner_core.certified.lns.resource_search import ResourceWindows
 from planner_core.certified.multipliers.latency import LatencyAscent
+from planner_core.certified.multipliers.queues import priced_by_queues
 from planner_core.certified.proofs.bound import Bound, rounded_bound
 from planner_core.certified.proofs.queues import queue_value
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import COLLECT, CONTACT, Floats, Ints, Problem
 from planner_core.problem.plan import Plan
+from planner_core.problem.restrict import taking
 from planner_core.referee.replay import replay
 from planner_core.referee.timeline import Timeline
 from planner_core.worth import share_earned
@@ -39,33 +41,95 @@ def close_in_on_the_ground(search: ResourceSearch, unit: float) -> None:
     rng = np.random.default_rng(search.seed)
     num_idle = number = 0
     _lower(best, ascent, TUNING.rounds // 2)
-    levels, named = TUNING.levels_per_collect, list[tuple[int, ...]]()
+    named = _Named(best, ascent)
     if len(best.problem.satellites) == 1:
-        # Coarse levels suffice to name good contacts. A fleet's programmes take too long.
+        # A fleet's programmes take too long.
         _lower(best, ascent, 3 * TUNING.rounds // 2)
-        hoped = max(best.reward, (1.0 - 2.0 * TUNING.little) * ascent.value)
-        named.append(_lower_by_queues(best, ascent, levels // 2, hoped))
-    if not any(named):
+        named.begin()
+    if not named.contacts:
         search.choose(unit)
     while num_idle < TUNING.patience and not best.is_done:
         before = best.reward
         own = _contacts_of(best.problem, best.plan)
         offered = (
-            *reversed(named),
+            *reversed(named.contacts),
             *reversed(ascent.contact_sets),
             own,
             *_near(best.problem, own, rng),
         )
         contacts = next((one for one in offered if one not in tried), own)
         tried.add(contacts)
-        finer = 2 * levels if contacts in named[1:] else levels
-        _plan_with(best, contacts, ascent.prices, unit, search.seed + number, finer)
+        levels = TUNING.levels_per_collect // (1 if number else 2)
+        _plan_with(best, contacts, named.prices, unit, search.seed + number, levels)
         number += 1
-        if number == 1 and any(named):
-            named.append(_lower_by_queues(best, ascent, levels, best.reward))
         num_idle = 0 if best.reward > before else num_idle + 1
+        if number == 1:
+            named.prove()
+        elif num_idle == TUNING.tries:
+            named.prove_again()
+            tried.difference_update(named.contacts[-1:])
         _lower(best, ascent, TUNING.several)
-    _prove_at_last(best, ascent)
+    _prove_at_last(best, ascent, named)
+
+
+class _Named:
+    """Contacts that exact programmes over queues name, and multipliers that suit them.
+
+    Attributes
+    ----------
+    contacts
+        Those of the best paths, the latest last; none where such programmes take too long.
+    """
+
+    def __init__(self, best: Incumbent, ascent: LatencyAscent) -> None:
+        self._best, self._ascent = best, ascent
+        self._prices: Floats | None = None
+        self.contacts: list[tuple[int, ...]] = []
+
+    @property
+    def prices(self) -> Floats:
+        """The multipliers of targets. Shape ``(num_targets,)``."""
+        return self._ascent.prices if self._prices is None else self._prices
+
+    def begin(self) -> None:
+        """Find contacts, with few levels of energy at first, and multipliers."""
+        best, ascent = self._best, self._ascent
+        hoped = max(best.reward, (1.0 - 2.0 * TUNING.little) * ascent.value)
+        for part in (3,):
+            self._find(TUNING.levels_per_collect // part, hoped)
+        self._price()
+
+    def prove(self) -> None:
+        """Prove a bound, which may name other contacts."""
+        if self.contacts and not self._best.is_done:
+            known = self.contacts[-1]
+            self._find(TUNING.levels_per_collect, self._best.reward)
+            if self.contacts[-1] != known:
+                self._price()
+
+    def prove_again(self) -> None:
+        """Prove a bound by better multipliers."""
+        if self.contacts and not self._best.is_done:
+            self._price()
+            self._find(TUNING.levels_per_collect, self._best.reward)
+
+    def _find(self, per_collect: int, level: float) -> None:
+        exact = self.contacts[-1] if self.contacts else ()
+        contacts = _lower_by_queues(
+            self._best, self._ascent, self.prices, per_collect, level, exact
+        )
+        if contacts:
+            self.contacts.append(contacts)
+
+    def _price(self) -> None:
+        if self.contacts and not self._best.is_done:
+            self._prices = priced_by_queues(
+                self._best.problem,
+                self.contacts[-1],
+                self.prices,
+                TUNING.rounds // 2,
+                self._best.budget.stop,
+            )
 
 
 class DayByDay:
@@ -103,7 +167,7 @@ class DayByDay:
 
     def prove(self) -> None:
         """Say what the best multipliers prove, if there is time left."""
-        _prove_at_last(self._best, self._ascent)
+        _prove_at_last(self._best, self._ascent, _Named(self._best, self._ascent))
 
 
 def _earned(best: Incumbent, plan: Plan) -> float:
@@ -151,11 +215,12 @@ def _lower(
     best.report("prices")
 
 
-def _prove_at_last(best: Incumbent, ascent: LatencyAscent) -> None:
+def _prove_at_last(best: Incumbent, ascent: LatencyAscent, named: _Named) -> None:
     """Say what the best multipliers prove, with queues too, if there is time left."""
     if not best.is_done:
         _lower(best, ascent, 0, is_last=True)
-        _lower_by_queues(best, ascent, TUNING.levels_per_collect, best.reward)
+        exact = _contacts_of(best.problem, best.plan)
+        _lower_by_queues(best, ascent, named.prices, TUNING.levels_per_collect, best.reward, exact)
 
 
 def _level(best: Incumbent, ascent: LatencyAscent) -> float:
@@ -164,24 +229,31 @@ def _level(best: Incumbent, ascent: LatencyAscent) -> float:
 
 
 def _lower_by_queues(
-    best: Incumbent, ascent: LatencyAscent, per_collect: int, level: float
+    best: Incumbent,
+    ascent: LatencyAscent,
+    prices: Floats,
+    per_collect: int,
+    level: float,
+    exact: tuple[int, ...],
 ) -> tuple[int, ...]:
     """Let exact programmes of queues bound the plans; return the contacts of the best paths."""
     value, rows = queue_value(
         best.problem,
-        ascent.prices,
+        prices,
         per_collect,
         best.budget.stop,
         contact_prices=ascent.contact_prices,
+        exact_contacts=exact,
         level=level,
     )
     best.lower(
         Bound(
             value=value,
             proof="dp",
-            prices=ascent.prices,
+            prices=prices,
             contact_prices=ascent.contact_prices,
             queue_levels=per_collect,
+            exact_contacts=exact,
         )
     )
     best.report("queues")

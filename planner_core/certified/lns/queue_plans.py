@@ -8,9 +8,6 @@ beside what the others do.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
-
 import numpy as np
 
 from planner_core.certified.dp.contact_queues import most_by_queues
@@ -25,20 +22,13 @@ from planner_core.problem import (
     Bytes,
     Floats,
     Ints,
-    Kept,
     Problem,
     SatelliteProblem,
 )
 from planner_core.problem.plan import Plan
+from planner_core.problem.restrict import taking
 from planner_core.referee.replay import replay
 from planner_core.solvers.sequential import blocked_rows
-
-
-def taking(problem: Problem, contacts: Sequence[int]) -> Problem:
-    """Return the problem with contacts that must be taken."""
-    already = {kept.row for kept in problem.pinned.kept}
-    new = tuple(Kept(row=row, pointer="") for row in contacts if row not in already)
-    return replace(problem, pinned=replace(problem.pinned, kept=(*problem.pinned.kept, *new)))
 
 
 def plan_with_queues(

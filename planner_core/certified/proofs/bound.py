@@ -35,6 +35,8 @@ class Bound:
     queue_levels
         Of energy in a collect, where exact programmes of queues prove a bound with a half-life
         (``queues.queue_value``).
+    exact_contacts
+        Rows of the contacts whose energy those do not round.
     unit
         In what the dynamic programmes count worth.
     certificate
@@ -52,6 +54,7 @@ class Bound:
     contact_prices: Floats | None = None
     antenna_prices: Floats | None = None
     queue_levels: int | None = None
+    exact_contacts: tuple[int, ...] = ()
     is_elementary: bool = False
     unit: float | None = None
     certificate: Certificate | None = None

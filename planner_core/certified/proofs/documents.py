@@ -45,6 +45,7 @@ def to_json(bound: Bound) -> str:
         document["antenna_prices"] = bound.antenna_prices.tolist()
     if bound.queue_levels is not None:
         document["queue_levels"] = bound.queue_levels
+        document["exact_contacts"] = list(bound.exact_contacts)
     if bound.is_elementary:
         document["elementary"] = True
     if bound.unit is not None:
@@ -74,6 +75,7 @@ def from_json(text: str) -> Bound:
         contact_prices=prices("contact_prices"),
         antenna_prices=prices("antenna_prices"),
         queue_levels=document.get("queue_levels"),
+        exact_contacts=tuple(document.get("exact_contacts", ())),
         is_elementary=bool(document.get("elementary", False)),
         unit=document.get("unit"),
         certificate=Certificate(
@@ -116,6 +118,7 @@ def is_proven(problem: Problem, bound: Bound) -> bool | None:
             bound.prices,
             bound.queue_levels,
             contact_prices=bound.contact_prices,
+            exact_contacts=bound.exact_contacts,
             level=bound.value,
         )
     elif bound.contact_prices is not None:

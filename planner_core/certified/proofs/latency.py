@@ -122,9 +122,21 @@ class LatencyRelaxation:
 
     @classmethod
     def of(
-        cls, problem: Problem, satellite: SatelliteProblem, per_collect: int, *, is_estimate: bool
+        cls,
+        problem: Problem,
+        satellite: SatelliteProblem,
+        per_collect: int,
+        *,
+        is_estimate: bool,
+        exact: Bools | None = None,
     ) -> LatencyRelaxation:
-        """Return the relaxation of a satellite that has opportunities."""
+        """Return the relaxation of a satellite that has opportunities.
+
+        Parameters
+        ----------
+        exact
+            Opportunities whose energy a proof does not round. Shape ``(n,)``.
+        """
         network, rows = network_of(problem, satellite), satellite.rows
         layers = layers_of(network)
         is_image = satellite.kind == COLLECT
@@ -132,7 +144,10 @@ class LatencyRelaxation:
         size = np.where(is_image, satellite.end_s - satellite.start_s, 0.0) * own.collect_fill_per_s
         on_board = problem.objective.collected_share * problem.worth_on_ground[rows]
         setup_s = problem.downlinks.stations.setup_s[satellite.place[layers.contact]]
-        levels = levels_of_estimate if is_estimate else levels_of_proof
+        if is_estimate:
+            levels = levels_of_estimate(network, per_collect)
+        else:
+            levels = levels_of_proof(network, per_collect, None if exact is None else exact[rows])
         # There a path gains nothing by a task that is worth nothing, neither energy nor a turn.
         is_dear = own.sun_pointing == "free" and own.idle_drain_per_s == 0.0
         return cls(
@@ -142,7 +157,7 @@ class LatencyRelaxation:
             typical=(float(np.median(size[is_image])) if is_image.any() else 0.0) or 1.0,
             may_need_all=not (is_dear and is_transitive_on(satellite)),
             network=network,
-            levels=levels(network, per_collect),
+            levels=levels,
             layers=layers,
             terms=_Terms(
                 end_s=satellite.end_s,
@@ -269,7 +284,11 @@ def _weigh(
 
 
 def latency_relaxations(
-    problem: Problem, *, is_estimate: bool = False, per_collect: int | None = None
+    problem: Problem,
+    *,
+    is_estimate: bool = False,
+    per_collect: int | None = None,
+    exact: Bools | None = None,
 ) -> tuple[LatencyRelaxation, ...]:
     """Return the programmes of all satellites that have anything to do.
 
@@ -279,10 +298,12 @@ def latency_relaxations(
         Whether energy may be rounded so that plans are lost, in a search for multipliers.
     per_collect
         How many levels of energy a collect takes; as many as tuning says by default.
+    exact
+        Opportunities whose energy a proof does not round, none by default. Shape ``(n,)``.
     """
     levels = TUNING.levels_per_collect if per_collect is None else per_collect
     return tuple(
-        LatencyRelaxation.of(problem, satellite, levels, is_estimate=is_estimate)
+        LatencyRelaxation.of(problem, satellite, levels, is_estimate=is_estimate, exact=exact)
         for satellite in problem.satellites
         if len(satellite)
     )
@@ -337,6 +358,7 @@ def reductions(
     contact_prices: Floats,
     level: float,
     per_collect: int,
+    exact: Bools,
     stop: Bytes,
 ) -> dict[int, Reduction]:
     """Return what prices say of plans worth more than ``level``, by satellite.
@@ -347,12 +369,14 @@ def reductions(
     ----------
     per_collect
         How many levels of energy a collect takes, here and in the programme that this is for.
+    exact
+        Opportunities whose energy both do not round. Shape ``(n,)``.
     """
     given = _multipliers(problem, prices, contact_prices, None)
     most: dict[int, tuple[Floats, Fixing]] = {}
     total = given.paid
     indices = [index for index, one in enumerate(problem.satellites) if len(one)]
-    relaxations = latency_relaxations(problem, per_collect=per_collect)
+    relaxations = latency_relaxations(problem, per_collect=per_collect, exact=exact)
     for index, one in zip(indices, relaxations, strict=True):
         if stop[0]:
             return {}

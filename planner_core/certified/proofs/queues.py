@@ -9,6 +9,8 @@ prices take hundredths, and proves a percent more.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from planner_core.certified.dp.contact_queues import most_by_queues
@@ -35,6 +37,7 @@ def queue_value(
     stop: Bytes | None = None,
     *,
     contact_prices: Floats | None = None,
+    exact_contacts: Sequence[int] = (),
     level: float = -np.inf,
 ) -> tuple[float, Ints]:
     """Return the bound that prices of targets prove, and the rows of paths that reach it.
@@ -50,6 +53,8 @@ def queue_value(
         How many levels of energy a collect takes.
     contact_prices
         As of ``latency_value``. Shape ``(num_contacts,)``.
+    exact_contacts
+        Rows of contacts whose energy is not rounded in favour of the satellite; that of others is.
     """
     price = surplus(prices, problem.best_worth)
     stop = np.zeros(1, dtype=np.uint8) if stop is None else stop
@@ -57,9 +62,11 @@ def queue_value(
     satellites = {index: one for index, one in enumerate(problem.satellites) if len(one)}
     if not all(map(is_supported, satellites.values())):
         return np.inf, paths[0]
+    exact = np.zeros(len(problem.opportunities), dtype=np.bool_)
+    exact[[*exact_contacts, *problem.kept_rows.tolist()]] = True
     reduced: dict[int, Reduction] = {}
     if contact_prices is not None:
-        reduced = reductions(problem, prices, contact_prices, level, per_collect, stop)
+        reduced = reductions(problem, prices, contact_prices, level, per_collect, exact, stop)
     for index, satellite in satellites.items():
         own = reduced.get(index)
         queues = queues_of(
@@ -71,6 +78,7 @@ def queue_value(
             num_classes=PROMISES,
             earliest=own.earliest if own else None,
             fixing=own.fixing if own else None,
+            exact=exact[satellite.rows],
         )
         if queues is None or stop[0]:
             return np.inf, paths[0]

@@ -1,0 +1,107 @@
+"""Satellites whose contacts are settled, with what waits for each, as an oracle.
+
+To answer with all contacts takes the programme over queues seconds; with those of a good plan, few
+levels of energy and whole images of data a tenth of one. The multipliers that this leads to prove
+nearly as much for all contacts, and plans at these take few targets twice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from planner_core.certified.dp.contact_queues import most_by_queues
+from planner_core.certified.dp.queue_tables import Queues
+from planner_core.certified.dp.queue_terms import queues_of
+from planner_core.certified.dp.resource_network import network_of
+from planner_core.certified.multipliers.ascent import Ascent, Steps
+from planner_core.certified.tuning import TUNING
+from planner_core.problem import COLLECT, Bools, Bytes, Floats, Ints, Problem, SatelliteProblem
+from planner_core.problem.restrict import taking
+
+
+class _Part(NamedTuple):
+    """One satellite's programme, and the targets of its rows; contacts have one too far."""
+
+    queues: Queues
+    target: Ints
+
+    @classmethod
+    def of(cls, problem: Problem, satellite: SatelliteProblem, is_open: Bools) -> _Part | None:
+        rows = np.flatnonzero(is_open[satellite.rows]).astype(np.int32)
+        num_targets = len(problem.target_ids)
+        queues = queues_of(
+            problem,
+            satellite,
+            network_of(problem, satellite),
+            np.zeros(num_targets),
+            per_collect=TUNING.several,
+            num_classes=1,
+            data_per_collect=1,
+            rows=rows,
+        )
+        if queues is None:
+            return None
+        is_image = satellite.kind[rows] == COLLECT
+        target = np.where(is_image, satellite.place[rows], num_targets)
+        return cls(queues=queues, target=target.astype(np.int32))
+
+
+class QueuePaths:
+    """The best path of each satellite that takes given contacts, at given multipliers."""
+
+    def __init__(self, parts: Sequence[_Part], stop: Bytes) -> None:
+        self._satellites, self._stop = parts, stop
+        self.parts: Ints = np.arange(len(parts), dtype=np.int32)
+        self._taken = [part.target[:0] for part in parts]
+
+    def answer(self, parts: Ints, multipliers: Floats, count: Ints) -> None:
+        """Let some satellites answer anew."""
+        for number in parts.tolist():
+            part = self._satellites[number]
+            _, path = self._best(part, multipliers)
+            np.subtract.at(count, self._taken[number], 1)
+            self._taken[number] = part.target[path]
+            np.add.at(count, self._taken[number], 1)
+
+    def gain(self, multipliers: Floats) -> float:
+        """Return the most that all satellites can gain."""
+        return sum(self._best(part, multipliers)[0] for part in self._satellites)
+
+    def _best(self, part: _Part, multipliers: Floats) -> tuple[float, Ints]:
+        return most_by_queues(part.queues._replace(price=multipliers[part.target]), self._stop)
+
+
+def priced_by_queues(
+    problem: Problem, contacts: Sequence[int], begin: Floats, num_epochs: int, stop: Bytes
+) -> Floats:
+    """Return multipliers of targets that suit plans with these contacts.
+
+    Those at first where the programmes would take too long. On the paper's satellite with 1,000
+    targets and a half-life of 12 h ten epochs take one CPU second, plans are worth 237.4 in place
+    of 237.2, and the bound with all contacts is 0.05 lower.
+
+    Parameters
+    ----------
+    begin
+        The multipliers at first. Shape ``(num_targets,)``.
+    """
+    part = taking(problem, contacts)
+    is_open = problem.opportunities.kind == COLLECT
+    is_open[[*contacts, *problem.kept_rows.tolist()]] = True
+    parts = [_Part.of(part, satellite, is_open) for satellite in part.satellites if len(satellite)]
+    known = [one for one in parts if one is not None]
+    if len(known) < len(parts):
+        return begin
+    # From good multipliers long steps lead away.
+    steps = Steps(
+        first=TUNING.little,
+        last=TUNING.last_step_of_few,
+        num_epochs=num_epochs,
+        asked_every=num_epochs + 1,
+    )
+    ascent = Ascent(QueuePaths(known, stop), problem.best_worth, begin, steps, seed=0)
+    ascent.improve(num_epochs, stop)
+    return begin if stop[0] else ascent.mean.copy()
