@@ -37,7 +37,7 @@ class ProofOut(Wire):
         None,
         description=(
             "With a half-life: a multiplier for what each contact takes down, by recorder "
-            "capacity, in the order of the opportunities."
+            "capacity, in the order of the opportunities. All 0 where batteries alone prove it."
         ),
     )
     antenna_prices: tuple[float, ...] | None = Field(

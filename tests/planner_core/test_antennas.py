@@ -11,13 +11,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget
+from planner_core.certified.drivers.resource_fleet import _FleetPricing
+from planner_core.certified.drivers.resource_steps import ResourceSearch
+from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.multipliers.latency import LatencyAscent
 from planner_core.certified.multipliers.resources import PriceSearch
+from planner_core.certified.proofs.bound import rounded_bound
 from planner_core.certified.proofs.documents import from_json, is_proven, to_json
 from planner_core.certified.proofs.latency import latency_value
 from planner_core.certified.proofs.resource_bound import resource_value, whole_worth
 from planner_core.certified.proofs.satellite_relaxation import relaxations
 from planner_core.certified.solver import Certified
+from planner_core.certified.tuning import tuned
 from planner_core.domain import Dynamics, Objective, Resources
 from planner_core.precedence.antennas import antenna_groups, antenna_tolls, paid_for_antennas
 from planner_core.problem import COLLECT, CONTACT, Problem
@@ -27,7 +32,7 @@ from planner_core.referee.replay import replay
 from planner_core.referee.rules import stations
 from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
-from tests.planner_core.problems import Task, make_problem, random_problem, varied_problem
+from tests.planner_core.problems import TIGHT, Task, make_problem, random_problem, varied_problem
 
 SEEDS = st.integers(0, 10**6)
 ROOMY = replace(Resources.limitless(), collect_fill_per_s=0.001, downlink_per_s=0.001)
@@ -118,6 +123,53 @@ def test_prices_tell_that_one_of_two_satellites_is_served() -> None:
     assert bound.antenna_prices is not None
     assert is_proven(problem, from_json(to_json(bound)))
     assert not is_proven(problem, replace(bound, antenna_prices=None))
+
+
+def _crowded_fleet(seed: int) -> Problem:
+    problem = random_problem(
+        seed, num_satellites=3, num_collects=60, num_targets=30, num_contacts=8, span_s=6000.0,
+        resources=TIGHT,
+    )  # fmt: skip
+    return with_objective(problem, Objective.delivered())
+
+
+def test_more_levels_of_the_recorder_lower_the_bound_of_the_same_prices() -> None:
+    resources = replace(ROOMY, collect_fill_per_s=0.0037, downlink_per_s=0.0013)
+    roughly, finely = list[float](), list[float]()
+    for seed in range(8):
+        problem = random_problem(
+            seed, num_satellites=3, num_collects=150, num_targets=100, num_contacts=6,
+            span_s=6000.0, resources=replace(resources, initial_recorder_fraction=0.0),
+        )  # fmt: skip
+        problem = with_objective(problem, Objective.delivered())
+        search = PriceSearch(problem, 8.0, np.zeros(100), np.zeros(1, dtype=np.uint8))
+        search.step(0.0)
+        roughly.append(search.value)
+        search.count_finely()
+        search.step(0.0)
+        finely.append(search.value)
+        assert finely[-1] <= roughly[-1]
+        assert is_proven(problem, search.bound())
+    assert sum(finely) < 0.9 * sum(roughly)
+
+
+def test_prices_of_antennas_that_prove_nothing_are_given_up() -> None:
+    """The bound of the prices that a search ends with is no higher than at first."""
+    num_crowded = 0
+    for seed in range(12):
+        problem = _crowded_fleet(seed)
+        search = ResourceSearch(Incumbent(problem, Budget(), 0.0), seed)
+        with tuned(worth_a_step=1.0):
+            pricing = _FleetPricing(search)
+            while pricing.prices is None:
+                pricing.turn()
+            first = search.best.bound.value
+            while not pricing.is_settled:
+                pricing.turn()
+        num_crowded += pricing.prices.wants_antennas
+        assert not pricing.knows_antennas
+        assert rounded_bound(problem, pricing.prices.value, 0.0) <= first
+    assert num_crowded > 1
 
 
 def test_prices_tell_so_where_images_age() -> None:

@@ -14,9 +14,15 @@ from hypothesis import strategies as st
 from planner_core.budget import Budget
 from planner_core.certified.dp.energy_labels import EnergyLevels, energy_levels, most_by_energy
 from planner_core.certified.dp.resource_network import Network, network_of
+from planner_core.certified.drivers.resource_steps import ResourceSearch
+from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.multipliers.ascent import Ascent
 from planner_core.certified.multipliers.energy import EnergyPaths, ascent_on_energy
+from planner_core.certified.proofs.bound import rounded_bound
+from planner_core.certified.proofs.documents import from_json, is_proven, to_json
+from planner_core.domain import Objective
 from planner_core.problem import Floats, Problem
+from planner_core.problem.delivery import with_objective
 from planner_core.referee.replay import replay
 from planner_core.solvers.registry import Certified
 from tests.examples import examples
@@ -50,6 +56,29 @@ def best_by_enumeration(network: Network, levels: EnergyLevels, weight: Floats) 
         return best
 
     return from_here(-1, levels.start)
+
+
+@pytest.mark.parametrize("dynamics", ["physical", "paper"])
+@examples(60)
+@given(seed=SEEDS, collected_share=st.sampled_from([0.0, 0.5, 1.0]))
+def test_what_batteries_alone_prove_bounds_all_plans(
+    dynamics: Dynamics, seed: int, collected_share: float
+) -> None:
+    problem = _problem(seed, dynamics, 2, num_contacts=2, has_quality=True)
+    problem = with_objective(problem, Objective(collected_share=collected_share))
+    search = ResourceSearch(Incumbent(problem, Budget(), 0.0), seed)
+    energy = ascent(problem, 30, seed)
+    search.ask_energy(energy)
+    energy.ask()
+    search.prove_by_energy(energy)
+    bound = search.best.bound
+    assert bound.value >= best_reward(problem) - 1e-9
+    if bound.contact_prices is not None:
+        assert not bound.contact_prices.any()
+        assert bound.value <= rounded_bound(problem, energy.value, 0.0) + 1e-6
+        assert is_proven(problem, from_json(to_json(bound)))
+        if bound.value > 0.1:
+            assert not is_proven(problem, replace(bound, value=0.98 * bound.value))
 
 
 @pytest.mark.parametrize("dynamics", ["physical", "paper"])

@@ -137,6 +137,7 @@ class _FleetPricing:
             # What takes opportunities counts from here on: answers come near the best plans.
             usage[:] = 0.0
             search.ask_energy(energy)
+        search.prove_by_energy(energy)
         yield beside_prices
         value = min(search.best.bound.value, energy.value)
         prices = PriceSearch(search.problem, value, energy.multipliers, search.budget.stop)
@@ -148,6 +149,9 @@ class _FleetPricing:
         if prices.wants_antennas and search.problem.counts_delivery:
             yield from self._price_antennas(prices, known)
             if self.knows_antennas:
+                prices.count_finely()
+                yield TUNING.steps_beside
+                search.price(prices, 1)
                 return
         # With turns to the sun each pair of near tasks has a column, and a relaxation takes as long
         # as ten programs over the few tasks that most answers take.
@@ -167,6 +171,10 @@ class _FleetPricing:
                 prices.restart(relaxation.prices)
         yield beside_prices
         search.price(prices, 1)
+        if search.problem.counts_delivery:
+            prices.count_finely()
+            yield TUNING.steps_beside
+            search.price(prices, 1)
 
     def _price_antennas(self, prices: PriceSearch, known: Bound) -> Iterator[int]:
         """Let prices of antennas lower the bound, as long as they do.
@@ -180,13 +188,17 @@ class _FleetPricing:
             prices.restart(known.prices)
         # Steps are many, and rounding to larger units loses less than they gain.
         unit, at_first = prices.unit, min(known.value, prices.value)
+        began = prices.prices, prices.antenna_prices
         prices.count_in(TUNING.several * unit, moves_antennas=True)
         prices.usage[:] = 0.0
         for _ in range(TUNING.tries):
             yield 1
             self._search.price(prices, TUNING.several)
         if prices.value > (1.0 - TUNING.worth_a_step) * at_first:
+            is_lower = prices.value < at_first
             prices.count_in(unit, moves_antennas=False)
+            if not is_lower:
+                prices.restart(*began)
             return
         self.knows_antennas = True
         while not prices.is_settled:

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.proofs.resource_bound import leaving_whole_units, whole_worth
-from planner_core.certified.proofs.satellite_relaxation import relaxations
+from planner_core.certified.proofs.satellite_relaxation import SatelliteRelaxation, relaxations
 from planner_core.certified.sizes import MAX_CELLS
 from planner_core.certified.tolerances import NOTHING
 from planner_core.certified.tuning import TUNING
@@ -49,9 +49,8 @@ class PriceSearch:
         self._typical = problem.typical_worth
         # By target: what the image earns that plans take of it, as far as they are known.
         self._worth_taken = problem.best_worth.copy()
-        coarse = relaxations(problem, TUNING.coarse)
-        num_images = int(value / self._typical / len(coarse))
-        self.satellites = tuple(s.with_data_price(num_images) for s in coarse)
+        self._num_images = int(value / self._typical / sum(len(s) > 0 for s in problem.satellites))
+        self.satellites = self._relaxations(TUNING.coarse)
         # Multipliers are the prices of targets, then those of groups of contacts.
         self._groups = antenna_groups(problem)
         num_groups = len(self._groups)
@@ -70,6 +69,10 @@ class PriceSearch:
         self.contact_sets: Counter[tuple[int, ...]] = Counter()
         self.wants_antennas = False
         self.restart(prices)
+
+    def _relaxations(self, levels_per_collect: int) -> tuple[SatelliteRelaxation, ...]:
+        every = relaxations(self._problem, levels_per_collect)
+        return tuple(one.with_data_price(self._num_images) for one in every)
 
     def _scale_of_antennas(self) -> Floats:
         """Return how far prices of antennas go where those of typical targets go their worth.
@@ -147,6 +150,11 @@ class PriceSearch:
         self._is_moved[len(self._is_reachable) :] = moves_antennas
         self.restart(self.prices)
 
+    def count_finely(self) -> None:
+        """Go on with more levels of the recorder."""
+        self.satellites = self._relaxations(TUNING.fine)
+        self._return_to_the_best()
+
     @property
     def is_settled(self) -> bool:
         """Whether steps have got so short that more are of little use."""
@@ -160,8 +168,13 @@ class PriceSearch:
             paths.append(np.flatnonzero(taken[relaxation.satellite.rows]).astype(np.int32))
         self._note_images(np.flatnonzero(taken))
 
-    def restart(self, prices: Floats) -> None:
-        """Go on from other prices of targets, in shorter steps."""
+    def restart(self, prices: Floats, antenna_prices: Floats | None = None) -> None:
+        """Go on from other prices of targets, and of antennas, in shorter steps.
+
+        Prices of antennas are the best so far by default.
+        """
+        if antenna_prices is not None:
+            self.antenna_prices = antenna_prices
         self.value, self.prices = np.inf, np.where(self._is_reachable, prices, 0.0)
         self.theta, self._stalled = 1.0, 0
         self._return_to_the_best()

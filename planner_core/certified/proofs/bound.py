@@ -28,7 +28,7 @@ class Bound:
         Whether it is ``elementary_value`` that checks the prices.
     contact_prices
         What proves a bound with a half-life, with ``prices`` (``latency.latency_value``), one for
-        each contact. Shape ``(num_contacts,)``.
+        each contact; all 0 where batteries alone prove one without. Shape ``(num_contacts,)``.
     antenna_prices
         What proves a bound by dynamic programmes, with ``prices``, where satellites want the same
         antennas (``planner_core.precedence.antennas``). Shape ``(num_groups,)``.
