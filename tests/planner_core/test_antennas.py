@@ -145,7 +145,7 @@ def test_more_levels_of_the_recorder_lower_the_bound_of_the_same_prices() -> Non
         search = PriceSearch(problem, 8.0, np.zeros(100), np.zeros(1, dtype=np.uint8))
         search.step(0.0)
         roughly.append(search.value)
-        search.count_finely()
+        search.count_finely(Plan())
         search.step(0.0)
         finely.append(search.value)
         assert finely[-1] <= roughly[-1]

@@ -95,8 +95,7 @@ class _Named:
         """Find contacts, with few levels of energy at first, and multipliers."""
         best, ascent = self._best, self._ascent
         hoped = max(best.reward, (1.0 - 2.0 * TUNING.little) * ascent.value)
-        for part in (3,):
-            self._find(TUNING.levels_per_collect // part, hoped)
+        self._find(TUNING.fine, hoped)
         self._price()
 
     def prove(self) -> None:

@@ -149,9 +149,7 @@ class _FleetPricing:
         if prices.wants_antennas and search.problem.counts_delivery:
             yield from self._price_antennas(prices, known)
             if self.knows_antennas:
-                prices.count_finely()
-                yield TUNING.steps_beside
-                search.price(prices, 1)
+                yield from self._prove_finely(prices)
                 return
         # With turns to the sun each pair of near tasks has a column, and a relaxation takes as long
         # as ten programs over the few tasks that most answers take.
@@ -172,9 +170,13 @@ class _FleetPricing:
         yield beside_prices
         search.price(prices, 1)
         if search.problem.counts_delivery:
-            prices.count_finely()
-            yield TUNING.steps_beside
-            search.price(prices, 1)
+            yield from self._prove_finely(prices)
+
+    def _prove_finely(self, prices: PriceSearch) -> Iterator[int]:
+        """Ask the best prices once more, with more levels of the recorder."""
+        yield TUNING.steps_beside
+        prices.count_finely(self._search.best.plan)
+        self._search.price(prices, 1)
 
     def _price_antennas(self, prices: PriceSearch, known: Bound) -> Iterator[int]:
         """Let prices of antennas lower the bound, as long as they do.

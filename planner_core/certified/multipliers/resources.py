@@ -150,9 +150,12 @@ class PriceSearch:
         self._is_moved[len(self._is_reachable) :] = moves_antennas
         self.restart(self.prices)
 
-    def count_finely(self) -> None:
-        """Go on with more levels of the recorder."""
+    def count_finely(self, plan: Plan) -> None:
+        """Go on with more levels of the recorder, from a plan that is known."""
         self.satellites = self._relaxations(TUNING.fine)
+        # Of the paths so far some are none with these.
+        self._paths = [[] for _ in self.satellites]
+        self.learn(plan)
         self._return_to_the_best()
 
     @property
