@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from typing import Final
 
 from planner_core.budget import Budget
-from planner_core.certified.drivers.latency import worth_with
 from planner_core.certified.lns.downlinks import Accepts, with_contacts
 from planner_core.certified.lns.resource_search import ResourceWindows
+from planner_core.certified.lns.settled_contacts import worth_with
 from planner_core.domain import Preference
 from planner_core.preferences.aims import figure_of, liking_of, value_of
 from planner_core.preferences.contacts import without_contacts

@@ -17,8 +17,9 @@ from planner_core.certified.dp.contact_layers import Layers, layers_of, most_by_
 from planner_core.certified.dp.energy_labels import EnergyLevels, energy_levels
 from planner_core.certified.dp.resource_network import Network, network_of
 from planner_core.certified.drivers import resources
-from planner_core.certified.drivers.latency import DayByDay, worth_with
+from planner_core.certified.drivers.latency import DayByDay
 from planner_core.certified.drivers.resource_steps import ResourceSearch
+from planner_core.certified.lns.settled_contacts import worth_with
 from planner_core.certified.multipliers.latency import LatencyAscent
 from planner_core.certified.proofs.bound import rounded_bound
 from planner_core.certified.proofs.documents import from_json, is_proven, to_json

@@ -20,17 +20,15 @@ from planner_core.certified.lns.alternating import TurnSearch
 from planner_core.certified.lns.choices import ChoiceSearch
 from planner_core.certified.lns.queue_plans import plan_with_queues, replanned_day
 from planner_core.certified.lns.resource_search import ResourceWindows
+from planner_core.certified.lns.settled_contacts import served, with_contacts
 from planner_core.certified.multipliers.latency import LatencyAscent
 from planner_core.certified.multipliers.queues import priced_by_queues
 from planner_core.certified.proofs.bound import Bound, rounded_bound
 from planner_core.certified.proofs.queues import queue_value
 from planner_core.certified.tuning import TUNING
-from planner_core.problem import COLLECT, CONTACT, Floats, Ints, Problem
+from planner_core.problem import CONTACT, Floats, Problem
 from planner_core.problem.plan import Plan
 from planner_core.problem.restrict import taking
-from planner_core.referee.replay import replay
-from planner_core.referee.timeline import Timeline
-from planner_core.worth import share_earned
 
 
 def close_in_on_the_ground(search: ResourceSearch, unit: float) -> None:
@@ -290,11 +288,11 @@ def _plan_with(
 ) -> None:
     """Look for plans that take these contacts, as far as stations can serve them."""
     problem, stop = best.problem, best.budget.stop
-    served = _served(problem, contacts)
+    taken = served(problem, contacts)
     rng = np.random.default_rng(seed)
-    plan = plan_with_queues(taking(problem, served), prices, rng, stop, per_collect)
+    plan = plan_with_queues(taking(problem, taken), prices, rng, stop, per_collect)
     is_known = plan is not None
-    part = with_contacts(problem, served, plan, best.judge(plan) if plan else None)
+    part = with_contacts(problem, taken, plan, best.judge(plan) if plan else None)
     if plan is None:
         choices = ChoiceSearch(part, unit, seed, stop)
         choices.start(np.zeros(len(problem.opportunities), dtype=np.bool_), TUNING.first_goal)
@@ -311,7 +309,7 @@ def _plan_with(
         if timeline.reward <= reached:
             return
         reached = timeline.reward
-        part = with_contacts(problem, served, plan, timeline)
+        part = with_contacts(problem, taken, plan, timeline)
 
 
 def _bettered(
@@ -323,99 +321,3 @@ def _bettered(
     turns = TurnSearch(part, plan, unit, best.budget, seed)
     turns.turn(TUNING.tries)
     return turns.plan
-
-
-def with_contacts(
-    problem: Problem, contacts: list[int], plan: Plan | None, verdict: Timeline | None
-) -> Problem:
-    """Return the problem with contacts that must be taken, and what images earn with them.
-
-    Parameters
-    ----------
-    plan, verdict
-        What else is in the queue, and what the referee says of it; None for nothing.
-    """
-    return replace(
-        taking(problem, contacts),
-        worth=worth_with(problem, contacts, plan, verdict),
-        left_on_board=None if problem.objective.collected_share > 0.0 else 0.0,
-    )
-
-
-def worth_with(
-    problem: Problem,
-    contacts: list[int],
-    plan: Plan | None = None,
-    verdict: Timeline | None = None,
-) -> Floats:
-    """Return what each image earns if these contacts are taken, and nothing else changes.
-
-    An image comes down after what a plan has taken before it, and in the first contact after it
-    that has time left. One that the plan holds comes down when it does there, by the verdict that
-    is at hand or the referee is asked for. Shape ``(n,)``.
-    """
-    table = problem.opportunities
-    down_s = np.full(len(table), np.inf)
-    taken = np.zeros(0, dtype=np.int64)
-    if plan is not None:
-        verdict = verdict or replay(problem, plan, in_detail=False)
-        images = verdict.collected.values()
-        taken = np.array([plan.actions[i.position].opportunity for i in images], dtype=np.int64)
-        down_s[taken] = [np.inf if i.delivered_s is None else i.delivered_s for i in images]
-    for index, satellite in enumerate(problem.satellites):
-        own = satellite.rows[satellite.kind == COLLECT]
-        queue = taken[table.satellite[taken] == index]
-        passes = np.array([c for c in contacts if table.satellite[c] == index], dtype=np.int32)
-        free = own[np.isin(own, queue, invert=True)]
-        down_s[free] = _down_s(problem, passes, queue, down_s[queue], free)
-    age_s = down_s - table.end_s
-    worth: Floats = problem.worth_on_ground * share_earned(problem.objective, age_s)
-    return np.where(table.kind == COLLECT, np.minimum(worth, problem.worth), 0.0)
-
-
-def _down_s(
-    problem: Problem, contacts: Ints, queue: Ints, queue_down_s: Floats, images: Ints
-) -> Floats:
-    """Return when images of a satellite are down that come after others in the queue."""
-    table = problem.opportunities
-    satellite = problem.satellites[int(table.satellite[images[0]])] if len(images) else None
-    found = np.full(len(images), np.inf)
-    if satellite is None or len(contacts) == 0:
-        return found
-    order = np.argsort(table.end_s[queue], kind="stable")
-    last_s = np.append(0.0, np.maximum.accumulate(queue_down_s[order]))
-    before_s = last_s[np.searchsorted(table.end_s[queue][order], table.end_s[images])]
-    ready_s = table.start_s[contacts] + problem.downlinks.stations.setup_s[table.place[contacts]]
-    useful_s = np.maximum(table.end_s[contacts] - ready_s, 1e-9)
-    rate = satellite.volume[problem.local_row[contacts]] / useful_s
-    size = (table.end_s - table.start_s)[images] * satellite.resources.collect_fill_per_s
-    at = np.searchsorted(table.start_s[contacts], table.end_s[images])
-    while np.any(is_open := (at < len(contacts)) & np.isinf(found)):
-        c = np.minimum(at, len(contacts) - 1)
-        down_s = np.maximum(ready_s[c], before_s) + size / np.maximum(rate[c], 1e-12)
-        fits = is_open & (down_s <= table.end_s[contacts[c]])
-        found[fits] = down_s[fits]
-        at += is_open & ~fits
-    return found
-
-
-def _served(problem: Problem, contacts: tuple[int, ...]) -> list[int]:
-    """Return the contacts for which stations have an antenna, the earlier first."""
-    served = list[int]()
-    for row in sorted(contacts, key=lambda row: float(problem.opportunities.start_s[row])):
-        if _is_served(problem, served, row):
-            served.append(row)
-    return served
-
-
-def _is_served(problem: Problem, chosen: list[int], row: int) -> bool:
-    """Return whether the station has an antenna left for a contact beside those chosen."""
-    table = problem.opportunities
-    beside = [
-        other
-        for other in chosen
-        if table.place[other] == table.place[row]
-        and table.start_s[other] < table.end_s[row]
-        and table.end_s[other] > table.start_s[row]
-    ]
-    return len(beside) < int(problem.station_antennas[table.place[row]])

@@ -48,6 +48,19 @@ class Oracle(Protocol):
         """Return the most that all parts can gain at these multipliers."""
 
 
+class Latest:
+    """Which targets the latest answer of each part takes."""
+
+    def __init__(self, num_parts: int) -> None:
+        self._taken = [np.empty(0, dtype=np.int32)] * num_parts
+
+    def replace(self, part: int, targets: Ints, count: Ints) -> None:
+        """Note another answer of a part, and what that makes of the count of all."""
+        np.subtract.at(count, self._taken[part], 1)
+        np.add.at(count, targets, 1)
+        self._taken[part] = targets
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Steps:
     """How far multipliers move.

@@ -13,7 +13,7 @@ import numpy as np
 
 from planner_core.certified.dp.energy_labels import EnergyLevels, levels_of_estimate, most_by_energy
 from planner_core.certified.dp.resource_network import Network, network_of
-from planner_core.certified.multipliers.ascent import Ascent, Steps
+from planner_core.certified.multipliers.ascent import Ascent, Latest, Steps
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import COLLECT, Floats, Ints, Problem, SatelliteProblem
 from planner_core.worth import weights
@@ -56,7 +56,7 @@ class EnergyPaths:
         self._own = np.empty((most_rows, widest))
         self._num_own = np.zeros(most_rows, dtype=np.int64)
         self._worth = problem.worth
-        self._taken = [part.target[:0] for part in self._satellites]
+        self._latest = Latest(len(self._satellites))
         self.usage = np.zeros(len(problem.opportunities))
 
     def answer(self, parts: Ints, multipliers: Floats, count: Ints) -> None:
@@ -64,9 +64,7 @@ class EnergyPaths:
         for number in parts.tolist():
             part = self._satellites[number]
             _, path = self._best(part, multipliers)
-            np.subtract.at(count, self._taken[number], 1)
-            self._taken[number] = part.target[path]
-            np.add.at(count, self._taken[number], 1)
+            self._latest.replace(number, part.target[path], count)
             self.usage[part.rows[path]] += 1.0
 
     def gain(self, multipliers: Floats) -> float:

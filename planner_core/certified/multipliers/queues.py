@@ -16,7 +16,7 @@ from planner_core.certified.dp.contact_queues import most_by_queues
 from planner_core.certified.dp.queue_tables import Queues
 from planner_core.certified.dp.queue_terms import queues_of
 from planner_core.certified.dp.resource_network import network_of
-from planner_core.certified.multipliers.ascent import Ascent, Steps
+from planner_core.certified.multipliers.ascent import Ascent, Latest, Steps
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import COLLECT, Bools, Bytes, Floats, Ints, Problem, SatelliteProblem
 from planner_core.problem.restrict import taking
@@ -55,16 +55,14 @@ class QueuePaths:
     def __init__(self, parts: Sequence[_Part], stop: Bytes) -> None:
         self._satellites, self._stop = parts, stop
         self.parts: Ints = np.arange(len(parts), dtype=np.int32)
-        self._taken = [part.target[:0] for part in parts]
+        self._latest = Latest(len(parts))
 
     def answer(self, parts: Ints, multipliers: Floats, count: Ints) -> None:
         """Let some satellites answer anew."""
         for number in parts.tolist():
             part = self._satellites[number]
             _, path = self._best(part, multipliers)
-            np.subtract.at(count, self._taken[number], 1)
-            self._taken[number] = part.target[path]
-            np.add.at(count, self._taken[number], 1)
+            self._latest.replace(number, part.target[path], count)
 
     def gain(self, multipliers: Floats) -> float:
         """Return the most that all satellites can gain."""
