@@ -180,9 +180,9 @@ def carried(past: Past, part: Problem, of_data: Problem, given_start: Start) -> 
         done = tuple(replace(image, amount=0.0) for image in images if image.target >= 0)
         return Start(resources=resources, heading=heading, images=done)
     plan = Plan.of(part, range(len(part.opportunities)))
-    points = integrate(part, satellite, plan.actions).points
+    curve = integrate(part, satellite, plan.actions).curve
     at_s = (horizon.start - past.state.at).total_seconds()
-    battery = np.interp(at_s, [p.time_s for p in points], [p.battery for p in points])
+    battery = np.interp(at_s, curve.time_s, curve.battery)
     held = sum(image.amount for image in images)
     return Start(
         resources=replace(
@@ -379,4 +379,5 @@ def _since(past: Past, instant: datetime) -> float:
 def _taken_down(part: Problem, row: int, start_s: float, begin_s: float, end_s: float) -> float:
     """Return what a contact takes down from ``begin_s`` on that was set up from its own start."""
     pieces = flow(part, part.satellites[0], Action(start_s, end_s, row))
-    return sum(max(0.0, to_s - max(from_s, begin_s)) * per_s for from_s, to_s, per_s in pieces)
+    from_s, to_s, per_s = pieces.T
+    return float(np.sum(np.maximum(to_s - np.maximum(from_s, begin_s), 0.0) * per_s))

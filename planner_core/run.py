@@ -14,7 +14,7 @@ from planner_core.build import build_problem
 from planner_core.certified.drivers.continuous import with_own_starts
 from planner_core.certified.lns.downlinks import brought_down
 from planner_core.certified.proofs import continuous
-from planner_core.certified.proofs.bound import Bound
+from planner_core.certified.proofs.bound import Bound, is_optimal
 from planner_core.certified.proofs.lagrangian import lagrangian_bound
 from planner_core.certified.proofs.resource_bound import quick_bound
 from planner_core.domain import Scenario
@@ -210,7 +210,7 @@ def _best_bound(
     is_settled = not problem.use_resources and any(
         bound is solution.proven and bound.proof == "lagrangian" for bound in sound
     )
-    is_loose = not is_settled and all(bound.value > reward for bound in sound)
+    is_loose = not is_settled and not any(is_optimal(reward, bound.value, 0.0) for bound in sound)
     if known not in sound and is_loose and (wants_quick or not sound):
         quick = _quick_bound(problem, reward, budget)
         sound = [b for b in (*sound, quick) if not _is_beaten(b, timeline, reward)]

@@ -10,29 +10,17 @@ from planner_core.budget import Budget, Progress
 from planner_core.certified.proofs.bound import (
     Bound,
     accessible,
+    is_optimal,
     reward_unit,
     rounded_bound,
 )
 from planner_core.certified.sizes import MAX_VERDICTS
-from planner_core.certified.tolerances import LEAST_BOUND, SAME
+from planner_core.certified.tolerances import SAME
 from planner_core.problem import CONTACT, Problem
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
 from planner_core.referee.timeline import Timeline
 from planner_core.solvers.base import Solution
-
-
-def is_optimal(reward: float, bound: float, unit: float) -> bool:
-    """Return whether no plan earns more than ``reward``, to the stated tolerance.
-
-    Parameters
-    ----------
-    bound
-        What no plan exceeds.
-    unit
-        An amount of which what any plan earns is a multiple; 0 where there is none.
-    """
-    return bound < reward + max(unit, SAME * reward, LEAST_BOUND)
 
 
 class Incumbent:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from planner_core.precedence.relation import excluded_by
+import numpy as np
+
+from planner_core.precedence.relation import fit_beside
 from planner_core.problem import CONTACT, Problem
 from planner_core.problem.slew import TIME_TOLERANCE_S
 
@@ -12,24 +14,19 @@ from planner_core.problem.slew import TIME_TOLERANCE_S
 def conflicts(problem: Problem, row: int, taken: Collection[int]) -> list[int]:
     """Return which of these rows cannot stand beside ``row``: no time to turn, or no antenna."""
     table, local = problem.opportunities, problem.local_row
+    others = np.array([other for other in taken if other != row], dtype=np.int64)
     satellite = int(table.satellite[row])
-    excluded = excluded_by(problem.satellites[satellite], int(local[row]))
-    found = [
-        other
-        for other in taken
-        if other != row and table.satellite[other] == satellite and excluded[local[other]]
-    ]
+    own = others[table.satellite[others] == satellite]
+    beside = local[own].astype(np.int64)
+    fits = fit_beside(problem.satellites[satellite], np.full_like(beside, local[row]), beside)
+    found: list[int] = own[~fits].tolist()
     if table.kind[row] == CONTACT:
         station = table.place[row]
-        there = [
-            other
-            for other in taken
-            if other != row
-            and table.kind[other] == CONTACT
-            and table.place[other] == station
-            and table.start_s[other] < table.end_s[row] - TIME_TOLERANCE_S
-            and table.end_s[other] > table.start_s[row] + TIME_TOLERANCE_S
-        ]
+        there = others[(table.kind[others] == CONTACT) & (table.place[others] == station)]
+        at_once = (table.start_s[there] < table.end_s[row] - TIME_TOLERANCE_S) & (
+            table.end_s[there] > table.start_s[row] + TIME_TOLERANCE_S
+        )
+        there = there[at_once]
         if len(there) >= problem.station_antennas[station]:
-            found += [other for other in there if other not in found]
+            found += there[~np.isin(there, found)].tolist()
     return found

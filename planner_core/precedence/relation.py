@@ -162,14 +162,6 @@ def are_comparable(precedence: Precedence, a: int, b: int) -> bool:
     return comes_before(precedence, a, b) if a < b else comes_before(precedence, b, a)
 
 
-def excluded_by(satellite: SatelliteProblem, row: int) -> Bools:
-    """Return the tasks that cannot stand in one plan with a satellite's local ``row``."""
-    _, others = excluded_beside(satellite, np.array([row], dtype=np.int32))
-    excluded = np.zeros(len(satellite), dtype=np.bool_)
-    excluded[others] = True
-    return excluded
-
-
 def excluded_beside(satellite: SatelliteProblem, rows: Ints) -> tuple[Longs, Longs]:
     """Return which tasks cannot stand in one plan with which of some local rows.
 
@@ -181,13 +173,16 @@ def excluded_beside(satellite: SatelliteProblem, rows: Ints) -> tuple[Longs, Lon
     first_of = np.cumsum(count) - count
     other = np.arange(len(position)) - np.repeat(first_of - begin, count)
     one = rows[position].astype(np.int64)
+    is_excluded = ~fit_beside(satellite, one, other) & (one != other)
+    return position[is_excluded], other[is_excluded]
+
+
+def fit_beside(satellite: SatelliteProblem, one: Longs, other: Longs) -> Bools:
+    """Return whether two local rows can stand in one plan, for each pair. Shape ``(k,)``."""
     earlier, later = np.minimum(one, other), np.maximum(one, other)
     if is_transitive_on(satellite):
-        fits = may_follow_each(satellite.transitions, earlier, later)
-    else:
-        fits = _come_before(transitive_closure(satellite), earlier, later)
-    is_excluded = ~fits & (one != other)
-    return position[is_excluded], other[is_excluded]
+        return may_follow_each(satellite.transitions, earlier, later)
+    return _come_before(transitive_closure(satellite), earlier, later)
 
 
 def near_in_time(satellite: SatelliteProblem, rows: Ints | Longs) -> tuple[Longs, Longs]:

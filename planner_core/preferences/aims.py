@@ -117,7 +117,7 @@ def _of_drain(view: View) -> Floats:
     """Return -1 for what lowers the battery before it is lowest, 0 for the rest."""
     table = view.problem.opportunities
     liking = np.zeros(len(table))
-    lines = [one.resources for one in view.timeline.satellites]
+    lines = view.curves
     lowest = [np.inf if line is None else line.battery.min(initial=np.inf) for line in lines]
     index = int(np.argmin(lowest))
     line = lines[index]

@@ -38,26 +38,36 @@ class PassRate:
         >>> rate.until(np.array([1.0, 2.0, 4.0]))
         array([ 1.5,  4. , 10. ])
         """
-        steps_s = np.diff(self.time_s)
-        whole = np.concatenate([[0.0], np.cumsum(steps_s * (self.per_s[1:] + self.per_s[:-1]) / 2)])
+        steps_s, whole = self._added_up()
         at = np.clip(np.searchsorted(self.time_s, t_s, side="right") - 1, 0, len(steps_s) - 1)
         into_s = np.clip(t_s - self.time_s[at], 0.0, steps_s[at])
         slope = (self.per_s[at + 1] - self.per_s[at]) / steps_s[at]
         return np.asarray(whole[at] + into_s * (self.per_s[at] + slope * into_s / 2.0))
 
     def when(self, amount: Floats) -> Floats:
-        """Return the first instants at which these amounts have come down, to the millisecond.
+        """Return the first instants at which these amounts have come down.
 
         Amounts lie between 0 and what the whole access gives.
+
+        >>> rate = PassRate(time_s=np.array([0.0, 2.0, 4.0]), per_s=np.array([1.0, 3.0, 3.0]))
+        >>> rate.when(np.array([0.0, 1.5, 4.0, 10.0]))
+        array([0., 1., 2., 4.])
         """
-        low_s = np.full_like(amount, self.time_s[0])
-        high_s = np.full_like(amount, self.time_s[-1])
-        while np.any(high_s - low_s > 1e-4):
-            middle_s = (low_s + high_s) / 2.0
-            is_enough = self.until(middle_s) >= amount
-            high_s = np.where(is_enough, middle_s, high_s)
-            low_s = np.where(is_enough, low_s, middle_s)
-        return high_s
+        steps_s, whole = self._added_up()
+        at = np.clip(np.searchsorted(whole, amount, side="left") - 1, 0, len(steps_s) - 1)
+        first = self.per_s[at]
+        rise = (self.per_s[at + 1] - first) / steps_s[at]
+        missing = np.maximum(amount - whole[at], 0.0)
+        # The quadratic's root in the form that holds where the rate stays the same, too.
+        until = first + np.sqrt(np.maximum(first**2 + 2.0 * rise * missing, 0.0))
+        into_s = np.divide(2.0 * missing, until, out=np.zeros_like(missing), where=until > 0.0)
+        return np.asarray(self.time_s[at] + np.minimum(into_s, steps_s[at]))
+
+    def _added_up(self) -> tuple[Floats, Floats]:
+        """Return the seconds between the instants, and what has come down at each instant."""
+        steps_s = np.diff(self.time_s)
+        parts = steps_s * (self.per_s[1:] + self.per_s[:-1]) / 2
+        return steps_s, np.concatenate([[0.0], np.cumsum(parts)])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -18,7 +18,7 @@ Vector = tuple[float, float, float]
 
 _MOST_STEPS: Final = 60
 _SETTLED: Final = 1e-9  # deg/s
-_HALVINGS: Final = 40
+_ACCURACY_S: Final = 1e-6
 _MOST_RATES: Final = 5.0  # rate over acceleration: to brake, to turn by way of rest, and to go on
 
 
@@ -108,7 +108,7 @@ def moving_turn_s(
     turn: Vector, rate_from: Vector, rate_to: Vector,
     rate_deg_s: float, acceleration_deg_s2: float,
 ) -> float:  # fmt: skip
-    """Return the least time of such a turn, to a microsecond or so; see ``turns_in``.
+    """Return the least time of such a turn, to a microsecond; see ``turns_in``.
 
     >>> round(moving_turn_s((30.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0, 0.5), 3)
     32.0
@@ -116,7 +116,7 @@ def moving_turn_s(
     30.0
     """
     low_s, high_s = 0.0, longest_turn_s(rate_deg_s, acceleration_deg_s2)
-    for _ in range(_HALVINGS):
+    while high_s - low_s > _ACCURACY_S:
         middle_s = 0.5 * (low_s + high_s)
         if turns_in(middle_s, turn, rate_from, rate_to, rate_deg_s, acceleration_deg_s2):
             high_s = middle_s

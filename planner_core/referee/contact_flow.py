@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-import itertools
-from typing import NamedTuple
-
 import numpy as np
 
-from planner_core.problem import Problem, SatelliteProblem
+from planner_core.problem import Floats, Problem, SatelliteProblem
 from planner_core.problem.plan import Action
 
 
-class Piece(NamedTuple):
-    """Part of a contact, and how fast data comes down in it (recorder capacities per second)."""
-
-    from_s: float
-    to_s: float
-    per_s: float
-
-
-def flow(problem: Problem, satellite: SatelliteProblem, action: Action) -> list[Piece]:
+def flow(problem: Problem, satellite: SatelliteProblem, action: Action) -> Floats:
     """Return the rate during a contact, in order of time; nothing of it while it is set up.
 
+    Returns
+    -------
+    From when until when (s), and how fast data comes down meanwhile, in recorder capacities per
+    second. Shape ``(k, 3)``.
+
+    Notes
+    -----
     The rate is linear between the instants at which the pass knows it, so the mean of a piece is
     that at its middle.
     """
@@ -29,13 +25,13 @@ def flow(problem: Problem, satellite: SatelliteProblem, action: Action) -> list[
     station = int(table.place[action.opportunity])
     begins_s = action.start_s + float(links.stations.setup_s[station])
     if begins_s >= action.end_s:
-        return []
+        return np.empty((0, 3))
     rate = links.passes.get(int(table.access[action.opportunity]))
     if rate is None:
         gain = float(links.stations.gain[station])
-        return [Piece(begins_s, action.end_s, satellite.resources.downlink_per_s * gain)]
-    inside = (rate.time_s > begins_s) & (rate.time_s < action.end_s)
-    cuts_s = np.array([begins_s, *rate.time_s[inside], action.end_s])
+        return np.array([[begins_s, action.end_s, satellite.resources.downlink_per_s * gain]])
+    first = np.searchsorted(rate.time_s, begins_s, side="right")
+    inside_s = rate.time_s[first : np.searchsorted(rate.time_s, action.end_s)]
+    cuts_s = np.concatenate([[begins_s], inside_s, [action.end_s]])
     per_s = np.interp((cuts_s[:-1] + cuts_s[1:]) / 2.0, rate.time_s, rate.per_s)
-    pieces = zip(itertools.pairwise(cuts_s.tolist()), per_s.tolist(), strict=True)
-    return [Piece(from_s, to_s, mean_per_s) for (from_s, to_s), mean_per_s in pieces]
+    return np.stack([cuts_s[:-1], cuts_s[1:], per_s], axis=1)

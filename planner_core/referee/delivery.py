@@ -17,7 +17,7 @@ from planner_core.jit import kernel
 from planner_core.problem import CONTACT, Floats, Longs, Problem, SatelliteProblem
 from planner_core.problem.plan import Action
 from planner_core.problem.slew import TIME_TOLERANCE_S
-from planner_core.referee.contact_flow import Piece, flow
+from planner_core.referee.contact_flow import flow
 from planner_core.referee.resource_profile import Profile
 
 _AMOUNT_TOLERANCE: Final = 1e-9  # of a recorder's capacity, in comparing sums of many pieces
@@ -58,7 +58,7 @@ def _next_flow_s(
     """Return when data can come down in a contact that begins then or later; NaN for never."""
     later = [action for action in contacts if action.start_s >= after_s - TIME_TOLERANCE_S]
     flows = [flow(problem, satellite, action) for action in later]
-    return min((pieces[0].from_s for pieces in flows if pieces), default=math.nan)
+    return min((float(pieces[0, 0]) for pieces in flows if len(pieces)), default=math.nan)
 
 
 def on_ground_s(
@@ -117,25 +117,22 @@ def _removal(
 ) -> tuple[Floats, Floats]:
     """Return what has been removed by when, linear in between."""
     if problem.dynamics == "physical":
-        points = [(point.time_s, point.removed) for point in profile.points]
-    else:
-        # Events book a contact at its start: its bits come down one after another from there.
-        points = [(0.0, 0.0)]
-        for action, before, after in zip(actions, profile.before, profile.after, strict=True):
-            if after.removed > before.removed:
-                pieces = flow(problem, satellite, action)
-                points += _one_after_another(pieces, before.removed, after.removed)
+        return profile.curve.time_s, profile.curve.removed
+    # Events book a contact at its start: its bits come down one after another from there.
+    points = [(0.0, 0.0)]
+    for action, before, after in zip(actions, profile.before, profile.after, strict=True):
+        if after.removed > before.removed:
+            pieces = flow(problem, satellite, action)
+            points += _one_after_another(pieces, before.removed, after.removed)
     table = np.array(points)
     return table[:, 0].copy(), table[:, 1].copy()
 
 
-def _one_after_another(
-    pieces: Sequence[Piece], before: float, after: float
-) -> list[tuple[float, float]]:
+def _one_after_another(pieces: Floats, before: float, after: float) -> list[tuple[float, float]]:
     """Return what a contact has removed by when, from its first bit to its last."""
-    points = [(pieces[0].from_s, before)]
+    points = [(float(pieces[0, 0]), before)]
     removed = before
-    for from_s, to_s, per_s in pieces:
+    for from_s, to_s, per_s in pieces.tolist():
         whole = (to_s - from_s) * per_s
         if removed + whole >= after:
             points.append((from_s + (after - removed) / per_s, after))

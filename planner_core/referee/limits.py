@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Literal, NamedTuple
 
+import numpy as np
+
 from planner_core.problem import Problem
 from planner_core.problem.plan import Plan
-from planner_core.referee.resource_profile import Point, Profile
+from planner_core.referee.resource_profile import Curve, Point, Profile
 from planner_core.referee.timeline import Violation
 from planner_core.referee.unavoidable import is_unavoidable
 
@@ -46,7 +48,7 @@ def limits_broken(
     def is_frozen(position: int) -> bool:
         return problem.pinned.is_frozen(plan.actions[position].start_s)
 
-    began_s = profile.points[0].time_s
+    began_s = float(profile.curve.time_s[0])
     checked: tuple[_Check, ...] = (
         ("battery", is_low, drains, is_empty, r.battery_min_fraction),
         ("recorder", is_full, fills, has_no_room, r.recorder_max_fraction),
@@ -66,7 +68,7 @@ def limits_broken(
             )
             if is_broken(after) or (problem.dynamics == "physical" and is_broken(before))
         ]
-        for start_s, end_s, first, worst in _excursions(problem, profile.points, code, limit):
+        for start_s, end_s, first, worst in _excursions(problem, profile.curve, code, limit):
             is_given = start_s == began_s or is_unavoidable(problem, index, code, first, start_s)
             blamed = tuple(
                 part.position
@@ -112,28 +114,22 @@ class _Part(NamedTuple):
 
 
 def _excursions(
-    problem: Problem, points: Sequence[Point], code: str, limit: float
+    problem: Problem, curve: Curve, code: str, limit: float
 ) -> list[tuple[float, float, float, float]]:
     """Return (start, end, value at the start, worst) of each stay at or beyond a limit."""
-    values = [p.battery if code == "battery" else p.recorder for p in points]
-    sign = -1.0 if code == "battery" else 1.0
-    found: list[tuple[float, float, float, float]] = []
-    start_s: float | None = None
-    first = worst = limit
-    for i, value in enumerate(values):
-        is_broken = sign * (value - limit) >= 0.0
-        if is_broken and start_s is None:
-            start_s, first, worst = points[i].time_s, value, value
-            step = value - values[i - 1] if i else 0.0
-            if problem.dynamics == "physical" and step != 0.0:
-                share = (limit - values[i - 1]) / step
-                start_s = points[i - 1].time_s + share * (points[i].time_s - points[i - 1].time_s)
-                first = limit
-        elif is_broken:
-            worst = max(worst, value) if sign > 0 else min(worst, value)
-        elif start_s is not None:
-            found.append((start_s, points[i].time_s, first, worst))
-            start_s = None
-    if start_s is not None:
-        found.append((start_s, points[-1].time_s, first, worst))
+    sign, values = (-1.0, curve.battery) if code == "battery" else (1.0, curve.recorder)
+    is_broken = sign * (values - limit) >= 0.0
+    edges = np.diff(is_broken, prepend=False, append=False)
+    found = []
+    for begin, end in np.flatnonzero(edges).reshape(-1, 2).tolist():
+        start_s, first = curve.time_s[begin], values[begin]
+        step = values[begin] - values[begin - 1] if begin else 0.0
+        if problem.dynamics == "physical" and step != 0.0:
+            share = (limit - values[begin - 1]) / step
+            before_s = curve.time_s[begin - 1]
+            start_s, first = before_s + share * (start_s - before_s), limit
+        stay = values[begin:end]
+        worst = stay.max() if sign > 0 else stay.min()
+        end_s = curve.time_s[min(end, len(values) - 1)]
+        found.append((float(start_s), float(end_s), float(first), float(worst)))
     return found

@@ -95,7 +95,7 @@ def replay(problem: Problem, plan: Plan, *, in_detail: bool = True) -> Timeline:
     violations += duplicates
     earned = {c.position: c.worth for c in collected.values()}
     brought_down = brought_down_of(problem, plan, by_satellite, profiles)
-    points = [point for profile in profiles if profile for point in profile.points]
+    curves = [profile.curve for profile in profiles if profile]
     return Timeline(
         satellites=tuple(
             _satellite_timeline(
@@ -107,10 +107,10 @@ def replay(problem: Problem, plan: Plan, *, in_detail: bool = True) -> Timeline:
         violations=tuple(sorted(violations, key=lambda v: (v.at_s, v.satellite, v.code))),
         reward=math.fsum((*earned.values(), *(image.earned for image in brought_down))),
         collected=collected,
-        downlinked=tuple(profile.points[-1].removed if profile else 0.0 for profile in profiles),
-        on_board=tuple(profile.points[-1].recorder if profile else 0.0 for profile in profiles),
-        battery_min=min((p.battery for p in points), default=None),
-        recorder_max=max((p.recorder for p in points), default=None),
+        downlinked=tuple(float(p.curve.removed[-1]) if p else 0.0 for p in profiles),
+        on_board=tuple(float(p.curve.recorder[-1]) if p else 0.0 for p in profiles),
+        battery_min=min((float(curve.battery.min()) for curve in curves), default=None),
+        recorder_max=max((float(curve.recorder.max()) for curve in curves), default=None),
         brought_down=brought_down,
     )
 
@@ -239,7 +239,7 @@ def _satellite_timeline(
         )
     if profile is None:
         return SatelliteTimeline(actions=tuple(actions), resources=None)
-    time_s, battery, recorder = thin(profile.points)
+    time_s, battery, recorder = thin(profile.curve)
     idle = [_idle_action(*pair) for pair in zip(profile.idle, profile.sun_end, strict=True)]
     # Of a task and what is idle at one instant, as of overlapping tasks, the earlier stands first.
     actions = list(heapq.merge(actions, idle, key=lambda action: action.start_s))

@@ -43,14 +43,24 @@ class Point(NamedTuple):
     removed: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+class Curve(NamedTuple):
+    """States in order of time, a column for each member of ``Point``. Shape ``(n,)`` each."""
+
+    time_s: Floats
+    battery: Floats
+    recorder: Floats
+    recorded: Floats
+    removed: Floats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Profile:
     """Battery and recorder over the horizon, linear (``physical``) or stepped (``paper``).
 
     Attributes
     ----------
-    points
-        In order of time; limits need to be tested at these only.
+    curve
+        Limits need to be tested at its instants only.
     before, after
         The state in which each action starts, and the one that it leaves.
     idle
@@ -59,7 +69,7 @@ class Profile:
         The state in which it leaves the sun in each of these spans.
     """
 
-    points: tuple[Point, ...]
+    curve: Curve
     before: tuple[Point, ...]
     after: tuple[Point, ...]
     idle: tuple[Idle, ...]
@@ -86,7 +96,8 @@ def _integrate_physical(
     is_contact = problem.opportunities.kind[rows] == CONTACT
     idle = idle_spans(problem, satellite, actions)
     contacts = itertools.compress(actions, is_contact.tolist())
-    pieces = np.array([p for a in contacts for p in flow(problem, satellite, a)]).reshape(-1, 3)
+    flows = [flow(problem, satellite, contact) for contact in contacts]
+    pieces = np.concatenate([np.empty((0, 3)), *flows])
     tasks = np.array([(a.start_s, a.end_s) for a in actions]).reshape(-1, 2)
     sunlit = np.array((satellite.sunlight.enter_s, satellite.sunlight.exit_s)).T.copy()
     at_sun = np.array([(span.sun_from_s, span.sun_until_s) for span in idle]).reshape(-1, 2)
@@ -100,16 +111,19 @@ def _integrate_physical(
     held = r.initial_recorder_fraction
     first = (0.0, r.initial_battery_fraction, held, held, 0.0)
     states, at = states_under(times, power, fill, drain, first)
-    points = tuple(map(Point._make, states.tolist()))
-    starts, stops = at[np.searchsorted(times, tasks).T].tolist()
-    sun_ends = at[np.searchsorted(times, at_sun[:, 1])].tolist()
+    starts, stops = at[np.searchsorted(times, tasks).T]
     return Profile(
-        points=points,
-        before=tuple(points[start] for start in starts),
-        after=tuple(points[stop] for stop in stops),
+        curve=Curve(*states.T.copy()),
+        before=_points(states[starts]),
+        after=_points(states[stops]),
         idle=idle,
-        sun_end=tuple(points[end] for end in sun_ends),
+        sun_end=_points(states[at[np.searchsorted(times, at_sun[:, 1])]]),
     )
+
+
+def _points(states: Floats) -> tuple[Point, ...]:
+    """Return the rows as points. Shape ``(n, 5)``."""
+    return tuple(map(Point._make, states.tolist()))
 
 
 class _Rates(NamedTuple):
@@ -267,7 +281,7 @@ def _integrate_events(
     idle = idle_spans(problem, satellite, actions)
     level_at = {action.start_s: level for action, level in zip(actions, before, strict=True)}
     return Profile(
-        points=tuple(points),
+        curve=Curve(*np.array(points).T.copy()),
         before=tuple(before),
         after=tuple(after),
         idle=idle,
@@ -289,7 +303,7 @@ def _book(
     if problem.opportunities.kind[action.opportunity] == CONTACT:
         held = point.recorder + telemetry
         pieces = flow(problem, satellite, action)
-        removed = min(held, math.fsum((until - since) * per_s for since, until, per_s in pieces))
+        removed = min(held, math.fsum((pieces[:, 1] - pieces[:, 0]) * pieces[:, 2]))
         return Point(
             t_s,
             max(0.0, point.battery - r.contact_drain_per_s * duration_s),
@@ -307,19 +321,25 @@ def _book(
     )
 
 
-def thin(points: Sequence[Point]) -> tuple[Floats, Floats, Floats]:
+def thin(curve: Curve) -> tuple[Floats, Floats, Floats]:
     """Return time, battery and recorder without points that lie on a line or repeat."""
-    kept = [*points[:1]]
-    for point, after in itertools.pairwise(points[1:]):
-        last = kept[-1]
-        span_s = after.time_s - last.time_s
+    kept = _kept(curve.time_s, curve.battery, curve.recorder)
+    return curve.time_s[kept], curve.battery[kept], curve.recorder[kept]
+
+
+@kernel
+def _kept(time_s: Floats, battery: Floats, recorder: Floats) -> Bools:
+    """Return which points do not lie on the line from the last one kept to the next one."""
+    kept = np.ones(len(time_s), dtype=np.bool_)
+    last = 0
+    for i in range(1, len(time_s) - 1):
+        span_s = time_s[i + 1] - time_s[last]
         if span_s > 0.0:
-            share = (point.time_s - last.time_s) / span_s
-            battery = last.battery + share * (after.battery - last.battery)
-            recorder = last.recorder + share * (after.recorder - last.recorder)
-            if abs(battery - point.battery) < _SAME and abs(recorder - point.recorder) < _SAME:
+            share = (time_s[i] - time_s[last]) / span_s
+            on_line = battery[last] + share * (battery[i + 1] - battery[last])
+            held_on_line = recorder[last] + share * (recorder[i + 1] - recorder[last])
+            if abs(on_line - battery[i]) < _SAME and abs(held_on_line - recorder[i]) < _SAME:
+                kept[i] = False
                 continue
-        kept.append(point)
-    kept += points[1:][-1:]
-    table = np.array([(p.time_s, p.battery, p.recorder) for p in kept])
-    return table[:, 0], table[:, 1], table[:, 2]
+        last = i
+    return kept

@@ -7,8 +7,6 @@ energy or writes data, and every contact that is left takes data down.
 
 from __future__ import annotations
 
-from bisect import bisect_right
-from collections.abc import Sequence
 from typing import Final, Literal
 from weakref import WeakKeyDictionary
 
@@ -16,10 +14,10 @@ import numpy as np
 
 from planner_core.problem import CONTACT, Problem
 from planner_core.problem.plan import Plan
-from planner_core.referee.resource_profile import Point, integrate
+from planner_core.referee.resource_profile import Curve, integrate
 
 _SAME: Final = 1e-9  # of a capacity
-_known: WeakKeyDictionary[Problem, dict[tuple[str, int], tuple[Point, ...]]] = WeakKeyDictionary()
+_known: WeakKeyDictionary[Problem, dict[tuple[str, int], Curve]] = WeakKeyDictionary()
 
 
 def is_unavoidable(
@@ -41,18 +39,19 @@ def is_unavoidable(
 def beyond_from_s(problem: Problem, index: int) -> float | None:
     """Return when the recorder of a satellite is first too full in every plan; None for never."""
     limit = problem.satellites[index].resources.recorder_max_fraction
-    points = _at_best(problem, index, "recorder")
-    return next((point.time_s for point in points if point.recorder >= limit), None)
+    curve = _at_best(problem, index, "recorder")
+    beyond_s = curve.time_s[curve.recorder >= limit]
+    return float(beyond_s[0]) if len(beyond_s) else None
 
 
-def _at_best(problem: Problem, index: int, code: str) -> tuple[Point, ...]:
+def _at_best(problem: Problem, index: int, code: str) -> Curve:
     found = _known.setdefault(problem, {})
     if (code, index) not in found:
         rows = _flown(problem, index)
         if code == "recorder":
             rows = sorted({*rows, *_contacts(problem, index)})
         actions = sorted(Plan.of(problem, rows).actions)
-        found[code, index] = integrate(problem, problem.satellites[index], actions).points
+        found[code, index] = integrate(problem, problem.satellites[index], actions).curve
     return found[code, index]
 
 
@@ -73,9 +72,8 @@ def _contacts(problem: Problem, index: int) -> list[int]:
     return own
 
 
-def _level_at(problem: Problem, points: Sequence[Point], code: str, at_s: float) -> float:
-    time_s = [point.time_s for point in points]
-    level = [point.battery if code == "battery" else point.recorder for point in points]
+def _level_at(problem: Problem, curve: Curve, code: str, at_s: float) -> float:
+    level = curve.battery if code == "battery" else curve.recorder
     if problem.dynamics == "physical":
-        return float(np.interp(at_s, time_s, level))
-    return level[max(0, bisect_right(time_s, at_s) - 1)]
+        return float(np.interp(at_s, curve.time_s, level))
+    return float(level[max(0, int(np.searchsorted(curve.time_s, at_s, side="right")) - 1)])

@@ -11,7 +11,7 @@ import numpy as np
 from planner_core.problem import CONTACT, Ints, Problem
 from planner_core.problem.plan import Action, Plan
 from planner_core.referee.replay import replay
-from planner_core.referee.timeline import Timeline
+from planner_core.referee.timeline import Resourceline, Timeline
 
 Judge = Callable[[Plan], Timeline]
 """What says of a plan what the referee says."""
@@ -24,7 +24,7 @@ class View:
     Attributes
     ----------
     judge
-        Who judges further plans; the referee, in detail, by default.
+        Who judges further plans; the referee by default.
     """
 
     problem: Problem
@@ -35,12 +35,17 @@ class View:
     @classmethod
     def of(cls, problem: Problem, plan: Plan, judge: Judge | None = None) -> View:
         """Return the plan, judged."""
-        timeline = judge(plan) if judge else replay(problem, plan)
+        timeline = judge(plan) if judge else replay(problem, plan, in_detail=False)
         return cls(problem=problem, plan=plan, timeline=timeline, judge=judge)
 
     def of_another(self, plan: Plan) -> View:
         """Return another plan, judged by who judged this one."""
         return View.of(self.problem, plan, self.judge)
+
+    @cached_property
+    def curves(self) -> list[Resourceline | None]:
+        """Battery and recorder of each satellite."""
+        return [own.resources for own in replay(self.problem, self.plan).satellites]
 
     @cached_property
     def images(self) -> list[Action]:

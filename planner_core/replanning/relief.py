@@ -20,7 +20,7 @@ from planner_core.precedence.conflicts import conflicts
 from planner_core.problem import CONTACT, Problem, SatelliteProblem
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
-from planner_core.referee.resource_profile import Point, integrate
+from planner_core.referee.resource_profile import Curve, integrate
 from planner_core.referee.unavoidable import beyond_from_s
 from planner_core.replanning.known import KnownPrices
 from planner_core.replanning.promises import require_promises, with_promised
@@ -142,7 +142,7 @@ def _keeps_limits(problem: Problem, index: int, satellite: SatelliteProblem) -> 
 def _emptied(problem: Problem, index: int, satellite: SatelliteProblem) -> SatelliteProblem:
     """Return the satellite with a recorder in which what is kept, and telemetry, finds room."""
     r = satellite.resources
-    over = max(p.recorder for p in _levels(problem, index, satellite)) - r.recorder_max_fraction
+    over = _levels(problem, index, satellite).recorder.max() - r.recorder_max_fraction
     start = max(0.0, r.initial_recorder_fraction - max(0.0, over + _CLEARLY))
     return replace(satellite, resources=replace(r, initial_recorder_fraction=start))
 
@@ -150,7 +150,7 @@ def _emptied(problem: Problem, index: int, satellite: SatelliteProblem) -> Satel
 def _charged(problem: Problem, index: int, satellite: SatelliteProblem) -> SatelliteProblem:
     """Return the satellite with a battery that lasts for what is kept."""
     r = satellite.resources
-    under = r.battery_min_fraction - min(p.battery for p in _levels(problem, index, satellite))
+    under = r.battery_min_fraction - _levels(problem, index, satellite).battery.min()
     start = min(1.0, r.initial_battery_fraction + max(0.0, under + _CLEARLY))
     return replace(satellite, resources=replace(r, initial_battery_fraction=start))
 
@@ -161,11 +161,11 @@ def _unlimited(satellite: SatelliteProblem) -> SatelliteProblem:
     return replace(satellite, resources=r)
 
 
-def _levels(problem: Problem, index: int, satellite: SatelliteProblem) -> tuple[Point, ...]:
+def _levels(problem: Problem, index: int, satellite: SatelliteProblem) -> Curve:
     """Return battery and recorder of a satellite that does what it must and nothing else."""
     table = problem.opportunities
     rows = [row for row in problem.kept_rows.tolist() if table.satellite[row] == index]
-    return integrate(problem, satellite, Plan.of(problem, rows).actions).points
+    return integrate(problem, satellite, Plan.of(problem, rows).actions).curve
 
 
 def _with_relief(problem: Problem, index: int, rows: set[int]) -> set[int]:

@@ -47,7 +47,7 @@ from planner_core.errors import InvalidScenario
 from planner_core.jit import all_stamps, load_stored
 from planner_core.pins import BlockedInterval, PinnedAction, Pins
 from planner_core.precedence.arcs import arc_network_of
-from planner_core.precedence.relation import excluded_by
+from planner_core.precedence.relation import excluded_beside
 from planner_core.problem import CONTACT, Problem
 from planner_core.problem.delivery import with_objective
 from planner_core.run import plan_scenario
@@ -256,7 +256,7 @@ def _shortage() -> None:
     free.price()
     free.cut(1)
     Mcts(worthless="sunpoint").solve(problem, Budget(), 0)
-    excluded_by(problem.satellites[0], 0)
+    excluded_beside(problem.satellites[0], problem.satellites[0].rows[:1])
 
 
 def _late() -> None:
@@ -278,7 +278,7 @@ def _slow() -> None:
     Graph().solve(problem, Budget(), 0)
     Milp(formulation="pairwise").solve(problem, Budget(), 0)
     arc_network_of(problem)
-    excluded_by(problem.satellites[0], 0)
+    excluded_beside(problem.satellites[0], problem.satellites[0].rows[:1])
 
 
 DEMONSTRATION: Final[dict[str, Callable[[], None]]] = {

@@ -14,7 +14,6 @@ from planner_core.errors import InvalidScenario
 from planner_core.problem import COLLECT, CONTACT, Problem
 from planner_core.problem.delivery import least_age_s, with_objective
 from planner_core.problem.plan import Plan
-from planner_core.referee.contact_flow import Piece
 from planner_core.referee.delivery import _one_after_another
 from planner_core.referee.replay import replay
 from planner_core.referee.timeline import Timeline
@@ -131,7 +130,7 @@ def test_an_image_without_data_is_down_when_the_next_contact_begins(
 
 def test_a_contact_that_takes_down_all_it_can_ends_with_its_last_bit() -> None:
     """Its pieces, added one by one, may fall short of their sum by a rounding."""
-    pieces = [Piece(0.0, 10.0, 0.01), Piece(10.0, 20.0, 0.03), Piece(20.0, 30.0, 0.02)]
+    pieces = np.array([[0.0, 10.0, 0.01], [10.0, 20.0, 0.03], [20.0, 30.0, 0.02]])
     points = _one_after_another(pieces, 0.2, 0.8 + 1e-12)
     assert points[0] == (0.0, 0.2)
     assert [time_s for time_s, _ in points] == [0.0, 10.0, 20.0, 30.0]

@@ -370,8 +370,8 @@ def test_flows_are_empty_while_a_contact_is_set_up() -> None:
         (action,) = Plan.of(problem, (row,)).actions
         pieces = flow(problem, problem.satellites[0], action)
         setup_s = problem.downlinks.stations.setup_s[problem.opportunities.place[row]]
-        assert pieces[0].from_s == pytest.approx(action.start_s + setup_s)
-        assert pieces[-1].to_s == action.end_s
+        assert pieces[0, 0] == pytest.approx(action.start_s + setup_s)
+        assert pieces[-1, 1] == action.end_s
 
 
 def test_a_rate_below_telemetry_is_refused() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import combinations
 
@@ -19,7 +19,7 @@ from planner_core.pinning.apply_pins import apply_pins
 from planner_core.problem import COLLECT, CONTACT, Kept, Pinned, Problem
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
-from planner_core.referee.resource_profile import Point, integrate
+from planner_core.referee.resource_profile import Curve, integrate
 from planner_core.referee.timeline import Timeline
 from planner_core.referee.unavoidable import is_unavoidable
 from planner_core.replanning.question import Question
@@ -232,17 +232,16 @@ def test_what_counts_as_inherited_no_plan_avoids(seed: int, dynamics: Dynamics) 
     event(f"inherited: {len(given_s)}")
     r = problem.satellites[0].resources
     for plan, _ in plans if given_s else ():
-        points = integrate(problem, problem.satellites[0], plan.actions).points
+        curve = integrate(problem, problem.satellites[0], plan.actions).curve
         for code, at_s in given_s:
             if code == "battery":
-                assert _level(problem, points, "battery", at_s) <= r.battery_min_fraction + 1e-6
+                assert _level(problem, curve, "battery", at_s) <= r.battery_min_fraction + 1e-6
             else:
-                assert _level(problem, points, "recorder", at_s) >= r.recorder_max_fraction - 1e-6
+                assert _level(problem, curve, "recorder", at_s) >= r.recorder_max_fraction - 1e-6
 
 
-def _level(problem: Problem, points: Sequence[Point], name: str, at_s: float) -> float:
-    time_s = [point.time_s for point in points]
-    levels = [getattr(point, name) for point in points]
+def _level(problem: Problem, curve: Curve, name: str, at_s: float) -> float:
+    time_s, levels = curve.time_s, getattr(curve, name)
     if problem.dynamics == "physical":
         return float(np.interp(at_s, time_s, levels))
     return float(levels[np.searchsorted(time_s, at_s, side="right") - 1])

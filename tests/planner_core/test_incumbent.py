@@ -10,9 +10,9 @@ import pytest
 from planner_core.budget import Budget, Progress, Termination
 from planner_core.certified.drivers.agility_only import FreeSearch
 from planner_core.certified.drivers.fleet import FleetSearch
-from planner_core.certified.incumbent import Incumbent, is_optimal
+from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.mip.highs import Engine, Outcome
-from planner_core.certified.proofs.bound import Bound
+from planner_core.certified.proofs.bound import Bound, is_optimal
 from planner_core.certified.tolerances import SAME
 from planner_core.problem import COLLECT, Kept, Pinned, Problem
 from planner_core.problem.plan import Plan

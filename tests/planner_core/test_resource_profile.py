@@ -9,7 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.mdp.track import compile_track
-from planner_core.referee.resource_profile import Point, advance, integrate, states_under, thin
+from planner_core.referee.resource_profile import (
+    Curve,
+    advance,
+    integrate,
+    states_under,
+    thin,
+)
 from tests.examples import examples
 from tests.planner_core.problems import random_problem
 
@@ -72,7 +78,7 @@ def test_levels_at_the_start_may_be_whole_numbers() -> None:
         for b, d in ((1, 0), (1.0, 0.0))
     )
     profiles = [integrate(p, p.satellites[0], ()) for p in (whole, real)]
-    assert profiles[0] == profiles[1]
+    np.testing.assert_array_equal(profiles[0].curve, profiles[1].curve)
     # Kernels are compiled for what they are given: of the same types once.
     tracks = [
         compile_track(p, p.satellites[0], np.zeros(len(p.satellites[0]), dtype=np.uint8))
@@ -85,12 +91,14 @@ def test_curves_are_drawn_without_what_lies_on_a_line_or_repeats() -> None:
     battery = [0.5, 0.6, 0.7, 0.7, 0.65, 0.6, 0.6]
     recorder = [0.1, 0.2, 0.3, 0.3, 0.45, 0.6, 0.2]
     time_s = [0.0, 0.25, 0.5, 0.5, 0.75, 1.0, 1.0]
-    points = [Point(*state, 0.0, 0.0) for state in zip(time_s, battery, recorder, strict=True)]
+    nothing = [0.0] * len(time_s)
+    states = np.array([time_s, battery, recorder, nothing, nothing])
     kept = [0, 3, 5, 6]
-    drawn = thin(points)
+    drawn = thin(Curve(*states))
     assert [column.tolist() for column in drawn] == [
         [column[i] for i in kept] for column in (time_s, battery, recorder)
     ]
-    assert [column.tolist() for column in thin(points[:1])] == [[0.0], [0.5], [0.1]]
-    bent = [points[0], Point(0.25, 0.6, 0.21, 0.0, 0.0), points[2]]
-    assert thin(bent)[2].tolist() == [0.1, 0.21, 0.3]
+    assert [column.tolist() for column in thin(Curve(*states[:, :1]))] == [[0.0], [0.5], [0.1]]
+    bent = states[:, :3].copy()
+    bent[2, 1] = 0.21
+    assert thin(Curve(*bent))[2].tolist() == [0.1, 0.21, 0.3]

@@ -64,17 +64,16 @@ def test_a_state_is_carried_as_the_referee_lets_a_satellite_idle(
     )  # fmt: skip
     begin = hours(1).start
     whole = _built(_mission(known, Horizon(start=begin, end=_later(before_s).end)))
-    points = integrate(whole, whole.satellites[0], ()).points
+    curve = integrate(whole, whole.satellites[0], ()).curve
     own = whole.satellites[0].id
     state = State(satellite_id=own, at=begin, battery_fraction=0.4, recorder_fraction=0.5)
     given = replace(known, initial_battery_fraction=1.0, initial_recorder_fraction=0.0)
     r = _built(_mission(given, _later(before_s), state)).satellites[0].resources
-    time_s = [p.time_s for p in points]
     assert r.initial_battery_fraction == pytest.approx(
-        np.interp(before_s, time_s, [p.battery for p in points]), abs=2e-6
+        np.interp(before_s, curve.time_s, curve.battery), abs=2e-6
     )
     assert r.initial_recorder_fraction == pytest.approx(
-        np.interp(before_s, time_s, [p.recorder for p in points]), abs=1e-9
+        np.interp(before_s, curve.time_s, curve.recorder), abs=1e-9
     )
 
 

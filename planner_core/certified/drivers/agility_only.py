@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner_core.budget import Budget
-from planner_core.certified.incumbent import Incumbent, is_optimal
+from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.search import WindowSearch
 from planner_core.certified.mip.model import plan_program
 from planner_core.certified.mip.program import Program
@@ -22,7 +22,7 @@ from planner_core.certified.mip.restricted_master import Master
 from planner_core.certified.multipliers.ascent import Ascent
 from planner_core.certified.multipliers.elementary import ascent_on_passes
 from planner_core.certified.multipliers.paths import ascent_on_paths
-from planner_core.certified.proofs.bound import Bound, accessible, rounded_bound
+from planner_core.certified.proofs.bound import Bound, accessible, is_optimal, rounded_bound
 from planner_core.certified.proofs.certificate import (
     Certificate,
     Multipliers,

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from planner_core.certified.proofs.certificate import Certificate
-from planner_core.certified.tolerances import SAME
+from planner_core.certified.tolerances import LEAST_BOUND, SAME
 from planner_core.problem import Floats, Problem
 
 Proof = Literal["lagrangian", "milp", "dp", "totals"]
@@ -87,6 +87,19 @@ def rounded_bound(problem: Problem, value: float, reward: float) -> float:
     if unit > 0.0:
         safe = float(np.floor((safe + SAME) / unit) * unit)
     return max(safe, reward)
+
+
+def is_optimal(reward: float, bound: float, unit: float) -> bool:
+    """Return whether no plan earns more than ``reward``, to the stated tolerance.
+
+    Parameters
+    ----------
+    bound
+        What no plan exceeds.
+    unit
+        An amount of which what any plan earns is a multiple; 0 where there is none.
+    """
+    return bound < reward + max(unit, SAME * reward, LEAST_BOUND)
 
 
 def accessible(problem: Problem) -> Bound:

@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from planner_core.certified.multipliers.latency import LatencyAscent
-from planner_core.certified.proofs.bound import Bound, rounded_bound
+from planner_core.certified.proofs.bound import Bound, is_optimal, reward_unit, rounded_bound
 from planner_core.certified.proofs.lagrangian import lagrangian_bound
 from planner_core.certified.proofs.satellite_relaxation import SatelliteRelaxation, relaxations
 from planner_core.certified.sizes import MAX_CELLS, MAX_STEPS
@@ -101,6 +101,8 @@ def quick_bound(problem: Problem, reward: float) -> Bound:
         What a known plan earns: nothing below it needs proof.
     """
     best = lagrangian_bound(problem, reward)
+    if is_optimal(reward, best.value, reward_unit(problem)):
+        return best
     if problem.counts_delivery and problem.objective.half_life_s is not None:
         return _with_half_life(problem, best, reward)
     # Where all targets are worth the same and energy is short, prices of zero are best.
@@ -109,7 +111,7 @@ def quick_bound(problem: Problem, reward: float) -> Bound:
     if problem.use_resources:
         is_quick = is_plain or len(problem.opportunities) <= TUNING.large
         satellites = relaxations(problem, TUNING.fine if is_quick else TUNING.coarse)
-    if not satellites or best.value <= reward:
+    if not satellites:
         return best
     stop = np.zeros(1, dtype=np.uint8)
     unit = _unit(problem, satellites, best.value)
