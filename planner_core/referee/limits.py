@@ -119,6 +119,8 @@ def _excursions(
     """Return (start, end, value at the start, worst) of each stay at or beyond a limit."""
     sign, values = (-1.0, curve.battery) if code == "battery" else (1.0, curve.recorder)
     is_broken = sign * (values - limit) >= 0.0
+    if not is_broken.any():
+        return []
     edges = np.diff(is_broken, prepend=False, append=False)
     found = []
     for begin, end in np.flatnonzero(edges).reshape(-1, 2).tolist():
