@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +17,7 @@ Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.integer]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class PassRate:
     """How fast data comes down during one access to a station, setup aside.
 
@@ -38,7 +39,7 @@ class PassRate:
         >>> rate.until(np.array([1.0, 2.0, 4.0]))
         array([ 1.5,  4. , 10. ])
         """
-        steps_s, whole = self._added_up()
+        steps_s, whole = self._added_up
         at = np.clip(np.searchsorted(self.time_s, t_s, side="right") - 1, 0, len(steps_s) - 1)
         into_s = np.clip(t_s - self.time_s[at], 0.0, steps_s[at])
         slope = (self.per_s[at + 1] - self.per_s[at]) / steps_s[at]
@@ -53,7 +54,7 @@ class PassRate:
         >>> rate.when(np.array([0.0, 1.5, 4.0, 10.0]))
         array([0., 1., 2., 4.])
         """
-        steps_s, whole = self._added_up()
+        steps_s, whole = self._added_up
         at = np.clip(np.searchsorted(whole, amount, side="left") - 1, 0, len(steps_s) - 1)
         first = self.per_s[at]
         rise = (self.per_s[at + 1] - first) / steps_s[at]
@@ -63,6 +64,7 @@ class PassRate:
         into_s = np.divide(2.0 * missing, until, out=np.zeros_like(missing), where=until > 0.0)
         return np.asarray(self.time_s[at] + np.minimum(into_s, steps_s[at]))
 
+    @cached_property
     def _added_up(self) -> tuple[Floats, Floats]:
         """Return the seconds between the instants, and what has come down at each instant."""
         steps_s = np.diff(self.time_s)
