@@ -7,7 +7,7 @@ from typing import Annotated
 import sqlalchemy as sa
 from fastapi import APIRouter, Depends, Query
 
-from service.api.deps import DatabaseDep, admin_only
+from service.api.deps import CallDep, admin_only
 from service.api.paging import PagingDep, newest_first
 from service.db.rows import AuditEventRow
 from service.stores.finding import with_values
@@ -22,7 +22,7 @@ router = APIRouter(
 
 @router.get("")
 def list_audit_events(
-    database: DatabaseDep,
+    call: CallDep,
     paging: PagingDep,
     object_id: Annotated[str | None, Query(description="Only of this object.")] = None,
     kind: Annotated[str | None, Query(description="Only of objects of this kind.")] = None,
@@ -32,6 +32,6 @@ def list_audit_events(
     """List who changed what, newest first. Needs the scope `admin`."""
     wanted = {"object_id": object_id, "kind": kind, "action": action, "owner": owner}
     query = sa.select(AuditEventRow).where(*with_values(AuditEventRow, **wanted))
-    with database.reading() as session:
+    with call.database.reading() as session:
         page = newest_first(session, query, AuditEventRow.id, paging)
-    return Listed(items=[from_row(AuditEventOut, row) for row in page.rows], next=page.next)
+        return page.listed(lambda row: from_row(AuditEventOut, row))

@@ -11,7 +11,7 @@ from sqlalchemy.orm import Session
 from planner_core.errors import inside
 from service.api import ask_again
 from service.api import job_intake as intake
-from service.api.conditional import created, readable, require_match, unless_known
+from service.api.conditional import readable, require_match, unless_known
 from service.api.deps import Call, CallDep
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
@@ -66,9 +66,8 @@ def create_comparison(body: ComparisonIn, call: CallDep, once: OnceDep) -> Compa
         shown = _shown(session, [row])[0]
         call.audit.record(session, "create", "job", *(run.job_id for run in shown.runs))
         call.audit.record(session, "create", "comparison", row.id)
-        shown = created(call.response, shown, f"/v1/comparisons/{row.id}")
         _describe(call.response, shown)
-        return once.keep(session, shown)
+        return once.created(session, shown, f"/v1/comparisons/{row.id}")
 
 
 @router.get("")
@@ -87,7 +86,7 @@ def get_comparison(comparison_id: str, call: CallDep) -> ComparisonOut | Respons
     with call.database.reading() as session:
         shown = _shown(session, [_find(session, comparison_id, call)])[0]
     _describe(call.response, shown)
-    return unless_known(call.request, call.response, shown)
+    return unless_known(call, shown)
 
 
 @router.delete("/{comparison_id}", status_code=204, responses=problem_responses(404, 412))
@@ -95,7 +94,7 @@ def delete_comparison(comparison_id: str, call: CallDep) -> None:
     """Delete a comparison. Its runs stay jobs like any other."""
     with call.database.transaction() as session:
         row = _find(session, comparison_id, call)
-        require_match(call.request, lambda: _shown(session, [row])[0])
+        require_match(call, lambda: _shown(session, [row])[0])
         deletion.delete_comparison(session, comparison_id)
         call.audit.record(session, "delete", "comparison", comparison_id)
 

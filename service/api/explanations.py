@@ -44,8 +44,7 @@ def get_explanation(
     if target_id not in ids:
         raise ServiceError("not_found", f"The job has no target {target_id!r}.")
     etag = etag_of(version_of(job_id, target_id))
-    if (known := known_as(call.request, etag)) is not None:
+    if (known := known_as(call, etag)) is not None:
         return known
     explainer = cast(Explainer, call.request.app.state.explainer)
-    call.response.headers["ETag"] = etag
     return explainer.get(job_id, described, timeline, ids.index(target_id))

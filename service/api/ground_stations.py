@@ -9,8 +9,8 @@ from fastapi import APIRouter, Response
 from sqlalchemy.orm import Session
 
 from planner_core.errors import Fault
-from service.api.conditional import created, readable, require_match, unless_known
-from service.api.deps import CallDep, DatabaseDep, RawBodyDep, file_type
+from service.api.conditional import located, readable, require_match, unless_known
+from service.api.deps import CallDep, RawBodyDep, file_type
 from service.api.errors import problem_responses
 from service.api.filters import NameQuery, by_name
 from service.api.idempotency import OnceDep
@@ -49,8 +49,7 @@ def create_ground_station(body: GroundStationIn, once: OnceDep, call: CallDep) -
     with once.transaction() as session:
         row = _add(session, body)
         call.audit.record(session, "create", "ground_station", row.id)
-        shown = created(call.response, _shown(row), f"/v1/ground-stations/{row.id}")
-        return once.keep(session, shown)
+        return once.created(session, _shown(row), f"/v1/ground-stations/{row.id}")
 
 
 @router.post(
@@ -98,23 +97,21 @@ def read_stations(kind: str, data: bytes) -> tuple[list[Checked[GroundStationIn]
 
 @router.get("")
 def list_ground_stations(
-    database: DatabaseDep, paging: PagingDep, name: NameQuery = None
+    call: CallDep, paging: PagingDep, name: NameQuery = None
 ) -> Listed[GroundStationOut]:
     """List the ground stations, newest first."""
     own_name = GroundStationRow.body["name"].as_string()
     query = by_name(alive(GroundStationRow), own_name, name)
-    with database.reading() as session:
+    with call.database.reading() as session:
         weight = size_of(GroundStationRow.body)
-        page = newest_first(session, query, GroundStationRow.id, paging, weight)
-    return Listed(items=[_shown(row) for row in page.rows], next=page.next)
+        return newest_first(session, query, GroundStationRow.id, paging, weight).listed(_shown)
 
 
 @router.get("/{station_id}", response_model=GroundStationOut, responses=readable())
 def get_ground_station(station_id: str, call: CallDep) -> GroundStationOut | Response:
     """Return one ground station."""
     with call.database.reading() as session:
-        shown = _shown(existing(session, GroundStationRow, "ground station", station_id))
-    return unless_known(call.request, call.response, shown)
+        return unless_known(call, _shown(_find(session, station_id)))
 
 
 @router.patch("/{station_id}", responses=problem_responses(404, 412))
@@ -126,8 +123,8 @@ def change_ground_station(
     `If-Match` takes the ETag of the station.
     """
     with call.database.transaction() as session:
-        row = existing(session, GroundStationRow, "ground station", station_id, to_change=True)
-        require_match(call.request, lambda: _shown(row))
+        row = _find(session, station_id, to_change=True)
+        require_match(call, lambda: _shown(row))
         changes = body.model_dump(mode="json", exclude_none=True)
         whole = row.body | changes
         changed = validated(GroundStationIn, whole)  # a stored value may be out of today's range
@@ -135,17 +132,21 @@ def change_ground_station(
         if _change(row, changed):
             call.audit.record(session, "update", "ground_station", station_id)
         shown = _shown(row)
-    return created(call.response, shown, f"/v1/ground-stations/{station_id}")
+    return located(call, shown, f"/v1/ground-stations/{station_id}")
 
 
 @router.delete("/{station_id}", status_code=204, responses=problem_responses(404, 412))
 def delete_ground_station(station_id: str, call: CallDep) -> None:
     """Delete a ground station. Scenarios that use it keep their copy."""
     with call.database.transaction() as session:
-        row = existing(session, GroundStationRow, "ground station", station_id, to_change=True)
-        require_match(call.request, lambda: _shown(row))
+        row = _find(session, station_id, to_change=True)
+        require_match(call, lambda: _shown(row))
         row.delete()
         call.audit.record(session, "delete", "ground_station", station_id)
+
+
+def _find(session: Session, station_id: str, *, to_change: bool = False) -> GroundStationRow:
+    return existing(session, GroundStationRow, "ground station", station_id, to_change=to_change)
 
 
 def _add(session: Session, body: GroundStationIn) -> GroundStationRow:

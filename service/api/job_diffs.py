@@ -33,9 +33,8 @@ def get_diff(job_id: str, other_id: str, call: CallDep) -> DiffOut | Response:
         jobs = [intake.find_job(session, own_id) for own_id in (job_id, other_id)]
         before, after = (intake.find_timeline(session, job) for job in jobs)
     etag = etag_of(f"{job_id}/{other_id}")  # timelines never change
-    if (known := known_as(call.request, etag)) is not None:
+    if (known := known_as(call, etag)) is not None:
         return known
-    call.response.headers["ETag"] = etag
     return _diff(job_id, other_id, before, after)
 
 

@@ -12,7 +12,7 @@ from fastapi.responses import StreamingResponse
 from sqlalchemy.exc import SQLAlchemyError
 
 from service.access.callers import Caller
-from service.api.deps import CallerDep, own_job_only
+from service.api.deps import CallDep, own_job_only
 from service.api.errors import problem_responses
 from service.api.job_shapes import etag_of_job, shown
 from service.api.job_wait import wait_for_change
@@ -39,7 +39,7 @@ _NOTHING_SEEN: Final = "0"
 )
 async def job_events(
     job_id: str,
-    caller: CallerDep,
+    call: CallDep,
     questions: QuestionsDep,
     last_event_id: Annotated[
         str, Header(alias="Last-Event-ID", description="The last event that was seen.")
@@ -58,7 +58,7 @@ async def job_events(
         # What browsers do after a stream has ended is to ask for it again, for ever.
         return Response(status_code=204)
     return StreamingResponse(
-        _events(questions, _Listener(questions, caller), job_id, f'"{seen}"'),
+        _events(questions, _Listener(questions, call.caller), job_id, f'"{seen}"'),
         media_type="text/event-stream",
         headers={"Cache-Control": "no-store"},
     )

@@ -126,7 +126,7 @@ def delete_job(job_id: str, call: CallDep) -> None:
     """Delete a finished job with its answer, for good: not one that a plan or a comparison has."""
     with call.database.transaction() as session:
         job = intake.find_job(session, job_id)
-        require_match_of(call.request, etag_of_job(job))
+        require_match_of(call, etag_of_job(job))
         deletion.delete_job(session, job)
         call.audit.record(session, "delete", "job", job_id)
 

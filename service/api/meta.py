@@ -9,14 +9,15 @@ import sqlalchemy as sa
 from fastapi import APIRouter, Path
 
 import planner_core
-from service.api.deps import CallDep, CallerDep
+from service.api.deps import CallDep
 from service.api.errors import problem_responses
 from service.db.rows import WorkerRow
 from service.db.session import Database
 from service.jobs.queue import JobQueue
-from service.problems.kinds import KINDS, ServiceError, kind_of
+from service.problems.kinds import KINDS, ServiceError
 from service.stores.finding import no_such
 from service.wire.operations import CallerOut, Live, ProblemExplained, Ready, Version
+from service.wire.stored import from_row
 
 router = APIRouter(tags=["operations"])
 
@@ -24,14 +25,9 @@ WORKER_SILENCE = timedelta(seconds=30)
 
 
 @router.get("/v1/me")
-def who_am_i(caller: CallerDep) -> CallerOut:
+def who_am_i(call: CallDep) -> CallerOut:
     """Say whose key this is and what it allows."""
-    return CallerOut(
-        owner=caller.owner,
-        scope=caller.scope.value,
-        key_id=caller.key_id,
-        key_name=caller.key_name,
-    )
+    return from_row(CallerOut, call.caller, scope=call.caller.scope.value)
 
 
 @router.get("/health/live")
@@ -81,7 +77,4 @@ def explain_problem(code: Annotated[str, Path(examples=["tle-checksum"])]) -> Pr
     name = code.replace("-", "_")
     if name not in KINDS:
         raise no_such("problem code", code)
-    kind = kind_of(name)
-    return ProblemExplained(
-        code=name, title=kind.title, status=kind.status, explanation=kind.explanation
-    )
+    return from_row(ProblemExplained, KINDS[name], code=name)

@@ -30,7 +30,7 @@ from sqlalchemy.orm import Session
 from starlette.types import Scope
 
 import planner_core
-from service.api.deps import DatabaseDep
+from service.api.deps import CallDep
 from service.db.session import Database
 from service.stores import metrics_store as store
 
@@ -78,15 +78,13 @@ async def _counters(request: Request) -> CallCounters:
     response_class=Response,
     responses={200: {"content": {"text/plain": {}}, "description": "Prometheus text format."}},
 )
-def metrics(
-    database: DatabaseDep, counters: Annotated[CallCounters, Depends(_counters)]
-) -> Response:
+def metrics(call: CallDep, counters: Annotated[CallCounters, Depends(_counters)]) -> Response:
     """Return figures for Prometheus: jobs, workers, orbits, and the calls of this process.
 
     Where the database does not answer, `slewline_database_up` is 0 and its figures are absent.
     """
     service = CollectorRegistry()
-    service.register(_Collected(list(_families(database))))
+    service.register(_Collected(list(_families(call.database))))
     text = generate_latest(service) + generate_latest(counters.registry)
     return Response(text, headers={"Content-Type": CONTENT_TYPE_LATEST})
 

@@ -9,7 +9,7 @@ import sqlalchemy as sa
 from fastapi import APIRouter, Query, Response
 from sqlalchemy.orm import Session
 
-from service.api.conditional import created, readable, require_match, unless_known
+from service.api.conditional import readable, require_match, unless_known
 from service.api.deps import CallDep
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
@@ -40,8 +40,7 @@ def create_outage(body: OutageIn, call: CallDep, once: OnceDep) -> OutageOut:
         session.add(row)
         session.flush()
         call.audit.record(session, "create", "outage", row.id)
-        shown = created(call.response, _shown(session, [row])[0], f"/v1/outages/{row.id}")
-        return once.keep(session, shown)
+        return once.created(session, _shown(session, [row])[0], f"/v1/outages/{row.id}")
 
 
 @router.get("")
@@ -67,8 +66,8 @@ def list_outages(
 def get_outage(outage_id: str, call: CallDep) -> OutageOut | Response:
     """Return one outage."""
     with call.database.reading() as session:
-        shown = _shown(session, [existing(session, OutageRow, "outage", outage_id)])[0]
-    return unless_known(call.request, call.response, shown)
+        row = existing(session, OutageRow, "outage", outage_id)
+        return unless_known(call, _shown(session, [row])[0])
 
 
 @router.delete("/{outage_id}", status_code=204, responses=problem_responses(404, 412))
@@ -76,7 +75,7 @@ def delete_outage(outage_id: str, call: CallDep) -> None:
     """Delete an outage, as where it ends early. Scenarios that took it along keep it."""
     with call.database.transaction() as session:
         row = existing(session, OutageRow, "outage", outage_id, to_change=True)
-        require_match(call.request, lambda: _shown(session, [row])[0])
+        require_match(call, lambda: _shown(session, [row])[0])
         row.delete()
         call.audit.record(session, "delete", "outage", outage_id)
 

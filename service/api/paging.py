@@ -14,10 +14,10 @@ from fastapi import Depends, Query, Request, Response
 from sqlalchemy.orm import InstrumentedAttribute, Session
 
 from service.problems.kinds import ServiceError
+from service.wire.base import Listed
 
 T = TypeVar("T")
 R = TypeVar("R")
-K = TypeVar("K", str, int)
 
 MOST_BYTES: Final = 2_000_000
 """Of a page whose rows may be large; one row more, where a single one is larger."""
@@ -29,6 +29,10 @@ class Page(Generic[R]):
 
     rows: Sequence[R]
     next: str | None
+
+    def listed(self, show: Callable[[R], T]) -> Listed[T]:
+        """Return the page as clients see it."""
+        return Listed(items=[show(row) for row in self.rows], next=self.next)
 
 
 @dataclass(frozen=True, slots=True)

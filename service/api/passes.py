@@ -69,7 +69,7 @@ def list_passes(
     after = paging.after_number()
     numbered = list(enumerate(_find(call, plan_id, wanted).passes))[after + 1 :]
     page = paging.answer(numbered[: paging.limit + 1], lambda pair: pair[0])
-    return Listed(items=[one for _, one in page.rows], next=page.next)
+    return page.listed(lambda pair: pair[1])
 
 
 @router.get(
@@ -86,7 +86,7 @@ def list_passes(
 def get_passes_as(plan_id: str, suffix: Suffix, call: CallDep, wanted: FilterDep) -> Response:
     """Return the passes of a plan as a table or as a calendar."""
     with call.database.reading() as session:
-        find_plan(session, plan_id, call.caller)
+        find_plan(session, plan_id, call)
     require_offered(suffix, _TYPES, "Passes are")
     found = _find(call, plan_id, wanted)
     return StreamingResponse(
@@ -104,7 +104,7 @@ def _written(found: _Found, suffix: str) -> Iterator[str]:
 
 def _find(call: Call, plan_id: str, wanted: PassFilter) -> _Found:
     with call.database.reading() as session:
-        job = session.get_one(JobRow, find_plan(session, plan_id, call.caller).job_id)
+        job = session.get_one(JobRow, find_plan(session, plan_id, call).job_id)
         made_at = intake.require_answer(session, job)
         timeline = read(TimelineOut, intake.find_timeline(session, job))
         question = StoredQuestion(job_store.content_of(session, job.id))

@@ -54,13 +54,13 @@ def create_replan(plan_id: str, body: ReplanIn, call: CallDep, once: OnceDep) ->
     job = intake.asked_for(body, call)
     queue = intake.queue_with_room(call)
     with call.database.reading() as session:
-        plan = find_plan(session, plan_id, call.caller)
+        plan = find_plan(session, plan_id, call)
         scenario_id = session.get_one(JobRow, plan.job_id).scenario_id
         content = session.get_one(ScenarioRow, scenario_id).content
     file = read_file(json.loads(content))
     with once.transaction() as session:
         intake.require_room(session, call)
-        plan = find_plan(session, plan_id, call.caller)
+        plan = find_plan(session, plan_id, call)
         if body.executions:
             take_down(session, call, plan, body.executions, "/executions")
         now = _to_the_millisecond(body.now or clock.now(session))
@@ -153,7 +153,7 @@ def _newest(session: Session, satellite_ids: Sequence[str]) -> dict[str, FileSat
 def list_changes(plan_id: str, call: CallDep) -> PlanChangesOut:
     """List what a replan has changed after its freeze, and why; nothing of any other plan."""
     with call.database.reading() as session:
-        plan = find_plan(session, plan_id, call.caller)
+        plan = find_plan(session, plan_id, call)
         job = session.get_one(JobRow, plan.job_id)
         if plan.parent_id is None or not replans.is_replan(job.change):
             return PlanChangesOut(

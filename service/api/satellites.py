@@ -12,8 +12,8 @@ from sqlalchemy.orm import Session
 
 from planner_core.orbits.ingest import read_elements
 from planner_core.orbits.oem import outline_of
-from service.api.conditional import created, readable, require_match, unless_known
-from service.api.deps import CallDep, DatabaseDep, RawBodyDep, file_type
+from service.api.conditional import located, readable, require_match, unless_known
+from service.api.deps import CallDep, RawBodyDep, file_type
 from service.api.errors import problem_responses
 from service.api.filters import NameQuery, by_name
 from service.api.idempotency import OnceDep
@@ -66,8 +66,7 @@ def create_satellite(body: SatelliteIn, once: OnceDep, call: CallDep) -> Satelli
         satellite_from(whole, "new")
         row = store.add_satellite(session, whole, orbit.elements, orbit.stored)
         call.audit.record(session, "create", "satellite", row.id)
-        shown = created(call.response, _shown(session, [row])[0], f"/v1/satellites/{row.id}")
-        return once.keep(session, shown)
+        return once.created(session, _shown(session, [row])[0], f"/v1/satellites/{row.id}")
 
 
 @router.post(
@@ -110,7 +109,7 @@ def import_satellites(
 
 @router.get("")
 def list_satellites(
-    database: DatabaseDep,
+    call: CallDep,
     paging: PagingDep,
     norad_cat_id: Annotated[
         int | None, Query(ge=0, le=999_999_999, description="Only this number.")
@@ -121,7 +120,7 @@ def list_satellites(
     query = by_name(alive(SatelliteRow), SatelliteRow.name, name)
     if norad_cat_id is not None:
         query = query.where(SatelliteRow.norad_cat_id == norad_cat_id)
-    with database.reading() as session:
+    with call.database.reading() as session:
         page = newest_first(session, query, SatelliteRow.id, paging)
         return Listed(items=_shown(session, page.rows), next=page.next)
 
@@ -130,8 +129,7 @@ def list_satellites(
 def get_satellite(satellite_id: str, call: CallDep) -> SatelliteOut | Response:
     """Return one satellite with the element set in force."""
     with call.database.reading() as session:
-        shown = _shown(session, [find_satellite(session, satellite_id)])[0]
-    return unless_known(call.request, call.response, shown)
+        return unless_known(call, _shown(session, [find_satellite(session, satellite_id)])[0])
 
 
 @router.patch("/{satellite_id}", responses=problem_responses(404, 412))
@@ -143,7 +141,7 @@ def change_satellite(satellite_id: str, body: SatellitePatch, call: CallDep) -> 
     with call.database.transaction() as session:
         row = find_satellite(session, satellite_id, to_change=True)
         before = _shown(session, [row])[0]
-        require_match(call.request, lambda: before)
+        require_match(call, lambda: before)
         changed = _changed(session, before, body)
         satellite_from(changed, satellite_id)
         changes = changed.model_dump(mode="json", include=set(SatellitePatch.model_fields))
@@ -152,7 +150,7 @@ def change_satellite(satellite_id: str, body: SatellitePatch, call: CallDep) -> 
         shown = _shown(session, [row])[0]
         if shown != before:
             call.audit.record(session, "update", "satellite", satellite_id)
-    return created(call.response, shown, f"/v1/satellites/{satellite_id}")
+    return located(call, shown, f"/v1/satellites/{satellite_id}")
 
 
 @router.delete("/{satellite_id}", status_code=204, responses=problem_responses(404, 412))
@@ -160,7 +158,7 @@ def delete_satellite(satellite_id: str, call: CallDep) -> None:
     """Delete a satellite. Scenarios that use it keep their copy."""
     with call.database.transaction() as session:
         row = find_satellite(session, satellite_id, to_change=True)
-        require_match(call.request, lambda: _shown(session, [row])[0])
+        require_match(call, lambda: _shown(session, [row])[0])
         row.delete()
         call.audit.record(session, "delete", "satellite", satellite_id)
 
@@ -175,26 +173,22 @@ def put_elements(satellite_id: str, body: OrbitIn, call: CallDep) -> SatelliteOu
     orbit = orbit_from(body)
     with call.database.transaction() as session:
         row = find_satellite(session, satellite_id, to_change=True)
-        require_match(call.request, lambda: _shown(session, [row])[0])
+        require_match(call, lambda: _shown(session, [row])[0])
         _require_same_object(row, orbit.elements.norad_cat_id, body)
         store.add_elements(session, row.id, orbit.elements.epoch, orbit.stored)
         call.audit.record(session, _ADD_ELEMENTS, "satellite", row.id)
         shown = _shown(session, [row])[0]
-    return created(call.response, shown, f"/v1/satellites/{row.id}/elements")
+    return located(call, shown, f"/v1/satellites/{row.id}/elements")
 
 
 @router.get("/{satellite_id}/elements", responses=problem_responses(404))
-def list_elements(
-    satellite_id: str, database: DatabaseDep, paging: PagingDep
-) -> Listed[ElementsOut]:
+def list_elements(satellite_id: str, call: CallDep, paging: PagingDep) -> Listed[ElementsOut]:
     """List all element sets of a satellite, the last stored first."""
     query = sa.select(ElementSetRow).where(ElementSetRow.satellite_id == satellite_id)
-    with database.reading() as session:
+    with call.database.reading() as session:
         find_satellite(session, satellite_id)
         page = newest_first(session, query, ElementSetRow.id, paging)
-    return Listed(
-        items=[from_row(ElementsOut, row, **_told(row.orbit)) for row in page.rows], next=page.next
-    )
+        return page.listed(lambda row: from_row(ElementsOut, row, **_told(row.orbit)))
 
 
 def find_satellite(session: Session, satellite_id: str, *, to_change: bool = False) -> SatelliteRow:

@@ -15,7 +15,7 @@ from planner_core.orbits.places import View
 from planner_core.problem import COLLECT, CONTACT, Opportunities
 from service.access.callers import Caller
 from service.api import job_intake as intake
-from service.api.conditional import created, etag_of, readable, require_match, sent, unless_known
+from service.api.conditional import etag_of, readable, require_match, sent, unless_known
 from service.api.deps import CallDep
 from service.api.errors import problem_responses
 from service.api.filters import NameQuery, SatelliteQuery, StationQuery, StoredDep, by_name
@@ -56,7 +56,7 @@ def create_scenario(body: ScenarioIn, call: CallDep, once: OnceDep) -> ScenarioO
     with once.transaction() as session:
         row, is_new = intake.save(session, call, frozen)
         call.response.status_code = 201 if is_new else 200
-        return once.keep(session, created(call.response, _shown(row), f"/v1/scenarios/{row.id}"))
+        return once.created(session, _shown(row), f"/v1/scenarios/{row.id}")
 
 
 @router.get("")
@@ -78,8 +78,7 @@ def list_scenarios(
     query = query.where(*scenario_store.with_parts(ScenarioRow.id, satellite_id, station_id))
     with call.database.reading() as session:
         weight = size_of(ScenarioRow.summary)
-        page = newest_first(session, query, ScenarioRow.id, paging, weight)
-    return Listed(items=[_summary(row) for row in page.rows], next=page.next)
+        return newest_first(session, query, ScenarioRow.id, paging, weight).listed(_summary)
 
 
 @router.get("/{scenario_id}", response_model=ScenarioOut | ScenarioFile, responses=readable())
@@ -95,8 +94,7 @@ def get_scenario(
         row = _find(session, scenario_id, call.caller)
         if expand:
             return _file(call.request, row)
-        shown = _shown(row)
-    return unless_known(call.request, call.response, shown)
+        return unless_known(call, _shown(row))
 
 
 def _file(request: Request, row: ScenarioRow) -> Response:
@@ -109,7 +107,7 @@ def delete_scenario(scenario_id: str, call: CallDep) -> None:
     """Delete a scenario for good, with its opportunities: not one that jobs have."""
     with call.database.transaction() as session:
         row = _find(session, scenario_id, call.caller)
-        require_match(call.request, lambda: _shown(row))
+        require_match(call, lambda: _shown(row))
         deletion.delete_scenario(session, row)
         call.audit.record(session, "delete", "scenario", scenario_id)
 

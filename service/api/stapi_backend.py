@@ -25,7 +25,7 @@ from service.scenarios.opportunities import Described
 from service.scenarios.spacecraft_views import fleet_of, types_flown, views_of
 from service.scenarios.translate import target_from
 from service.stores import order_store
-from service.stores.finding import find, find_own, no_such, of_owner
+from service.stores.finding import find, no_such, of_owner
 from service.wire.places import TargetIn
 from service.wire.scenarios import FileTarget
 from service.wire.spacecraft_types import BUILT_IN
@@ -174,11 +174,8 @@ def statuses(call: Call, order_id: str) -> list[OrderStatus]:
 
 
 def _find(call: Call, order_id: str) -> tuple[OrderRow, Sequence[Step]]:
-    owner = call.caller.visible_owner
     with call.database.reading() as session:
-        row = find_own(session, OrderRow, order_id, owner)
-        if row is None:
-            raise no_such("order", order_id)
+        row = call.own(session, OrderRow, "order", order_id)
         return row, steps_of(session, [row])[0]
 
 

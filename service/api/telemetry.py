@@ -65,7 +65,7 @@ def report_executions(plan_id: str, data: RawBodyDep, call: CallDep, once: OnceD
     """Report what became of actions. Reports are added, never changed: the last one counts."""
     reports = _reports(call, data, ExecutionIn, ExecutionIn.model_fields, ("action_id", "outcome"))
     with once.transaction() as session:
-        plan = find_plan(session, plan_id, call.caller)
+        plan = find_plan(session, plan_id, call)
         rows = take_down(session, call, plan, reports)
         return once.keep(session, ReportedOut(executions=tuple(map(_execution_out, rows))))
 
@@ -92,10 +92,9 @@ def take_down(
 def list_executions(plan_id: str, call: CallDep, paging: PagingDep) -> Listed[ExecutionOut]:
     """List what was reported of a plan, newest first."""
     with call.database.reading() as session:
-        find_plan(session, plan_id, call.caller)
-        query = plan_store.executions(plan_id)
-        page = newest_first(session, query, ExecutionRow.id, paging)
-    return Listed(items=[_execution_out(row) for row in page.rows], next=page.next)
+        find_plan(session, plan_id, call)
+        page = newest_first(session, plan_store.executions(plan_id), ExecutionRow.id, paging)
+        return page.listed(_execution_out)
 
 
 @router.post(
@@ -115,7 +114,7 @@ def report_states(
     required = ("satellite_id", "at")
     states = _reports(call, data, StateIn, _STATE_COLUMNS, required, _nested, state_from)
     with once.transaction() as session:
-        plan = find_plan(session, plan_id, call.caller)
+        plan = find_plan(session, plan_id, call)
         _require_published(plan)
         require_none(faults_of_states(session, plan, states, ""))
         rows = plan_store.report_states(session, call.caller, plan.id, states)
@@ -127,9 +126,9 @@ def report_states(
 def list_states(plan_id: str, call: CallDep, paging: PagingDep) -> Listed[PlanStateOut]:
     """List telemetry of a plan, newest first."""
     with call.database.reading() as session:
-        find_plan(session, plan_id, call.caller)
+        find_plan(session, plan_id, call)
         page = newest_first(session, plan_store.states(plan_id), PlanStateRow.id, paging)
-    return Listed(items=[_state_out(row) for row in page.rows], next=page.next)
+        return page.listed(_state_out)
 
 
 def faults_of_states(
