@@ -11,7 +11,8 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import AsyncIterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
+from types import SimpleNamespace
 from typing import Any, Final
 
 import httpcore
@@ -23,7 +24,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.access.callers import Caller
 from service.access.callers import Scope as KeyScope
-from service.api.errors import on_http_exception, problem
+from service.api.errors import on_http_exception, on_service_error
 from service.api.slots import Slots
 from service.problems.kinds import ServiceError
 from service.process.logs import request_id
@@ -54,13 +55,6 @@ _AGAIN_S: Final = 5
 
 class Heavy(Exception):
     """What was asked for turns out to be too heavy to be done here; nothing is done yet."""
-
-
-@dataclass(frozen=True, slots=True)
-class _Route:
-    """What metrics ask for of a route that is served elsewhere."""
-
-    path_format: str
 
 
 def require_light(
@@ -112,8 +106,7 @@ class Bulkhead:
             async with self._slots.held(request.state.caller.owner):
                 await self._pass_on(request, receive, send)
         except ServiceError as error:
-            answer = problem(request, error.code, error.detail, headers=error.headers)
-            await answer(scope, receive, send)
+            await on_service_error(request, error)(scope, receive, send)
         except HTTPException as error:
             await on_http_exception(request, error)(scope, receive, send)
         except ClientDisconnect:
@@ -131,8 +124,9 @@ class Bulkhead:
                 extensions={"timeout": dict.fromkeys(("connect", "read", "write"), _WITHIN_S)},
             ) as answer:
                 headers = [pair for pair in answer.headers if pair[0].lower() not in _OF_ONE_HOP]
+                # What metrics ask for of a route.
                 route = dict(headers).get(_ROUTE, b"none").decode()
-                scope["route"] = _Route(route)
+                scope["route"] = SimpleNamespace(path_format=route)
                 headers = [pair for pair in headers if pair[0] != _ROUTE]
                 start = {"type": "http.response.start", "status": answer.status, "headers": headers}
                 is_started = True

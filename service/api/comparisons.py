@@ -9,12 +9,12 @@ from fastapi import APIRouter, Response
 from sqlalchemy.orm import Session
 
 from planner_core.errors import inside
-from service.api import ask_again
 from service.api import job_intake as intake
 from service.api.conditional import readable, require_match, unless_known
 from service.api.deps import Call, CallDep
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
+from service.api.job_shapes import SOON_S
 from service.api.paging import PagingDep, newest_first
 from service.db.rows import ComparisonRow
 from service.jobs import submission
@@ -108,7 +108,7 @@ def _find(session: Session, comparison_id: str, call: Call) -> ComparisonRow:
 
 def _describe(response: Response, shown: ComparisonOut) -> None:
     if shown.state == "running":
-        response.headers["Retry-After"] = str(ask_again.SOON_S)
+        response.headers["Retry-After"] = str(SOON_S)
 
 
 def _shown(session: Session, rows: Sequence[ComparisonRow]) -> list[ComparisonOut]:
@@ -125,10 +125,7 @@ def _table(row: ComparisonRow, runs: list[Run], sha256: str) -> ComparisonOut:
         state="running" if is_active else "finished",
         scenario=ScenarioRef(id=row.scenario_id, sha256=sha256),
         runs=[_line(run) for run in runs],
-        links={
-            "self": f"/v1/comparisons/{row.id}",
-            "scenario": f"/v1/scenarios/{row.scenario_id}",
-        },
+        links={"self": f"/v1/comparisons/{row.id}", "scenario": f"/v1/scenarios/{row.scenario_id}"},
     )
 
 

@@ -30,12 +30,12 @@ logger = logging.getLogger(__name__)
 
 def install_error_handlers(app: FastAPI) -> None:
     """Route every exception, the framework's own included, to a problem document."""
-    app.add_exception_handler(ServiceError, _on_service_error)
-    app.add_exception_handler(PlannerError, _on_planner_error)
-    app.add_exception_handler(RequestValidationError, _on_validation_error)
-    app.add_exception_handler(HTTPException, on_http_exception)
-    app.add_exception_handler(SQLAlchemyError, on_database_error)
-    app.add_exception_handler(Exception, _on_bug)
+    app.exception_handler(ServiceError)(on_service_error)
+    app.exception_handler(PlannerError)(_on_planner_error)
+    app.exception_handler(RequestValidationError)(_on_validation_error)
+    app.exception_handler(HTTPException)(on_http_exception)
+    app.exception_handler(SQLAlchemyError)(on_database_error)
+    app.exception_handler(Exception)(_on_bug)
 
 
 def problem_responses(*statuses: int) -> dict[int | str, dict[str, Any]]:
@@ -93,19 +93,17 @@ def _sendable(text: str) -> str:
     return masked(text.encode("utf-8", "replace").decode())
 
 
-def _on_service_error(request: Request, error: Exception) -> JSONResponse:
-    assert isinstance(error, ServiceError)
+def on_service_error(request: Request, error: ServiceError) -> JSONResponse:
+    """Answer what the service itself has refused."""
     return problem(request, error.code, error.detail, faults=error.faults, headers=error.headers)
 
 
-def _on_planner_error(request: Request, error: Exception) -> JSONResponse:
-    assert isinstance(error, PlannerError)
+def _on_planner_error(request: Request, error: PlannerError) -> JSONResponse:
     return problem(request, error.code, error.detail, faults=(error.fault,))
 
 
-def _on_validation_error(request: Request, error: Exception) -> JSONResponse:
-    assert isinstance(error, RequestValidationError)
-    return _on_service_error(request, refuse(faults_of(error.errors(), error.body)))
+def _on_validation_error(request: Request, error: RequestValidationError) -> JSONResponse:
+    return on_service_error(request, refuse(faults_of(error.errors(), error.body)))
 
 
 _HTTP_CODES = {
@@ -118,9 +116,8 @@ _HTTP_CODES = {
 }
 
 
-def on_http_exception(request: Request, error: Exception) -> JSONResponse:
+def on_http_exception(request: Request, error: HTTPException) -> JSONResponse:
     """Answer what the framework, or a limit of a body, has refused."""
-    assert isinstance(error, HTTPException)
     code = _HTTP_CODES.get(error.status_code)
     if code is None:
         code = "_".join(HTTPStatus(error.status_code).phrase.lower().split())

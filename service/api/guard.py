@@ -13,7 +13,7 @@ from service.access.callers import LOCAL_CALLER, NOBODY, Caller
 from service.access.callers import Scope as KeyScope
 from service.access.rate_limit import RateLimiter
 from service.access.static_keys import StaticKeys
-from service.api.errors import on_database_error, problem
+from service.api.errors import on_database_error, on_service_error
 from service.api.questions import Questions
 from service.api.sites import READING, Sites
 from service.api.slots import Slots
@@ -76,8 +76,7 @@ class Guard:
             if is_limited(scope["path"]):
                 await self._slots.take(caller.owner)
         except ServiceError as error:
-            answer = problem(request, error.code, error.detail, headers=error.headers)
-            await answer(scope, receive, send)
+            await on_service_error(request, error)(scope, receive, send)
             return
         except SQLAlchemyError as error:
             await on_database_error(request, error)(scope, receive, send)

@@ -7,16 +7,16 @@ from datetime import datetime
 from functools import partial
 from typing import Any, Final
 
-from fastapi import Request, Response
+from fastapi import Request
 from sqlalchemy.orm import Session
 
 from planner_core.errors import inside
 from planner_core.solvers.registry import solver_class
 from service.answers import store as answer_store
-from service.api import ask_again, bulkhead
+from service.api import bulkhead
 from service.api.deps import Call
 from service.api.idempotency import Once
-from service.api.job_shapes import headers_of, shown
+from service.api.job_shapes import SOON_S, headers_of, shown
 from service.db.rows import JobRow, ScenarioRow
 from service.jobs.queue import JobQueue
 from service.jobs.solver_params import params_of, parse_params
@@ -177,7 +177,7 @@ def find_job(session: Session, job_id: str) -> JobRow:
 def not_ready(job: JobRow) -> ServiceError:
     """Return the error for a job without an answer, yet or for good."""
     if job.state in ACTIVE:
-        headers = {"Retry-After": str(ask_again.SOON_S)}
+        headers = {"Retry-After": str(SOON_S)}
         return ServiceError("not_ready", f"The job is {job.state}.", headers=headers)
     why = job.error["code"] if job.error else "it was stopped before it had a plan"
     return ServiceError("not_ready", f"The job is {job.state} and left no answer: {why}.")
@@ -204,15 +204,9 @@ def shown_job(session: Session, job: JobRow) -> JobOut:
     return shown(job, store.scenario_hashes(session, [job])[job.scenario_id])
 
 
-def describe(response: Response, job: JobRow) -> None:
-    """Set the headers that every answer about one job has."""
-    response.headers.update(headers_of(job))
-
-
 def queued(session: Session, call: Call, once: Once, queue: JobQueue, spec: JobSpec) -> JobOut:
     """Queue a job; return it, and tell where to follow it."""
     job = submit(session, queue, spec)
     call.audit.record(session, "create", "job", job.id)
-    call.response.headers["Location"] = f"/v1/jobs/{job.id}"
-    describe(call.response, job)
+    call.response.headers.update({"Location": f"/v1/jobs/{job.id}"} | headers_of(job))
     return once.keep(session, shown_job(session, job))

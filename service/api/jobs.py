@@ -10,12 +10,12 @@ from fastapi import APIRouter, Depends, Query, Response
 from sqlalchemy.exc import SQLAlchemyError
 
 from service.api import job_intake as intake
-from service.api.conditional import matches, readable, require_match_of
+from service.api.conditional import known_as, readable, require_match_of
 from service.api.deps import CallDep, own_job_only
 from service.api.errors import problem_responses
 from service.api.filters import SatelliteQuery, StationQuery, StoredDep
 from service.api.idempotency import OnceDep
-from service.api.job_shapes import etag_of_job, shown
+from service.api.job_shapes import etag_of_job, headers_of, shown
 from service.api.job_wait import wait_for_change
 from service.api.paging import PagingDep, newest_first, size_of
 from service.api.questions import QuestionsDep
@@ -94,10 +94,8 @@ async def get_job(
     job, sha256 = await wait_for_change(
         questions, job_id, known, wait, call.request.is_disconnected
     )
-    if matches(known, etag_of_job(job)):
-        return Response(status_code=304, headers={"ETag": etag_of_job(job)})
-    intake.describe(call.response, job)
-    return shown(job, sha256)
+    call.response.headers.update(headers_of(job))
+    return known_as(call, etag_of_job(job)) or shown(job, sha256)
 
 
 @router.post("/{job_id}/cancel", status_code=202, responses=problem_responses(404, 409, 503))
@@ -117,7 +115,7 @@ def cancel_job(job_id: str, call: CallDep) -> JobOut:
         answer = intake.shown_job(session, job)
     if was_waiting:
         _forget(intake.queue_of(call.request), job)
-    intake.describe(call.response, job)
+    call.response.headers.update(headers_of(job))
     return answer
 
 

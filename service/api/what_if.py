@@ -42,10 +42,7 @@ def create_what_if(job_id: str, body: WhatIfIn, call: CallDep, once: OnceDep) ->
         scenario = session.get_one(ScenarioRow, job.scenario_id)
         content, sha256 = scenario.content, scenario.sha256
     asked = Asked(
-        content=content,
-        timeline=timeline,
-        change=body,
-        limits=call.settings.scenario_limits,
+        content=content, timeline=timeline, change=body, limits=call.settings.scenario_limits
     )
     solver, params = _solver(job, body)
     limits = _limits(job, body, call.settings)
