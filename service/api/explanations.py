@@ -11,7 +11,6 @@ from service.api import job_intake as intake
 from service.api.conditional import etag_of, known_as, readable
 from service.api.deps import CallDep, own_job_only
 from service.problems.kinds import ServiceError
-from service.scenarios.opportunities import OpportunityReader
 from service.stores.job_store import hashes_of
 from service.wire.outcomes import ExplanationOut
 
@@ -38,8 +37,7 @@ def get_explanation(
         job = intake.find_job(session, job_id)
         timeline = intake.find_timeline(session, job)
         sha256 = hashes_of(session, [job.scenario_id])[job.scenario_id]
-    reader = cast(OpportunityReader, call.request.app.state.opportunities)
-    described = reader.get(call.database, job.scenario_id, sha256)
+    described = intake.described(call, job.scenario_id, sha256)
     ids = [target.id for target in described.scenario.targets]
     if target_id not in ids:
         raise ServiceError("not_found", f"The job has no target {target_id!r}.")

@@ -55,8 +55,10 @@ def create_ground_station(body: GroundStationIn, once: OnceDep, call: CallDep) -
 @router.post(
     "/import",
     openapi_extra=body_schemas(
-        geojson=("application/geo+json", "A FeatureCollection of points, each with a `name`."),
-        csv=("text/csv", f"A header with some of {', '.join(_CSV_COLUMNS)}."),
+        {
+            "application/geo+json": "A FeatureCollection of points, each with a `name`.",
+            "text/csv": f"A header with some of {', '.join(_CSV_COLUMNS)}.",
+        }
     ),
     responses=problem_responses(413, 415),
 )

@@ -25,6 +25,7 @@ from service.problems.faults import refuse_one
 from service.problems.kinds import ServiceError
 from service.scenarios import freezing
 from service.scenarios.freezing import FrozenScenario
+from service.scenarios.opportunities import Described, OpportunityReader
 from service.scenarios.pin_inputs import with_settled_pins
 from service.scenarios.translate import read_file
 from service.settings import Settings
@@ -36,6 +37,12 @@ from service.wire.replans import ReplanIn
 from service.wire.scenarios import ScenarioFile, ScenarioIn
 
 _QUEUE_FULL_S: Final = 30
+
+
+def described(call: Call, scenario_id: str, sha256: str) -> Described:
+    """Return a scenario and its opportunities; 503 where to compute them takes long."""
+    reader: OpportunityReader = call.request.app.state.opportunities
+    return reader.get(call.database, scenario_id, sha256)
 
 
 def queue_of(request: Request) -> JobQueue:

@@ -36,6 +36,7 @@ _SENTENCE = re.compile(r"(.+?)\.(?:\s+|$)(.*)", re.DOTALL)
 _ALWAYS = (422, 500, 503)
 _WITH_BODY = (413, 415)
 # What each of these answers says about itself, and which request header brings it about.
+_ON_EVERY_ANSWER = {"X-Request-ID": "Names this request in the logs and in problem documents."}
 _ANSWER_HEADERS = {
     "201": {"Location": "Address of what was created.", "ETag": "Of its present form."},
     "202": {"Location": "Where to follow it.", "Retry-After": "Seconds until it is worth asking."},
@@ -57,12 +58,6 @@ _KEYS = {
         "name": "X-API-Key",
         "description": "The same, for clients that cannot set Authorization.",
     },
-}
-_HEADERS = {
-    "X-Request-ID": {
-        "description": "Names this request in the logs and in problem documents.",
-        "schema": {"type": "string"},
-    }
 }
 
 
@@ -107,14 +102,12 @@ def _with_problems(document: dict[str, Any]) -> dict[str, Any]:
             for status, (header, description) in _CONDITIONS.items():
                 if status in operation["responses"]:
                     operation.setdefault("parameters", []).append(
-                        _header_parameter(header, description)
+                        {"name": header, "in": "header", "required": False, **_text(description)}
                     )
             for status, response in operation["responses"].items():
-                of_status = {
-                    name: {"description": text, "schema": {"type": "string"}}
-                    for name, text in _ANSWER_HEADERS.get(status, {}).items()
-                }
-                response["headers"] = _HEADERS | of_status | response.get("headers", {})
+                told = _ON_EVERY_ANSWER | _ANSWER_HEADERS.get(status, {})
+                headers = {name: _text(description) for name, description in told.items()}
+                response["headers"] = headers | response.get("headers", {})
     add_examples(document)
     add_links(document)
     return document
@@ -128,14 +121,8 @@ def _summarise(operation: dict[str, Any]) -> None:
         operation["description"] = rest or f"{first}."
 
 
-def _header_parameter(name: str, description: str) -> dict[str, Any]:
-    return {
-        "name": name,
-        "in": "header",
-        "required": False,
-        "description": description,
-        "schema": {"type": "string"},
-    }
+def _text(description: str) -> dict[str, Any]:
+    return {"description": description, "schema": {"type": "string"}}
 
 
 @router.get("/docs", response_class=HTMLResponse)

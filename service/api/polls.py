@@ -6,6 +6,7 @@ import re
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final, cast
 
 import sqlalchemy as sa
@@ -60,7 +61,7 @@ class Polls:
         self.app = app
         self._polled = [
             _Polled("", _PolledJobs(state).ask),
-            _Polled("/timeline", _PolledTimelines(state).ask, needs_etag=True),
+            _Polled("/timeline", partial(_known_timelines, state), needs_etag=True),
         ]
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -139,22 +140,15 @@ class _PolledJobs:
 
     def ask(self, polls: Sequence[Poll]) -> Mapping[Poll, _Found]:
         database = cast(Database, self._state.database)
-        found: dict[Poll, _Found] = {}
-        changed: dict[Poll, sa.Row[Any]] = {}
         rows = _rows(database, _JOBS, polls)
-        for poll in polls:
-            job_id, known = poll
-            if (row := rows.get(job_id)) is None:
-                continue
-            if matches(known, etag_of_job(row)):
-                found[poll] = _Found(row.tenant, headers_of(row))
-            else:
-                changed[poll] = row
-        whole = self._whole(database, {row.id: row for row in changed.values()})
-        for poll in changed:
-            if poll[0] in whole:
-                found[poll] = whole[poll[0]]
-        return found
+        found = {
+            (job_id, known): _Found(row.tenant, headers_of(row))
+            for job_id, known in polls
+            if (row := rows.get(job_id)) is not None and matches(known, etag_of_job(row))
+        }
+        changed = [poll for poll in polls if poll[0] in rows and poll not in found]
+        whole = self._whole(database, {job_id: rows[job_id] for job_id, _ in changed})
+        return found | {poll: whole[poll[0]] for poll in changed if poll[0] in whole}
 
     def _whole(self, database: Database, rows: Mapping[str, sa.Row[Any]]) -> Mapping[str, _Found]:
         whole: dict[str, _Found] = {}
@@ -180,24 +174,15 @@ class _PolledJobs:
             self._kept.popitem(last=False)
 
 
-class _PolledTimelines:
-    """Timelines, which never change: who has one is told so."""
-
-    def __init__(self, state: State):
-        self._state = state
-
-    def ask(self, polls: Sequence[Poll]) -> Mapping[Poll, _Found]:
-        known = [poll for poll in polls if matches(poll[1], etag_of_timeline(poll[0]))]
-        if not known:
-            return {}
-        rows = _rows(cast(Database, self._state.database), _TIMELINES, known)
-        return {
-            (job_id, tags): _Found(
-                rows[job_id].tenant, {"ETag": etag_of_timeline(job_id), "Vary": "Accept"}
-            )
-            for job_id, tags in known
-            if job_id in rows
-        }
+def _known_timelines(state: State, polls: Sequence[Poll]) -> Mapping[Poll, _Found]:
+    """Return which timelines clients have: they never change."""
+    known = [poll for poll in polls if matches(poll[1], etag_of_timeline(poll[0]))]
+    rows = _rows(cast(Database, state.database), _TIMELINES, known) if known else {}
+    return {
+        poll: _Found(rows[poll[0]].tenant, {"ETag": etag_of_timeline(poll[0]), "Vary": "Accept"})
+        for poll in known
+        if poll[0] in rows
+    }
 
 
 def _rows(

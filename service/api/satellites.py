@@ -72,10 +72,12 @@ def create_satellite(body: SatelliteIn, once: OnceDep, call: CallDep) -> Satelli
 @router.post(
     "/import",
     openapi_extra=body_schemas(
-        tle=("text/plain", "TLE, 2LE or 3LE; or OMM or OEM in the keyword form (KVN)."),
-        json=("application/json", "One OMM; or a list of them, as CelesTrak serves it."),
-        csv=("text/csv", "OMM keywords in the header, one element set a line."),
-        xml=("application/xml", "An omm or oem document, or an ndm with many of one kind."),
+        {
+            "text/plain": "TLE, 2LE or 3LE; or OMM or OEM in the keyword form (KVN).",
+            "application/json": "One OMM; or a list of them, as CelesTrak serves it.",
+            "text/csv": "OMM keywords in the header, one element set a line.",
+            "application/xml": "An omm or oem document, or an ndm with many of one kind.",
+        }
     ),
     responses=problem_responses(413, 415),
 )
@@ -218,9 +220,7 @@ def _changed(session: Session, before: SatelliteOut, body: SatellitePatch) -> Wh
 
 def _merged(before: P, changes: P | None) -> P:
     """Return settings with those that a client has sent in place of their own."""
-    if changes is None:
-        return before
-    sent = {name: getattr(changes, name) for name in changes.model_fields_set}
+    sent = {} if changes is None else changes.model_dump(exclude_unset=True)
     return before.model_copy(update=sent)
 
 
@@ -254,14 +254,11 @@ def _told(orbit: Json) -> Json:
 
 
 def _imported(one: store.ImportedEntry) -> ImportedSatellite:
-    return ImportedSatellite(
-        id=one.satellite.id,
-        name=one.satellite.name,
-        norad_cat_id=one.satellite.norad_cat_id,
+    return from_row(
+        ImportedSatellite,
+        one.satellite,
         epoch=one.entry.elements.epoch,
         row=one.entry.row,
         status=one.status,
-        warnings=[
-            RecordWarning(row=w.row, code=w.code, detail=w.detail) for w in one.entry.warnings
-        ],
+        warnings=[from_row(RecordWarning, warning) for warning in one.entry.warnings],
     )

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Any, cast
+from typing import Annotated, Any
 
 import numpy as np
 import sqlalchemy as sa
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import APIRouter, Query, Response
 from sqlalchemy.orm import Session
 
 from planner_core.access.scenario_opportunities import view_at
@@ -22,7 +22,7 @@ from service.api.filters import NameQuery, SatelliteQuery, StationQuery, StoredD
 from service.api.idempotency import OnceDep
 from service.api.paging import PagingDep, newest_first, size_of
 from service.db.rows import ScenarioRow
-from service.scenarios.opportunities import Described, OpportunityReader
+from service.scenarios.opportunities import Described
 from service.scenarios.stored_question import StoredQuestion
 from service.stores import deletion, scenario_store
 from service.stores.finding import no_such
@@ -36,6 +36,7 @@ from service.wire.scenarios import (
     ScenarioSummary,
     ViewOut,
 )
+from service.wire.stored import from_row
 
 router = APIRouter(prefix="/v1/scenarios", tags=["scenarios"])
 
@@ -93,13 +94,9 @@ def get_scenario(
     with call.database.reading() as session:
         row = _find(session, scenario_id, call.caller)
         if expand:
-            return _file(call.request, row)
+            text = StoredQuestion(row.content).exported(row.name)
+            return sent(call.request, text, "application/json", {"ETag": etag_of(text)})
         return unless_known(call, _shown(row))
-
-
-def _file(request: Request, row: ScenarioRow) -> Response:
-    text = StoredQuestion(row.content).exported(row.name)
-    return sent(request, text, "application/json", {"ETag": etag_of(text)})
 
 
 @router.delete("/{scenario_id}", status_code=204, responses=problem_responses(404, 409, 412))
@@ -129,8 +126,7 @@ def list_opportunities(
     """
     with call.database.reading() as session:
         sha256 = _find(session, scenario_id, call.caller).sha256
-    reader = cast(OpportunityReader, call.request.app.state.opportunities)
-    described = reader.get(call.database, scenario_id, sha256)
+    described = intake.described(call, scenario_id, sha256)
     rows = _matching(described, target_id, satellite_id, kind)
     first = int(np.searchsorted(rows, paging.after_number(), side="right"))
     page = paging.answer(rows[first : first + paging.limit + 1].tolist(), lambda row: row)
@@ -145,11 +141,10 @@ def _edges(described: Described, rows: Sequence[int]) -> list[dict[str, ViewOut]
     chosen = np.array(rows, dtype=np.int64)
     first = view_at(scenario, table, chosen, table.start_s[chosen])
     last = view_at(scenario, table, chosen, table.end_s[chosen])
-    return [{"at_start": _view(first, i), "at_end": _view(last, i)} for i in range(len(rows))]
-
-
-def _view(seen: View, position: int) -> ViewOut:
-    return ViewOut(**_seen(seen, position))
+    return [
+        {"at_start": ViewOut(**_seen(first, i)), "at_end": ViewOut(**_seen(last, i))}
+        for i in range(len(rows))
+    ]
 
 
 def _seen(seen: View | Opportunities, row: int) -> dict[str, Any]:
@@ -181,20 +176,19 @@ def _matching(
 def _opportunity(described: Described, row: int, **edges: ViewOut) -> OpportunityOut:
     scenario, table = described.scenario, described.computed.opportunities
     is_collect = int(table.kind[row]) == COLLECT
-    place = int(table.place[row])
+    places = scenario.targets if is_collect else scenario.ground_stations
+    place = places[int(table.place[row])]
     satellite = scenario.satellites[int(table.satellite[row])]
-    target = scenario.targets[place] if is_collect else None
-    station = None if is_collect else scenario.ground_stations[place]
     at = scenario.horizon.instant
     return OpportunityOut(
         id=f"o{row}",
         satellite_id=satellite.id,
         satellite_name=satellite.name,
         kind="collect" if is_collect else "contact",
-        target_id=None if target is None else target.id,
-        target_name=None if target is None else target.name,
-        station_id=None if station is None else station.id,
-        station_name=None if station is None else station.name,
+        target_id=place.id if is_collect else None,
+        target_name=place.name if is_collect else None,
+        station_id=None if is_collect else place.id,
+        station_name=None if is_collect else place.name,
         start=at(float(table.start_s[row])),
         end=at(float(table.end_s[row])),
         access_start=at(float(table.access_start_s[row])),
@@ -226,5 +220,4 @@ def _summary(row: ScenarioRow) -> ScenarioSummary:
     where = f"/v1/scenarios/{row.id}"
     summary = {name: value for name, value in row.summary.items() if name != "pins"}
     links = {"opportunities": f"{where}/opportunities", "file": f"{where}?expand=true"}
-    own = {"id": row.id, "sha256": row.sha256, "name": row.name, "created_at": row.created_at}
-    return ScenarioSummary(**own, links=links, **summary)
+    return from_row(ScenarioSummary, row, links=links, **summary)

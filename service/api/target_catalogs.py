@@ -20,15 +20,7 @@ from service.api.idempotency import OnceDep
 from service.api.imports import BYTES, request_body
 from service.api.paging import PagingDep, newest_first
 from service.db.rows import TargetCatalogRow, TargetRow
-from service.files.records import (
-    Checked,
-    Record,
-    Records,
-    check,
-    read_csv,
-    read_geojson,
-    read_json,
-)
+from service.files.records import Checked, Record, Records, check, read_csv, read_geojson, read_json
 from service.problems.faults import pointer_to, require_none, validated
 from service.scenarios.translate import target_from
 from service.stores.finding import alive, existing
@@ -79,10 +71,7 @@ _REQUEST_BODY: Final = request_body(
 
 
 @router.post(
-    "",
-    status_code=201,
-    openapi_extra=_REQUEST_BODY,
-    responses=problem_responses(413, 415),
+    "", status_code=201, openapi_extra=_REQUEST_BODY, responses=problem_responses(413, 415)
 )
 def create_target_catalog(
     call: CallDep,
@@ -99,8 +88,7 @@ def create_target_catalog(
         call.count_stored(session, num_rows=len(targets), num_bytes=len(data))
         row = _add(session, found.name or name or _UNNAMED, targets)
         call.audit.record(session, "create", "target_catalog", row.id)
-        location = f"/v1/target-catalogs/{row.id}"
-        shown = located(call, _shown(row), location)
+        shown = located(call, _shown(row), f"/v1/target-catalogs/{row.id}")
         answer = CreatedCatalog(**shown.model_dump(), ignored_columns=list(found.ignored))
         return once.keep(session, answer)
 
@@ -113,17 +101,17 @@ def read_targets(kind: str, data: bytes) -> tuple[Records, list[TargetIn]]:
     ServiceError
         With every fault of the file, where there is any.
     """
-    found = _read(kind, data)
-    return found, _checked(found)
-
-
-def _read(kind: str, data: bytes) -> Records:
     match kind:
         case "text/csv":
-            return read_csv(data, _COLUMNS, _REQUIRED, most=MAX_TARGETS)
+            found = read_csv(data, _COLUMNS, _REQUIRED, most=MAX_TARGETS)
         case "application/geo+json":
-            return read_geojson(data, _COLUMNS, most=MAX_TARGETS)
-    return _read_json(data)
+            found = read_geojson(data, _COLUMNS, most=MAX_TARGETS)
+        case _:
+            found = _read_json(data)
+    good, faults = check(found.records, TargetIn, target_from)
+    faults += [*found.faults, *_faults_of_repeated(good)]
+    require_none(sorted(faults, key=lambda fault: fault.row or 0))
+    return found, [one.body for one in good]
 
 
 def _read_json(data: bytes) -> Records:
@@ -133,14 +121,6 @@ def _read_json(data: bytes) -> Records:
         for position, target in enumerate(body.targets)
     )
     return Records(records=records, name=body.name)
-
-
-def _checked(found: Records) -> list[TargetIn]:
-    good, faults = check(found.records, TargetIn, target_from)
-    faults += found.faults
-    faults += _faults_of_repeated(good)
-    require_none(sorted(faults, key=lambda fault: fault.row or 0))
-    return [one.body for one in good]
 
 
 def _faults_of_repeated(good: Sequence[Checked[TargetIn]]) -> list[Fault]:

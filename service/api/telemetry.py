@@ -67,7 +67,7 @@ def report_executions(plan_id: str, data: RawBodyDep, call: CallDep, once: OnceD
     with once.transaction() as session:
         plan = find_plan(session, plan_id, call)
         rows = take_down(session, call, plan, reports)
-        return once.keep(session, ReportedOut(executions=tuple(map(_execution_out, rows))))
+        return once.keep(session, ReportedOut(executions=[_execution_out(row) for row in rows]))
 
 
 def take_down(
@@ -213,9 +213,7 @@ def _nested(record: Record) -> Record:
         attitude["sun"] = str(sun).lower() in ("true", "1", "yes") or sun
     look = [fields.pop(name, None) for name in _LINE_OF_SIGHT]
     if any(value is not None for value in look):
-        attitude["line_of_sight"] = [
-            float(value) if isinstance(value, int) else value for value in look
-        ]
+        attitude["line_of_sight"] = [float(v) if isinstance(v, int) else v for v in look]
     if attitude:
         fields["attitude"] = attitude
     return Record(fields=fields, row=record.row)

@@ -61,12 +61,8 @@ def timeline_responses(forms: Sequence[Form]) -> dict[int | str, dict[str, Any]]
         # Generated clients take all of these as text, whatever the suffix asks for.
         del content[_JSON]
         content[_JSON] = {"schema": {"anyOf": [_TIMELINE, *other]}}
-    headers = {
-        "Content-Disposition": {
-            "description": "A name to save it under.",
-            "schema": {"type": "string"},
-        }
-    }
+    name = {"description": "A name to save it under.", "schema": {"type": "string"}}
+    headers = {"Content-Disposition": name}
     return {
         200: {"description": "The timeline.", "content": content, "headers": headers},
         **readable(406, 409),
@@ -168,7 +164,7 @@ def _answer(call: Call, job: JobRow, form: Form | None) -> Response:
     """Return a timeline in a form, or as the document itself."""
     suffix = "json" if form is None else form.suffix
     headers = {
-        "ETag": _etag(job.id, form),
+        "ETag": etag_of_timeline(job.id) if form is None else _etag(job.id, form),
         "Vary": "Accept",
         "Content-Disposition": f'inline; filename="timeline-{job.id}.{suffix}"',
     }
@@ -190,8 +186,6 @@ def _answer(call: Call, job: JobRow, form: Form | None) -> Response:
     return StreamingResponse(form.write(answered), media_type=form.media_type, headers=headers)
 
 
-def _etag(job_id: str, form: Form | None) -> str:
-    if form is None:
-        return etag_of_timeline(job_id)
+def _etag(job_id: str, form: Form) -> str:
     # How it is written may change with the version of the service.
     return f'"{job_id}-{form.suffix}-{planner_core.__version__}"'

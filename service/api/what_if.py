@@ -14,7 +14,6 @@ from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
 from service.db.rows import JobRow, ScenarioRow
 from service.jobs import submission
-from service.scenarios.opportunities import OpportunityReader
 from service.settings import Settings
 from service.stores import opportunity_store
 from service.wire.changes import ChangeIn
@@ -46,8 +45,7 @@ def create_what_if(job_id: str, body: WhatIfIn, call: CallDep, once: OnceDep) ->
     )
     solver, params = _solver(job, body)
     limits = _limits(job, body, call.settings)
-    reader = cast(OpportunityReader, call.request.app.state.opportunities)
-    described = reader.get(call.database, job.scenario_id, sha256)
+    described = intake.described(call, job.scenario_id, sha256)
     varied = cast(Variations, call.request.app.state.variations).get(asked, described)
     with once.transaction() as session:
         intake.require_room(session, call)

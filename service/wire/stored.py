@@ -35,7 +35,7 @@ def from_store(model: type[M], values: Mapping[str, Any]) -> M:
         return beyond_ranges(model.model_validate, values, error)
 
 
-def from_row(model: type[M], row: object, **more: object) -> M:
+def from_row(model: type[M], row: object, /, **more: object) -> M:
     """Return a row in a shape: what it has under the names of the shape's fields, and ``more``."""
     names = [name for name in model.model_fields if name not in more and hasattr(row, name)]
     return from_store(model, {name: getattr(row, name) for name in names} | more)
