@@ -16,7 +16,7 @@ from planner_core.errors import Fault
 from service.access.audit import Audit
 from service.access.callers import Caller, Scope
 from service.api.guard import require_scope
-from service.api.questions import QuestionsDep
+from service.api.questions import Questions
 from service.db.columns import Owned
 from service.db.session import Database
 from service.files.told import media_type_told
@@ -52,6 +52,7 @@ class Call:
     caller: Caller
     database: Database
     settings: Settings
+    questions: Questions
     audit: Audit
 
     def count_stored(self, session: Session, *, num_rows: int = 0, num_bytes: int = 0) -> None:
@@ -75,7 +76,7 @@ class Call:
 async def _call(request: Request, response: Response) -> Call:
     caller, state = request.state.caller, request.app.state
     audit = Audit(caller=caller, request_id=request.state.request_id)
-    return Call(request, response, caller, state.database, state.settings, audit)
+    return Call(request, response, caller, state.database, state.settings, state.questions, audit)
 
 
 CallDep = Annotated[Call, Depends(_call)]
@@ -86,13 +87,13 @@ async def admin_only(call: CallDep) -> None:
     require_scope(call.caller, Scope.ADMIN)
 
 
-async def own_job_only(call: CallDep, questions: QuestionsDep) -> None:
+async def own_job_only(call: CallDep) -> None:
     """Let a caller reach only jobs of its own: for it there are no others (404)."""
     job_id = call.request.path_params.get("job_id")
     owner = call.caller.visible_owner
     if job_id is None or owner is None:
         return
-    if await questions.owners.get(job_id) != owner:
+    if await call.questions.owners.get(job_id) != owner:
         raise no_such("job", job_id)
 
 

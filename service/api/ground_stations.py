@@ -159,7 +159,7 @@ def _add(session: Session, body: GroundStationIn) -> GroundStationRow:
 
 def _store(session: Session, good: list[Checked[GroundStationIn]]) -> list[ImportedStation]:
     stored = session.scalars(alive(GroundStationRow)).all()
-    known = {_body(row): row for row in stored}
+    known = {from_store(GroundStationIn, row.body).model_dump_json(): row for row in stored}
     # A name that is there twice, or twice in the file, says nothing about which station is meant.
     of_file = Counter(one.body.name for one in good)
     of_store = Counter(row.name for row in stored)
@@ -184,10 +184,6 @@ def _change(row: GroundStationRow, body: GroundStationIn) -> bool:
     is_other = dumped != row.body
     row.name, row.body = body.name, dumped
     return is_other
-
-
-def _body(row: GroundStationRow) -> str:
-    return from_store(GroundStationIn, row.body).model_dump_json()
 
 
 def _shown(row: GroundStationRow) -> GroundStationOut:

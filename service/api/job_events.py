@@ -16,7 +16,7 @@ from service.api.deps import CallDep, own_job_only
 from service.api.errors import problem_responses
 from service.api.job_shapes import etag_of_job, shown
 from service.api.job_wait import wait_for_change
-from service.api.questions import Questions, QuestionsDep
+from service.api.questions import Questions
 from service.db.failures import why_unavailable
 from service.wire.jobs import ACTIVE, FINAL
 
@@ -40,7 +40,6 @@ _NOTHING_SEEN: Final = "0"
 async def job_events(
     job_id: str,
     call: CallDep,
-    questions: QuestionsDep,
     last_event_id: Annotated[
         str, Header(alias="Last-Event-ID", description="The last event that was seen.")
     ] = "",
@@ -52,13 +51,13 @@ async def job_events(
     database fails: ask again with `Last-Event-ID`. It ends for good with the key it was asked
     for with.
     """
-    job, _ = await wait_for_change(questions, job_id, None, 0.0, _never)
+    job, _ = await wait_for_change(call.questions, job_id, None, 0.0, _never)
     seen = last_event_id or _NOTHING_SEEN
     if job.state in FINAL and seen == str(job.version):
         # What browsers do after a stream has ended is to ask for it again, for ever.
         return Response(status_code=204)
     return StreamingResponse(
-        _events(questions, _Listener(questions, call.caller), job_id, f'"{seen}"'),
+        _events(call.questions, _Listener(call.questions, call.caller), job_id, f'"{seen}"'),
         media_type="text/event-stream",
         headers={"Cache-Control": "no-store"},
     )

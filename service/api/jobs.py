@@ -18,7 +18,6 @@ from service.api.idempotency import OnceDep
 from service.api.job_shapes import etag_of_job, headers_of, shown
 from service.api.job_wait import wait_for_change
 from service.api.paging import PagingDep, newest_first, size_of
-from service.api.questions import QuestionsDep
 from service.db.rows import JobRow
 from service.jobs import lease, submission
 from service.jobs.queue import JobQueue
@@ -79,7 +78,6 @@ def list_jobs(
 async def get_job(
     job_id: str,
     call: CallDep,
-    questions: QuestionsDep,
     wait: Annotated[
         float,
         Query(ge=0, le=LONGEST_WAIT_S, description="Hold so many seconds for a change."),
@@ -92,7 +90,7 @@ async def get_job(
     """
     known = call.request.headers.get("if-none-match")
     job, sha256 = await wait_for_change(
-        questions, job_id, known, wait, call.request.is_disconnected
+        call.questions, job_id, known, wait, call.request.is_disconnected
     )
     call.response.headers.update(headers_of(job))
     return known_as(call, etag_of_job(job)) or shown(job, sha256)

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from datetime import datetime
 from functools import partial
 
-import sqlalchemy as sa
 from fastapi import APIRouter
 from sqlalchemy.orm import Session
 
@@ -32,6 +31,7 @@ from service.scenarios.pin_inputs import with_settled_pins
 from service.scenarios.stored_question import StoredQuestion
 from service.scenarios.translate import read_file
 from service.stores import outage_store
+from service.stores.finding import alive
 from service.wire.jobs import JobOut
 from service.wire.pins import StateIn
 from service.wire.replans import PlanChangeItem, PlanChangesOut, ReplanIn
@@ -63,7 +63,8 @@ def create_replan(plan_id: str, body: ReplanIn, call: CallDep, once: OnceDep) ->
         plan = find_plan(session, plan_id, call)
         if body.executions:
             take_down(session, call, plan, body.executions, "/executions")
-        now = _to_the_millisecond(body.now or clock.now(session))
+        now = body.now or clock.now(session)
+        now = now.replace(microsecond=now.microsecond // 1000 * 1000)
         freeze_until = max(body.freeze_until or now, now)
         happened = _happened(session, plan, body, file, now, freeze_until)
         asked = replanning.replan_file(file, body, happened)
@@ -72,15 +73,8 @@ def create_replan(plan_id: str, body: ReplanIn, call: CallDep, once: OnceDep) ->
                 asked = with_settled_pins(asked)
             frozen = freezing.freeze_file(asked, call.settings.scenario_limits)
         row, _ = intake.save(session, call, frozen, call.caller.owner)
-        spec = job(
-            scenario_id=row.id,
-            change=replans.note_of(plan, call.caller, body.name, freeze_until),
-        )
-        return intake.queued(session, call, once, queue, spec)
-
-
-def _to_the_millisecond(instant: datetime) -> datetime:
-    return instant.replace(microsecond=instant.microsecond // 1000 * 1000)
+        change = replans.note_of(plan, call.caller, body.name, freeze_until)
+        return intake.queued(session, call, once, queue, job(scenario_id=row.id, change=change))
 
 
 def _happened(
@@ -91,11 +85,8 @@ def _happened(
     now: datetime,
     freeze_until: datetime,
 ) -> replanning.Happened:
-    stations = {
-        row.station_id
-        for row in replans.all_actions(session, plan.id)
-        if row.station_id is not None
-    }
+    actions = replans.all_actions(session, plan.id)
+    stations = {row.station_id for row in actions if row.station_id is not None}
     satellites = [row.satellite_id for row in plan_store.satellites(session, [plan.id])[plan.id]]
     stored = outage_store.concerning(
         session, satellites, stations, plan.horizon_start, body.horizon_end or plan.horizon_end
@@ -142,11 +133,8 @@ def _telemetry(
 
 def _newest(session: Session, satellite_ids: Sequence[str]) -> dict[str, FileSatellite]:
     """Return the satellites with their elements of today, those that are still stored."""
-    wanted = sa.select(SatelliteRow.id).where(
-        SatelliteRow.id.in_(satellite_ids), SatelliteRow.deleted_at.is_(None)
-    )
-    stored = freezing.satellites_of(session, list(session.scalars(wanted)))
-    return {str(one.id): one for one in stored}
+    rows = session.scalars(alive(SatelliteRow).where(SatelliteRow.id.in_(satellite_ids)))
+    return {str(one.id): one for one in freezing.satellites_of(session, [row.id for row in rows])}
 
 
 @router.get("/{plan_id}/changes", responses=problem_responses(404))

@@ -162,15 +162,18 @@ def list_outcomes(
 
 def _answer(call: Call, job: JobRow, form: Form | None) -> Response:
     """Return a timeline in a form, or as the document itself."""
-    suffix = "json" if form is None else form.suffix
+    suffix, etag = "json", etag_of_timeline(job.id)
+    if form is not None:
+        # How it is written may change with the version of the service.
+        suffix, etag = form.suffix, f'"{job.id}-{form.suffix}-{planner_core.__version__}"'
     headers = {
-        "ETag": etag_of_timeline(job.id) if form is None else _etag(job.id, form),
+        "ETag": etag,
         "Vary": "Accept",
         "Content-Disposition": f'inline; filename="timeline-{job.id}.{suffix}"',
     }
     with call.database.reading() as session:
         finished_at = intake.require_answer(session, job)
-        if matches(call.request.headers.get("if-none-match"), headers["ETag"]):
+        if matches(call.request.headers.get("if-none-match"), etag):
             return Response(status_code=304, headers=headers)
         contents = answer_store.contents(session, job.id, *TIMELINE, "targets")
         content = "" if form is None else store.content_of(session, job.id)
@@ -184,8 +187,3 @@ def _answer(call: Call, job: JobRow, form: Form | None) -> Response:
         return StreamingResponse(pieces, media_type=_JSON, headers=headers)
     answered = Answered(contents, texts, content, finished_at)
     return StreamingResponse(form.write(answered), media_type=form.media_type, headers=headers)
-
-
-def _etag(job_id: str, form: Form) -> str:
-    # How it is written may change with the version of the service.
-    return f'"{job_id}-{form.suffix}-{planner_core.__version__}"'
