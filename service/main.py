@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from fastapi import Depends, FastAPI
 from starlette.middleware.cors import CORSMiddleware
+from starlette.middleware.exceptions import ExceptionMiddleware
 
 import planner_core
 from service.answers.explanations import Explainer
@@ -45,7 +46,7 @@ from service.api import (
 from service.api.body_limit import BodyLimit
 from service.api.bulkhead import Admitted, Bulkhead
 from service.api.deps import check_request
-from service.api.errors import install_error_handlers
+from service.api.errors import install_error_handlers, refusals
 from service.api.guard import Guard
 from service.api.idempotency import install_replay
 from service.api.middleware import RequestContext
@@ -140,6 +141,7 @@ def create_app(
     app.add_middleware(Polls, state=app.state)
     app.add_middleware(BodyLimit, max_bytes=int(settings.max_body_mb * 1_000_000))
     app.add_middleware(Guard, settings=settings)
+    app.add_middleware(ExceptionMiddleware, handlers=refusals(app))
     if settings.allowed_origins:
         _allow_pages(app, settings.allowed_origins)
     app.add_middleware(SecurityHeaders)

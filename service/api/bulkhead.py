@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import AsyncIterator
+from contextlib import suppress
 from dataclasses import asdict
 from types import SimpleNamespace
 from typing import Any, Final
@@ -18,13 +19,11 @@ from typing import Any, Final
 import httpcore
 from opentelemetry.propagate import inject
 from starlette.datastructures import Headers
-from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect, Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.access.callers import Caller
 from service.access.callers import Scope as KeyScope
-from service.api.errors import on_http_exception, on_service_error
 from service.api.slots import Slots
 from service.problems.kinds import ServiceError
 from service.process.logs import request_id
@@ -102,15 +101,9 @@ class Bulkhead:
                 receive = _again(kept, receive)
             else:
                 return
-        try:
+        with suppress(ClientDisconnect):
             async with self._slots.held(request.state.caller.owner):
                 await self._pass_on(request, receive, send)
-        except ServiceError as error:
-            await on_service_error(request, error)(scope, receive, send)
-        except HTTPException as error:
-            await on_http_exception(request, error)(scope, receive, send)
-        except ClientDisconnect:
-            return
 
     async def _pass_on(self, request: Request, receive: Receive, send: Send) -> None:
         scope = request.scope

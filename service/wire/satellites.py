@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal, TypeVar
 
 from pydantic import AfterValidator, Discriminator, Field, StringConstraints, Tag, model_validator
 from pydantic_core import PydanticCustomError
@@ -24,6 +24,8 @@ from service.wire.base import (
     Wire,
 )
 from service.wire.imports import RejectedRow
+
+R = TypeVar("R")
 
 SunExclusion = Annotated[float | None, Field(ge=0, le=180)]
 PanelAngle = Annotated[float, Field(ge=0, le=180)]
@@ -155,9 +157,7 @@ def _form_of_resources(value: object) -> str:
     return "object" if isinstance(value, (dict, ResourcesIn)) else "preset"
 
 
-def _shortest(
-    resources: Preset | PresetResourcesIn | ResourcesIn,
-) -> Preset | PresetResourcesIn | ResourcesIn:
+def _shortest(resources: R) -> R | Preset:
     """Return a preset that changes nothing by its name alone: one question has one hash."""
     if not isinstance(resources, PresetResourcesIn):
         return resources
@@ -165,13 +165,14 @@ def _shortest(
     return resources.preset if resources == plain else resources
 
 
-ResourcesField = Annotated[
+PresetOr = Annotated[
     Annotated[Preset, Tag("preset")]
     | Annotated[PresetResourcesIn, Tag("changed_preset")]
-    | Annotated[ResourcesIn, Tag("object")],
+    | Annotated[R, Tag("object")],
     Discriminator(_form_of_resources),
     AfterValidator(_shortest),
 ]
+ResourcesField = PresetOr[ResourcesIn]
 
 
 _MOST_LINES: Final = 110_000
@@ -221,13 +222,7 @@ class OwnResources(Body):
     panel_angle_deg: PanelAngle | None = None
 
 
-OwnResourcesField = Annotated[
-    Annotated[Preset, Tag("preset")]
-    | Annotated[PresetResourcesIn, Tag("changed_preset")]
-    | Annotated[OwnResources, Tag("object")],
-    Discriminator(_form_of_resources),
-    AfterValidator(_shortest),
-]
+OwnResourcesField = PresetOr[OwnResources]
 
 
 class Figures(Body):

@@ -10,10 +10,7 @@ from pydantic import BaseModel, ValidationError
 
 M = TypeVar("M", bound=BaseModel)
 
-_BOUNDS: Final = {
-    "greater_than_equal": "ge",
-    "less_than_equal": "le",
-}
+_BOUNDS: Final = {"greater_than_equal": "ge", "less_than_equal": "le"}
 """Kinds of errors that a value within its range does not make, and where the range stands."""
 _PLAIN_TEXT: Final = "stored"
 
