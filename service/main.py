@@ -15,14 +15,12 @@ import planner_core
 from service.answers.explanations import Explainer
 from service.answers.variations import Variations
 from service.api import (
-    audit_events,
     comparisons,
     element_exports,
-    explanations,
     forecasts,
     ground_stations,
-    job_diffs,
     job_events,
+    job_questions,
     jobs,
     meta,
     metrics,
@@ -41,7 +39,6 @@ from service.api import (
     telemetry,
     timelines,
     webhooks,
-    what_if,
 )
 from service.api.body_limit import BodyLimit
 from service.api.bulkhead import Admitted, Bulkhead
@@ -72,9 +69,8 @@ ROUTERS = tuple(
     module.router
     for module in (
         element_exports, satellites, spacecraft, stapi, ground_stations, outages, target_catalogs,
-        targets, forecasts, scenarios, jobs, timelines, explanations, job_diffs, what_if,
-        job_events, comparisons, solvers, plans, telemetry, passes, replans, webhooks, audit_events,
-        meta, metrics, openapi, dashboard,
+        targets, forecasts, scenarios, jobs, timelines, job_questions, job_events, comparisons,
+        solvers, plans, telemetry, passes, replans, webhooks, meta, metrics, openapi, dashboard,
     )
 )  # fmt: skip
 

@@ -12,10 +12,9 @@ from planner_core.errors import Fault
 from service.api.conditional import located, readable, require_match, unless_known
 from service.api.deps import CallDep, RawBodyDep, file_type
 from service.api.errors import problem_responses
-from service.api.filters import NameQuery, by_name
 from service.api.idempotency import OnceDep
 from service.api.imports import OnError, OnErrorQuery, body_schemas, imported, refuse_if_asked
-from service.api.paging import PagingDep, newest_first, size_of
+from service.api.paging import NameQuery, PagingDep, by_name, newest_first, size_of
 from service.db.rows import GroundStationRow
 from service.files.records import Checked, check, read_csv, read_geojson
 from service.problems.faults import validated

@@ -1,10 +1,11 @@
-"""A job's changes as server-sent events."""
+"""A job's changes: waited for without a thread that waits, and sent as events."""
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable, Callable
 from typing import Annotated, Final
 
 from fastapi import APIRouter, Depends, Header, Response
@@ -12,12 +13,14 @@ from fastapi.responses import StreamingResponse
 from sqlalchemy.exc import SQLAlchemyError
 
 from service.access.callers import Caller
+from service.api.conditional import matches
 from service.api.deps import CallDep, own_job_only
 from service.api.errors import problem_responses
 from service.api.job_shapes import etag_of_job, shown
-from service.api.job_wait import wait_for_change
 from service.api.questions import Questions
 from service.db.failures import why_unavailable
+from service.db.rows import JobRow
+from service.stores.finding import no_such
 from service.wire.jobs import ACTIVE, FINAL
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[Depends(own_job_only)])
@@ -26,6 +29,7 @@ log = logging.getLogger(__name__)
 SIGN_OF_LIFE_S: Final = 10.0
 _LOOK_AT_KEY_EVERY_S: Final = 2.0
 _NOTHING_SEEN: Final = "0"
+_LOOK_EVERY_S: Final = 0.1
 
 
 @router.get(
@@ -110,3 +114,44 @@ class _Listener:
             self._next_s = time.monotonic() + _LOOK_AT_KEY_EVERY_S
             self._has_lost_its_key = bool(await self._questions.ended_keys.get(self._key_id))
         return self._has_lost_its_key
+
+
+async def wait_for_change(
+    questions: Questions,
+    job_id: str,
+    known: str | None,
+    wait_s: float,
+    is_disconnected: Callable[[], Awaitable[bool]],
+) -> tuple[JobRow, str]:
+    """Return a job and its scenario's hash, at the latest after ``wait_s``.
+
+    Parameters
+    ----------
+    known
+        The client's ``If-None-Match``: what it has seen; None for what is there now.
+
+    Raises
+    ------
+    ServiceError
+        Where there is no such job.
+    """
+    job, sha256 = await _read(questions, job_id)
+    seen = etag_of_job(job) if known is None else known
+    clock = asyncio.get_running_loop()
+    until_s = clock.time() + wait_s
+    while job.state in ACTIVE and matches(seen, etag_of_job(job)):
+        left_s = until_s - clock.time()
+        if left_s <= 0 or await is_disconnected():
+            break
+        await asyncio.sleep(min(_LOOK_EVERY_S, left_s))
+        # Only a number is read until it moves: many may wait at once.
+        if await questions.versions.get(job_id) != job.version:
+            job, sha256 = await _read(questions, job_id)
+    return job, sha256
+
+
+async def _read(questions: Questions, job_id: str) -> tuple[JobRow, str]:
+    found = await questions.jobs.get(job_id)
+    if found is None:
+        raise no_such("job", job_id)
+    return found

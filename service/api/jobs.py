@@ -13,11 +13,17 @@ from service.api import job_intake as intake
 from service.api.conditional import known_as, readable, require_match_of
 from service.api.deps import CallDep, own_job_only
 from service.api.errors import problem_responses
-from service.api.filters import SatelliteQuery, StationQuery, StoredDep
 from service.api.idempotency import OnceDep
+from service.api.job_events import wait_for_change
 from service.api.job_shapes import etag_of_job, headers_of, shown
-from service.api.job_wait import wait_for_change
-from service.api.paging import PagingDep, newest_first, size_of
+from service.api.paging import (
+    PagingDep,
+    SatelliteQuery,
+    StationQuery,
+    StoredDep,
+    newest_first,
+    size_of,
+)
 from service.db.rows import JobRow
 from service.jobs import lease, submission
 from service.jobs.queue import JobQueue

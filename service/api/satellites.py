@@ -15,10 +15,9 @@ from planner_core.orbits.oem import outline_of
 from service.api.conditional import located, readable, require_match, unless_known
 from service.api.deps import CallDep, RawBodyDep, file_type
 from service.api.errors import problem_responses
-from service.api.filters import NameQuery, by_name
 from service.api.idempotency import OnceDep
 from service.api.imports import OnError, OnErrorQuery, body_schemas, imported, refuse_if_asked
-from service.api.paging import PagingDep, newest_first
+from service.api.paging import NameQuery, PagingDep, by_name, newest_first
 from service.db.rows import ElementSetRow, SatelliteRow
 from service.problems.faults import refuse_one
 from service.scenarios.translate import orbit_from, satellite_from

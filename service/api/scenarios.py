@@ -18,9 +18,17 @@ from service.api import job_intake as intake
 from service.api.conditional import etag_of, readable, require_match, sent, unless_known
 from service.api.deps import CallDep
 from service.api.errors import problem_responses
-from service.api.filters import NameQuery, SatelliteQuery, StationQuery, StoredDep, by_name
 from service.api.idempotency import OnceDep
-from service.api.paging import PagingDep, newest_first, size_of
+from service.api.paging import (
+    NameQuery,
+    PagingDep,
+    SatelliteQuery,
+    StationQuery,
+    StoredDep,
+    by_name,
+    newest_first,
+    size_of,
+)
 from service.db.rows import ScenarioRow
 from service.scenarios.opportunities import Described
 from service.scenarios.stored_question import StoredQuestion

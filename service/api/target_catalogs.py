@@ -15,10 +15,9 @@ from planner_core.errors import Fault
 from service.api.conditional import located, readable, require_match, unless_known
 from service.api.deps import ANY_FILE, CallDep, RawBodyDep, file_type
 from service.api.errors import problem_responses
-from service.api.filters import NameQuery, by_name
 from service.api.idempotency import OnceDep
 from service.api.imports import BYTES, request_body
-from service.api.paging import PagingDep, newest_first
+from service.api.paging import NameQuery, PagingDep, by_name, newest_first
 from service.db.rows import TargetCatalogRow, TargetRow
 from service.files.records import Checked, Record, Records, check, read_csv, read_geojson, read_json
 from service.problems.faults import pointer_to, require_none, validated
