@@ -10,7 +10,7 @@ from sqlalchemy.orm import Session
 
 from planner_core.errors import inside
 from service.api import job_intake as intake
-from service.api.conditional import readable, require_match, unless_known
+from service.api.conditional import matched, readable, unless_known
 from service.api.deps import Call, CallDep
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
@@ -65,9 +65,8 @@ def create_comparison(body: ComparisonIn, call: CallDep, once: OnceDep) -> Compa
         row = submission.submit_comparison(session, queue, specs, label=body.label)
         shown = _shown(session, [row])[0]
         call.audit.record(session, "create", "job", *(run.job_id for run in shown.runs))
-        call.audit.record(session, "create", "comparison", row.id)
         _describe(call.response, shown)
-        return once.created(session, shown, f"/v1/comparisons/{row.id}")
+        return once.created(session, "comparison", row.id, shown)
 
 
 @router.get("")
@@ -92,11 +91,10 @@ def get_comparison(comparison_id: str, call: CallDep) -> ComparisonOut | Respons
 @router.delete("/{comparison_id}", status_code=204, responses=problem_responses(404, 412))
 def delete_comparison(comparison_id: str, call: CallDep) -> None:
     """Delete a comparison. Its runs stay jobs like any other."""
-    with call.database.transaction() as session:
+    with call.noted("delete", "comparison", comparison_id) as session:
         row = _find(session, comparison_id, call)
-        require_match(call, lambda: _shown(session, [row])[0])
+        matched(call, row, lambda row: _shown(session, [row])[0])
         deletion.delete_comparison(session, comparison_id)
-        call.audit.record(session, "delete", "comparison", comparison_id)
 
 
 def _find(session: Session, comparison_id: str, call: Call) -> ComparisonRow:

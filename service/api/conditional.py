@@ -14,6 +14,7 @@ from service.api.errors import problem_responses
 from service.problems.kinds import ServiceError
 
 M = TypeVar("M", bound=BaseModel)
+R = TypeVar("R")
 
 NOT_MODIFIED: Final[dict[int | str, dict[str, Any]]] = {
     304: {"description": "`If-None-Match` names what there is: nothing has changed."}
@@ -83,16 +84,17 @@ def unless_known(call: Call, model: M) -> M | Response:
     return known_as(call, etagged(model)) or model
 
 
-def require_match(call: Call, current: Callable[[], BaseModel]) -> None:
-    """Refuse a change (412) where ``If-Match`` names another state than the current one.
+def matched(call: Call, row: R, show: Callable[[R], BaseModel]) -> R:
+    """Return a row that is to change; 412 where ``If-Match`` names another state than it shows.
 
     Call it in the transaction of the change, with the row locked.
     """
     if "if-match" in call.request.headers:
-        require_match_of(call, etagged(current()))
+        require_match(call, etagged(show(row)))
+    return row
 
 
-def require_match_of(call: Call, etag: str) -> None:
+def require_match(call: Call, etag: str) -> None:
     """Refuse a change (412) where ``If-Match`` names another state than that of this ETag."""
     asked = call.request.headers.get("if-match")
     if asked is not None and not matches_strongly(asked, etag):

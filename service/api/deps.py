@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Annotated, Final, TypeVar
 
@@ -62,6 +63,13 @@ class Call:
         if num_rows or num_bytes:
             usage = usage_store.add(session, owner, num_rows=num_rows, num_bytes=num_bytes)
         usage_store.require(usage, settings.max_rows_per_tenant, settings.max_stored_mb_per_tenant)
+
+    @contextmanager
+    def noted(self, action: str, kind: str, own_id: str) -> Iterator[Session]:
+        """Yield a session that may write; its transaction also notes who did what to what."""
+        with self.database.transaction() as session:
+            yield session
+            self.audit.record(session, action, kind, own_id)
 
     def own(
         self, session: Session, table: type[W], what: str, own_id: str, *, to_change: bool = False

@@ -60,12 +60,9 @@ def get_all_omm(suffix: Suffix, call: CallDep) -> Response:
     """
     require_offered(suffix, _FORMS, _OFFERED)
     with call.database.reading() as session:
-        rows = session.scalars(alive(SatelliteRow).order_by(SatelliteRow.id)).all()
-        messages = [
-            message
-            for first in range(0, len(rows), _AT_ONCE)
-            for message in _messages(session, rows[first : first + _AT_ONCE])
-        ]
+        rows = session.scalars(alive(SatelliteRow).order_by(SatelliteRow.id))
+        parts = rows.partitions(_AT_ONCE)
+        messages = [message for part in parts for message in _messages(session, part)]
     return _answer(call, suffix, messages, "satellites")
 
 

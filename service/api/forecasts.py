@@ -7,7 +7,7 @@ from typing import Annotated, Final
 import sqlalchemy as sa
 from fastapi import APIRouter, Query, Response
 
-from service.api.conditional import readable, require_match, unless_known
+from service.api.conditional import matched, readable, unless_known
 from service.api.deps import ANY_FILE, CallDep, RawBodyDep, file_type
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
@@ -82,8 +82,7 @@ def create_forecast(
         )
         session.add(row)
         session.flush()
-        call.audit.record(session, "create", "forecast", row.id)
-        return once.created(session, _shown(row), f"/v1/forecasts/{row.id}")
+        return once.created(session, "forecast", row.id, _shown(row))
 
 
 @router.get("")
@@ -104,11 +103,9 @@ def get_forecast(forecast_id: str, call: CallDep) -> ForecastOut | Response:
 @router.delete("/{forecast_id}", status_code=204, responses=problem_responses(404, 412))
 def delete_forecast(forecast_id: str, call: CallDep) -> None:
     """Delete a forecast. Scenarios that use it keep what it said of their targets."""
-    with call.database.transaction() as session:
-        row = call.own(session, ForecastRow, "forecast", forecast_id)
-        require_match(call, lambda: _shown(row))
+    with call.noted("delete", "forecast", forecast_id) as session:
+        row = matched(call, call.own(session, ForecastRow, "forecast", forecast_id), _shown)
         session.delete(row)
-        call.audit.record(session, "delete", "forecast", forecast_id)
 
 
 def _shown(row: ForecastRow) -> ForecastOut:

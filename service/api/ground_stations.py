@@ -9,7 +9,7 @@ from fastapi import APIRouter, Response
 from sqlalchemy.orm import Session
 
 from planner_core.errors import Fault
-from service.api.conditional import located, readable, require_match, unless_known
+from service.api.conditional import located, matched, readable, unless_known
 from service.api.deps import CallDep, RawBodyDep, file_type
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
@@ -42,13 +42,12 @@ _IMPORT_TYPES = ("application/geo+json", "application/json", "text/csv")
 
 
 @router.post("", status_code=201)
-def create_ground_station(body: GroundStationIn, once: OnceDep, call: CallDep) -> GroundStationOut:
+def create_ground_station(body: GroundStationIn, once: OnceDep) -> GroundStationOut:
     """Store one ground station."""
     ground_station_from(body, "new")
     with once.transaction() as session:
         row = _add(session, body)
-        call.audit.record(session, "create", "ground_station", row.id)
-        return once.created(session, _shown(row), f"/v1/ground-stations/{row.id}")
+        return once.created(session, "ground_station", row.id, _shown(row))
 
 
 @router.post(
@@ -124,8 +123,7 @@ def change_ground_station(
     `If-Match` takes the ETag of the station.
     """
     with call.database.transaction() as session:
-        row = _find(session, station_id, to_change=True)
-        require_match(call, lambda: _shown(row))
+        row = matched(call, _find(session, station_id, to_change=True), _shown)
         changes = body.model_dump(mode="json", exclude_none=True)
         whole = row.body | changes
         changed = validated(GroundStationIn, whole)  # a stored value may be out of today's range
@@ -139,11 +137,9 @@ def change_ground_station(
 @router.delete("/{station_id}", status_code=204, responses=problem_responses(404, 412))
 def delete_ground_station(station_id: str, call: CallDep) -> None:
     """Delete a ground station. Scenarios that use it keep their copy."""
-    with call.database.transaction() as session:
-        row = _find(session, station_id, to_change=True)
-        require_match(call, lambda: _shown(row))
+    with call.noted("delete", "ground_station", station_id) as session:
+        row = matched(call, _find(session, station_id, to_change=True), _shown)
         row.delete()
-        call.audit.record(session, "delete", "ground_station", station_id)
 
 
 def _find(session: Session, station_id: str, *, to_change: bool = False) -> GroundStationRow:

@@ -77,11 +77,11 @@ class Guard:
 
     async def _admitted(self, request: Request) -> Caller:
         path = request.scope["path"]
-        if is_limited(path):
-            self._sites.check(request.method, request.headers)
+        if not is_limited(path):
+            return NOBODY
+        self._sites.check(request.method, request.headers)
         if is_open(path):
-            if is_limited(path):
-                self._count(request, NOBODY)
+            self._count(request, NOBODY)
             return NOBODY
         try:
             caller = await self._caller(request)

@@ -68,9 +68,11 @@ class Once:
             raise AlreadyAnswered(answer)
 
     def created(
-        self, session: Session, model: M, location: str, shown_once: Collection[str] = ()
+        self, session: Session, kind: str, own_id: str, model: M, shown_once: Collection[str] = ()
     ) -> M:
-        """Return the model of something new, kept with its ``Location`` and ETag."""
+        """Return a new thing of the collection that was called, noted, kept, told where it is."""
+        self._call.audit.record(session, "create", kind, own_id)
+        location = f"{self._call.request.url.path}/{own_id}"
         return self.keep(session, located(self._call, model, location), shown_once)
 
     def keep(self, session: Session, model: M, shown_once: Collection[str] = ()) -> M:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from datetime import datetime
 from functools import partial
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 from fastapi import Request
 from sqlalchemy.orm import Session
@@ -35,6 +35,8 @@ from service.stores.finding import no_such
 from service.wire.jobs import ACTIVE, JobIn, JobOut, LimitsIn, QuestionIn
 from service.wire.replans import ReplanIn
 from service.wire.scenarios import ScenarioFile, ScenarioIn
+
+T = TypeVar("T")
 
 _QUEUE_FULL_S: Final = 30
 
@@ -181,29 +183,25 @@ def find_job(session: Session, job_id: str) -> JobRow:
     return job
 
 
-def not_ready(job: JobRow) -> ServiceError:
-    """Return the error for a job without an answer, yet or for good."""
-    if job.state in ACTIVE:
-        headers = {"Retry-After": str(SOON_S)}
-        return ServiceError("not_ready", f"The job is {job.state}.", headers=headers)
-    why = job.error["code"] if job.error else "it was stopped before it had a plan"
-    return ServiceError("not_ready", f"The job is {job.state} and left no answer: {why}.")
-
-
 def require_answer(session: Session, job: JobRow) -> datetime:
     """Return when a job's answer was stored; 409 where it has none."""
-    finished_at = answer_store.answered_at(session, job.id)
-    if finished_at is None:
-        raise not_ready(job)
-    return finished_at
+    return _left_by(job, answer_store.answered_at(session, job.id))
 
 
 def find_timeline(session: Session, job: JobRow) -> str:
     """Return a job's timeline as JSON text; 409 where there is none."""
-    timeline = answer_store.timeline_of(session, job.id)
-    if timeline is None:
-        raise not_ready(job)
-    return timeline
+    return _left_by(job, answer_store.timeline_of(session, job.id))
+
+
+def _left_by(job: JobRow, answer: T | None) -> T:
+    """Return what a job has left; 409 where that is nothing, yet or for good."""
+    if answer is not None:
+        return answer
+    if job.state in ACTIVE:
+        headers = {"Retry-After": str(SOON_S)}
+        raise ServiceError("not_ready", f"The job is {job.state}.", headers=headers)
+    why = job.error["code"] if job.error else "it was stopped before it had a plan"
+    raise ServiceError("not_ready", f"The job is {job.state} and left no answer: {why}.")
 
 
 def shown_job(session: Session, job: JobRow) -> JobOut:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import Annotated, Any, Final, cast
 
@@ -90,7 +89,7 @@ def _diff(job_id: str, other_id: str, before: str, after: str) -> DiffOut:
         before=job_id,
         after=other_id,
         is_empty=found.is_empty,
-        questions_differ_in=list(_differences(first, second)),
+        questions_differ_in=_differences(first, second),
         added=[names.shown(action) for action in found.added],
         removed=[names.shown(action) for action in found.removed],
         moved=[MovedOut(before=names.shown(a), after=names.shown(b)) for a, b in found.moved],
@@ -101,17 +100,15 @@ def _diff(job_id: str, other_id: str, before: str, after: str) -> DiffOut:
     )
 
 
-def _differences(first: TimelineOut, second: TimelineOut) -> Iterator[Difference]:
-    if first.scenario_sha256 != second.scenario_sha256:
-        yield "scenario"
-    if first.horizon != second.horizon:
-        yield "horizon"
-    if {s.id for s in first.satellites} != {s.id for s in second.satellites}:
-        yield "satellites"
-    if first.use_resources != second.use_resources:
-        yield "use_resources"
-    if first.dynamics != second.dynamics:
-        yield "dynamics"
+def _differences(first: TimelineOut, second: TimelineOut) -> tuple[Difference, ...]:
+    differ: dict[Difference, bool] = {
+        "scenario": first.scenario_sha256 != second.scenario_sha256,
+        "horizon": first.horizon != second.horizon,
+        "satellites": {s.id for s in first.satellites} != {s.id for s in second.satellites},
+        "use_resources": first.use_resources != second.use_resources,
+        "dynamics": first.dynamics != second.dynamics,
+    }
+    return tuple(part for part, is_other in differ.items() if is_other)
 
 
 class _Names:

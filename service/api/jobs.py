@@ -10,7 +10,7 @@ from fastapi import APIRouter, Depends, Query, Response
 from sqlalchemy.exc import SQLAlchemyError
 
 from service.api import job_intake as intake
-from service.api.conditional import known_as, readable, require_match_of
+from service.api.conditional import known_as, readable, require_match
 from service.api.deps import CallDep, own_job_only
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
@@ -105,7 +105,7 @@ async def get_job(
 @router.post("/{job_id}/cancel", status_code=202, responses=problem_responses(404, 409, 503))
 def cancel_job(job_id: str, call: CallDep) -> JobOut:
     """Cancel a job: at once where it waits; a running one stops and keeps its best plan so far."""
-    with call.database.transaction() as session:
+    with call.noted("cancel", "job", job_id) as session:
         job = intake.find_job(session, job_id)
         was_waiting = job.state == "queued"
         if not lease.request_cancel(session, job_id):
@@ -114,7 +114,6 @@ def cancel_job(job_id: str, call: CallDep) -> JobOut:
                 f"The job is {job.state}, which is final: no transition is allowed from there. "
                 "Only queued and running jobs can be cancelled.",
             )
-        call.audit.record(session, "cancel", "job", job_id)
         session.refresh(job)
         answer = intake.shown_job(session, job)
     if was_waiting:
@@ -126,11 +125,10 @@ def cancel_job(job_id: str, call: CallDep) -> JobOut:
 @router.delete("/{job_id}", status_code=204, responses=problem_responses(404, 409, 412))
 def delete_job(job_id: str, call: CallDep) -> None:
     """Delete a finished job with its answer, for good: not one that a plan or a comparison has."""
-    with call.database.transaction() as session:
+    with call.noted("delete", "job", job_id) as session:
         job = intake.find_job(session, job_id)
-        require_match_of(call, etag_of_job(job))
+        require_match(call, etag_of_job(job))
         deletion.delete_job(session, job)
-        call.audit.record(session, "delete", "job", job_id)
 
 
 @router.post("/{job_id}/rerun", status_code=202, responses=problem_responses(404, 503))

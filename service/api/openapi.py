@@ -16,7 +16,6 @@ from pydantic import BaseModel
 from service.api.errors import problem_responses
 from service.api.examples import add_examples
 from service.api.guard import is_limited, is_open
-from service.api.links import add_links
 from service.wire.operations import ProblemOut
 from service.wire.places import TargetCatalogIn
 from service.wire.proofs import ProofOut
@@ -33,6 +32,7 @@ _FURTHER_SCHEMAS: dict[str, type[BaseModel]] = {
 }
 
 _SENTENCE = re.compile(r"(.+?)\.(?:\s+|$)(.*)", re.DOTALL)
+_CREATING = ("200", "201", "202")
 _ALWAYS = (422, 500, 503)
 _WITH_BODY = (413, 415)
 # What each of these answers says about itself, and which request header brings it about.
@@ -109,7 +109,7 @@ def _with_problems(document: dict[str, Any]) -> dict[str, Any]:
                 headers = {name: _text(description) for name, description in told.items()}
                 response["headers"] = headers | response.get("headers", {})
     add_examples(document)
-    add_links(document)
+    _add_links(document)
     return document
 
 
@@ -119,6 +119,36 @@ def _summarise(operation: dict[str, Any]) -> None:
         first, rest = found.groups()
         operation["summary"] = " ".join(first.split())
         operation["description"] = rest or f"{first}."
+
+
+def _add_links(document: dict[str, Any]) -> None:
+    """Link each creating call to every call whose only further need is the new thing's id."""
+    paths = document["paths"]
+    for path, operations in paths.items():
+        if "post" not in operations:
+            continue
+        links = {
+            operation["operationId"]: {
+                "operationId": operation["operationId"],
+                "parameters": {parameter: "$response.body#/id"},
+                "description": operation.get("summary", ""),
+            }
+            for below, parameter in _below(path, paths)
+            for operation in paths[below].values()
+        }
+        for status, response in operations["post"]["responses"].items():
+            if links and status in _CREATING:
+                response["links"] = links
+
+
+def _below(collection: str, paths: dict[str, Any]) -> list[tuple[str, str]]:
+    """Return the paths that begin with one thing of a collection, and what its id is called."""
+    found = []
+    for path in paths:
+        root, slot, _ = path.partition("/{")
+        if slot and root == collection and path.count("{") == 1:
+            found.append((path, path[path.index("{") + 1 : path.index("}")]))
+    return found
 
 
 def _text(description: str) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from datetime import datetime
+from functools import partial
 from typing import Annotated, cast
 
 from fastapi import APIRouter, Query, Response
@@ -10,7 +11,7 @@ from sqlalchemy.orm import Session
 
 from service.access.callers import Scope
 from service.api import job_intake as intake
-from service.api.conditional import etagged, readable, require_match, unless_known
+from service.api.conditional import etagged, matched, readable, unless_known
 from service.api.deps import Call, CallDep
 from service.api.errors import problem_responses
 from service.api.guard import require_scope
@@ -42,11 +43,6 @@ from service.wire.timelines import TimelineOut
 
 router = APIRouter(prefix="/v1/plans", tags=["plans"])
 
-At = Annotated[
-    str | None,
-    Query(description="Only plans in force at this instant; `now` for the present one."),
-]
-
 
 @router.post("", status_code=201, responses=problem_responses(409, 422))
 def create_plan(body: PlanIn, call: CallDep, once: OnceDep) -> PlanOut:
@@ -59,9 +55,8 @@ def create_plan(body: PlanIn, call: CallDep, once: OnceDep) -> PlanOut:
         job = intake.find_job(session, body.job_id)
         timeline = read(TimelineOut, intake.find_timeline(session, job))
         plan = plan_store.add(session, call.caller, owner, job.id, body.name, timeline)
-        call.audit.record(session, "create", "plan", plan.id)
         outbox.tell_plan(session, plan, None, None)
-        return once.created(session, _shown(session, plan), f"/v1/plans/{plan.id}")
+        return once.created(session, "plan", plan.id, _shown(session, plan))
 
 
 @router.get("")
@@ -70,7 +65,10 @@ def list_plans(
     paging: PagingDep,
     state: Annotated[PlanState | None, Query(description="Only plans in this state.")] = None,
     satellite_id: Annotated[str | None, Query(description="Only plans of this satellite.")] = None,
-    at: At = None,
+    at: Annotated[
+        str | None,
+        Query(description="Only plans in force at this instant; `now` for the present one."),
+    ] = None,
     job_id: Annotated[str | None, Query(description="Only plans of this job.")] = None,
     parent_id: Annotated[str | None, Query(description="Only changes of this plan.")] = None,
 ) -> Listed[PlanOut]:
@@ -111,11 +109,10 @@ def get_plan(plan_id: str, call: CallDep) -> PlanOut | Response:
 @router.delete("/{plan_id}", status_code=204, responses=problem_responses(404, 409, 412))
 def delete_plan(plan_id: str, call: CallDep) -> None:
     """Delete a plan for good: not an approved or published one, nor one that has changes."""
-    with call.database.transaction() as session:
+    with call.noted("delete", "plan", plan_id) as session:
         plan = find_plan(session, plan_id, call, to_change=True)
-        require_match(call, lambda: _shown(session, plan))
+        matched(call, plan, partial(_shown, session))
         deletion.delete_plan(session, plan)
-        call.audit.record(session, "delete", "plan", plan_id)
 
 
 @router.post("/{plan_id}/transitions", responses=problem_responses(403, 404, 409, 412, 422))
@@ -134,7 +131,7 @@ def move_plan(plan_id: str, body: TransitionIn, call: CallDep, once: OnceDep) ->
             # Before the plan itself is locked, so that two publishers come one after the other.
             plan_store.lock_publishing(session, find_plan(session, plan_id, call).owner)
         plan = find_plan(session, plan_id, call, to_change=True)
-        require_match(call, lambda: _shown(session, plan))
+        matched(call, plan, partial(_shown, session))
         lifecycle.move(session, call.caller, plan, body)
         call.audit.record(session, body.to, "plan", plan.id)
         shown = _shown(session, plan)

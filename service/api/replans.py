@@ -148,13 +148,12 @@ def list_changes(plan_id: str, call: CallDep) -> PlanChangesOut:
                 parent_id=None, freeze_until=None, changed_share=0.0, forced_share=0.0, items=()
             )
         content = session.get_one(ScenarioRow, job.scenario_id).content
-        rows = {own: replans.all_actions(session, own) for own in (plan.parent_id, plan.id)}
+        rows = [replans.all_actions(session, own) for own in (plan.parent_id, plan.id)]
     assert job.change is not None
     freeze_until = datetime.fromisoformat(job.change["freeze_until"])
     question = StoredQuestion(content)
     before, after = (
-        {planned(row): row for row in rows[own] if row.start >= freeze_until}
-        for own in (plan.parent_id, plan.id)
+        {planned(row): row for row in of_plan if row.start >= freeze_until} for of_plan in rows
     )
     found = changes_of(
         list(before), list(after), lambda one: _is_lost(question, one),

@@ -12,7 +12,7 @@ from sqlalchemy.orm import Session
 
 from planner_core.orbits.ingest import read_elements
 from planner_core.orbits.oem import outline_of
-from service.api.conditional import located, readable, require_match, unless_known
+from service.api.conditional import etagged, located, matched, readable, require_match, unless_known
 from service.api.deps import CallDep, RawBodyDep, file_type
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
@@ -47,13 +47,12 @@ router = APIRouter(prefix="/v1/satellites", tags=["satellites"])
 
 P = TypeVar("P", AgilityIn, SensorIn)
 
-_ADD_ELEMENTS: Final = "add_elements"
-_ACTIONS: Final[dict[store.Status, str]] = {"created": "create", "elements_added": _ADD_ELEMENTS}
+_ACTIONS: Final[dict[store.Status, str]] = {"created": "create", "elements_added": "add_elements"}
 _IMPORT_TYPES = ("text/plain", "application/json", "text/csv", "application/xml", "text/xml")
 
 
 @router.post("", status_code=201, responses=problem_responses(409))
-def create_satellite(body: SatelliteIn, once: OnceDep, call: CallDep) -> SatelliteOut:
+def create_satellite(body: SatelliteIn, once: OnceDep) -> SatelliteOut:
     """Store one satellite.
 
     There is one satellite of a catalogue number: 409 `duplicate_norad_cat_id` names it. Number 0
@@ -64,8 +63,7 @@ def create_satellite(body: SatelliteIn, once: OnceDep, call: CallDep) -> Satelli
         whole = spacecraft_store.completed(session, sent_by(body), WholeSatellite)
         satellite_from(whole, "new")
         row = store.add_satellite(session, whole, orbit.elements, orbit.stored)
-        call.audit.record(session, "create", "satellite", row.id)
-        return once.created(session, _shown(session, [row])[0], f"/v1/satellites/{row.id}")
+        return once.created(session, "satellite", row.id, _shown(session, [row])[0])
 
 
 @router.post(
@@ -142,7 +140,7 @@ def change_satellite(satellite_id: str, body: SatellitePatch, call: CallDep) -> 
     with call.database.transaction() as session:
         row = find_satellite(session, satellite_id, to_change=True)
         before = _shown(session, [row])[0]
-        require_match(call, lambda: before)
+        require_match(call, etagged(before))
         changed = _changed(session, before, body)
         satellite_from(changed, satellite_id)
         changes = changed.model_dump(mode="json", include=set(SatellitePatch.model_fields))
@@ -157,11 +155,10 @@ def change_satellite(satellite_id: str, body: SatellitePatch, call: CallDep) -> 
 @router.delete("/{satellite_id}", status_code=204, responses=problem_responses(404, 412))
 def delete_satellite(satellite_id: str, call: CallDep) -> None:
     """Delete a satellite. Scenarios that use it keep their copy."""
-    with call.database.transaction() as session:
+    with call.noted("delete", "satellite", satellite_id) as session:
         row = find_satellite(session, satellite_id, to_change=True)
-        require_match(call, lambda: _shown(session, [row])[0])
+        matched(call, row, lambda row: _shown(session, [row])[0])
         row.delete()
-        call.audit.record(session, "delete", "satellite", satellite_id)
 
 
 @router.put("/{satellite_id}/elements", responses=problem_responses(404, 412))
@@ -172,12 +169,11 @@ def put_elements(satellite_id: str, body: OrbitIn, call: CallDep) -> SatelliteOu
     the satellite.
     """
     orbit = orbit_from(body)
-    with call.database.transaction() as session:
+    with call.noted("add_elements", "satellite", satellite_id) as session:
         row = find_satellite(session, satellite_id, to_change=True)
-        require_match(call, lambda: _shown(session, [row])[0])
+        matched(call, row, lambda row: _shown(session, [row])[0])
         _require_same_object(row, orbit.elements.norad_cat_id, body)
         store.add_elements(session, row.id, orbit.elements.epoch, orbit.stored)
-        call.audit.record(session, _ADD_ELEMENTS, "satellite", row.id)
         shown = _shown(session, [row])[0]
     return located(call, shown, f"/v1/satellites/{row.id}/elements")
 

@@ -15,7 +15,7 @@ from planner_core.orbits.places import View
 from planner_core.problem import COLLECT, CONTACT, Opportunities
 from service.access.callers import Caller
 from service.api import job_intake as intake
-from service.api.conditional import etag_of, readable, require_match, sent, unless_known
+from service.api.conditional import etag_of, located, matched, readable, sent, unless_known
 from service.api.deps import CallDep
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
@@ -65,7 +65,7 @@ def create_scenario(body: ScenarioIn, call: CallDep, once: OnceDep) -> ScenarioO
     with once.transaction() as session:
         row, is_new = intake.save(session, call, frozen)
         call.response.status_code = 201 if is_new else 200
-        return once.created(session, _shown(row), f"/v1/scenarios/{row.id}")
+        return once.keep(session, located(call, _shown(row), f"/v1/scenarios/{row.id}"))
 
 
 @router.get("")
@@ -110,11 +110,9 @@ def get_scenario(
 @router.delete("/{scenario_id}", status_code=204, responses=problem_responses(404, 409, 412))
 def delete_scenario(scenario_id: str, call: CallDep) -> None:
     """Delete a scenario for good, with its opportunities: not one that jobs have."""
-    with call.database.transaction() as session:
-        row = _find(session, scenario_id, call.caller)
-        require_match(call, lambda: _shown(row))
+    with call.noted("delete", "scenario", scenario_id) as session:
+        row = matched(call, _find(session, scenario_id, call.caller), _shown)
         deletion.delete_scenario(session, row)
-        call.audit.record(session, "delete", "scenario", scenario_id)
 
 
 @router.get("/{scenario_id}/opportunities", responses=problem_responses(404, 503))
@@ -159,8 +157,8 @@ def _seen(seen: View | Opportunities, row: int) -> dict[str, Any]:
     """Return what satellite and place see of each other, as answers have it."""
     angles = ("off_nadir_deg", "elevation_deg", "azimuth_deg", "sun_elevation_deg")
     return {
-        **{name: _rounded(getattr(seen, name)[row]) for name in angles},
-        "range_km": _rounded(seen.range_m[row] / 1000.0),
+        **{name: round(float(getattr(seen, name)[row]), 6) for name in angles},
+        "range_km": round(float(seen.range_m[row]) / 1000.0, 6),
         "eclipse": bool(seen.in_eclipse[row]),
     }
 
@@ -205,10 +203,6 @@ def _opportunity(described: Described, row: int, **edges: ViewOut) -> Opportunit
         **_seen(table, row),
         **edges,
     )
-
-
-def _rounded(value: float) -> float:
-    return round(float(value), 6)
 
 
 def _find(session: Session, scenario_id: str, caller: Caller) -> ScenarioRow:

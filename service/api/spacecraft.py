@@ -7,7 +7,7 @@ from typing import Any, Final
 from fastapi import APIRouter, Response
 from sqlalchemy.orm import Session
 
-from service.api.conditional import located, readable, require_match, unless_known
+from service.api.conditional import etagged, located, matched, readable, require_match, unless_known
 from service.api.deps import CallDep
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
@@ -31,15 +31,14 @@ router = APIRouter(prefix="/v1/spacecraft", tags=["spacecraft"])
 
 
 @router.post("", status_code=201)
-def create_spacecraft(body: SpacecraftIn, once: OnceDep, call: CallDep) -> SpacecraftOut:
+def create_spacecraft(body: SpacecraftIn, once: OnceDep) -> SpacecraftOut:
     """Store a type of spacecraft, for satellites to name."""
     with once.transaction() as session:
         whole = store.completed(session, sent_by(body), WholeSpacecraft, names_type=False)
         figures_from(whole, _ANY_PERIOD_S)
         row = SpacecraftRow(name=whole.name, body=_figures(whole))
         session.add(row)
-        call.audit.record(session, "create", "spacecraft", row.id)
-        return once.created(session, _shown(row), f"/v1/spacecraft/{row.id}")
+        return once.created(session, "spacecraft", row.id, _shown(row))
 
 
 @router.get("")
@@ -69,7 +68,7 @@ def change_spacecraft(spacecraft_id: str, body: SpacecraftPatch, call: CallDep) 
     with call.database.transaction() as session:
         row = _find(session, spacecraft_id, to_change=True)
         before = _shown(row)
-        require_match(call, lambda: before)
+        require_match(call, etagged(before))
         merged = filled({"name": row.name} | sent_by(body), row.body)
         whole = validated(WholeSpacecraft, merged)
         figures_from(whole, _ANY_PERIOD_S)
@@ -83,11 +82,9 @@ def change_spacecraft(spacecraft_id: str, body: SpacecraftPatch, call: CallDep) 
 @router.delete("/{spacecraft_id}", status_code=204, responses=problem_responses(404, 409, 412))
 def delete_spacecraft(spacecraft_id: str, call: CallDep) -> None:
     """Delete a type of one's own. Satellites made from it stay as they are."""
-    with call.database.transaction() as session:
-        row = _find(session, spacecraft_id, to_change=True)
-        require_match(call, lambda: _shown(row))
+    with call.noted("delete", "spacecraft", spacecraft_id) as session:
+        row = matched(call, _find(session, spacecraft_id, to_change=True), _shown)
         row.delete()
-        call.audit.record(session, "delete", "spacecraft", spacecraft_id)
 
 
 def _find(session: Session, spacecraft_id: str, *, to_change: bool = False) -> SpacecraftRow:

@@ -20,7 +20,7 @@ from service.api.stapi_bodies import OrderIn, SearchIn, StapiOpportunity
 from service.db.ids import new_id
 from service.db.rows import OrderRow, SpacecraftRow
 from service.plans.order_tracking import Step, steps_of
-from service.problems.faults import faults_of_validation, refuse, refuse_one
+from service.problems.faults import faults_of_validation, refuse
 from service.scenarios.opportunities import Described
 from service.scenarios.spacecraft_views import fleet_of, types_flown, views_of
 from service.scenarios.translate import target_from
@@ -120,10 +120,7 @@ def _target(asked: SearchIn | OrderIn, own_id: str, product: Found) -> TargetIn:
     fields = {"sensor_type": product.sensor_type}
     if isinstance(asked, OrderIn):
         fields |= asked.order_parameters.model_dump()
-    try:
-        body = asked.as_target(own_id, **fields)
-    except ValueError as error:
-        raise refuse_one("invalid_value", f"{error}.", "/filter") from None
+    body = asked.as_target(own_id, **fields)
     try:
         target = TargetIn.model_validate(body)
     except ValidationError as error:

@@ -12,7 +12,7 @@ from pydantic import Field
 from sqlalchemy.orm import Session
 
 from planner_core.errors import Fault
-from service.api.conditional import located, readable, require_match, unless_known
+from service.api.conditional import located, matched, readable, unless_known
 from service.api.deps import ANY_FILE, CallDep, RawBodyDep, file_type
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
@@ -196,13 +196,11 @@ def change_target_catalog(
 
     Scenarios that use it keep their copy. `If-Match` takes the ETag of the catalogue.
     """
-    with call.database.transaction() as session:
-        row = _find(session, catalog_id, to_change=True)
-        require_match(call, lambda: _shown(row))
+    with call.noted("update", "target_catalog", catalog_id) as session:
+        row = matched(call, _find(session, catalog_id, to_change=True), _shown)
         row.name = body.name or row.name
         _set_rewards(session, catalog_id, body.rewards or {})
         row.changed_at = datetime.now(UTC)
-        call.audit.record(session, "update", "target_catalog", catalog_id)
         shown = _shown(row)
     return located(call, shown, f"/v1/target-catalogs/{catalog_id}")
 
@@ -232,11 +230,9 @@ def _set_rewards(session: Session, catalog_id: str, rewards: Mapping[str, float]
 @router.delete("/{catalog_id}", status_code=204, responses=problem_responses(404, 412))
 def delete_target_catalog(catalog_id: str, call: CallDep) -> None:
     """Delete a catalogue. Scenarios that use it keep their copy."""
-    with call.database.transaction() as session:
-        row = _find(session, catalog_id, to_change=True)
-        require_match(call, lambda: _shown(row))
+    with call.noted("delete", "target_catalog", catalog_id) as session:
+        row = matched(call, _find(session, catalog_id, to_change=True), _shown)
         row.delete()
-        call.audit.record(session, "delete", "target_catalog", catalog_id)
 
 
 def _find(session: Session, catalog_id: str, *, to_change: bool = False) -> TargetCatalogRow:

@@ -67,7 +67,9 @@ def report_executions(plan_id: str, data: RawBodyDep, call: CallDep, once: OnceD
     with once.transaction() as session:
         plan = find_plan(session, plan_id, call)
         rows = take_down(session, call, plan, reports)
-        return once.keep(session, ReportedOut(executions=[_execution_out(row) for row in rows]))
+        return once.keep(
+            session, ReportedOut(executions=[from_row(ExecutionOut, row) for row in rows])
+        )
 
 
 def take_down(
@@ -94,7 +96,7 @@ def list_executions(plan_id: str, call: CallDep, paging: PagingDep) -> Listed[Ex
     with call.database.reading() as session:
         find_plan(session, plan_id, call)
         page = newest_first(session, plan_store.executions(plan_id), ExecutionRow.id, paging)
-        return page.listed(_execution_out)
+        return page.listed(lambda row: from_row(ExecutionOut, row))
 
 
 @router.post(
@@ -177,13 +179,13 @@ def _reports(
     schema: type[B],
     columns: Collection[str],
     required: Collection[str],
-    from_row: Callable[[Record], Record] = lambda record: record,
+    of_row: Callable[[Record], Record] = lambda record: record,
     build: Callable[[B], object] = lambda body: body,
 ) -> list[B]:
     """Return the reports of a body; raises with every fault and its place."""
     if file_type(call.request, data, *_TYPES) == "text/csv":
         found = read_csv(data, columns, required, most=MAX_REPORTED)
-        records = tuple(map(from_row, found.records))
+        records = tuple(map(of_row, found.records))
     else:
         found = _listed(data)
         records = found.records
@@ -217,10 +219,6 @@ def _nested(record: Record) -> Record:
     if attitude:
         fields["attitude"] = attitude
     return Record(fields=fields, row=record.row)
-
-
-def _execution_out(row: ExecutionRow) -> ExecutionOut:
-    return from_row(ExecutionOut, row)
 
 
 def _state_out(row: PlanStateRow) -> PlanStateOut:

@@ -10,7 +10,7 @@ import sqlalchemy as sa
 from fastapi import APIRouter, Response
 from sqlalchemy.orm import Session
 
-from service.api.conditional import readable, require_match, unless_known
+from service.api.conditional import matched, readable, unless_known
 from service.api.deps import Call, CallDep
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
@@ -61,9 +61,8 @@ def create_webhook(body: WebhookIn, call: CallDep, once: OnceDep) -> CreatedWebh
         )
         session.add(row)
         session.flush()
-        call.audit.record(session, "create", "webhook", row.id)
         shown = CreatedWebhook(**_shown(row).model_dump(), secret=row.secret)
-        return once.created(session, shown, f"/v1/webhooks/{row.id}", shown_once={"secret"})
+        return once.created(session, "webhook", row.id, shown, shown_once={"secret"})
 
 
 @router.get("")
@@ -84,13 +83,11 @@ def get_webhook(webhook_id: str, call: CallDep) -> WebhookOut | Response:
 @router.delete("/{webhook_id}", status_code=204, responses=problem_responses(404, 412))
 def delete_webhook(webhook_id: str, call: CallDep) -> None:
     """Delete a webhook and all that was or was to be sent to it."""
-    with call.database.transaction() as session:
-        row = _find(session, webhook_id, call, to_change=True)
-        require_match(call, lambda: _shown(row))
+    with call.noted("delete", "webhook", webhook_id) as session:
+        row = matched(call, _find(session, webhook_id, call, to_change=True), _shown)
         sent = WebhookDeliveryRow.webhook_id == webhook_id
         session.execute(sa.delete(WebhookDeliveryRow).where(sent))
         session.delete(row)
-        call.audit.record(session, "delete", "webhook", webhook_id)
 
 
 @router.post("/{webhook_id}/test", status_code=202, responses=problem_responses(404, 409))

@@ -248,10 +248,8 @@ def sent_by(body: Figures | Patch) -> Json:
     sent = body.model_dump(mode="json", exclude_unset=True, exclude={"resources"})
     if "resources" in body.model_fields_set:
         resources = getattr(body, "resources", None)
-        if isinstance(resources, OwnResources):
+        if isinstance(resources, Body):
             resources = resources.model_dump(mode="json", exclude_none=True)
-        elif isinstance(resources, PresetResourcesIn):
-            resources = resources.model_dump(mode="json")
         sent["resources"] = resources
     return {name: value for name, value in sent.items() if value is not None}
 
