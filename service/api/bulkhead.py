@@ -27,6 +27,7 @@ from service.access.callers import Scope as KeyScope
 from service.api.slots import Slots
 from service.problems.kinds import ServiceError
 from service.process.logs import request_id
+from service.wire.scenarios import ScenarioIn
 
 LIGHT_BYTES: Final = 65_536
 """Of a body that is read where polls are answered."""
@@ -56,12 +57,10 @@ class Heavy(Exception):
     """What was asked for turns out to be too heavy to be done here; nothing is done yet."""
 
 
-def require_light(
-    request: Request, num_targets: int, num_satellites: int, *, has_forecast: bool = False
-) -> None:
+def require_light(request: Request, body: ScenarioIn, num_targets: int) -> None:
     """Leave this request to the process for heavy ones, if there is one and it is large."""
-    is_large = has_forecast or num_targets + 10 * num_satellites > LIGHT_TARGETS
-    if request.scope.get(_IS_LIGHT) and is_large:
+    is_large = num_targets + 10 * len(body.satellite_ids) > LIGHT_TARGETS
+    if request.scope.get(_IS_LIGHT) and (is_large or body.forecast_id is not None):
         raise Heavy
 
 

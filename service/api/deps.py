@@ -28,6 +28,7 @@ from service.stores import usage_store
 from service.stores.finding import find_own, no_such
 from service.wire.base import is_plain
 
+T = TypeVar("T")
 W = TypeVar("W", bound=Owned)
 
 ANY_FILE: Final = "application/octet-stream"
@@ -76,9 +77,14 @@ class Call:
     ) -> W:
         """Return a thing that the caller may see; 404 where there is none, in these words."""
         row = find_own(session, table, own_id, self.caller.visible_owner, to_change=to_change)
-        if row is None:
-            raise no_such(what, own_id)
-        return row
+        return found(row, what, own_id)
+
+
+def found(thing: T | None, what: str, own_id: str) -> T:
+    """Return what was looked for; 404 where there is none, in these words."""
+    if thing is None:
+        raise no_such(what, own_id)
+    return thing
 
 
 async def _call(request: Request, response: Response) -> Call:

@@ -31,8 +31,7 @@ class OnError(StrEnum):
 
 
 OnErrorQuery = Annotated[
-    OnError,
-    Query(description="`skip` stores the good records; `reject_all` stores nothing (422)."),
+    OnError, Query(description="`skip` stores the good records; `reject_all` stores nothing (422).")
 ]
 
 

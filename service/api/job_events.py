@@ -14,13 +14,12 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from service.access.callers import Caller
 from service.api.conditional import matches
-from service.api.deps import CallDep, own_job_only
+from service.api.deps import CallDep, found, own_job_only
 from service.api.errors import problem_responses
 from service.api.job_shapes import etag_of_job, shown
 from service.api.questions import Questions
 from service.db.failures import why_unavailable
 from service.db.rows import JobRow
-from service.stores.finding import no_such
 from service.wire.jobs import ACTIVE, FINAL
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[Depends(own_job_only)])
@@ -151,7 +150,4 @@ async def wait_for_change(
 
 
 async def _read(questions: Questions, job_id: str) -> tuple[JobRow, str]:
-    found = await questions.jobs.get(job_id)
-    if found is None:
-        raise no_such("job", job_id)
-    return found
+    return found(await questions.jobs.get(job_id), "job", job_id)

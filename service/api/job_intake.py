@@ -14,7 +14,7 @@ from planner_core.errors import inside
 from planner_core.solvers.registry import solver_class
 from service.answers import store as answer_store
 from service.api import bulkhead
-from service.api.deps import Call
+from service.api.deps import Call, found
 from service.api.idempotency import Once
 from service.api.job_shapes import SOON_S, headers_of, shown
 from service.db.rows import JobRow, ScenarioRow
@@ -31,7 +31,6 @@ from service.scenarios.translate import read_file
 from service.settings import Settings
 from service.stores import job_store as store
 from service.stores import scenario_store
-from service.stores.finding import no_such
 from service.wire.jobs import ACTIVE, JobIn, JobOut, LimitsIn, QuestionIn
 from service.wire.replans import ReplanIn
 from service.wire.scenarios import ScenarioFile, ScenarioIn
@@ -112,10 +111,7 @@ def freeze(call: Call, body: ScenarioIn) -> FrozenScenario:
     """Return a question over what is stored, ready to be stored: here, where it is not large."""
     with call.database.reading() as session:
         num_targets = freezing.num_targets(session, body.target_catalog_ids)
-    has_forecast = body.forecast_id is not None
-    bulkhead.require_light(
-        call.request, num_targets, len(body.satellite_ids), has_forecast=has_forecast
-    )
+    bulkhead.require_light(call.request, body, num_targets)
     limits = call.settings.scenario_limits
     return freezing.freeze(call.database, body, limits, call.caller.visible_owner)
 
@@ -177,10 +173,7 @@ def require_room(session: Session, call: Call, num_jobs: int = 1) -> None:
 
 def find_job(session: Session, job_id: str) -> JobRow:
     """Return a job; 404 where there is none."""
-    job = session.get(JobRow, job_id)
-    if job is None:
-        raise no_such("job", job_id)
-    return job
+    return found(session.get(JobRow, job_id), "job", job_id)
 
 
 def require_answer(session: Session, job: JobRow) -> datetime:

@@ -85,8 +85,7 @@ async def get_job(
     job_id: str,
     call: CallDep,
     wait: Annotated[
-        float,
-        Query(ge=0, le=LONGEST_WAIT_S, description="Hold so many seconds for a change."),
+        float, Query(ge=0, le=LONGEST_WAIT_S, description="Hold so many seconds for a change.")
     ] = 0.0,
 ) -> JobOut | Response:
     """Return one job.

@@ -172,9 +172,7 @@ def docs(request: Request) -> HTMLResponse:
     page = _PAGE.format(
         style=_STYLE,
         script=_SCRIPT,
-        title=escape(document["info"]["title"]),
-        version=escape(document["info"]["version"]),
-        description=escape(document["info"]["description"]),
+        **{name: escape(text) for name, text in document["info"].items()},
         operations="\n".join(parts),
         models="\n".join(models),
     )

@@ -57,15 +57,11 @@ class Paging:
         """Return the page of up to ``limit + 1`` rows that were read, and set the Link header."""
         if len(rows) <= self.limit:
             return Page(rows, None)
-        cursor = encode_cursor(str(key(rows[self.limit - 1])))
+        last = str(key(rows[self.limit - 1]))
+        cursor = base64.urlsafe_b64encode(last.encode()).decode().rstrip("=")
         url = self.request.url.include_query_params(cursor=cursor)
         self.response.headers["Link"] = f'<{url.path}?{url.query}>; rel="next"'
         return Page(rows[: self.limit], cursor)
-
-
-def encode_cursor(key: str) -> str:
-    """Return the opaque form of a key."""
-    return base64.urlsafe_b64encode(key.encode()).decode().rstrip("=")
 
 
 def decode_cursor(cursor: str) -> str:

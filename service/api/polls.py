@@ -23,6 +23,8 @@ from service.db.rows import JobResultRow, JobRow
 from service.db.session import Database
 from service.stores import job_store
 
+# Ids by their form: one that the database cannot even read would spoil the query of the others.
+_PATH: Final = re.compile(r"/v1/jobs/([0-9a-f-]{36})(/timeline)?")
 _JSON: Final = "application/json"
 _ACCEPTABLE: Final = (None, "*/*", _JSON)
 # Made once: to make and compile a query takes longer than to run it.
@@ -59,10 +61,10 @@ class Polls:
 
     def __init__(self, app: ASGIApp, state: State):
         self.app = app
-        self._polled = [
-            _Polled("", _PolledJobs(state).ask),
-            _Polled("/timeline", partial(_known_timelines, state), needs_etag=True),
-        ]
+        self._polled = {
+            None: _Polled("", _PolledJobs(state).ask),
+            "/timeline": _Polled("/timeline", partial(_known_timelines, state), needs_etag=True),
+        }
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request."""
@@ -72,12 +74,12 @@ class Polls:
     async def _answer(self, scope: Scope) -> Response | None:
         if scope["type"] != "http" or scope["method"] != "GET" or scope["query_string"]:
             return None
-        polled, job_id = self._find(scope["path"])
-        headers = Headers(scope=scope)
+        path, headers = _PATH.fullmatch(scope["path"]), Headers(scope=scope)
         # The other forms of a timeline have other names.
-        if polled is None or headers.get("accept") not in _ACCEPTABLE:
+        if path is None or headers.get("accept") not in _ACCEPTABLE:
             return None
-        known = headers.get("if-none-match")
+        job_id, end = path.groups()
+        polled, known = self._polled[end], headers.get("if-none-match")
         if known is None and polled.needs_etag:
             return None
         try:
@@ -89,12 +91,6 @@ class Polls:
             return None
         scope["route"] = polled
         return found.response()
-
-    def _find(self, path: str) -> tuple[_Polled | None, str]:
-        for polled in self._polled:
-            if job := polled.path.fullmatch(path):
-                return polled, job[1]
-        return None, ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,8 +110,7 @@ class _Found:
 class _Polled:
     """What clients ask for again and again.
 
-    ``path_format`` is that of its route, which metrics ask for. Ids are told by their form, as
-    one that the database cannot even read would spoil the query of the others.
+    ``path_format`` is that of its route, which metrics ask for.
     """
 
     def __init__(
@@ -127,7 +122,6 @@ class _Polled:
     ):
         self.needs_etag = needs_etag
         self.path_format = "/v1/jobs/{job_id}" + end
-        self.path = re.compile(f"/v1/jobs/([0-9a-f-]{{36}}){end}")
         self.answers = Together(ask)
 
 

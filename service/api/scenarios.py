@@ -16,7 +16,7 @@ from planner_core.problem import COLLECT, CONTACT, Opportunities
 from service.access.callers import Caller
 from service.api import job_intake as intake
 from service.api.conditional import etag_of, located, matched, readable, sent, unless_known
-from service.api.deps import CallDep
+from service.api.deps import CallDep, found
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
 from service.api.paging import (
@@ -33,7 +33,6 @@ from service.db.rows import ScenarioRow
 from service.scenarios.opportunities import Described
 from service.scenarios.stored_question import StoredQuestion
 from service.stores import deletion, scenario_store
-from service.stores.finding import no_such
 from service.wire.base import Listed
 from service.wire.scenarios import (
     Kind,
@@ -207,9 +206,7 @@ def _opportunity(described: Described, row: int, **edges: ViewOut) -> Opportunit
 
 def _find(session: Session, scenario_id: str, caller: Caller) -> ScenarioRow:
     row = scenario_store.find(session, scenario_id, caller.visible_owner)
-    if row is None:
-        raise no_such("scenario", scenario_id)
-    return row
+    return found(row, "scenario", scenario_id)
 
 
 def _shown(row: ScenarioRow) -> ScenarioOut:

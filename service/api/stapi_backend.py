@@ -15,7 +15,7 @@ from stapi_pydantic import Opportunity, Order, OrderStatus
 from stapi_pydantic import Product as ProductShown
 
 from planner_core.errors import Fault
-from service.api.deps import Call
+from service.api.deps import Call, found
 from service.api.stapi_bodies import OrderIn, SearchIn, StapiOpportunity
 from service.db.ids import new_id
 from service.db.rows import OrderRow, SpacecraftRow
@@ -51,17 +51,15 @@ class Found:
 def products(call: Call) -> list[Found]:
     """Return the products, by id."""
     with call.database.reading() as session:
-        found = [_product(session, type_id) for type_id in types_flown(session)]
-    return [one for one in found if one is not None]
+        flown = [_product(session, type_id) for type_id in types_flown(session)]
+    return [one for one in flown if one is not None]
 
 
 def find_product(call: Call, product_id: str) -> Found:
     """Return one product; 404 where no satellite is of this type."""
     with call.database.reading() as session:
-        found = _product(session, product_id) if product_id in types_flown(session) else None
-    if found is None:
-        raise no_such("product", product_id)
-    return found
+        product = _product(session, product_id) if product_id in types_flown(session) else None
+    return found(product, "product", product_id)
 
 
 def _product(session: Session, type_id: str) -> Found | None:
@@ -151,12 +149,12 @@ def list_orders(
         count = session.scalar(sa.select(sa.func.count()).select_from(wanted.subquery())) or 0
         if after is not None:
             wanted = wanted.where(OrderRow.id < after)
-        found = session.scalars(wanted.order_by(OrderRow.id.desc()).limit(limit + 1)).all()
-        rows = found[:limit]
+        read = session.scalars(wanted.order_by(OrderRow.id.desc()).limit(limit + 1)).all()
+        rows = read[:limit]
         orders = [
             _order(row, steps) for row, steps in zip(rows, steps_of(session, rows), strict=True)
         ]
-    return orders, rows[-1].id if len(found) > limit else None, count
+    return orders, rows[-1].id if len(read) > limit else None, count
 
 
 def find_order(call: Call, order_id: str) -> Order[OrderStatus]:

@@ -55,8 +55,7 @@ class AgilityIn(Body):
         "sight move, which needs acceleration_deg_s2.",
     )
     sun_exclusion_deg: SunExclusion = Field(
-        None,
-        description="Least angle between boresight and sun in turns, which a flight checks.",
+        None, description="Least angle between boresight and sun in turns, which a flight checks."
     )
 
 
