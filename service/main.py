@@ -137,6 +137,7 @@ def create_app(
     app.add_middleware(Polls, state=app.state)
     app.add_middleware(BodyLimit, max_bytes=int(settings.max_body_mb * 1_000_000))
     app.add_middleware(Guard, settings=settings)
+    # What the door, a limit or the bulkhead raises is answered like what routes raise.
     app.add_middleware(ExceptionMiddleware, handlers=refusals(app))
     if settings.allowed_origins:
         _allow_pages(app, settings.allowed_origins)

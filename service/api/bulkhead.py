@@ -47,7 +47,7 @@ _CALLER: Final = "x-slewline-caller"
 _SCHEME: Final = "x-slewline-scheme"
 _ROUTE: Final = b"x-slewline-route"
 _OF_ONE_HOP: Final = (
-    b"connection", b"keep-alive", b"transfer-encoding", b"expect", b"upgrade", b"te",
+    b"connection", b"keep-alive", b"transfer-encoding", b"expect", b"upgrade", b"te", _ROUTE,
 )  # fmt: skip
 _WITHIN_S: Final = 120.0
 _AGAIN_S: Final = 5
@@ -115,11 +115,10 @@ class Bulkhead:
                 content=_body(receive),
                 extensions={"timeout": dict.fromkeys(("connect", "read", "write"), _WITHIN_S)},
             ) as answer:
-                headers = [pair for pair in answer.headers if pair[0].lower() not in _OF_ONE_HOP]
                 # What metrics ask for of a route.
-                route = dict(headers).get(_ROUTE, b"none").decode()
+                route = dict(answer.headers).get(_ROUTE, b"none").decode()
                 scope["route"] = SimpleNamespace(path_format=route)
-                headers = [pair for pair in headers if pair[0] != _ROUTE]
+                headers = [pair for pair in answer.headers if pair[0].lower() not in _OF_ONE_HOP]
                 start = {"type": "http.response.start", "status": answer.status, "headers": headers}
                 is_started = True
                 await send(start)

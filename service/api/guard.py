@@ -12,7 +12,6 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from service.access.callers import LOCAL_CALLER, NOBODY, Caller
 from service.access.callers import Scope as KeyScope
 from service.access.rate_limit import RateLimiter
-from service.access.static_keys import StaticKeys
 from service.api.questions import Questions
 from service.api.sites import READING, Sites
 from service.api.slots import Slots
@@ -58,7 +57,7 @@ class Guard:
     def __init__(self, app: ASGIApp, settings: Settings):
         self.app = app
         self._keys_required = settings.keys_required
-        self._static_keys: StaticKeys = settings.static_keys
+        self._static_keys = settings.static_keys
         self._sites = Sites(settings.own_hosts, settings.allowed_origins)
         self._slots = Slots(MOST_AT_ONCE, MOST_OF_AN_OWNER)
         per_s = settings.requests_per_s

@@ -9,14 +9,14 @@ import sqlalchemy as sa
 from fastapi import APIRouter, Depends, Path, Query
 
 import planner_core
-from service.api.deps import CallDep, admin_only
+from service.api.deps import CallDep, admin_only, found
 from service.api.errors import problem_responses
 from service.api.paging import PagingDep, newest_first
 from service.db.rows import AuditEventRow, WorkerRow
 from service.db.session import Database
 from service.jobs.queue import JobQueue
 from service.problems.kinds import KINDS, ServiceError
-from service.stores.finding import no_such, with_values
+from service.stores.finding import with_values
 from service.wire.base import Listed
 from service.wire.operations import AuditEventOut, CallerOut, Live, ProblemExplained, Ready, Version
 from service.wire.stored import from_row
@@ -94,6 +94,4 @@ def version() -> Version:
 def explain_problem(code: Annotated[str, Path(examples=["tle-checksum"])]) -> ProblemExplained:
     """Explain a problem code, written with hyphens or underscores."""
     name = code.replace("-", "_")
-    if name not in KINDS:
-        raise no_such("problem code", code)
-    return from_row(ProblemExplained, KINDS[name], code=name)
+    return from_row(ProblemExplained, found(KINDS.get(name), "problem code", code), code=name)

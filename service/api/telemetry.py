@@ -67,9 +67,8 @@ def report_executions(plan_id: str, data: RawBodyDep, call: CallDep, once: OnceD
     with once.transaction() as session:
         plan = find_plan(session, plan_id, call)
         rows = take_down(session, call, plan, reports)
-        return once.keep(
-            session, ReportedOut(executions=[from_row(ExecutionOut, row) for row in rows])
-        )
+        executions = [from_row(ExecutionOut, row) for row in rows]
+        return once.keep(session, ReportedOut(executions=executions))
 
 
 def take_down(
