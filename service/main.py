@@ -9,19 +9,18 @@ from typing import TYPE_CHECKING
 
 from fastapi import Depends, FastAPI
 from starlette.middleware.cors import CORSMiddleware
+from starlette.middleware.exceptions import ExceptionMiddleware
 
 import planner_core
 from service.answers.explanations import Explainer
 from service.answers.variations import Variations
 from service.api import (
-    audit_events,
     comparisons,
     element_exports,
-    explanations,
     forecasts,
     ground_stations,
-    job_diffs,
     job_events,
+    job_questions,
     jobs,
     meta,
     metrics,
@@ -40,12 +39,11 @@ from service.api import (
     telemetry,
     timelines,
     webhooks,
-    what_if,
 )
 from service.api.body_limit import BodyLimit
 from service.api.bulkhead import Admitted, Bulkhead
 from service.api.deps import check_request
-from service.api.errors import install_error_handlers
+from service.api.errors import install_error_handlers, refusals
 from service.api.guard import Guard
 from service.api.idempotency import install_replay
 from service.api.middleware import RequestContext
@@ -71,9 +69,8 @@ ROUTERS = tuple(
     module.router
     for module in (
         element_exports, satellites, spacecraft, stapi, ground_stations, outages, target_catalogs,
-        targets, forecasts, scenarios, jobs, timelines, explanations, job_diffs, what_if,
-        job_events, comparisons, solvers, plans, telemetry, passes, replans, webhooks, audit_events,
-        meta, metrics, openapi, dashboard,
+        targets, forecasts, scenarios, jobs, timelines, job_questions, job_events, comparisons,
+        solvers, plans, telemetry, passes, replans, webhooks, meta, metrics, openapi, dashboard,
     )
 )  # fmt: skip
 
@@ -140,6 +137,8 @@ def create_app(
     app.add_middleware(Polls, state=app.state)
     app.add_middleware(BodyLimit, max_bytes=int(settings.max_body_mb * 1_000_000))
     app.add_middleware(Guard, settings=settings)
+    # What the door, a limit or the bulkhead raises is answered like what routes raise.
+    app.add_middleware(ExceptionMiddleware, handlers=refusals(app))
     if settings.allowed_origins:
         _allow_pages(app, settings.allowed_origins)
     app.add_middleware(SecurityHeaders)

@@ -7,10 +7,9 @@ from typing import Final
 
 from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
-from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.api.errors import problem
+from service.problems.kinds import ServiceError
 
 PART_WITHIN_S: Final = 20.0
 """Between two parts of a body."""
@@ -45,14 +44,10 @@ class BodyLimit:
         if coding not in ("", "identity"):
             detail = f"Content-Encoding is {coding[:80]!a}; send the body as it is."
             accepted = {"Accept-Encoding": "identity"}
-            response = problem(Request(scope), "unsupported_media_type", detail, headers=accepted)
-            await response(scope, receive, send)
-            return
+            raise ServiceError("unsupported_media_type", detail, headers=accepted)
         declared = headers.get("content-length", "")
         if declared.isdigit() and int(declared) > self.max_bytes:
-            response = problem(Request(scope), "body_too_large", self._too_many_bytes())
-            await response(scope, receive, send)
-            return
+            raise HTTPException(413, self._too_many_bytes())
         is_json = "json" in headers.get("content-type", "").lower()
         opening = b""
         num_bytes = num_values = num_commas = 0

@@ -11,22 +11,23 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import AsyncIterator
-from dataclasses import asdict, dataclass
+from contextlib import suppress
+from dataclasses import asdict
+from types import SimpleNamespace
 from typing import Any, Final
 
 import httpcore
 from opentelemetry.propagate import inject
 from starlette.datastructures import Headers
-from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect, Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.access.callers import Caller
 from service.access.callers import Scope as KeyScope
-from service.api.errors import on_http_exception, problem
 from service.api.slots import Slots
 from service.problems.kinds import ServiceError
 from service.process.logs import request_id
+from service.wire.scenarios import ScenarioIn
 
 LIGHT_BYTES: Final = 65_536
 """Of a body that is read where polls are answered."""
@@ -46,7 +47,7 @@ _CALLER: Final = "x-slewline-caller"
 _SCHEME: Final = "x-slewline-scheme"
 _ROUTE: Final = b"x-slewline-route"
 _OF_ONE_HOP: Final = (
-    b"connection", b"keep-alive", b"transfer-encoding", b"expect", b"upgrade", b"te",
+    b"connection", b"keep-alive", b"transfer-encoding", b"expect", b"upgrade", b"te", _ROUTE,
 )  # fmt: skip
 _WITHIN_S: Final = 120.0
 _AGAIN_S: Final = 5
@@ -56,19 +57,10 @@ class Heavy(Exception):
     """What was asked for turns out to be too heavy to be done here; nothing is done yet."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Route:
-    """What metrics ask for of a route that is served elsewhere."""
-
-    path_format: str
-
-
-def require_light(
-    request: Request, num_targets: int, num_satellites: int, *, has_forecast: bool = False
-) -> None:
+def require_light(request: Request, body: ScenarioIn, num_targets: int) -> None:
     """Leave this request to the process for heavy ones, if there is one and it is large."""
-    is_large = has_forecast or num_targets + 10 * num_satellites > LIGHT_TARGETS
-    if request.scope.get(_IS_LIGHT) and is_large:
+    is_large = num_targets + 10 * len(body.satellite_ids) > LIGHT_TARGETS
+    if request.scope.get(_IS_LIGHT) and (is_large or body.forecast_id is not None):
         raise Heavy
 
 
@@ -108,16 +100,9 @@ class Bulkhead:
                 receive = _again(kept, receive)
             else:
                 return
-        try:
+        with suppress(ClientDisconnect):
             async with self._slots.held(request.state.caller.owner):
                 await self._pass_on(request, receive, send)
-        except ServiceError as error:
-            answer = problem(request, error.code, error.detail, headers=error.headers)
-            await answer(scope, receive, send)
-        except HTTPException as error:
-            await on_http_exception(request, error)(scope, receive, send)
-        except ClientDisconnect:
-            return
 
     async def _pass_on(self, request: Request, receive: Receive, send: Send) -> None:
         scope = request.scope
@@ -130,10 +115,10 @@ class Bulkhead:
                 content=_body(receive),
                 extensions={"timeout": dict.fromkeys(("connect", "read", "write"), _WITHIN_S)},
             ) as answer:
+                # What metrics ask for of a route.
+                route = dict(answer.headers).get(_ROUTE, b"none").decode()
+                scope["route"] = SimpleNamespace(path_format=route)
                 headers = [pair for pair in answer.headers if pair[0].lower() not in _OF_ONE_HOP]
-                route = dict(headers).get(_ROUTE, b"none").decode()
-                scope["route"] = _Route(route)
-                headers = [pair for pair in headers if pair[0] != _ROUTE]
                 start = {"type": "http.response.start", "status": answer.status, "headers": headers}
                 is_started = True
                 await send(start)

@@ -9,12 +9,12 @@ from fastapi import APIRouter, Response
 from sqlalchemy.orm import Session
 
 from planner_core.errors import inside
-from service.api import ask_again
 from service.api import job_intake as intake
-from service.api.conditional import created, readable, require_match, unless_known
+from service.api.conditional import matched, readable, unless_known
 from service.api.deps import Call, CallDep
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
+from service.api.job_shapes import SOON_S
 from service.api.paging import PagingDep, newest_first
 from service.db.rows import ComparisonRow
 from service.jobs import submission
@@ -65,10 +65,8 @@ def create_comparison(body: ComparisonIn, call: CallDep, once: OnceDep) -> Compa
         row = submission.submit_comparison(session, queue, specs, label=body.label)
         shown = _shown(session, [row])[0]
         call.audit.record(session, "create", "job", *(run.job_id for run in shown.runs))
-        call.audit.record(session, "create", "comparison", row.id)
-        shown = created(call.response, shown, f"/v1/comparisons/{row.id}")
         _describe(call.response, shown)
-        return once.keep(session, shown)
+        return once.created(session, "comparison", row.id, shown)
 
 
 @router.get("")
@@ -87,17 +85,16 @@ def get_comparison(comparison_id: str, call: CallDep) -> ComparisonOut | Respons
     with call.database.reading() as session:
         shown = _shown(session, [_find(session, comparison_id, call)])[0]
     _describe(call.response, shown)
-    return unless_known(call.request, call.response, shown)
+    return unless_known(call, shown)
 
 
 @router.delete("/{comparison_id}", status_code=204, responses=problem_responses(404, 412))
 def delete_comparison(comparison_id: str, call: CallDep) -> None:
     """Delete a comparison. Its runs stay jobs like any other."""
-    with call.database.transaction() as session:
+    with call.noted("delete", "comparison", comparison_id) as session:
         row = _find(session, comparison_id, call)
-        require_match(call.request, lambda: _shown(session, [row])[0])
+        matched(call, row, lambda row: _shown(session, [row])[0])
         deletion.delete_comparison(session, comparison_id)
-        call.audit.record(session, "delete", "comparison", comparison_id)
 
 
 def _find(session: Session, comparison_id: str, call: Call) -> ComparisonRow:
@@ -109,7 +106,7 @@ def _find(session: Session, comparison_id: str, call: Call) -> ComparisonRow:
 
 def _describe(response: Response, shown: ComparisonOut) -> None:
     if shown.state == "running":
-        response.headers["Retry-After"] = str(ask_again.SOON_S)
+        response.headers["Retry-After"] = str(SOON_S)
 
 
 def _shown(session: Session, rows: Sequence[ComparisonRow]) -> list[ComparisonOut]:
@@ -126,10 +123,7 @@ def _table(row: ComparisonRow, runs: list[Run], sha256: str) -> ComparisonOut:
         state="running" if is_active else "finished",
         scenario=ScenarioRef(id=row.scenario_id, sha256=sha256),
         runs=[_line(run) for run in runs],
-        links={
-            "self": f"/v1/comparisons/{row.id}",
-            "scenario": f"/v1/scenarios/{row.scenario_id}",
-        },
+        links={"self": f"/v1/comparisons/{row.id}", "scenario": f"/v1/scenarios/{row.scenario_id}"},
     )
 
 

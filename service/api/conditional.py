@@ -9,10 +9,12 @@ from typing import Any, Final, TypeVar
 from fastapi import Request, Response
 from pydantic import BaseModel
 
+from service.api.deps import Call
 from service.api.errors import problem_responses
 from service.problems.kinds import ServiceError
 
 M = TypeVar("M", bound=BaseModel)
+R = TypeVar("R")
 
 NOT_MODIFIED: Final[dict[int | str, dict[str, Any]]] = {
     304: {"description": "`If-None-Match` names what there is: nothing has changed."}
@@ -61,9 +63,10 @@ def readable(*statuses: int) -> dict[int | str, dict[str, Any]]:
     return {**NOT_MODIFIED, **problem_responses(404, *statuses)}
 
 
-def known_as(request: Request, etag: str) -> Response | None:
-    """Return 304 where ``If-None-Match`` names this ETag, else None."""
-    is_known = matches(request.headers.get("if-none-match"), etag)
+def known_as(call: Call, etag: str) -> Response | None:
+    """Give the answer this ETag; return 304 where ``If-None-Match`` names it, else None."""
+    call.response.headers["ETag"] = etag
+    is_known = matches(call.request.headers.get("if-none-match"), etag)
     return Response(status_code=304, headers={"ETag": etag}) if is_known else None
 
 
@@ -76,24 +79,24 @@ def sent(
     return Response(content, media_type=media_type, headers=headers)
 
 
-def unless_known(request: Request, response: Response, model: M) -> M | Response:
+def unless_known(call: Call, model: M) -> M | Response:
     """Return the model with its ETag, or 304 where ``If-None-Match`` names that ETag."""
-    response.headers["ETag"] = etag = etagged(model)
-    return known_as(request, etag) or model
+    return known_as(call, etagged(model)) or model
 
 
-def require_match(request: Request, current: Callable[[], BaseModel]) -> None:
-    """Refuse a change (412) where ``If-Match`` names another state than the current one.
+def matched(call: Call, row: R, show: Callable[[R], BaseModel]) -> R:
+    """Return a row that is to change; 412 where ``If-Match`` names another state than it shows.
 
     Call it in the transaction of the change, with the row locked.
     """
-    if request.headers.get("if-match") is not None:
-        require_match_of(request, etagged(current()))
+    if "if-match" in call.request.headers:
+        require_match(call, etagged(show(row)))
+    return row
 
 
-def require_match_of(request: Request, etag: str) -> None:
+def require_match(call: Call, etag: str) -> None:
     """Refuse a change (412) where ``If-Match`` names another state than that of this ETag."""
-    asked = request.headers.get("if-match")
+    asked = call.request.headers.get("if-match")
     if asked is not None and not matches_strongly(asked, etag):
         raise ServiceError(
             "precondition_failed",
@@ -102,8 +105,7 @@ def require_match_of(request: Request, etag: str) -> None:
         )
 
 
-def created(response: Response, model: M, location: str) -> M:
-    """Return the model of something new, with its ``Location`` and ETag."""
-    response.headers["Location"] = location
-    response.headers["ETag"] = etagged(model)
+def located(call: Call, model: M, location: str) -> M:
+    """Return the model of something new or changed, with its ``Location`` and ETag."""
+    call.response.headers.update({"Location": location, "ETag": etagged(model)})
     return model

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Annotated, Final, cast
+from typing import Annotated, Final, TypeVar
 
 from fastapi import Depends, Request, Response
 from fastapi.dependencies.models import Dependant
@@ -16,15 +17,19 @@ from planner_core.errors import Fault
 from service.access.audit import Audit
 from service.access.callers import Caller, Scope
 from service.api.guard import require_scope
-from service.api.questions import QuestionsDep
+from service.api.questions import Questions
+from service.db.columns import Owned
 from service.db.session import Database
 from service.files.told import media_type_told
 from service.problems.faults import require_none
 from service.problems.kinds import ServiceError
 from service.settings import Settings
 from service.stores import usage_store
-from service.stores.finding import no_such
+from service.stores.finding import find_own, no_such
 from service.wire.base import is_plain
+
+T = TypeVar("T")
+W = TypeVar("W", bound=Owned)
 
 ANY_FILE: Final = "application/octet-stream"
 """A file of any form that a call takes. Generated clients can often send nothing else."""
@@ -33,26 +38,11 @@ ANY_FILE: Final = "application/octet-stream"
 # work itself.
 
 
-async def _database(request: Request) -> Database:
-    return cast(Database, request.app.state.database)
-
-
-async def _settings(request: Request) -> Settings:
-    return cast(Settings, request.app.state.settings)
-
-
 async def _raw_body(request: Request) -> bytes:
     return await request.body()
 
 
-async def _caller(request: Request) -> Caller:
-    return cast(Caller, request.state.caller)
-
-
-DatabaseDep = Annotated[Database, Depends(_database)]
-SettingsDep = Annotated[Settings, Depends(_settings)]
 RawBodyDep = Annotated[bytes, Depends(_raw_body)]
-CallerDep = Annotated[Caller, Depends(_caller)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +54,7 @@ class Call:
     caller: Caller
     database: Database
     settings: Settings
+    questions: Questions
     audit: Audit
 
     def count_stored(self, session: Session, *, num_rows: int = 0, num_bytes: int = 0) -> None:
@@ -74,39 +65,55 @@ class Call:
             usage = usage_store.add(session, owner, num_rows=num_rows, num_bytes=num_bytes)
         usage_store.require(usage, settings.max_rows_per_tenant, settings.max_stored_mb_per_tenant)
 
+    @contextmanager
+    def noted(self, action: str, kind: str, own_id: str) -> Iterator[Session]:
+        """Yield a session that may write; its transaction also notes who did what to what."""
+        with self.database.transaction() as session:
+            yield session
+            self.audit.record(session, action, kind, own_id)
+
+    def own(
+        self, session: Session, table: type[W], what: str, own_id: str, *, to_change: bool = False
+    ) -> W:
+        """Return a thing that the caller may see; 404 where there is none, in these words."""
+        row = find_own(session, table, own_id, self.caller.visible_owner, to_change=to_change)
+        return found(row, what, own_id)
+
+
+def found(thing: T | None, what: str, own_id: str) -> T:
+    """Return what was looked for; 404 where there is none, in these words."""
+    if thing is None:
+        raise no_such(what, own_id)
+    return thing
+
 
 async def _call(request: Request, response: Response) -> Call:
     caller, state = request.state.caller, request.app.state
     audit = Audit(caller=caller, request_id=request.state.request_id)
-    return Call(request, response, caller, state.database, state.settings, audit)
+    return Call(request, response, caller, state.database, state.settings, state.questions, audit)
 
 
 CallDep = Annotated[Call, Depends(_call)]
 
 
-async def admin_only(caller: CallerDep) -> None:
+async def admin_only(call: CallDep) -> None:
     """Refuse callers without the scope `admin`."""
-    require_scope(caller, Scope.ADMIN)
+    require_scope(call.caller, Scope.ADMIN)
 
 
-async def own_job_only(request: Request, caller: CallerDep, questions: QuestionsDep) -> None:
+async def own_job_only(call: CallDep) -> None:
     """Let a caller reach only jobs of its own: for it there are no others (404)."""
-    job_id = request.path_params.get("job_id")
-    owner = caller.visible_owner
+    job_id = call.request.path_params.get("job_id")
+    owner = call.caller.visible_owner
     if job_id is None or owner is None:
         return
-    if await questions.owners.get(job_id) != owner:
+    if await call.questions.owners.get(job_id) != owner:
         raise no_such("job", job_id)
-
-
-def media_type_of(request: Request) -> str:
-    """Return the media type of the body in lower case, without parameters; "" for none."""
-    return request.headers.get("content-type", "").partition(";")[0].strip().lower()
 
 
 def require_media_type(request: Request, *allowed: str) -> str:
     """Return the media type of the body; 415 where it is none of these."""
-    media_type = media_type_of(request)
+    media_type = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     if media_type not in allowed:
         said = media_type or "missing"
         raise ServiceError(

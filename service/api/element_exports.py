@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Annotated, Any, Final
 
-from fastapi import APIRouter, Path, Request, Response
+from fastapi import APIRouter, Path, Response
 from sqlalchemy.orm import Session
 
 from planner_core.domain import OrbitEphemeris
@@ -14,7 +14,7 @@ from planner_core.orbits import omm_writing
 from planner_core.orbits.omm_writing import Outgoing
 from service.api.accept import require_offered
 from service.api.conditional import NOT_MODIFIED, etag_of, readable, sent
-from service.api.deps import CallDep
+from service.api.deps import Call, CallDep
 from service.api.errors import problem_responses
 from service.api.satellites import find_satellite
 from service.db.rows import SatelliteRow
@@ -27,24 +27,19 @@ from service.wire.satellites import OrbitIn
 router = APIRouter(prefix="/v1/satellites", tags=["satellites"])
 
 _AT_ONCE: Final = 500
-
-
-@dataclass(frozen=True, slots=True)
-class _Form:
-    media_type: str
-    write: Callable[[Sequence[Outgoing]], str]
+_OFFERED: Final = "Element sets are"
 
 
 _FORMS: Final = {
-    "json": _Form("application/json", omm_writing.write_json),
-    "csv": _Form("text/csv", omm_writing.write_csv),
-    "xml": _Form("application/xml", omm_writing.write_xml),
-    "kvn": _Form("text/plain", omm_writing.write_kvn),
+    "json": ("application/json", omm_writing.write_json),
+    "csv": ("text/csv", omm_writing.write_csv),
+    "xml": ("application/xml", omm_writing.write_xml),
+    "kvn": ("text/plain", omm_writing.write_kvn),
 }
 _RESPONSES: Final[dict[int | str, dict[str, Any]]] = {
     200: {
         "description": "The messages.",
-        "content": {form.media_type: {} for form in _FORMS.values()},
+        "content": {media_type: {} for media_type, _ in _FORMS.values()},
     },
     **NOT_MODIFIED,
     **problem_responses(406),
@@ -63,15 +58,12 @@ def get_all_omm(suffix: Suffix, call: CallDep) -> Response:
 
     `POST /v1/satellites/import` takes the file back, with the media type that it comes in.
     """
-    form = _form_of(suffix)
+    require_offered(suffix, _FORMS, _OFFERED)
     with call.database.reading() as session:
-        rows = session.scalars(alive(SatelliteRow).order_by(SatelliteRow.id)).all()
-        messages = [
-            message
-            for first in range(0, len(rows), _AT_ONCE)
-            for message in _messages(session, rows[first : first + _AT_ONCE])
-        ]
-    return _answer(call.request, form, messages, f"satellites.omm.{suffix}")
+        rows = session.scalars(alive(SatelliteRow).order_by(SatelliteRow.id))
+        parts = rows.partitions(_AT_ONCE)
+        messages = [message for part in parts for message in _messages(session, part)]
+    return _answer(call, suffix, messages, "satellites")
 
 
 @router.get(
@@ -83,12 +75,12 @@ def get_omm(satellite_id: str, suffix: Suffix, call: CallDep) -> Response:
     """Return the element set in force of one satellite."""
     with call.database.reading() as session:
         row = find_satellite(session, satellite_id)
-        form = _form_of(suffix)
+        require_offered(suffix, _FORMS, _OFFERED)
         messages = _messages(session, [row])
     if not messages:
         detail = f"The orbit of {row.name!r} is an ephemeris, without elements: ask for oem.kvn."
         raise ServiceError("not_acceptable", detail)
-    return _answer(call.request, form, messages, f"{satellite_id}.omm.{suffix}")
+    return _answer(call, suffix, messages, satellite_id)
 
 
 @router.get(
@@ -109,12 +101,7 @@ def get_oem(satellite_id: str, call: CallDep) -> Response:
             "not_acceptable", f"The orbit of {row.name!r} is an element set: ask for omm.json."
         )
     text = "\n".join([*orbit["oem"], ""])
-    return _sent(call.request, text, "text/plain", f"{satellite_id}.oem.kvn")
-
-
-def _form_of(suffix: str) -> _Form:
-    require_offered(suffix, _FORMS, "Element sets are")
-    return _FORMS[suffix]
+    return _sent(call, text, "text/plain", f"{satellite_id}.oem.kvn")
 
 
 def _messages(session: Session, rows: Sequence[SatelliteRow]) -> list[Outgoing]:
@@ -131,15 +118,11 @@ def _messages(session: Session, rows: Sequence[SatelliteRow]) -> list[Outgoing]:
     return messages
 
 
-def _answer(
-    request: Request, form: _Form, messages: Sequence[Outgoing], file_name: str
-) -> Response:
-    return _sent(request, form.write(messages), form.media_type, file_name)
+def _answer(call: Call, suffix: str, messages: Sequence[Outgoing], name: str) -> Response:
+    media_type, write = _FORMS[suffix]
+    return _sent(call, write(messages), media_type, f"{name}.omm.{suffix}")
 
 
-def _sent(request: Request, text: str, media_type: str, file_name: str) -> Response:
-    headers = {
-        "ETag": etag_of(text),
-        "Content-Disposition": f'inline; filename="{file_name}"',
-    }
-    return sent(request, text, media_type, headers)
+def _sent(call: Call, text: str, media_type: str, file_name: str) -> Response:
+    headers = {"ETag": etag_of(text), "Content-Disposition": f'inline; filename="{file_name}"'}
+    return sent(call.request, text, media_type, headers)

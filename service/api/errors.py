@@ -30,12 +30,17 @@ logger = logging.getLogger(__name__)
 
 def install_error_handlers(app: FastAPI) -> None:
     """Route every exception, the framework's own included, to a problem document."""
-    app.add_exception_handler(ServiceError, _on_service_error)
-    app.add_exception_handler(PlannerError, _on_planner_error)
-    app.add_exception_handler(RequestValidationError, _on_validation_error)
-    app.add_exception_handler(HTTPException, on_http_exception)
-    app.add_exception_handler(SQLAlchemyError, on_database_error)
-    app.add_exception_handler(Exception, _on_bug)
+    app.exception_handler(ServiceError)(_on_service_error)
+    app.exception_handler(PlannerError)(_on_planner_error)
+    app.exception_handler(RequestValidationError)(_on_validation_error)
+    app.exception_handler(HTTPException)(_on_http_exception)
+    app.exception_handler(SQLAlchemyError)(_on_database_error)
+    app.exception_handler(Exception)(_on_bug)
+
+
+def refusals(app: FastAPI) -> dict[Any, Any]:
+    """Return the handlers for what stands before the routes, and refuses by raising as well."""
+    return {kind: on for kind, on in app.exception_handlers.items() if kind is not Exception}
 
 
 def problem_responses(*statuses: int) -> dict[int | str, dict[str, Any]]:
@@ -93,19 +98,20 @@ def _sendable(text: str) -> str:
     return masked(text.encode("utf-8", "replace").decode())
 
 
-def _on_service_error(request: Request, error: Exception) -> JSONResponse:
-    assert isinstance(error, ServiceError)
+# What needs no thread is async: who is refused must not wait for one.
+
+
+async def _on_service_error(request: Request, error: ServiceError) -> JSONResponse:
     return problem(request, error.code, error.detail, faults=error.faults, headers=error.headers)
 
 
-def _on_planner_error(request: Request, error: Exception) -> JSONResponse:
-    assert isinstance(error, PlannerError)
+def _on_planner_error(request: Request, error: PlannerError) -> JSONResponse:
     return problem(request, error.code, error.detail, faults=(error.fault,))
 
 
-def _on_validation_error(request: Request, error: Exception) -> JSONResponse:
-    assert isinstance(error, RequestValidationError)
-    return _on_service_error(request, refuse(faults_of(error.errors(), error.body)))
+def _on_validation_error(request: Request, error: RequestValidationError) -> JSONResponse:
+    told = refuse(faults_of(error.errors(), error.body))
+    return problem(request, told.code, told.detail, faults=told.faults)
 
 
 _HTTP_CODES = {
@@ -118,9 +124,7 @@ _HTTP_CODES = {
 }
 
 
-def on_http_exception(request: Request, error: Exception) -> JSONResponse:
-    """Answer what the framework, or a limit of a body, has refused."""
-    assert isinstance(error, HTTPException)
+def _on_http_exception(request: Request, error: HTTPException) -> JSONResponse:
     code = _HTTP_CODES.get(error.status_code)
     if code is None:
         code = "_".join(HTTPStatus(error.status_code).phrase.lower().split())
@@ -148,11 +152,11 @@ def _http_detail(request: Request, error: HTTPException) -> str:
     return error.detail
 
 
-def on_database_error(request: Request, error: Exception) -> JSONResponse:
-    """Answer 503 where the database is away or full; raise again what is a fault of ours."""
+async def _on_database_error(request: Request, error: Exception) -> JSONResponse:
+    # Away or full; what is a fault of ours is raised again.
     why = why_unavailable(error)
     if why is None:
-        raise error  # a fault of ours
+        raise error
     # The driver's words alone: SQLAlchemy's would add the statement and its values.
     logger.warning("the database did not serve a request: %s", getattr(error, "orig", error))
     headers = {"Retry-After": str(DATABASE_RETRY_S)}

@@ -6,10 +6,9 @@ from typing import Annotated, Final
 
 import sqlalchemy as sa
 from fastapi import APIRouter, Query, Response
-from sqlalchemy.orm import Session
 
-from service.api.conditional import created, readable, require_match, unless_known
-from service.api.deps import ANY_FILE, Call, CallDep, RawBodyDep, file_type
+from service.api.conditional import matched, readable, unless_known
+from service.api.deps import ANY_FILE, CallDep, RawBodyDep, file_type
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
 from service.api.imports import BYTES, request_body
@@ -18,7 +17,7 @@ from service.db.rows import ForecastRow
 from service.forecasts.csv_file import read_csv
 from service.forecasts.fields import instant_of, sha256_of, to_bytes
 from service.forecasts.netcdf_file import read_netcdf
-from service.stores.finding import find_own, no_such, of_owner
+from service.stores.finding import of_owner
 from service.wire.base import Listed, Name
 from service.wire.forecasts import ForecastOut
 from service.wire.stored import from_row
@@ -83,8 +82,7 @@ def create_forecast(
         )
         session.add(row)
         session.flush()
-        call.audit.record(session, "create", "forecast", row.id)
-        return once.keep(session, created(call.response, _shown(row), f"/v1/forecasts/{row.id}"))
+        return once.created(session, "forecast", row.id, _shown(row))
 
 
 @router.get("")
@@ -92,33 +90,22 @@ def list_forecasts(call: CallDep, paging: PagingDep) -> Listed[ForecastOut]:
     """List your forecasts, newest first; the scope `admin` sees all."""
     query = sa.select(ForecastRow).where(of_owner(ForecastRow.owner, call.caller.visible_owner))
     with call.database.reading() as session:
-        page = newest_first(session, query, ForecastRow.id, paging)
-    return Listed(items=[_shown(row) for row in page.rows], next=page.next)
+        return newest_first(session, query, ForecastRow.id, paging).listed(_shown)
 
 
 @router.get("/{forecast_id}", response_model=ForecastOut, responses=readable())
 def get_forecast(forecast_id: str, call: CallDep) -> ForecastOut | Response:
     """Return what is known of one forecast, without its values."""
     with call.database.reading() as session:
-        shown = _shown(_find(session, call, forecast_id))
-    return unless_known(call.request, call.response, shown)
+        return unless_known(call, _shown(call.own(session, ForecastRow, "forecast", forecast_id)))
 
 
 @router.delete("/{forecast_id}", status_code=204, responses=problem_responses(404, 412))
 def delete_forecast(forecast_id: str, call: CallDep) -> None:
     """Delete a forecast. Scenarios that use it keep what it said of their targets."""
-    with call.database.transaction() as session:
-        row = _find(session, call, forecast_id)
-        require_match(call.request, lambda: _shown(row))
+    with call.noted("delete", "forecast", forecast_id) as session:
+        row = matched(call, call.own(session, ForecastRow, "forecast", forecast_id), _shown)
         session.delete(row)
-        call.audit.record(session, "delete", "forecast", forecast_id)
-
-
-def _find(session: Session, call: Call, forecast_id: str) -> ForecastRow:
-    row = find_own(session, ForecastRow, forecast_id, call.caller.visible_owner)
-    if row is None:
-        raise no_such("forecast", forecast_id)
-    return row
 
 
 def _shown(row: ForecastRow) -> ForecastOut:

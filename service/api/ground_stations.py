@@ -9,13 +9,12 @@ from fastapi import APIRouter, Response
 from sqlalchemy.orm import Session
 
 from planner_core.errors import Fault
-from service.api.conditional import created, readable, require_match, unless_known
-from service.api.deps import CallDep, DatabaseDep, RawBodyDep, file_type
+from service.api.conditional import located, matched, readable, unless_known
+from service.api.deps import CallDep, RawBodyDep, file_type
 from service.api.errors import problem_responses
-from service.api.filters import NameQuery, by_name
 from service.api.idempotency import OnceDep
 from service.api.imports import OnError, OnErrorQuery, body_schemas, imported, refuse_if_asked
-from service.api.paging import PagingDep, newest_first, size_of
+from service.api.paging import NameQuery, PagingDep, by_name, newest_first, size_of
 from service.db.rows import GroundStationRow
 from service.files.records import Checked, check, read_csv, read_geojson
 from service.problems.faults import validated
@@ -43,21 +42,21 @@ _IMPORT_TYPES = ("application/geo+json", "application/json", "text/csv")
 
 
 @router.post("", status_code=201)
-def create_ground_station(body: GroundStationIn, once: OnceDep, call: CallDep) -> GroundStationOut:
+def create_ground_station(body: GroundStationIn, once: OnceDep) -> GroundStationOut:
     """Store one ground station."""
     ground_station_from(body, "new")
     with once.transaction() as session:
         row = _add(session, body)
-        call.audit.record(session, "create", "ground_station", row.id)
-        shown = created(call.response, _shown(row), f"/v1/ground-stations/{row.id}")
-        return once.keep(session, shown)
+        return once.created(session, "ground_station", row.id, _shown(row))
 
 
 @router.post(
     "/import",
     openapi_extra=body_schemas(
-        geojson=("application/geo+json", "A FeatureCollection of points, each with a `name`."),
-        csv=("text/csv", f"A header with some of {', '.join(_CSV_COLUMNS)}."),
+        {
+            "application/geo+json": "A FeatureCollection of points, each with a `name`.",
+            "text/csv": f"A header with some of {', '.join(_CSV_COLUMNS)}.",
+        }
     ),
     responses=problem_responses(413, 415),
 )
@@ -98,23 +97,21 @@ def read_stations(kind: str, data: bytes) -> tuple[list[Checked[GroundStationIn]
 
 @router.get("")
 def list_ground_stations(
-    database: DatabaseDep, paging: PagingDep, name: NameQuery = None
+    call: CallDep, paging: PagingDep, name: NameQuery = None
 ) -> Listed[GroundStationOut]:
     """List the ground stations, newest first."""
     own_name = GroundStationRow.body["name"].as_string()
     query = by_name(alive(GroundStationRow), own_name, name)
-    with database.reading() as session:
+    with call.database.reading() as session:
         weight = size_of(GroundStationRow.body)
-        page = newest_first(session, query, GroundStationRow.id, paging, weight)
-    return Listed(items=[_shown(row) for row in page.rows], next=page.next)
+        return newest_first(session, query, GroundStationRow.id, paging, weight).listed(_shown)
 
 
 @router.get("/{station_id}", response_model=GroundStationOut, responses=readable())
 def get_ground_station(station_id: str, call: CallDep) -> GroundStationOut | Response:
     """Return one ground station."""
     with call.database.reading() as session:
-        shown = _shown(existing(session, GroundStationRow, "ground station", station_id))
-    return unless_known(call.request, call.response, shown)
+        return unless_known(call, _shown(_find(session, station_id)))
 
 
 @router.patch("/{station_id}", responses=problem_responses(404, 412))
@@ -126,8 +123,7 @@ def change_ground_station(
     `If-Match` takes the ETag of the station.
     """
     with call.database.transaction() as session:
-        row = existing(session, GroundStationRow, "ground station", station_id, to_change=True)
-        require_match(call.request, lambda: _shown(row))
+        row = matched(call, _find(session, station_id, to_change=True), _shown)
         changes = body.model_dump(mode="json", exclude_none=True)
         whole = row.body | changes
         changed = validated(GroundStationIn, whole)  # a stored value may be out of today's range
@@ -135,17 +131,19 @@ def change_ground_station(
         if _change(row, changed):
             call.audit.record(session, "update", "ground_station", station_id)
         shown = _shown(row)
-    return created(call.response, shown, f"/v1/ground-stations/{station_id}")
+    return located(call, shown, f"/v1/ground-stations/{station_id}")
 
 
 @router.delete("/{station_id}", status_code=204, responses=problem_responses(404, 412))
 def delete_ground_station(station_id: str, call: CallDep) -> None:
     """Delete a ground station. Scenarios that use it keep their copy."""
-    with call.database.transaction() as session:
-        row = existing(session, GroundStationRow, "ground station", station_id, to_change=True)
-        require_match(call.request, lambda: _shown(row))
+    with call.noted("delete", "ground_station", station_id) as session:
+        row = matched(call, _find(session, station_id, to_change=True), _shown)
         row.delete()
-        call.audit.record(session, "delete", "ground_station", station_id)
+
+
+def _find(session: Session, station_id: str, *, to_change: bool = False) -> GroundStationRow:
+    return existing(session, GroundStationRow, "ground station", station_id, to_change=to_change)
 
 
 def _add(session: Session, body: GroundStationIn) -> GroundStationRow:
@@ -156,7 +154,7 @@ def _add(session: Session, body: GroundStationIn) -> GroundStationRow:
 
 def _store(session: Session, good: list[Checked[GroundStationIn]]) -> list[ImportedStation]:
     stored = session.scalars(alive(GroundStationRow)).all()
-    known = {_body(row): row for row in stored}
+    known = {from_store(GroundStationIn, row.body).model_dump_json(): row for row in stored}
     # A name that is there twice, or twice in the file, says nothing about which station is meant.
     of_file = Counter(one.body.name for one in good)
     of_store = Counter(row.name for row in stored)
@@ -181,10 +179,6 @@ def _change(row: GroundStationRow, body: GroundStationIn) -> bool:
     is_other = dumped != row.body
     row.name, row.body = body.name, dumped
     return is_other
-
-
-def _body(row: GroundStationRow) -> str:
-    return from_store(GroundStationIn, row.body).model_dump_json()
 
 
 def _shown(row: GroundStationRow) -> GroundStationOut:

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
+from contextlib import nullcontext
 from typing import Final
 
-from sqlalchemy.exc import SQLAlchemyError
 from starlette.requests import Request
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from service.access.callers import LOCAL_CALLER, NOBODY, Caller
 from service.access.callers import Scope as KeyScope
 from service.access.rate_limit import RateLimiter
-from service.access.static_keys import StaticKeys
-from service.api.errors import on_database_error, problem
 from service.api.questions import Questions
 from service.api.sites import READING, Sites
 from service.api.slots import Slots
@@ -59,42 +57,30 @@ class Guard:
     def __init__(self, app: ASGIApp, settings: Settings):
         self.app = app
         self._keys_required = settings.keys_required
-        self._static_keys: StaticKeys = settings.static_keys
+        self._static_keys = settings.static_keys
         self._sites = Sites(settings.own_hosts, settings.allowed_origins)
         self._slots = Slots(MOST_AT_ONCE, MOST_OF_AN_OWNER)
         per_s = settings.requests_per_s
         self._limiter = RateLimiter(per_s, settings.rate_limit_burst) if per_s else None
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve one request, or refuse it."""
+        """Serve one request, or raise what refuses it."""
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
         request = Request(scope)
-        try:
-            caller = request.state.caller = await self._admitted(request)
-            if is_limited(scope["path"]):
-                await self._slots.take(caller.owner)
-        except ServiceError as error:
-            answer = problem(request, error.code, error.detail, headers=error.headers)
-            await answer(scope, receive, send)
-            return
-        except SQLAlchemyError as error:
-            await on_database_error(request, error)(scope, receive, send)
-            return
-        try:
+        caller = request.state.caller = await self._admitted(request)
+        place = self._slots.held(caller.owner) if is_limited(scope["path"]) else nullcontext()
+        async with place:
             await self.app(scope, receive, send)
-        finally:
-            if is_limited(scope["path"]):
-                self._slots.give_back(caller.owner)
 
     async def _admitted(self, request: Request) -> Caller:
         path = request.scope["path"]
-        if is_limited(path):
-            self._sites.check(request.method, request.headers)
+        if not is_limited(path):
+            return NOBODY
+        self._sites.check(request.method, request.headers)
         if is_open(path):
-            if is_limited(path):
-                self._count(request, NOBODY)
+            self._count(request, NOBODY)
             return NOBODY
         try:
             caller = await self._caller(request)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from typing import Annotated, Any, Final, TypeVar
 
@@ -13,15 +13,14 @@ from pydantic import BaseModel
 from sqlalchemy.orm import Session
 from starlette.concurrency import run_in_threadpool
 
-from service.api.deps import CallerDep, DatabaseDep, SettingsDep
-from service.db.session import Database
+from service.api.conditional import located
+from service.api.deps import Call, CallDep
 from service.problems.kinds import ServiceError
 from service.stores import idempotency_store as store
 from service.stores.idempotency_store import KeptAnswer, Keyed
 
 M = TypeVar("M", bound=BaseModel)
 
-REPLAYED: Final = "Idempotency-Replayed"
 # Those of an answer that belong to what was created; the others are of one exchange.
 _KEPT_HEADERS: Final = ("location", "etag", "retry-after")
 
@@ -41,33 +40,42 @@ class Once:
     before that ends. Refused requests keep nothing: their key can be used again.
     """
 
-    def __init__(self, database: Database, keyed: Keyed | None, status: int, response: Response):
-        self._database = database
+    def __init__(self, call: Call, keyed: Keyed | None):
+        self._call = call
         self._keyed = keyed
-        self._status = status
-        self._response = response
 
     def find(self) -> None:
         """Raise ``AlreadyAnswered`` where the request is a repeated one."""
-        if self._keyed is None:
-            return
-        with self._database.reading() as session, _told_reuse():
-            answer = store.find(session, self._keyed)
-        if answer is not None:
-            raise AlreadyAnswered(answer)
+        with self._call.database.reading() as session:
+            self._require_first(session, store.find)
 
     @contextmanager
     def transaction(self) -> Iterator[Session]:
         """Yield a session that may write, in which the key is this request's."""
-        with self._database.transaction() as session:
-            if self._keyed is not None:
-                with _told_reuse():
-                    answer = store.claim(session, self._keyed)
-                if answer is not None:
-                    raise AlreadyAnswered(answer)
+        with self._call.database.transaction() as session:
+            self._require_first(session, store.claim)
             yield session
 
-    def keep(self, session: Session, model: M, *, shown_once: frozenset[str] = frozenset()) -> M:
+    def _require_first(
+        self, session: Session, ask: Callable[[Session, Keyed], KeptAnswer | None]
+    ) -> None:
+        try:
+            answer = None if self._keyed is None else ask(session, self._keyed)
+        except store.KeyReused:
+            detail = "The Idempotency-Key was used for another request; choose a new one."
+            raise ServiceError("idempotency_key_reused", detail) from None
+        if answer is not None:
+            raise AlreadyAnswered(answer)
+
+    def created(
+        self, session: Session, kind: str, own_id: str, model: M, shown_once: Collection[str] = ()
+    ) -> M:
+        """Return a new thing of the collection that was called, noted, kept, told where it is."""
+        self._call.audit.record(session, "create", kind, own_id)
+        location = f"{self._call.request.url.path}/{own_id}"
+        return self.keep(session, located(self._call, model, location), shown_once)
+
+    def keep(self, session: Session, model: M, shown_once: Collection[str] = ()) -> M:
         """Return the answer, and store it under the key with the headers set so far.
 
         Parameters
@@ -76,9 +84,10 @@ class Once:
             Fields that are kept, and shown to who sends the request again, as null.
         """
         if self._keyed is not None:
-            headers = self._response.headers
+            response, route = self._call.response, self._call.request.scope["route"]
+            headers = response.headers
             answer = KeptAnswer(
-                status=self._response.status_code or self._status,
+                status=response.status_code or route.status_code or 200,
                 headers={name: headers[name] for name in _KEPT_HEADERS if name in headers},
                 body=model.model_copy(update=dict.fromkeys(shown_once)).model_dump_json(),
             )
@@ -87,11 +96,7 @@ class Once:
 
 
 async def _once(
-    request: Request,
-    response: Response,
-    database: DatabaseDep,
-    settings: SettingsDep,
-    caller: CallerDep,
+    call: CallDep,
     idempotency_key: Annotated[
         str | None,
         Header(
@@ -104,15 +109,15 @@ async def _once(
         ),
     ] = None,
 ) -> Once:
-    keyed = None
-    if idempotency_key is not None:
-        keyed = Keyed(
-            tenant=caller.owner,
-            key=idempotency_key,
-            request_sha256=_fingerprint(request, await request.body()),
-            keep_s=settings.idempotency_hours * 3600.0,
-        )
-    once = Once(database, keyed, request.scope["route"].status_code or 200, response)
+    if idempotency_key is None:
+        return Once(call, None)
+    keyed = Keyed(
+        tenant=call.caller.owner,
+        key=idempotency_key,
+        request_sha256=_fingerprint(call.request, await call.request.body()),
+        keep_s=call.settings.idempotency_hours * 3600.0,
+    )
+    once = Once(call, keyed)
     # What a repeated request names may be gone by now: it is answered before that is looked up.
     await run_in_threadpool(once.find)
     return once
@@ -123,34 +128,21 @@ OnceDep = Annotated[Once, Depends(_once)]
 
 def install_replay(app: FastAPI) -> None:
     """Answer repeated requests with what they were answered first."""
-    app.add_exception_handler(AlreadyAnswered, _replay)
+    app.exception_handler(AlreadyAnswered)(_replay)
 
 
-def _replay(_request: Request, error: Exception) -> Response:
-    assert isinstance(error, AlreadyAnswered)
+def _replay(_request: Request, error: AlreadyAnswered) -> Response:
     answer = error.answer
-    headers = answer.headers | {REPLAYED: "true"}
+    headers = answer.headers | {"Idempotency-Replayed": "true"}
     return Response(answer.body, answer.status, headers, media_type="application/json")
 
 
 def _fingerprint(request: Request, body: bytes) -> str:
-    parts: list[Any] = [
-        request.method,
-        request.url.path,
-        sorted(request.query_params.multi_items()),
-    ]
+    query = sorted(request.query_params.multi_items())
+    parts: list[Any] = [request.method, request.url.path, query]
     try:
         # Two spellings of one JSON document are one request.
         parts.append(json.dumps(json.loads(body), sort_keys=True))
     except (ValueError, RecursionError):
         parts.append(hashlib.sha256(body).hexdigest())
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
-
-
-@contextmanager
-def _told_reuse() -> Iterator[None]:
-    try:
-        yield
-    except store.KeyReused:
-        detail = "The Idempotency-Key was used for another request; choose a new one."
-        raise ServiceError("idempotency_key_reused", detail) from None

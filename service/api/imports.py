@@ -31,8 +31,7 @@ class OnError(StrEnum):
 
 
 OnErrorQuery = Annotated[
-    OnError,
-    Query(description="`skip` stores the good records; `reject_all` stores nothing (422)."),
+    OnError, Query(description="`skip` stores the good records; `reject_all` stores nothing (422).")
 ]
 
 
@@ -58,14 +57,13 @@ def _placed(fault: Fault) -> str:
     )
 
 
-def _schema_of(kind: str) -> dict[str, Any]:
-    # Generators of clients cannot tell a list from a file.
-    return {"type": "object" if kind.endswith("json") else "string"}
-
-
-def body_schemas(**examples: tuple[str, str]) -> dict[str, Any]:
+def body_schemas(examples: Mapping[str, str]) -> dict[str, Any]:
     """Return OpenAPI's ``requestBody`` for files: media type to description."""
-    schemas = {kind: _schema_of(kind) | {"description": text} for kind, text in examples.values()}
+    # Generators of clients cannot tell a list from a file.
+    schemas = {
+        kind: {"type": "object" if kind.endswith("json") else "string", "description": text}
+        for kind, text in examples.items()
+    }
     return request_body(schemas | {ANY_FILE: BYTES})
 
 

@@ -1,10 +1,11 @@
-"""A job's changes as server-sent events."""
+"""A job's changes: waited for without a thread that waits, and sent as events."""
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable, Callable
 from typing import Annotated, Final
 
 from fastapi import APIRouter, Depends, Header, Response
@@ -12,12 +13,13 @@ from fastapi.responses import StreamingResponse
 from sqlalchemy.exc import SQLAlchemyError
 
 from service.access.callers import Caller
-from service.api.deps import CallerDep, own_job_only
+from service.api.conditional import matches
+from service.api.deps import CallDep, found, own_job_only
 from service.api.errors import problem_responses
 from service.api.job_shapes import etag_of_job, shown
-from service.api.job_wait import wait_for_change
-from service.api.questions import Questions, QuestionsDep
+from service.api.questions import Questions
 from service.db.failures import why_unavailable
+from service.db.rows import JobRow
 from service.wire.jobs import ACTIVE, FINAL
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[Depends(own_job_only)])
@@ -26,6 +28,7 @@ log = logging.getLogger(__name__)
 SIGN_OF_LIFE_S: Final = 10.0
 _LOOK_AT_KEY_EVERY_S: Final = 2.0
 _NOTHING_SEEN: Final = "0"
+_LOOK_EVERY_S: Final = 0.1
 
 
 @router.get(
@@ -39,8 +42,7 @@ _NOTHING_SEEN: Final = "0"
 )
 async def job_events(
     job_id: str,
-    caller: CallerDep,
-    questions: QuestionsDep,
+    call: CallDep,
     last_event_id: Annotated[
         str, Header(alias="Last-Event-ID", description="The last event that was seen.")
     ] = "",
@@ -52,13 +54,13 @@ async def job_events(
     database fails: ask again with `Last-Event-ID`. It ends for good with the key it was asked
     for with.
     """
-    job, _ = await wait_for_change(questions, job_id, None, 0.0, _never)
+    job, _ = await wait_for_change(call.questions, job_id, None, 0.0, _never)
     seen = last_event_id or _NOTHING_SEEN
     if job.state in FINAL and seen == str(job.version):
         # What browsers do after a stream has ended is to ask for it again, for ever.
         return Response(status_code=204)
     return StreamingResponse(
-        _events(questions, _Listener(questions, caller), job_id, f'"{seen}"'),
+        _events(call.questions, _Listener(call.questions, call.caller), job_id, f'"{seen}"'),
         media_type="text/event-stream",
         headers={"Cache-Control": "no-store"},
     )
@@ -111,3 +113,41 @@ class _Listener:
             self._next_s = time.monotonic() + _LOOK_AT_KEY_EVERY_S
             self._has_lost_its_key = bool(await self._questions.ended_keys.get(self._key_id))
         return self._has_lost_its_key
+
+
+async def wait_for_change(
+    questions: Questions,
+    job_id: str,
+    known: str | None,
+    wait_s: float,
+    is_disconnected: Callable[[], Awaitable[bool]],
+) -> tuple[JobRow, str]:
+    """Return a job and its scenario's hash, at the latest after ``wait_s``.
+
+    Parameters
+    ----------
+    known
+        The client's ``If-None-Match``: what it has seen; None for what is there now.
+
+    Raises
+    ------
+    ServiceError
+        Where there is no such job.
+    """
+    job, sha256 = await _read(questions, job_id)
+    seen = etag_of_job(job) if known is None else known
+    clock = asyncio.get_running_loop()
+    until_s = clock.time() + wait_s
+    while job.state in ACTIVE and matches(seen, etag_of_job(job)):
+        left_s = until_s - clock.time()
+        if left_s <= 0 or await is_disconnected():
+            break
+        await asyncio.sleep(min(_LOOK_EVERY_S, left_s))
+        # Only a number is read until it moves: many may wait at once.
+        if await questions.versions.get(job_id) != job.version:
+            job, sha256 = await _read(questions, job_id)
+    return job, sha256
+
+
+async def _read(questions: Questions, job_id: str) -> tuple[JobRow, str]:
+    return found(await questions.jobs.get(job_id), "job", job_id)

@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from datetime import datetime
 from functools import partial
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
-from fastapi import Request, Response
+from fastapi import Request
 from sqlalchemy.orm import Session
 
 from planner_core.errors import inside
 from planner_core.solvers.registry import solver_class
 from service.answers import store as answer_store
-from service.api import ask_again, bulkhead
-from service.api.deps import Call
+from service.api import bulkhead
+from service.api.deps import Call, found
 from service.api.idempotency import Once
-from service.api.job_shapes import headers_of, shown
+from service.api.job_shapes import SOON_S, headers_of, shown
 from service.db.rows import JobRow, ScenarioRow
 from service.jobs.queue import JobQueue
 from service.jobs.solver_params import params_of, parse_params
@@ -25,17 +25,25 @@ from service.problems.faults import refuse_one
 from service.problems.kinds import ServiceError
 from service.scenarios import freezing
 from service.scenarios.freezing import FrozenScenario
+from service.scenarios.opportunities import Described, OpportunityReader
 from service.scenarios.pin_inputs import with_settled_pins
 from service.scenarios.translate import read_file
 from service.settings import Settings
 from service.stores import job_store as store
 from service.stores import scenario_store
-from service.stores.finding import no_such
 from service.wire.jobs import ACTIVE, JobIn, JobOut, LimitsIn, QuestionIn
 from service.wire.replans import ReplanIn
 from service.wire.scenarios import ScenarioFile, ScenarioIn
 
+T = TypeVar("T")
+
 _QUEUE_FULL_S: Final = 30
+
+
+def described(call: Call, scenario_id: str, sha256: str) -> Described:
+    """Return a scenario and its opportunities; 503 where to compute them takes long."""
+    reader: OpportunityReader = call.request.app.state.opportunities
+    return reader.get(call.database, scenario_id, sha256)
 
 
 def queue_of(request: Request) -> JobQueue:
@@ -103,10 +111,7 @@ def freeze(call: Call, body: ScenarioIn) -> FrozenScenario:
     """Return a question over what is stored, ready to be stored: here, where it is not large."""
     with call.database.reading() as session:
         num_targets = freezing.num_targets(session, body.target_catalog_ids)
-    has_forecast = body.forecast_id is not None
-    bulkhead.require_light(
-        call.request, num_targets, len(body.satellite_ids), has_forecast=has_forecast
-    )
+    bulkhead.require_light(call.request, body, num_targets)
     limits = call.settings.scenario_limits
     return freezing.freeze(call.database, body, limits, call.caller.visible_owner)
 
@@ -168,35 +173,28 @@ def require_room(session: Session, call: Call, num_jobs: int = 1) -> None:
 
 def find_job(session: Session, job_id: str) -> JobRow:
     """Return a job; 404 where there is none."""
-    job = session.get(JobRow, job_id)
-    if job is None:
-        raise no_such("job", job_id)
-    return job
-
-
-def not_ready(job: JobRow) -> ServiceError:
-    """Return the error for a job without an answer, yet or for good."""
-    if job.state in ACTIVE:
-        headers = {"Retry-After": str(ask_again.SOON_S)}
-        return ServiceError("not_ready", f"The job is {job.state}.", headers=headers)
-    why = job.error["code"] if job.error else "it was stopped before it had a plan"
-    return ServiceError("not_ready", f"The job is {job.state} and left no answer: {why}.")
+    return found(session.get(JobRow, job_id), "job", job_id)
 
 
 def require_answer(session: Session, job: JobRow) -> datetime:
     """Return when a job's answer was stored; 409 where it has none."""
-    finished_at = answer_store.answered_at(session, job.id)
-    if finished_at is None:
-        raise not_ready(job)
-    return finished_at
+    return _left_by(job, answer_store.answered_at(session, job.id))
 
 
 def find_timeline(session: Session, job: JobRow) -> str:
     """Return a job's timeline as JSON text; 409 where there is none."""
-    timeline = answer_store.timeline_of(session, job.id)
-    if timeline is None:
-        raise not_ready(job)
-    return timeline
+    return _left_by(job, answer_store.timeline_of(session, job.id))
+
+
+def _left_by(job: JobRow, answer: T | None) -> T:
+    """Return what a job has left; 409 where that is nothing, yet or for good."""
+    if answer is not None:
+        return answer
+    if job.state in ACTIVE:
+        headers = {"Retry-After": str(SOON_S)}
+        raise ServiceError("not_ready", f"The job is {job.state}.", headers=headers)
+    why = job.error["code"] if job.error else "it was stopped before it had a plan"
+    raise ServiceError("not_ready", f"The job is {job.state} and left no answer: {why}.")
 
 
 def shown_job(session: Session, job: JobRow) -> JobOut:
@@ -204,15 +202,9 @@ def shown_job(session: Session, job: JobRow) -> JobOut:
     return shown(job, store.scenario_hashes(session, [job])[job.scenario_id])
 
 
-def describe(response: Response, job: JobRow) -> None:
-    """Set the headers that every answer about one job has."""
-    response.headers.update(headers_of(job))
-
-
 def queued(session: Session, call: Call, once: Once, queue: JobQueue, spec: JobSpec) -> JobOut:
     """Queue a job; return it, and tell where to follow it."""
     job = submit(session, queue, spec)
     call.audit.record(session, "create", "job", job.id)
-    call.response.headers["Location"] = f"/v1/jobs/{job.id}"
-    describe(call.response, job)
+    call.response.headers.update({"Location": f"/v1/jobs/{job.id}"} | headers_of(job))
     return once.keep(session, shown_job(session, job))

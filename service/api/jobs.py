@@ -10,15 +10,20 @@ from fastapi import APIRouter, Depends, Query, Response
 from sqlalchemy.exc import SQLAlchemyError
 
 from service.api import job_intake as intake
-from service.api.conditional import matches, readable, require_match_of
+from service.api.conditional import known_as, readable, require_match
 from service.api.deps import CallDep, own_job_only
 from service.api.errors import problem_responses
-from service.api.filters import SatelliteQuery, StationQuery, StoredDep
 from service.api.idempotency import OnceDep
-from service.api.job_shapes import etag_of_job, shown
-from service.api.job_wait import wait_for_change
-from service.api.paging import PagingDep, newest_first, size_of
-from service.api.questions import QuestionsDep
+from service.api.job_events import wait_for_change
+from service.api.job_shapes import etag_of_job, headers_of, shown
+from service.api.paging import (
+    PagingDep,
+    SatelliteQuery,
+    StationQuery,
+    StoredDep,
+    newest_first,
+    size_of,
+)
 from service.db.rows import JobRow
 from service.jobs import lease, submission
 from service.jobs.queue import JobQueue
@@ -79,10 +84,8 @@ def list_jobs(
 async def get_job(
     job_id: str,
     call: CallDep,
-    questions: QuestionsDep,
     wait: Annotated[
-        float,
-        Query(ge=0, le=LONGEST_WAIT_S, description="Hold so many seconds for a change."),
+        float, Query(ge=0, le=LONGEST_WAIT_S, description="Hold so many seconds for a change.")
     ] = 0.0,
 ) -> JobOut | Response:
     """Return one job.
@@ -92,18 +95,16 @@ async def get_job(
     """
     known = call.request.headers.get("if-none-match")
     job, sha256 = await wait_for_change(
-        questions, job_id, known, wait, call.request.is_disconnected
+        call.questions, job_id, known, wait, call.request.is_disconnected
     )
-    if matches(known, etag_of_job(job)):
-        return Response(status_code=304, headers={"ETag": etag_of_job(job)})
-    intake.describe(call.response, job)
-    return shown(job, sha256)
+    call.response.headers.update(headers_of(job))
+    return known_as(call, etag_of_job(job)) or shown(job, sha256)
 
 
 @router.post("/{job_id}/cancel", status_code=202, responses=problem_responses(404, 409, 503))
 def cancel_job(job_id: str, call: CallDep) -> JobOut:
     """Cancel a job: at once where it waits; a running one stops and keeps its best plan so far."""
-    with call.database.transaction() as session:
+    with call.noted("cancel", "job", job_id) as session:
         job = intake.find_job(session, job_id)
         was_waiting = job.state == "queued"
         if not lease.request_cancel(session, job_id):
@@ -112,23 +113,21 @@ def cancel_job(job_id: str, call: CallDep) -> JobOut:
                 f"The job is {job.state}, which is final: no transition is allowed from there. "
                 "Only queued and running jobs can be cancelled.",
             )
-        call.audit.record(session, "cancel", "job", job_id)
         session.refresh(job)
         answer = intake.shown_job(session, job)
     if was_waiting:
         _forget(intake.queue_of(call.request), job)
-    intake.describe(call.response, job)
+    call.response.headers.update(headers_of(job))
     return answer
 
 
 @router.delete("/{job_id}", status_code=204, responses=problem_responses(404, 409, 412))
 def delete_job(job_id: str, call: CallDep) -> None:
     """Delete a finished job with its answer, for good: not one that a plan or a comparison has."""
-    with call.database.transaction() as session:
+    with call.noted("delete", "job", job_id) as session:
         job = intake.find_job(session, job_id)
-        require_match_of(call.request, etag_of_job(job))
+        require_match(call, etag_of_job(job))
         deletion.delete_job(session, job)
-        call.audit.record(session, "delete", "job", job_id)
 
 
 @router.post("/{job_id}/rerun", status_code=202, responses=problem_responses(404, 503))

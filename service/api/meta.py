@@ -1,4 +1,4 @@
-"""Whom the service takes a caller for, its health, its version, and what problem codes mean."""
+"""Who changed what, whom a caller is taken for, health, version, and what problem codes mean."""
 
 from __future__ import annotations
 
@@ -6,32 +6,47 @@ from datetime import UTC, datetime, timedelta
 from typing import Annotated
 
 import sqlalchemy as sa
-from fastapi import APIRouter, Path
+from fastapi import APIRouter, Depends, Path, Query
 
 import planner_core
-from service.api.deps import CallDep, CallerDep
+from service.api.deps import CallDep, admin_only, found
 from service.api.errors import problem_responses
-from service.db.rows import WorkerRow
+from service.api.paging import PagingDep, newest_first
+from service.db.rows import AuditEventRow, WorkerRow
 from service.db.session import Database
 from service.jobs.queue import JobQueue
-from service.problems.kinds import KINDS, ServiceError, kind_of
-from service.stores.finding import no_such
-from service.wire.operations import CallerOut, Live, ProblemExplained, Ready, Version
+from service.problems.kinds import KINDS, ServiceError
+from service.stores.finding import with_values
+from service.wire.base import Listed
+from service.wire.operations import AuditEventOut, CallerOut, Live, ProblemExplained, Ready, Version
+from service.wire.stored import from_row
 
 router = APIRouter(tags=["operations"])
 
 WORKER_SILENCE = timedelta(seconds=30)
 
 
+@router.get("/v1/audit-events", dependencies=[Depends(admin_only)])
+def list_audit_events(
+    call: CallDep,
+    paging: PagingDep,
+    object_id: Annotated[str | None, Query(description="Only of this object.")] = None,
+    kind: Annotated[str | None, Query(description="Only of objects of this kind.")] = None,
+    action: Annotated[str | None, Query(description="Only this action.")] = None,
+    owner: Annotated[str | None, Query(description="Only by keys of this owner.")] = None,
+) -> Listed[AuditEventOut]:
+    """List who changed what, newest first. Needs the scope `admin`."""
+    wanted = {"object_id": object_id, "kind": kind, "action": action, "owner": owner}
+    query = sa.select(AuditEventRow).where(*with_values(AuditEventRow, **wanted))
+    with call.database.reading() as session:
+        page = newest_first(session, query, AuditEventRow.id, paging)
+        return page.listed(lambda row: from_row(AuditEventOut, row))
+
+
 @router.get("/v1/me")
-def who_am_i(caller: CallerDep) -> CallerOut:
+def who_am_i(call: CallDep) -> CallerOut:
     """Say whose key this is and what it allows."""
-    return CallerOut(
-        owner=caller.owner,
-        scope=caller.scope.value,
-        key_id=caller.key_id,
-        key_name=caller.key_name,
-    )
+    return from_row(CallerOut, call.caller, scope=call.caller.scope.value)
 
 
 @router.get("/health/live")
@@ -79,9 +94,4 @@ def version() -> Version:
 def explain_problem(code: Annotated[str, Path(examples=["tle-checksum"])]) -> ProblemExplained:
     """Explain a problem code, written with hyphens or underscores."""
     name = code.replace("-", "_")
-    if name not in KINDS:
-        raise no_such("problem code", code)
-    kind = kind_of(name)
-    return ProblemExplained(
-        code=name, title=kind.title, status=kind.status, explanation=kind.explanation
-    )
+    return from_row(ProblemExplained, found(KINDS.get(name), "problem code", code), code=name)

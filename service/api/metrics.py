@@ -7,10 +7,10 @@ are counted by each process for itself.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Final, cast
+from typing import Final
 
 import sqlalchemy as sa
-from fastapi import APIRouter, Depends, Request, Response
+from fastapi import APIRouter, Response
 from prometheus_client import (
     CONTENT_TYPE_LATEST,
     CollectorRegistry,
@@ -30,7 +30,7 @@ from sqlalchemy.orm import Session
 from starlette.types import Scope
 
 import planner_core
-from service.api.deps import DatabaseDep
+from service.api.deps import CallDep
 from service.db.session import Database
 from service.stores import metrics_store as store
 
@@ -69,25 +69,19 @@ class CallCounters:
         self._seconds.labels(method, route).observe(seconds)
 
 
-async def _counters(request: Request) -> CallCounters:
-    return cast(CallCounters, request.app.state.call_counters)
-
-
 @router.get(
     "/metrics",
     response_class=Response,
     responses={200: {"content": {"text/plain": {}}, "description": "Prometheus text format."}},
 )
-def metrics(
-    database: DatabaseDep, counters: Annotated[CallCounters, Depends(_counters)]
-) -> Response:
+def metrics(call: CallDep) -> Response:
     """Return figures for Prometheus: jobs, workers, orbits, and the calls of this process.
 
     Where the database does not answer, `slewline_database_up` is 0 and its figures are absent.
     """
-    service = CollectorRegistry()
-    service.register(_Collected(list(_families(database))))
-    text = generate_latest(service) + generate_latest(counters.registry)
+    counters: CallCounters = call.request.app.state.call_counters
+    stored = _Collected(list(_families(call.database)))
+    text = generate_latest(stored) + generate_latest(counters.registry)
     return Response(text, headers={"Content-Type": CONTENT_TYPE_LATEST})
 
 

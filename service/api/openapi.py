@@ -16,7 +16,6 @@ from pydantic import BaseModel
 from service.api.errors import problem_responses
 from service.api.examples import add_examples
 from service.api.guard import is_limited, is_open
-from service.api.links import add_links
 from service.wire.operations import ProblemOut
 from service.wire.places import TargetCatalogIn
 from service.wire.proofs import ProofOut
@@ -33,9 +32,11 @@ _FURTHER_SCHEMAS: dict[str, type[BaseModel]] = {
 }
 
 _SENTENCE = re.compile(r"(.+?)\.(?:\s+|$)(.*)", re.DOTALL)
+_CREATING = ("200", "201", "202")
 _ALWAYS = (422, 500, 503)
 _WITH_BODY = (413, 415)
 # What each of these answers says about itself, and which request header brings it about.
+_ON_EVERY_ANSWER = {"X-Request-ID": "Names this request in the logs and in problem documents."}
 _ANSWER_HEADERS = {
     "201": {"Location": "Address of what was created.", "ETag": "Of its present form."},
     "202": {"Location": "Where to follow it.", "Retry-After": "Seconds until it is worth asking."},
@@ -57,12 +58,6 @@ _KEYS = {
         "name": "X-API-Key",
         "description": "The same, for clients that cannot set Authorization.",
     },
-}
-_HEADERS = {
-    "X-Request-ID": {
-        "description": "Names this request in the logs and in problem documents.",
-        "schema": {"type": "string"},
-    }
 }
 
 
@@ -107,16 +102,14 @@ def _with_problems(document: dict[str, Any]) -> dict[str, Any]:
             for status, (header, description) in _CONDITIONS.items():
                 if status in operation["responses"]:
                     operation.setdefault("parameters", []).append(
-                        _header_parameter(header, description)
+                        {"name": header, "in": "header", "required": False, **_text(description)}
                     )
             for status, response in operation["responses"].items():
-                of_status = {
-                    name: {"description": text, "schema": {"type": "string"}}
-                    for name, text in _ANSWER_HEADERS.get(status, {}).items()
-                }
-                response["headers"] = _HEADERS | of_status | response.get("headers", {})
+                told = _ON_EVERY_ANSWER | _ANSWER_HEADERS.get(status, {})
+                headers = {name: _text(description) for name, description in told.items()}
+                response["headers"] = headers | response.get("headers", {})
     add_examples(document)
-    add_links(document)
+    _add_links(document)
     return document
 
 
@@ -128,14 +121,38 @@ def _summarise(operation: dict[str, Any]) -> None:
         operation["description"] = rest or f"{first}."
 
 
-def _header_parameter(name: str, description: str) -> dict[str, Any]:
-    return {
-        "name": name,
-        "in": "header",
-        "required": False,
-        "description": description,
-        "schema": {"type": "string"},
-    }
+def _add_links(document: dict[str, Any]) -> None:
+    """Link each creating call to every call whose only further need is the new thing's id."""
+    paths = document["paths"]
+    for path, operations in paths.items():
+        if "post" not in operations:
+            continue
+        links = {
+            operation["operationId"]: {
+                "operationId": operation["operationId"],
+                "parameters": {parameter: "$response.body#/id"},
+                "description": operation.get("summary", ""),
+            }
+            for below, parameter in _below(path, paths)
+            for operation in paths[below].values()
+        }
+        for status, response in operations["post"]["responses"].items():
+            if links and status in _CREATING:
+                response["links"] = links
+
+
+def _below(collection: str, paths: dict[str, Any]) -> list[tuple[str, str]]:
+    """Return the paths that begin with one thing of a collection, and what its id is called."""
+    found = []
+    for path in paths:
+        root, slot, _ = path.partition("/{")
+        if slot and root == collection and path.count("{") == 1:
+            found.append((path, path[path.index("{") + 1 : path.index("}")]))
+    return found
+
+
+def _text(description: str) -> dict[str, Any]:
+    return {"description": description, "schema": {"type": "string"}}
 
 
 @router.get("/docs", response_class=HTMLResponse)
@@ -155,9 +172,7 @@ def docs(request: Request) -> HTMLResponse:
     page = _PAGE.format(
         style=_STYLE,
         script=_SCRIPT,
-        title=escape(document["info"]["title"]),
-        version=escape(document["info"]["version"]),
-        description=escape(document["info"]["description"]),
+        **{name: escape(text) for name, text in document["info"].items()},
         operations="\n".join(parts),
         models="\n".join(models),
     )

@@ -9,7 +9,7 @@ import sqlalchemy as sa
 from fastapi import APIRouter, Query, Response
 from sqlalchemy.orm import Session
 
-from service.api.conditional import created, readable, require_match, unless_known
+from service.api.conditional import matched, readable, unless_known
 from service.api.deps import CallDep
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
@@ -26,7 +26,7 @@ router = APIRouter(prefix="/v1/outages", tags=["outages"])
 
 
 @router.post("", status_code=201)
-def create_outage(body: OutageIn, call: CallDep, once: OnceDep) -> OutageOut:
+def create_outage(body: OutageIn, once: OnceDep) -> OutageOut:
     """Report that a satellite or a ground station is out for a while.
 
     Scenarios stored from now on whose horizon it touches take it along, and name it.
@@ -39,9 +39,7 @@ def create_outage(body: OutageIn, call: CallDep, once: OnceDep) -> OutageOut:
         row = OutageRow(**body.model_dump())
         session.add(row)
         session.flush()
-        call.audit.record(session, "create", "outage", row.id)
-        shown = created(call.response, _shown(session, [row])[0], f"/v1/outages/{row.id}")
-        return once.keep(session, shown)
+        return once.created(session, "outage", row.id, _shown(session, [row])[0])
 
 
 @router.get("")
@@ -67,18 +65,17 @@ def list_outages(
 def get_outage(outage_id: str, call: CallDep) -> OutageOut | Response:
     """Return one outage."""
     with call.database.reading() as session:
-        shown = _shown(session, [existing(session, OutageRow, "outage", outage_id)])[0]
-    return unless_known(call.request, call.response, shown)
+        row = existing(session, OutageRow, "outage", outage_id)
+        return unless_known(call, _shown(session, [row])[0])
 
 
 @router.delete("/{outage_id}", status_code=204, responses=problem_responses(404, 412))
 def delete_outage(outage_id: str, call: CallDep) -> None:
     """Delete an outage, as where it ends early. Scenarios that took it along keep it."""
-    with call.database.transaction() as session:
+    with call.noted("delete", "outage", outage_id) as session:
         row = existing(session, OutageRow, "outage", outage_id, to_change=True)
-        require_match(call.request, lambda: _shown(session, [row])[0])
+        matched(call, row, lambda row: _shown(session, [row])[0])
         row.delete()
-        call.audit.record(session, "delete", "outage", outage_id)
 
 
 def _alive(

@@ -1,4 +1,4 @@
-"""Lists: opaque cursors, a limit, and a Link header to the next page."""
+"""Lists: cursors, a limit, a Link header to the next page, and what they are narrowed by."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import binascii
 import itertools
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime
 from typing import Annotated, Any, Final, Generic, TypeVar
 
 import sqlalchemy as sa
@@ -14,10 +15,10 @@ from fastapi import Depends, Query, Request, Response
 from sqlalchemy.orm import InstrumentedAttribute, Session
 
 from service.problems.kinds import ServiceError
+from service.wire.base import Instant, Listed
 
 T = TypeVar("T")
 R = TypeVar("R")
-K = TypeVar("K", str, int)
 
 MOST_BYTES: Final = 2_000_000
 """Of a page whose rows may be large; one row more, where a single one is larger."""
@@ -29,6 +30,10 @@ class Page(Generic[R]):
 
     rows: Sequence[R]
     next: str | None
+
+    def listed(self, show: Callable[[R], T]) -> Listed[T]:
+        """Return the page as clients see it."""
+        return Listed(items=[show(row) for row in self.rows], next=self.next)
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,15 +57,11 @@ class Paging:
         """Return the page of up to ``limit + 1`` rows that were read, and set the Link header."""
         if len(rows) <= self.limit:
             return Page(rows, None)
-        cursor = encode_cursor(str(key(rows[self.limit - 1])))
+        last = str(key(rows[self.limit - 1]))
+        cursor = base64.urlsafe_b64encode(last.encode()).decode().rstrip("=")
         url = self.request.url.include_query_params(cursor=cursor)
         self.response.headers["Link"] = f'<{url.path}?{url.query}>; rel="next"'
         return Page(rows[: self.limit], cursor)
-
-
-def encode_cursor(key: str) -> str:
-    """Return the opaque form of a key."""
-    return base64.urlsafe_b64encode(key.encode()).decode().rstrip("=")
 
 
 def decode_cursor(cursor: str) -> str:
@@ -137,3 +138,48 @@ def _num_fitting(weights: Iterable[int], most: int) -> int:
         if total > MOST_BYTES:
             return max(1, min(number, most))
     return most
+
+
+SatelliteQuery = Annotated[
+    str | None, Query(max_length=200, description="Only with this satellite, by its id.")
+]
+StationQuery = Annotated[
+    str | None, Query(max_length=200, description="Only with this ground station, by its id.")
+]
+NameQuery = Annotated[
+    str | None, Query(max_length=200, description="Only names that hold this text, in any case.")
+]
+_From = Annotated[
+    Instant | None, Query(alias="from", description="Only what was stored then or later.")
+]
+_To = Annotated[Instant | None, Query(description="Only what was stored before.")]
+
+
+@dataclass(frozen=True, slots=True)
+class Stored:
+    """When things were stored: from an instant on, and before another."""
+
+    start: datetime | None
+    end: datetime | None
+
+    def narrow(self, query: sa.Select[Any], column: sa.SQLColumnExpression[Any]) -> sa.Select[Any]:
+        """Return a query of what was stored then."""
+        if self.start is not None:
+            query = query.where(column >= self.start)
+        if self.end is not None:
+            query = query.where(column < self.end)
+        return query
+
+
+async def _stored(from_: _From = None, to: _To = None) -> Stored:
+    return Stored(from_, to)
+
+
+StoredDep = Annotated[Stored, Depends(_stored)]
+
+
+def by_name(
+    query: sa.Select[Any], column: sa.SQLColumnExpression[Any], name: str | None
+) -> sa.Select[Any]:
+    """Return a query of what has this text in its name."""
+    return query if name is None else query.where(column.icontains(name, autoescape=True))

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from datetime import datetime
 from typing import Annotated, Final
 
@@ -54,22 +53,15 @@ def _filter(
 FilterDep = Annotated[PassFilter, Depends(_filter)]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Found:
-    passes: Sequence[PassOut]
-    stations: dict[str, GroundStation]
-    made_at: datetime
-
-
 @router.get("/{plan_id}/passes", responses=problem_responses(404, 409, 503))
 def list_passes(
     plan_id: str, call: CallDep, paging: PagingDep, wanted: FilterDep
 ) -> Listed[PassOut]:
     """List the passes of a plan's satellites over its stations by AOS, planned or not."""
     after = paging.after_number()
-    numbered = list(enumerate(_find(call, plan_id, wanted).passes))[after + 1 :]
+    numbered = list(enumerate(_find(call, plan_id, wanted)[0]))[after + 1 :]
     page = paging.answer(numbered[: paging.limit + 1], lambda pair: pair[0])
-    return Listed(items=[one for _, one in page.rows], next=page.next)
+    return page.listed(lambda pair: pair[1])
 
 
 @router.get(
@@ -86,30 +78,24 @@ def list_passes(
 def get_passes_as(plan_id: str, suffix: Suffix, call: CallDep, wanted: FilterDep) -> Response:
     """Return the passes of a plan as a table or as a calendar."""
     with call.database.reading() as session:
-        find_plan(session, plan_id, call.caller)
+        find_plan(session, plan_id, call)
     require_offered(suffix, _TYPES, "Passes are")
-    found = _find(call, plan_id, wanted)
+    passes, stations, made_at = _find(call, plan_id, wanted)
     return StreamingResponse(
-        _written(found, suffix),
+        write_csv(passes) if suffix == "csv" else write_ics(passes, stations, made_at),
         media_type=_TYPES[suffix],
         headers={"Content-Disposition": f'inline; filename="passes-{plan_id}.{suffix}"'},
     )
 
 
-def _written(found: _Found, suffix: str) -> Iterator[str]:
-    if suffix == "csv":
-        return write_csv(found.passes)
-    return write_ics(found.passes, found.stations, found.made_at)
-
-
-def _find(call: Call, plan_id: str, wanted: PassFilter) -> _Found:
+def _find(
+    call: Call, plan_id: str, wanted: PassFilter
+) -> tuple[Sequence[PassOut], dict[str, GroundStation], datetime]:
+    """Return the passes, the stations by id, and when the plan was made."""
     with call.database.reading() as session:
-        job = session.get_one(JobRow, find_plan(session, plan_id, call.caller).job_id)
+        job = session.get_one(JobRow, find_plan(session, plan_id, call).job_id)
         made_at = intake.require_answer(session, job)
         timeline = read(TimelineOut, intake.find_timeline(session, job))
         question = StoredQuestion(job_store.content_of(session, job.id))
-    return _Found(
-        passes=passes_of_plan(question, timeline, wanted),
-        stations={station.id: station for station in question.ground_stations},
-        made_at=made_at,
-    )
+    stations = {station.id: station for station in question.ground_stations}
+    return passes_of_plan(question, timeline, wanted), stations, made_at

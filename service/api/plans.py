@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from datetime import datetime
+from functools import partial
 from typing import Annotated, cast
 
 from fastapi import APIRouter, Query, Response
 from sqlalchemy.orm import Session
 
-from service.access.callers import Caller, Scope
+from service.access.callers import Scope
 from service.api import job_intake as intake
-from service.api.conditional import created, etagged, readable, require_match, unless_known
-from service.api.deps import CallDep
+from service.api.conditional import etagged, matched, readable, unless_known
+from service.api.deps import Call, CallDep
 from service.api.errors import problem_responses
 from service.api.guard import require_scope
 from service.api.idempotency import OnceDep
@@ -24,7 +25,6 @@ from service.plans import lifecycle
 from service.plans import store as plan_store
 from service.problems.faults import refuse_one
 from service.stores import deletion, job_store
-from service.stores.finding import find_own, no_such
 from service.webhooks import outbox
 from service.wire.base import Listed, parse_instant, read
 from service.wire.plans import (
@@ -43,11 +43,6 @@ from service.wire.timelines import TimelineOut
 
 router = APIRouter(prefix="/v1/plans", tags=["plans"])
 
-At = Annotated[
-    str | None,
-    Query(description="Only plans in force at this instant; `now` for the present one."),
-]
-
 
 @router.post("", status_code=201, responses=problem_responses(409, 422))
 def create_plan(body: PlanIn, call: CallDep, once: OnceDep) -> PlanOut:
@@ -60,11 +55,8 @@ def create_plan(body: PlanIn, call: CallDep, once: OnceDep) -> PlanOut:
         job = intake.find_job(session, body.job_id)
         timeline = read(TimelineOut, intake.find_timeline(session, job))
         plan = plan_store.add(session, call.caller, owner, job.id, body.name, timeline)
-        call.audit.record(session, "create", "plan", plan.id)
         outbox.tell_plan(session, plan, None, None)
-        return once.keep(
-            session, created(call.response, _shown(session, plan), f"/v1/plans/{plan.id}")
-        )
+        return once.created(session, "plan", plan.id, _shown(session, plan))
 
 
 @router.get("")
@@ -73,7 +65,10 @@ def list_plans(
     paging: PagingDep,
     state: Annotated[PlanState | None, Query(description="Only plans in this state.")] = None,
     satellite_id: Annotated[str | None, Query(description="Only plans of this satellite.")] = None,
-    at: At = None,
+    at: Annotated[
+        str | None,
+        Query(description="Only plans in force at this instant; `now` for the present one."),
+    ] = None,
     job_id: Annotated[str | None, Query(description="Only plans of this job.")] = None,
     parent_id: Annotated[str | None, Query(description="Only changes of this plan.")] = None,
 ) -> Listed[PlanOut]:
@@ -108,18 +103,16 @@ def _instant(session: Session, at: str | None) -> datetime | None:
 def get_plan(plan_id: str, call: CallDep) -> PlanOut | Response:
     """Return one plan."""
     with call.database.reading() as session:
-        shown = _shown(session, find_plan(session, plan_id, call.caller))
-    return unless_known(call.request, call.response, shown)
+        return unless_known(call, _shown(session, find_plan(session, plan_id, call)))
 
 
 @router.delete("/{plan_id}", status_code=204, responses=problem_responses(404, 409, 412))
 def delete_plan(plan_id: str, call: CallDep) -> None:
     """Delete a plan for good: not an approved or published one, nor one that has changes."""
-    with call.database.transaction() as session:
-        plan = find_plan(session, plan_id, call.caller, to_change=True)
-        require_match(call.request, lambda: _shown(session, plan))
+    with call.noted("delete", "plan", plan_id) as session:
+        plan = find_plan(session, plan_id, call, to_change=True)
+        matched(call, plan, partial(_shown, session))
         deletion.delete_plan(session, plan)
-        call.audit.record(session, "delete", "plan", plan_id)
 
 
 @router.post("/{plan_id}/transitions", responses=problem_responses(403, 404, 409, 412, 422))
@@ -136,9 +129,9 @@ def move_plan(plan_id: str, body: TransitionIn, call: CallDep, once: OnceDep) ->
     with once.transaction() as session:
         if body.to == "published":
             # Before the plan itself is locked, so that two publishers come one after the other.
-            plan_store.lock_publishing(session, find_plan(session, plan_id, call.caller).owner)
-        plan = find_plan(session, plan_id, call.caller, to_change=True)
-        require_match(call.request, lambda: _shown(session, plan))
+            plan_store.lock_publishing(session, find_plan(session, plan_id, call).owner)
+        plan = find_plan(session, plan_id, call, to_change=True)
+        matched(call, plan, partial(_shown, session))
         lifecycle.move(session, call.caller, plan, body)
         call.audit.record(session, body.to, "plan", plan.id)
         shown = _shown(session, plan)
@@ -150,7 +143,7 @@ def move_plan(plan_id: str, body: TransitionIn, call: CallDep, once: OnceDep) ->
 def list_history(plan_id: str, call: CallDep) -> Listed[PlanEventOut]:
     """List a plan's transitions in their order: who, when and why."""
     with call.database.reading() as session:
-        find_plan(session, plan_id, call.caller)
+        find_plan(session, plan_id, call)
         events = plan_store.history(session, plan_id)
     return Listed(items=[from_row(PlanEventOut, event) for event in events], next=None)
 
@@ -164,12 +157,12 @@ def list_actions(
 ) -> Listed[PlanActionOut]:
     """List a plan's collects and contacts, and what became of them as far as it was reported."""
     with call.database.reading() as session:
-        find_plan(session, plan_id, call.caller)
+        find_plan(session, plan_id, call)
         found = plan_store.actions(
             session, plan_id, paging.after_number(), paging.limit + 1, satellite_id
         )
     page = paging.answer(found, lambda pair: pair[0].position)
-    return Listed(items=[action_out(row, last) for row, last in page.rows], next=page.next)
+    return page.listed(lambda pair: action_out(*pair))
 
 
 @router.get(
@@ -178,18 +171,13 @@ def list_actions(
 def get_plan_as(plan_id: str, suffix: Suffix, call: CallDep) -> Response:
     """Return the plan in the form that the suffix names, as of its job."""
     with call.database.reading() as session:
-        job = session.get_one(JobRow, find_plan(session, plan_id, call.caller).job_id)
+        job = session.get_one(JobRow, find_plan(session, plan_id, call).job_id)
     return timeline_answer(call, job, suffix)
 
 
-def find_plan(
-    session: Session, plan_id: str, caller: Caller, *, to_change: bool = False
-) -> PlanRow:
+def find_plan(session: Session, plan_id: str, call: Call, *, to_change: bool = False) -> PlanRow:
     """Return a plan; 404 where there is none that the caller may see."""
-    plan = find_own(session, PlanRow, plan_id, caller.visible_owner, to_change=to_change)
-    if plan is None:
-        raise no_such("plan", plan_id)
-    return plan
+    return call.own(session, PlanRow, "plan", plan_id, to_change=to_change)
 
 
 def _shown(session: Session, plan: PlanRow) -> PlanOut:

@@ -6,6 +6,7 @@ import re
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final, cast
 
 import sqlalchemy as sa
@@ -22,6 +23,8 @@ from service.db.rows import JobResultRow, JobRow
 from service.db.session import Database
 from service.stores import job_store
 
+# Ids by their form: one that the database cannot even read would spoil the query of the others.
+_PATH: Final = re.compile(r"/v1/jobs/([0-9a-f-]{36})(/timeline)?")
 _JSON: Final = "application/json"
 _ACCEPTABLE: Final = (None, "*/*", _JSON)
 # Made once: to make and compile a query takes longer than to run it.
@@ -58,10 +61,10 @@ class Polls:
 
     def __init__(self, app: ASGIApp, state: State):
         self.app = app
-        self._polled = [
-            _Polled("", _PolledJobs(state).ask),
-            _Polled("/timeline", _PolledTimelines(state).ask, needs_etag=True),
-        ]
+        self._polled = {
+            None: _Polled("", _PolledJobs(state).ask),
+            "/timeline": _Polled("/timeline", partial(_known_timelines, state), needs_etag=True),
+        }
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request."""
@@ -71,12 +74,12 @@ class Polls:
     async def _answer(self, scope: Scope) -> Response | None:
         if scope["type"] != "http" or scope["method"] != "GET" or scope["query_string"]:
             return None
-        polled, job_id = self._find(scope["path"])
-        headers = Headers(scope=scope)
+        path, headers = _PATH.fullmatch(scope["path"]), Headers(scope=scope)
         # The other forms of a timeline have other names.
-        if polled is None or headers.get("accept") not in _ACCEPTABLE:
+        if path is None or headers.get("accept") not in _ACCEPTABLE:
             return None
-        known = headers.get("if-none-match")
+        job_id, end = path.groups()
+        polled, known = self._polled[end], headers.get("if-none-match")
         if known is None and polled.needs_etag:
             return None
         try:
@@ -88,12 +91,6 @@ class Polls:
             return None
         scope["route"] = polled
         return found.response()
-
-    def _find(self, path: str) -> tuple[_Polled | None, str]:
-        for polled in self._polled:
-            if job := polled.path.fullmatch(path):
-                return polled, job[1]
-        return None, ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,8 +110,7 @@ class _Found:
 class _Polled:
     """What clients ask for again and again.
 
-    ``path_format`` is that of its route, which metrics ask for. Ids are told by their form, as
-    one that the database cannot even read would spoil the query of the others.
+    ``path_format`` is that of its route, which metrics ask for.
     """
 
     def __init__(
@@ -126,7 +122,6 @@ class _Polled:
     ):
         self.needs_etag = needs_etag
         self.path_format = "/v1/jobs/{job_id}" + end
-        self.path = re.compile(f"/v1/jobs/([0-9a-f-]{{36}}){end}")
         self.answers = Together(ask)
 
 
@@ -139,22 +134,15 @@ class _PolledJobs:
 
     def ask(self, polls: Sequence[Poll]) -> Mapping[Poll, _Found]:
         database = cast(Database, self._state.database)
-        found: dict[Poll, _Found] = {}
-        changed: dict[Poll, sa.Row[Any]] = {}
         rows = _rows(database, _JOBS, polls)
-        for poll in polls:
-            job_id, known = poll
-            if (row := rows.get(job_id)) is None:
-                continue
-            if matches(known, etag_of_job(row)):
-                found[poll] = _Found(row.tenant, headers_of(row))
-            else:
-                changed[poll] = row
-        whole = self._whole(database, {row.id: row for row in changed.values()})
-        for poll in changed:
-            if poll[0] in whole:
-                found[poll] = whole[poll[0]]
-        return found
+        found = {
+            (job_id, known): _Found(row.tenant, headers_of(row))
+            for job_id, known in polls
+            if (row := rows.get(job_id)) is not None and matches(known, etag_of_job(row))
+        }
+        changed = [poll for poll in polls if poll[0] in rows and poll not in found]
+        whole = self._whole(database, {job_id: rows[job_id] for job_id, _ in changed})
+        return found | {poll: whole[poll[0]] for poll in changed if poll[0] in whole}
 
     def _whole(self, database: Database, rows: Mapping[str, sa.Row[Any]]) -> Mapping[str, _Found]:
         whole: dict[str, _Found] = {}
@@ -180,24 +168,15 @@ class _PolledJobs:
             self._kept.popitem(last=False)
 
 
-class _PolledTimelines:
-    """Timelines, which never change: who has one is told so."""
-
-    def __init__(self, state: State):
-        self._state = state
-
-    def ask(self, polls: Sequence[Poll]) -> Mapping[Poll, _Found]:
-        known = [poll for poll in polls if matches(poll[1], etag_of_timeline(poll[0]))]
-        if not known:
-            return {}
-        rows = _rows(cast(Database, self._state.database), _TIMELINES, known)
-        return {
-            (job_id, tags): _Found(
-                rows[job_id].tenant, {"ETag": etag_of_timeline(job_id), "Vary": "Accept"}
-            )
-            for job_id, tags in known
-            if job_id in rows
-        }
+def _known_timelines(state: State, polls: Sequence[Poll]) -> Mapping[Poll, _Found]:
+    """Return which timelines clients have: they never change."""
+    known = [poll for poll in polls if matches(poll[1], etag_of_timeline(poll[0]))]
+    rows = _rows(cast(Database, state.database), _TIMELINES, known) if known else {}
+    return {
+        poll: _Found(rows[poll[0]].tenant, {"ETag": etag_of_timeline(poll[0]), "Vary": "Accept"})
+        for poll in known
+        if poll[0] in rows
+    }
 
 
 def _rows(

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Final, cast
+from typing import Final, cast
 
-from fastapi import Depends, Request
 from starlette.datastructures import State
 
 from service.access import key_store
@@ -81,10 +80,3 @@ class Questions:
 def _readable(job_ids: Sequence[str]) -> list[str]:
     # One that the database cannot even read would spoil the query of the others.
     return [job_id for job_id in job_ids if _JOB_ID.fullmatch(job_id)]
-
-
-async def _questions(request: Request) -> Questions:
-    return cast(Questions, request.app.state.questions)
-
-
-QuestionsDep = Annotated[Questions, Depends(_questions)]

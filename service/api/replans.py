@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from datetime import datetime
 from functools import partial
 
-import sqlalchemy as sa
 from fastapi import APIRouter
 from sqlalchemy.orm import Session
 
@@ -32,6 +31,7 @@ from service.scenarios.pin_inputs import with_settled_pins
 from service.scenarios.stored_question import StoredQuestion
 from service.scenarios.translate import read_file
 from service.stores import outage_store
+from service.stores.finding import alive
 from service.wire.jobs import JobOut
 from service.wire.pins import StateIn
 from service.wire.replans import PlanChangeItem, PlanChangesOut, ReplanIn
@@ -54,16 +54,17 @@ def create_replan(plan_id: str, body: ReplanIn, call: CallDep, once: OnceDep) ->
     job = intake.asked_for(body, call)
     queue = intake.queue_with_room(call)
     with call.database.reading() as session:
-        plan = find_plan(session, plan_id, call.caller)
+        plan = find_plan(session, plan_id, call)
         scenario_id = session.get_one(JobRow, plan.job_id).scenario_id
         content = session.get_one(ScenarioRow, scenario_id).content
     file = read_file(json.loads(content))
     with once.transaction() as session:
         intake.require_room(session, call)
-        plan = find_plan(session, plan_id, call.caller)
+        plan = find_plan(session, plan_id, call)
         if body.executions:
             take_down(session, call, plan, body.executions, "/executions")
-        now = _to_the_millisecond(body.now or clock.now(session))
+        now = body.now or clock.now(session)
+        now = now.replace(microsecond=now.microsecond // 1000 * 1000)
         freeze_until = max(body.freeze_until or now, now)
         happened = _happened(session, plan, body, file, now, freeze_until)
         asked = replanning.replan_file(file, body, happened)
@@ -72,15 +73,8 @@ def create_replan(plan_id: str, body: ReplanIn, call: CallDep, once: OnceDep) ->
                 asked = with_settled_pins(asked)
             frozen = freezing.freeze_file(asked, call.settings.scenario_limits)
         row, _ = intake.save(session, call, frozen, call.caller.owner)
-        spec = job(
-            scenario_id=row.id,
-            change=replans.note_of(plan, call.caller, body.name, freeze_until),
-        )
-        return intake.queued(session, call, once, queue, spec)
-
-
-def _to_the_millisecond(instant: datetime) -> datetime:
-    return instant.replace(microsecond=instant.microsecond // 1000 * 1000)
+        change = replans.note_of(plan, call.caller, body.name, freeze_until)
+        return intake.queued(session, call, once, queue, job(scenario_id=row.id, change=change))
 
 
 def _happened(
@@ -91,11 +85,8 @@ def _happened(
     now: datetime,
     freeze_until: datetime,
 ) -> replanning.Happened:
-    stations = {
-        row.station_id
-        for row in replans.all_actions(session, plan.id)
-        if row.station_id is not None
-    }
+    actions = replans.all_actions(session, plan.id)
+    stations = {row.station_id for row in actions if row.station_id is not None}
     satellites = [row.satellite_id for row in plan_store.satellites(session, [plan.id])[plan.id]]
     stored = outage_store.concerning(
         session, satellites, stations, plan.horizon_start, body.horizon_end or plan.horizon_end
@@ -142,31 +133,27 @@ def _telemetry(
 
 def _newest(session: Session, satellite_ids: Sequence[str]) -> dict[str, FileSatellite]:
     """Return the satellites with their elements of today, those that are still stored."""
-    wanted = sa.select(SatelliteRow.id).where(
-        SatelliteRow.id.in_(satellite_ids), SatelliteRow.deleted_at.is_(None)
-    )
-    stored = freezing.satellites_of(session, list(session.scalars(wanted)))
-    return {str(one.id): one for one in stored}
+    rows = session.scalars(alive(SatelliteRow).where(SatelliteRow.id.in_(satellite_ids)))
+    return {str(one.id): one for one in freezing.satellites_of(session, [row.id for row in rows])}
 
 
 @router.get("/{plan_id}/changes", responses=problem_responses(404))
 def list_changes(plan_id: str, call: CallDep) -> PlanChangesOut:
     """List what a replan has changed after its freeze, and why; nothing of any other plan."""
     with call.database.reading() as session:
-        plan = find_plan(session, plan_id, call.caller)
+        plan = find_plan(session, plan_id, call)
         job = session.get_one(JobRow, plan.job_id)
         if plan.parent_id is None or not replans.is_replan(job.change):
             return PlanChangesOut(
                 parent_id=None, freeze_until=None, changed_share=0.0, forced_share=0.0, items=()
             )
         content = session.get_one(ScenarioRow, job.scenario_id).content
-        rows = {own: replans.all_actions(session, own) for own in (plan.parent_id, plan.id)}
+        rows = [replans.all_actions(session, own) for own in (plan.parent_id, plan.id)]
     assert job.change is not None
     freeze_until = datetime.fromisoformat(job.change["freeze_until"])
     question = StoredQuestion(content)
     before, after = (
-        {planned(row): row for row in rows[own] if row.start >= freeze_until}
-        for own in (plan.parent_id, plan.id)
+        {planned(row): row for row in of_plan if row.start >= freeze_until} for of_plan in rows
     )
     found = changes_of(
         list(before), list(after), lambda one: _is_lost(question, one),

@@ -12,13 +12,12 @@ from sqlalchemy.orm import Session
 
 from planner_core.orbits.ingest import read_elements
 from planner_core.orbits.oem import outline_of
-from service.api.conditional import created, readable, require_match, unless_known
-from service.api.deps import CallDep, DatabaseDep, RawBodyDep, file_type
+from service.api.conditional import etagged, located, matched, readable, require_match, unless_known
+from service.api.deps import CallDep, RawBodyDep, file_type
 from service.api.errors import problem_responses
-from service.api.filters import NameQuery, by_name
 from service.api.idempotency import OnceDep
 from service.api.imports import OnError, OnErrorQuery, body_schemas, imported, refuse_if_asked
-from service.api.paging import PagingDep, newest_first
+from service.api.paging import NameQuery, PagingDep, by_name, newest_first
 from service.db.rows import ElementSetRow, SatelliteRow
 from service.problems.faults import refuse_one
 from service.scenarios.translate import orbit_from, satellite_from
@@ -48,13 +47,12 @@ router = APIRouter(prefix="/v1/satellites", tags=["satellites"])
 
 P = TypeVar("P", AgilityIn, SensorIn)
 
-_ADD_ELEMENTS: Final = "add_elements"
-_ACTIONS: Final[dict[store.Status, str]] = {"created": "create", "elements_added": _ADD_ELEMENTS}
+_ACTIONS: Final[dict[store.Status, str]] = {"created": "create", "elements_added": "add_elements"}
 _IMPORT_TYPES = ("text/plain", "application/json", "text/csv", "application/xml", "text/xml")
 
 
 @router.post("", status_code=201, responses=problem_responses(409))
-def create_satellite(body: SatelliteIn, once: OnceDep, call: CallDep) -> SatelliteOut:
+def create_satellite(body: SatelliteIn, once: OnceDep) -> SatelliteOut:
     """Store one satellite.
 
     There is one satellite of a catalogue number: 409 `duplicate_norad_cat_id` names it. Number 0
@@ -65,18 +63,18 @@ def create_satellite(body: SatelliteIn, once: OnceDep, call: CallDep) -> Satelli
         whole = spacecraft_store.completed(session, sent_by(body), WholeSatellite)
         satellite_from(whole, "new")
         row = store.add_satellite(session, whole, orbit.elements, orbit.stored)
-        call.audit.record(session, "create", "satellite", row.id)
-        shown = created(call.response, _shown(session, [row])[0], f"/v1/satellites/{row.id}")
-        return once.keep(session, shown)
+        return once.created(session, "satellite", row.id, _shown(session, [row])[0])
 
 
 @router.post(
     "/import",
     openapi_extra=body_schemas(
-        tle=("text/plain", "TLE, 2LE or 3LE; or OMM or OEM in the keyword form (KVN)."),
-        json=("application/json", "One OMM; or a list of them, as CelesTrak serves it."),
-        csv=("text/csv", "OMM keywords in the header, one element set a line."),
-        xml=("application/xml", "An omm or oem document, or an ndm with many of one kind."),
+        {
+            "text/plain": "TLE, 2LE or 3LE; or OMM or OEM in the keyword form (KVN).",
+            "application/json": "One OMM; or a list of them, as CelesTrak serves it.",
+            "text/csv": "OMM keywords in the header, one element set a line.",
+            "application/xml": "An omm or oem document, or an ndm with many of one kind.",
+        }
     ),
     responses=problem_responses(413, 415),
 )
@@ -110,7 +108,7 @@ def import_satellites(
 
 @router.get("")
 def list_satellites(
-    database: DatabaseDep,
+    call: CallDep,
     paging: PagingDep,
     norad_cat_id: Annotated[
         int | None, Query(ge=0, le=999_999_999, description="Only this number.")
@@ -121,7 +119,7 @@ def list_satellites(
     query = by_name(alive(SatelliteRow), SatelliteRow.name, name)
     if norad_cat_id is not None:
         query = query.where(SatelliteRow.norad_cat_id == norad_cat_id)
-    with database.reading() as session:
+    with call.database.reading() as session:
         page = newest_first(session, query, SatelliteRow.id, paging)
         return Listed(items=_shown(session, page.rows), next=page.next)
 
@@ -130,8 +128,7 @@ def list_satellites(
 def get_satellite(satellite_id: str, call: CallDep) -> SatelliteOut | Response:
     """Return one satellite with the element set in force."""
     with call.database.reading() as session:
-        shown = _shown(session, [find_satellite(session, satellite_id)])[0]
-    return unless_known(call.request, call.response, shown)
+        return unless_known(call, _shown(session, [find_satellite(session, satellite_id)])[0])
 
 
 @router.patch("/{satellite_id}", responses=problem_responses(404, 412))
@@ -143,7 +140,7 @@ def change_satellite(satellite_id: str, body: SatellitePatch, call: CallDep) -> 
     with call.database.transaction() as session:
         row = find_satellite(session, satellite_id, to_change=True)
         before = _shown(session, [row])[0]
-        require_match(call.request, lambda: before)
+        require_match(call, etagged(before))
         changed = _changed(session, before, body)
         satellite_from(changed, satellite_id)
         changes = changed.model_dump(mode="json", include=set(SatellitePatch.model_fields))
@@ -152,17 +149,16 @@ def change_satellite(satellite_id: str, body: SatellitePatch, call: CallDep) -> 
         shown = _shown(session, [row])[0]
         if shown != before:
             call.audit.record(session, "update", "satellite", satellite_id)
-    return created(call.response, shown, f"/v1/satellites/{satellite_id}")
+    return located(call, shown, f"/v1/satellites/{satellite_id}")
 
 
 @router.delete("/{satellite_id}", status_code=204, responses=problem_responses(404, 412))
 def delete_satellite(satellite_id: str, call: CallDep) -> None:
     """Delete a satellite. Scenarios that use it keep their copy."""
-    with call.database.transaction() as session:
+    with call.noted("delete", "satellite", satellite_id) as session:
         row = find_satellite(session, satellite_id, to_change=True)
-        require_match(call.request, lambda: _shown(session, [row])[0])
+        matched(call, row, lambda row: _shown(session, [row])[0])
         row.delete()
-        call.audit.record(session, "delete", "satellite", satellite_id)
 
 
 @router.put("/{satellite_id}/elements", responses=problem_responses(404, 412))
@@ -173,28 +169,23 @@ def put_elements(satellite_id: str, body: OrbitIn, call: CallDep) -> SatelliteOu
     the satellite.
     """
     orbit = orbit_from(body)
-    with call.database.transaction() as session:
+    with call.noted("add_elements", "satellite", satellite_id) as session:
         row = find_satellite(session, satellite_id, to_change=True)
-        require_match(call.request, lambda: _shown(session, [row])[0])
+        matched(call, row, lambda row: _shown(session, [row])[0])
         _require_same_object(row, orbit.elements.norad_cat_id, body)
         store.add_elements(session, row.id, orbit.elements.epoch, orbit.stored)
-        call.audit.record(session, _ADD_ELEMENTS, "satellite", row.id)
         shown = _shown(session, [row])[0]
-    return created(call.response, shown, f"/v1/satellites/{row.id}/elements")
+    return located(call, shown, f"/v1/satellites/{row.id}/elements")
 
 
 @router.get("/{satellite_id}/elements", responses=problem_responses(404))
-def list_elements(
-    satellite_id: str, database: DatabaseDep, paging: PagingDep
-) -> Listed[ElementsOut]:
+def list_elements(satellite_id: str, call: CallDep, paging: PagingDep) -> Listed[ElementsOut]:
     """List all element sets of a satellite, the last stored first."""
     query = sa.select(ElementSetRow).where(ElementSetRow.satellite_id == satellite_id)
-    with database.reading() as session:
+    with call.database.reading() as session:
         find_satellite(session, satellite_id)
         page = newest_first(session, query, ElementSetRow.id, paging)
-    return Listed(
-        items=[from_row(ElementsOut, row, **_told(row.orbit)) for row in page.rows], next=page.next
-    )
+        return page.listed(lambda row: from_row(ElementsOut, row, **_told(row.orbit)))
 
 
 def find_satellite(session: Session, satellite_id: str, *, to_change: bool = False) -> SatelliteRow:
@@ -224,9 +215,7 @@ def _changed(session: Session, before: SatelliteOut, body: SatellitePatch) -> Wh
 
 def _merged(before: P, changes: P | None) -> P:
     """Return settings with those that a client has sent in place of their own."""
-    if changes is None:
-        return before
-    sent = {name: getattr(changes, name) for name in changes.model_fields_set}
+    sent = {} if changes is None else changes.model_dump(exclude_unset=True)
     return before.model_copy(update=sent)
 
 
@@ -260,14 +249,11 @@ def _told(orbit: Json) -> Json:
 
 
 def _imported(one: store.ImportedEntry) -> ImportedSatellite:
-    return ImportedSatellite(
-        id=one.satellite.id,
-        name=one.satellite.name,
-        norad_cat_id=one.satellite.norad_cat_id,
+    return from_row(
+        ImportedSatellite,
+        one.satellite,
         epoch=one.entry.elements.epoch,
         row=one.entry.row,
         status=one.status,
-        warnings=[
-            RecordWarning(row=w.row, code=w.code, detail=w.detail) for w in one.entry.warnings
-        ],
+        warnings=[from_row(RecordWarning, warning) for warning in one.entry.warnings],
     )

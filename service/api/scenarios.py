@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Any, cast
+from typing import Annotated, Any
 
 import numpy as np
 import sqlalchemy as sa
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import APIRouter, Query, Response
 from sqlalchemy.orm import Session
 
 from planner_core.access.scenario_opportunities import view_at
@@ -15,17 +15,24 @@ from planner_core.orbits.places import View
 from planner_core.problem import COLLECT, CONTACT, Opportunities
 from service.access.callers import Caller
 from service.api import job_intake as intake
-from service.api.conditional import created, etag_of, readable, require_match, sent, unless_known
-from service.api.deps import CallDep
+from service.api.conditional import etag_of, located, matched, readable, sent, unless_known
+from service.api.deps import CallDep, found
 from service.api.errors import problem_responses
-from service.api.filters import NameQuery, SatelliteQuery, StationQuery, StoredDep, by_name
 from service.api.idempotency import OnceDep
-from service.api.paging import PagingDep, newest_first, size_of
+from service.api.paging import (
+    NameQuery,
+    PagingDep,
+    SatelliteQuery,
+    StationQuery,
+    StoredDep,
+    by_name,
+    newest_first,
+    size_of,
+)
 from service.db.rows import ScenarioRow
-from service.scenarios.opportunities import Described, OpportunityReader
+from service.scenarios.opportunities import Described
 from service.scenarios.stored_question import StoredQuestion
 from service.stores import deletion, scenario_store
-from service.stores.finding import no_such
 from service.wire.base import Listed
 from service.wire.scenarios import (
     Kind,
@@ -36,6 +43,7 @@ from service.wire.scenarios import (
     ScenarioSummary,
     ViewOut,
 )
+from service.wire.stored import from_row
 
 router = APIRouter(prefix="/v1/scenarios", tags=["scenarios"])
 
@@ -56,7 +64,7 @@ def create_scenario(body: ScenarioIn, call: CallDep, once: OnceDep) -> ScenarioO
     with once.transaction() as session:
         row, is_new = intake.save(session, call, frozen)
         call.response.status_code = 201 if is_new else 200
-        return once.keep(session, created(call.response, _shown(row), f"/v1/scenarios/{row.id}"))
+        return once.keep(session, located(call, _shown(row), f"/v1/scenarios/{row.id}"))
 
 
 @router.get("")
@@ -78,8 +86,7 @@ def list_scenarios(
     query = query.where(*scenario_store.with_parts(ScenarioRow.id, satellite_id, station_id))
     with call.database.reading() as session:
         weight = size_of(ScenarioRow.summary)
-        page = newest_first(session, query, ScenarioRow.id, paging, weight)
-    return Listed(items=[_summary(row) for row in page.rows], next=page.next)
+        return newest_first(session, query, ScenarioRow.id, paging, weight).listed(_summary)
 
 
 @router.get("/{scenario_id}", response_model=ScenarioOut | ScenarioFile, responses=readable())
@@ -94,24 +101,17 @@ def get_scenario(
     with call.database.reading() as session:
         row = _find(session, scenario_id, call.caller)
         if expand:
-            return _file(call.request, row)
-        shown = _shown(row)
-    return unless_known(call.request, call.response, shown)
-
-
-def _file(request: Request, row: ScenarioRow) -> Response:
-    text = StoredQuestion(row.content).exported(row.name)
-    return sent(request, text, "application/json", {"ETag": etag_of(text)})
+            text = StoredQuestion(row.content).exported(row.name)
+            return sent(call.request, text, "application/json", {"ETag": etag_of(text)})
+        return unless_known(call, _shown(row))
 
 
 @router.delete("/{scenario_id}", status_code=204, responses=problem_responses(404, 409, 412))
 def delete_scenario(scenario_id: str, call: CallDep) -> None:
     """Delete a scenario for good, with its opportunities: not one that jobs have."""
-    with call.database.transaction() as session:
-        row = _find(session, scenario_id, call.caller)
-        require_match(call.request, lambda: _shown(row))
+    with call.noted("delete", "scenario", scenario_id) as session:
+        row = matched(call, _find(session, scenario_id, call.caller), _shown)
         deletion.delete_scenario(session, row)
-        call.audit.record(session, "delete", "scenario", scenario_id)
 
 
 @router.get("/{scenario_id}/opportunities", responses=problem_responses(404, 503))
@@ -131,8 +131,7 @@ def list_opportunities(
     """
     with call.database.reading() as session:
         sha256 = _find(session, scenario_id, call.caller).sha256
-    reader = cast(OpportunityReader, call.request.app.state.opportunities)
-    described = reader.get(call.database, scenario_id, sha256)
+    described = intake.described(call, scenario_id, sha256)
     rows = _matching(described, target_id, satellite_id, kind)
     first = int(np.searchsorted(rows, paging.after_number(), side="right"))
     page = paging.answer(rows[first : first + paging.limit + 1].tolist(), lambda row: row)
@@ -147,19 +146,18 @@ def _edges(described: Described, rows: Sequence[int]) -> list[dict[str, ViewOut]
     chosen = np.array(rows, dtype=np.int64)
     first = view_at(scenario, table, chosen, table.start_s[chosen])
     last = view_at(scenario, table, chosen, table.end_s[chosen])
-    return [{"at_start": _view(first, i), "at_end": _view(last, i)} for i in range(len(rows))]
-
-
-def _view(seen: View, position: int) -> ViewOut:
-    return ViewOut(**_seen(seen, position))
+    return [
+        {"at_start": ViewOut(**_seen(first, i)), "at_end": ViewOut(**_seen(last, i))}
+        for i in range(len(rows))
+    ]
 
 
 def _seen(seen: View | Opportunities, row: int) -> dict[str, Any]:
     """Return what satellite and place see of each other, as answers have it."""
     angles = ("off_nadir_deg", "elevation_deg", "azimuth_deg", "sun_elevation_deg")
     return {
-        **{name: _rounded(getattr(seen, name)[row]) for name in angles},
-        "range_km": _rounded(seen.range_m[row] / 1000.0),
+        **{name: round(float(getattr(seen, name)[row]), 6) for name in angles},
+        "range_km": round(float(seen.range_m[row]) / 1000.0, 6),
         "eclipse": bool(seen.in_eclipse[row]),
     }
 
@@ -183,20 +181,19 @@ def _matching(
 def _opportunity(described: Described, row: int, **edges: ViewOut) -> OpportunityOut:
     scenario, table = described.scenario, described.computed.opportunities
     is_collect = int(table.kind[row]) == COLLECT
-    place = int(table.place[row])
+    places = scenario.targets if is_collect else scenario.ground_stations
+    place = places[int(table.place[row])]
     satellite = scenario.satellites[int(table.satellite[row])]
-    target = scenario.targets[place] if is_collect else None
-    station = None if is_collect else scenario.ground_stations[place]
     at = scenario.horizon.instant
     return OpportunityOut(
         id=f"o{row}",
         satellite_id=satellite.id,
         satellite_name=satellite.name,
         kind="collect" if is_collect else "contact",
-        target_id=None if target is None else target.id,
-        target_name=None if target is None else target.name,
-        station_id=None if station is None else station.id,
-        station_name=None if station is None else station.name,
+        target_id=place.id if is_collect else None,
+        target_name=place.name if is_collect else None,
+        station_id=None if is_collect else place.id,
+        station_name=None if is_collect else place.name,
         start=at(float(table.start_s[row])),
         end=at(float(table.end_s[row])),
         access_start=at(float(table.access_start_s[row])),
@@ -207,15 +204,9 @@ def _opportunity(described: Described, row: int, **edges: ViewOut) -> Opportunit
     )
 
 
-def _rounded(value: float) -> float:
-    return round(float(value), 6)
-
-
 def _find(session: Session, scenario_id: str, caller: Caller) -> ScenarioRow:
     row = scenario_store.find(session, scenario_id, caller.visible_owner)
-    if row is None:
-        raise no_such("scenario", scenario_id)
-    return row
+    return found(row, "scenario", scenario_id)
 
 
 def _shown(row: ScenarioRow) -> ScenarioOut:
@@ -228,5 +219,4 @@ def _summary(row: ScenarioRow) -> ScenarioSummary:
     where = f"/v1/scenarios/{row.id}"
     summary = {name: value for name, value in row.summary.items() if name != "pins"}
     links = {"opportunities": f"{where}/opportunities", "file": f"{where}?expand=true"}
-    own = {"id": row.id, "sha256": row.sha256, "name": row.name, "created_at": row.created_at}
-    return ScenarioSummary(**own, links=links, **summary)
+    return from_row(ScenarioSummary, row, links=links, **summary)

@@ -47,14 +47,13 @@ class Slots:
     @asynccontextmanager
     async def held(self, owner: str) -> AsyncIterator[None]:
         """Hold a place, after waiting for it where there is none."""
-        await self.take(owner)
+        await self._take(owner)
         try:
             yield
         finally:
-            self.give_back(owner)
+            self._give_back(owner)
 
-    async def take(self, owner: str) -> None:
-        """Take a place, after waiting for it where there is none; ``held`` gives it back too."""
+    async def _take(self, owner: str) -> None:
         if self._has_place(owner):
             self._held[owner] += 1
             return
@@ -69,7 +68,7 @@ class Slots:
             raise _too_busy() from None
         except asyncio.CancelledError:
             if turn.done() and not turn.cancelled():
-                self.give_back(owner)  # it was given the place and has gone
+                self._give_back(owner)  # it was given the place and has gone
             raise
         finally:
             self._queue.pop(turn, None)
@@ -77,8 +76,7 @@ class Slots:
     def _has_place(self, owner: str) -> bool:
         return self._held.total() < self._most and self._held[owner] < self._of_owner
 
-    def give_back(self, owner: str) -> None:
-        """Give a place back, to whoever is next."""
+    def _give_back(self, owner: str) -> None:
         self._held[owner] -= 1
         if not self._held[owner]:
             del self._held[owner]

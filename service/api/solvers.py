@@ -6,9 +6,9 @@ from fastapi import APIRouter
 
 from planner_core.solvers.base import Solver
 from planner_core.solvers.registry import SOLVERS
+from service.api.deps import found
 from service.api.errors import problem_responses
 from service.jobs.solver_params import params_schema
-from service.stores.finding import no_such
 from service.wire.base import Listed
 from service.wire.operations import SolverOut
 
@@ -24,10 +24,7 @@ def list_solvers() -> Listed[SolverOut]:
 @router.get("/{name}", responses=problem_responses(404))
 def get_solver(name: str) -> SolverOut:
     """Return one solver."""
-    solver = SOLVERS.get(name)
-    if solver is None:
-        raise no_such("solver", name)
-    return _shown(solver)
+    return _shown(found(SOLVERS.get(name), "solver", name))
 
 
 def _shown(solver: type[Solver]) -> SolverOut:

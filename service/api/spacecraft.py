@@ -7,8 +7,8 @@ from typing import Any, Final
 from fastapi import APIRouter, Response
 from sqlalchemy.orm import Session
 
-from service.api.conditional import created, readable, require_match, unless_known
-from service.api.deps import CallDep, DatabaseDep
+from service.api.conditional import etagged, located, matched, readable, require_match, unless_known
+from service.api.deps import CallDep
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
 from service.api.paging import PagingDep, newest_first
@@ -31,22 +31,20 @@ router = APIRouter(prefix="/v1/spacecraft", tags=["spacecraft"])
 
 
 @router.post("", status_code=201)
-def create_spacecraft(body: SpacecraftIn, once: OnceDep, call: CallDep) -> SpacecraftOut:
+def create_spacecraft(body: SpacecraftIn, once: OnceDep) -> SpacecraftOut:
     """Store a type of spacecraft, for satellites to name."""
     with once.transaction() as session:
         whole = store.completed(session, sent_by(body), WholeSpacecraft, names_type=False)
         figures_from(whole, _ANY_PERIOD_S)
         row = SpacecraftRow(name=whole.name, body=_figures(whole))
         session.add(row)
-        call.audit.record(session, "create", "spacecraft", row.id)
-        shown = created(call.response, _shown(row), f"/v1/spacecraft/{row.id}")
-        return once.keep(session, shown)
+        return once.created(session, "spacecraft", row.id, _shown(row))
 
 
 @router.get("")
-def list_spacecraft(database: DatabaseDep, paging: PagingDep) -> Listed[SpacecraftOut]:
+def list_spacecraft(call: CallDep, paging: PagingDep) -> Listed[SpacecraftOut]:
     """List the types: one's own, newest first; on the last page those that are built in as well."""
-    with database.reading() as session:
+    with call.database.reading() as session:
         page = newest_first(session, alive(SpacecraftRow), SpacecraftRow.id, paging)
     built_in = [_built_in(name) for name in BUILT_IN] if page.next is None else []
     return Listed(items=[*(_shown(row) for row in page.rows), *built_in], next=page.next)
@@ -56,10 +54,9 @@ def list_spacecraft(database: DatabaseDep, paging: PagingDep) -> Listed[Spacecra
 def get_spacecraft(spacecraft_id: str, call: CallDep) -> SpacecraftOut | Response:
     """Return one type, by its id or the name of one that is built in."""
     if spacecraft_id in BUILT_IN:
-        return unless_known(call.request, call.response, _built_in(spacecraft_id))
+        return unless_known(call, _built_in(spacecraft_id))
     with call.database.reading() as session:
-        shown = _shown(_find(session, spacecraft_id))
-    return unless_known(call.request, call.response, shown)
+        return unless_known(call, _shown(_find(session, spacecraft_id)))
 
 
 @router.patch("/{spacecraft_id}", responses=problem_responses(404, 409, 412))
@@ -71,7 +68,7 @@ def change_spacecraft(spacecraft_id: str, body: SpacecraftPatch, call: CallDep) 
     with call.database.transaction() as session:
         row = _find(session, spacecraft_id, to_change=True)
         before = _shown(row)
-        require_match(call.request, lambda: before)
+        require_match(call, etagged(before))
         merged = filled({"name": row.name} | sent_by(body), row.body)
         whole = validated(WholeSpacecraft, merged)
         figures_from(whole, _ANY_PERIOD_S)
@@ -79,17 +76,15 @@ def change_spacecraft(spacecraft_id: str, body: SpacecraftPatch, call: CallDep) 
         shown = _shown(row)
         if shown != before:
             call.audit.record(session, "update", "spacecraft", spacecraft_id)
-    return created(call.response, shown, f"/v1/spacecraft/{spacecraft_id}")
+    return located(call, shown, f"/v1/spacecraft/{spacecraft_id}")
 
 
 @router.delete("/{spacecraft_id}", status_code=204, responses=problem_responses(404, 409, 412))
 def delete_spacecraft(spacecraft_id: str, call: CallDep) -> None:
     """Delete a type of one's own. Satellites made from it stay as they are."""
-    with call.database.transaction() as session:
-        row = _find(session, spacecraft_id, to_change=True)
-        require_match(call.request, lambda: _shown(row))
+    with call.noted("delete", "spacecraft", spacecraft_id) as session:
+        row = matched(call, _find(session, spacecraft_id, to_change=True), _shown)
         row.delete()
-        call.audit.record(session, "delete", "spacecraft", spacecraft_id)
 
 
 def _find(session: Session, spacecraft_id: str, *, to_change: bool = False) -> SpacecraftRow:

@@ -15,17 +15,17 @@ from stapi_pydantic import Opportunity, Order, OrderStatus
 from stapi_pydantic import Product as ProductShown
 
 from planner_core.errors import Fault
-from service.api.deps import Call
+from service.api.deps import Call, found
 from service.api.stapi_bodies import OrderIn, SearchIn, StapiOpportunity
 from service.db.ids import new_id
 from service.db.rows import OrderRow, SpacecraftRow
 from service.plans.order_tracking import Step, steps_of
-from service.problems.faults import faults_of_validation, refuse, refuse_one
+from service.problems.faults import faults_of_validation, refuse
 from service.scenarios.opportunities import Described
 from service.scenarios.spacecraft_views import fleet_of, types_flown, views_of
 from service.scenarios.translate import target_from
 from service.stores import order_store
-from service.stores.finding import find, find_own, no_such, of_owner
+from service.stores.finding import find, no_such, of_owner
 from service.wire.places import TargetIn
 from service.wire.scenarios import FileTarget
 from service.wire.spacecraft_types import BUILT_IN
@@ -51,17 +51,15 @@ class Found:
 def products(call: Call) -> list[Found]:
     """Return the products, by id."""
     with call.database.reading() as session:
-        found = [_product(session, type_id) for type_id in types_flown(session)]
-    return [one for one in found if one is not None]
+        flown = [_product(session, type_id) for type_id in types_flown(session)]
+    return [one for one in flown if one is not None]
 
 
 def find_product(call: Call, product_id: str) -> Found:
     """Return one product; 404 where no satellite is of this type."""
     with call.database.reading() as session:
-        found = _product(session, product_id) if product_id in types_flown(session) else None
-    if found is None:
-        raise no_such("product", product_id)
-    return found
+        product = _product(session, product_id) if product_id in types_flown(session) else None
+    return found(product, "product", product_id)
 
 
 def _product(session: Session, type_id: str) -> Found | None:
@@ -120,10 +118,7 @@ def _target(asked: SearchIn | OrderIn, own_id: str, product: Found) -> TargetIn:
     fields = {"sensor_type": product.sensor_type}
     if isinstance(asked, OrderIn):
         fields |= asked.order_parameters.model_dump()
-    try:
-        body = asked.as_target(own_id, **fields)
-    except ValueError as error:
-        raise refuse_one("invalid_value", f"{error}.", "/filter") from None
+    body = asked.as_target(own_id, **fields)
     try:
         target = TargetIn.model_validate(body)
     except ValidationError as error:
@@ -154,12 +149,12 @@ def list_orders(
         count = session.scalar(sa.select(sa.func.count()).select_from(wanted.subquery())) or 0
         if after is not None:
             wanted = wanted.where(OrderRow.id < after)
-        found = session.scalars(wanted.order_by(OrderRow.id.desc()).limit(limit + 1)).all()
-        rows = found[:limit]
+        read = session.scalars(wanted.order_by(OrderRow.id.desc()).limit(limit + 1)).all()
+        rows = read[:limit]
         orders = [
             _order(row, steps) for row, steps in zip(rows, steps_of(session, rows), strict=True)
         ]
-    return orders, rows[-1].id if len(found) > limit else None, count
+    return orders, rows[-1].id if len(read) > limit else None, count
 
 
 def find_order(call: Call, order_id: str) -> Order[OrderStatus]:
@@ -174,11 +169,8 @@ def statuses(call: Call, order_id: str) -> list[OrderStatus]:
 
 
 def _find(call: Call, order_id: str) -> tuple[OrderRow, Sequence[Step]]:
-    owner = call.caller.visible_owner
     with call.database.reading() as session:
-        row = find_own(session, OrderRow, order_id, owner)
-        if row is None:
-            raise no_such("order", order_id)
+        row = call.own(session, OrderRow, "order", order_id)
         return row, steps_of(session, [row])[0]
 
 

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import Field, field_validator
 from stapi_pydantic import OpportunityProperties, OrderParameters, Queryables
 
+from service.problems.faults import refuse_one
 from service.wire.base import Body, Duration, NonNegative, parse_instant
 
 Angle = Annotated[float, Field(ge=0, le=90)]
@@ -108,7 +109,7 @@ class _AskIn(Body):
 
         Raises
         ------
-        ValueError
+        ServiceError
             The filter compares what no target limits.
         """
         lon_deg, lat_deg, *above = self.geometry.coordinates
@@ -136,7 +137,8 @@ class _AskIn(Body):
             named, number = part.args
             limit = LIMITS.get((named.property, part.op))
             if limit is None or limit in found:
-                raise ValueError(f"{named.property} {part.op} cannot be asked for here, or twice")
+                detail = f"{named.property} {part.op} cannot be asked for here, or twice."
+                raise refuse_one("invalid_value", detail, "/filter")
             found[limit] = number
         return found
 

@@ -12,23 +12,14 @@ from pydantic import Field
 from sqlalchemy.orm import Session
 
 from planner_core.errors import Fault
-from service.api.conditional import created, readable, require_match, unless_known
-from service.api.deps import ANY_FILE, CallDep, DatabaseDep, RawBodyDep, file_type
+from service.api.conditional import located, matched, readable, unless_known
+from service.api.deps import ANY_FILE, CallDep, RawBodyDep, file_type
 from service.api.errors import problem_responses
-from service.api.filters import NameQuery, by_name
 from service.api.idempotency import OnceDep
 from service.api.imports import BYTES, request_body
-from service.api.paging import PagingDep, newest_first
+from service.api.paging import NameQuery, PagingDep, by_name, newest_first
 from service.db.rows import TargetCatalogRow, TargetRow
-from service.files.records import (
-    Checked,
-    Record,
-    Records,
-    check,
-    read_csv,
-    read_geojson,
-    read_json,
-)
+from service.files.records import Checked, Record, Records, check, read_csv, read_geojson, read_json
 from service.problems.faults import pointer_to, require_none, validated
 from service.scenarios.translate import target_from
 from service.stores.finding import alive, existing
@@ -79,10 +70,7 @@ _REQUEST_BODY: Final = request_body(
 
 
 @router.post(
-    "",
-    status_code=201,
-    openapi_extra=_REQUEST_BODY,
-    responses=problem_responses(413, 415),
+    "", status_code=201, openapi_extra=_REQUEST_BODY, responses=problem_responses(413, 415)
 )
 def create_target_catalog(
     call: CallDep,
@@ -99,7 +87,7 @@ def create_target_catalog(
         call.count_stored(session, num_rows=len(targets), num_bytes=len(data))
         row = _add(session, found.name or name or _UNNAMED, targets)
         call.audit.record(session, "create", "target_catalog", row.id)
-        shown = created(call.response, _shown(row), f"/v1/target-catalogs/{row.id}")
+        shown = located(call, _shown(row), f"/v1/target-catalogs/{row.id}")
         answer = CreatedCatalog(**shown.model_dump(), ignored_columns=list(found.ignored))
         return once.keep(session, answer)
 
@@ -112,17 +100,17 @@ def read_targets(kind: str, data: bytes) -> tuple[Records, list[TargetIn]]:
     ServiceError
         With every fault of the file, where there is any.
     """
-    found = _read(kind, data)
-    return found, _checked(found)
-
-
-def _read(kind: str, data: bytes) -> Records:
     match kind:
         case "text/csv":
-            return read_csv(data, _COLUMNS, _REQUIRED, most=MAX_TARGETS)
+            found = read_csv(data, _COLUMNS, _REQUIRED, most=MAX_TARGETS)
         case "application/geo+json":
-            return read_geojson(data, _COLUMNS, most=MAX_TARGETS)
-    return _read_json(data)
+            found = read_geojson(data, _COLUMNS, most=MAX_TARGETS)
+        case _:
+            found = _read_json(data)
+    good, faults = check(found.records, TargetIn, target_from)
+    faults += [*found.faults, *_faults_of_repeated(good)]
+    require_none(sorted(faults, key=lambda fault: fault.row or 0))
+    return found, [one.body for one in good]
 
 
 def _read_json(data: bytes) -> Records:
@@ -132,14 +120,6 @@ def _read_json(data: bytes) -> Records:
         for position, target in enumerate(body.targets)
     )
     return Records(records=records, name=body.name)
-
-
-def _checked(found: Records) -> list[TargetIn]:
-    good, faults = check(found.records, TargetIn, target_from)
-    faults += found.faults
-    faults += _faults_of_repeated(good)
-    require_none(sorted(faults, key=lambda fault: fault.row or 0))
-    return [one.body for one in good]
 
 
 def _faults_of_repeated(good: Sequence[Checked[TargetIn]]) -> list[Fault]:
@@ -178,25 +158,23 @@ def _add(session: Session, name: str, targets: Sequence[TargetIn]) -> TargetCata
 
 @router.get("")
 def list_target_catalogs(
-    database: DatabaseDep, paging: PagingDep, name: NameQuery = None
+    call: CallDep, paging: PagingDep, name: NameQuery = None
 ) -> Listed[TargetCatalogOut]:
     """List the catalogues, newest first."""
     query = by_name(alive(TargetCatalogRow), TargetCatalogRow.name, name)
-    with database.reading() as session:
-        page = newest_first(session, query, TargetCatalogRow.id, paging)
-    return Listed(items=[_shown(row) for row in page.rows], next=page.next)
+    with call.database.reading() as session:
+        return newest_first(session, query, TargetCatalogRow.id, paging).listed(_shown)
 
 
 @router.get("/{catalog_id}", response_model=TargetCatalogOut, responses=readable())
 def get_target_catalog(catalog_id: str, call: CallDep) -> TargetCatalogOut | Response:
     """Return one catalogue, without its targets."""
     with call.database.reading() as session:
-        shown = _shown(existing(session, TargetCatalogRow, "target catalogue", catalog_id))
-    return unless_known(call.request, call.response, shown)
+        return unless_known(call, _shown(_find(session, catalog_id)))
 
 
 @router.get("/{catalog_id}/targets", responses=problem_responses(404))
-def list_targets(catalog_id: str, database: DatabaseDep, paging: PagingDep) -> Listed[TargetIn]:
+def list_targets(catalog_id: str, call: CallDep, paging: PagingDep) -> Listed[TargetIn]:
     """List the targets of a catalogue, in the order of its file."""
     query = (
         sa.select(TargetRow)
@@ -204,10 +182,10 @@ def list_targets(catalog_id: str, database: DatabaseDep, paging: PagingDep) -> L
         .order_by(TargetRow.position)
         .limit(paging.limit + 1)
     )
-    with database.reading() as session:
-        existing(session, TargetCatalogRow, "target catalogue", catalog_id)
+    with call.database.reading() as session:
+        _find(session, catalog_id)
         page = paging.answer(session.scalars(query).all(), lambda row: row.position)
-    return Listed(items=[from_store(TargetIn, row.body) for row in page.rows], next=page.next)
+        return page.listed(lambda row: from_store(TargetIn, row.body))
 
 
 @router.patch("/{catalog_id}", responses=problem_responses(404, 412))
@@ -218,15 +196,13 @@ def change_target_catalog(
 
     Scenarios that use it keep their copy. `If-Match` takes the ETag of the catalogue.
     """
-    with call.database.transaction() as session:
-        row = existing(session, TargetCatalogRow, "target catalogue", catalog_id, to_change=True)
-        require_match(call.request, lambda: _shown(row))
+    with call.noted("update", "target_catalog", catalog_id) as session:
+        row = matched(call, _find(session, catalog_id, to_change=True), _shown)
         row.name = body.name or row.name
         _set_rewards(session, catalog_id, body.rewards or {})
         row.changed_at = datetime.now(UTC)
-        call.audit.record(session, "update", "target_catalog", catalog_id)
         shown = _shown(row)
-    return created(call.response, shown, f"/v1/target-catalogs/{catalog_id}")
+    return located(call, shown, f"/v1/target-catalogs/{catalog_id}")
 
 
 def _set_rewards(session: Session, catalog_id: str, rewards: Mapping[str, float]) -> None:
@@ -254,11 +230,13 @@ def _set_rewards(session: Session, catalog_id: str, rewards: Mapping[str, float]
 @router.delete("/{catalog_id}", status_code=204, responses=problem_responses(404, 412))
 def delete_target_catalog(catalog_id: str, call: CallDep) -> None:
     """Delete a catalogue. Scenarios that use it keep their copy."""
-    with call.database.transaction() as session:
-        row = existing(session, TargetCatalogRow, "target catalogue", catalog_id, to_change=True)
-        require_match(call.request, lambda: _shown(row))
+    with call.noted("delete", "target_catalog", catalog_id) as session:
+        row = matched(call, _find(session, catalog_id, to_change=True), _shown)
         row.delete()
-        call.audit.record(session, "delete", "target_catalog", catalog_id)
+
+
+def _find(session: Session, catalog_id: str, *, to_change: bool = False) -> TargetCatalogRow:
+    return existing(session, TargetCatalogRow, "target catalogue", catalog_id, to_change=to_change)
 
 
 def _shown(row: TargetCatalogRow) -> TargetCatalogOut:

@@ -54,7 +54,7 @@ def list_target_lives(
         page = paging.answer(
             list(islice(found, paging.limit + 1)), lambda row: f"{row[0][0]} {row[0][1]}"
         )
-    return Listed(items=[life for _, life in page.rows], next=page.next)
+    return page.listed(lambda row: row[1])
 
 
 def _catalogs(session: Session, catalog_id: str | None, from_id: str) -> list[TargetCatalogRow]:

@@ -65,9 +65,10 @@ def report_executions(plan_id: str, data: RawBodyDep, call: CallDep, once: OnceD
     """Report what became of actions. Reports are added, never changed: the last one counts."""
     reports = _reports(call, data, ExecutionIn, ExecutionIn.model_fields, ("action_id", "outcome"))
     with once.transaction() as session:
-        plan = find_plan(session, plan_id, call.caller)
+        plan = find_plan(session, plan_id, call)
         rows = take_down(session, call, plan, reports)
-        return once.keep(session, ReportedOut(executions=tuple(map(_execution_out, rows))))
+        executions = [from_row(ExecutionOut, row) for row in rows]
+        return once.keep(session, ReportedOut(executions=executions))
 
 
 def take_down(
@@ -92,10 +93,9 @@ def take_down(
 def list_executions(plan_id: str, call: CallDep, paging: PagingDep) -> Listed[ExecutionOut]:
     """List what was reported of a plan, newest first."""
     with call.database.reading() as session:
-        find_plan(session, plan_id, call.caller)
-        query = plan_store.executions(plan_id)
-        page = newest_first(session, query, ExecutionRow.id, paging)
-    return Listed(items=[_execution_out(row) for row in page.rows], next=page.next)
+        find_plan(session, plan_id, call)
+        page = newest_first(session, plan_store.executions(plan_id), ExecutionRow.id, paging)
+        return page.listed(lambda row: from_row(ExecutionOut, row))
 
 
 @router.post(
@@ -115,7 +115,7 @@ def report_states(
     required = ("satellite_id", "at")
     states = _reports(call, data, StateIn, _STATE_COLUMNS, required, _nested, state_from)
     with once.transaction() as session:
-        plan = find_plan(session, plan_id, call.caller)
+        plan = find_plan(session, plan_id, call)
         _require_published(plan)
         require_none(faults_of_states(session, plan, states, ""))
         rows = plan_store.report_states(session, call.caller, plan.id, states)
@@ -127,9 +127,9 @@ def report_states(
 def list_states(plan_id: str, call: CallDep, paging: PagingDep) -> Listed[PlanStateOut]:
     """List telemetry of a plan, newest first."""
     with call.database.reading() as session:
-        find_plan(session, plan_id, call.caller)
+        find_plan(session, plan_id, call)
         page = newest_first(session, plan_store.states(plan_id), PlanStateRow.id, paging)
-    return Listed(items=[_state_out(row) for row in page.rows], next=page.next)
+        return page.listed(_state_out)
 
 
 def faults_of_states(
@@ -178,13 +178,13 @@ def _reports(
     schema: type[B],
     columns: Collection[str],
     required: Collection[str],
-    from_row: Callable[[Record], Record] = lambda record: record,
+    of_row: Callable[[Record], Record] = lambda record: record,
     build: Callable[[B], object] = lambda body: body,
 ) -> list[B]:
     """Return the reports of a body; raises with every fault and its place."""
     if file_type(call.request, data, *_TYPES) == "text/csv":
         found = read_csv(data, columns, required, most=MAX_REPORTED)
-        records = tuple(map(from_row, found.records))
+        records = tuple(map(of_row, found.records))
     else:
         found = _listed(data)
         records = found.records
@@ -214,16 +214,10 @@ def _nested(record: Record) -> Record:
         attitude["sun"] = str(sun).lower() in ("true", "1", "yes") or sun
     look = [fields.pop(name, None) for name in _LINE_OF_SIGHT]
     if any(value is not None for value in look):
-        attitude["line_of_sight"] = [
-            float(value) if isinstance(value, int) else value for value in look
-        ]
+        attitude["line_of_sight"] = [float(v) if isinstance(v, int) else v for v in look]
     if attitude:
         fields["attitude"] = attitude
     return Record(fields=fields, row=record.row)
-
-
-def _execution_out(row: ExecutionRow) -> ExecutionOut:
-    return from_row(ExecutionOut, row)
 
 
 def _state_out(row: PlanStateRow) -> PlanStateOut:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import islice
 from typing import Annotated, Any, Final
 
-from fastapi import APIRouter, Depends, Path, Query, Request, Response
+from fastapi import APIRouter, Depends, Path, Query, Response
 from fastapi.responses import StreamingResponse
 
 import planner_core
@@ -17,12 +17,11 @@ from service.answers.blocks import TIMELINE, Entry, holds, items_in
 from service.api import job_intake as intake
 from service.api.accept import preferred, require_offered
 from service.api.conditional import matches, readable, sent
-from service.api.deps import Call, CallDep, DatabaseDep, own_job_only
+from service.api.deps import Call, CallDep, own_job_only
 from service.api.errors import problem_responses
 from service.api.job_shapes import etag_of_timeline
 from service.api.paging import PagingDep
 from service.db.rows import JobRow
-from service.db.session import Database
 from service.exports.forms import FORMS, Form
 from service.problems.kinds import ServiceError
 from service.stores import job_store as store
@@ -62,12 +61,8 @@ def timeline_responses(forms: Sequence[Form]) -> dict[int | str, dict[str, Any]]
         # Generated clients take all of these as text, whatever the suffix asks for.
         del content[_JSON]
         content[_JSON] = {"schema": {"anyOf": [_TIMELINE, *other]}}
-    headers = {
-        "Content-Disposition": {
-            "description": "A name to save it under.",
-            "schema": {"type": "string"},
-        }
-    }
+    name = {"description": "A name to save it under.", "schema": {"type": "string"}}
+    headers = {"Content-Disposition": name}
     return {
         200: {"description": "The timeline.", "content": content, "headers": headers},
         **readable(406, 409),
@@ -91,7 +86,7 @@ def get_timeline(job_id: str, call: CallDep) -> Response:
         raise ServiceError(
             "not_acceptable", f"The timeline is offered as {', '.join([_JSON, *_BY_TYPE])}."
         )
-    return _answer(call.database, call.request, job, _BY_TYPE.get(media_type))
+    return _answer(call, job, _BY_TYPE.get(media_type))
 
 
 @router.get(
@@ -107,7 +102,7 @@ def get_timeline_as(job_id: str, suffix: Suffix, call: CallDep) -> Response:
 def timeline_answer(call: Call, job: JobRow, suffix: str) -> Response:
     """Return a job's plan in the form that a suffix names."""
     require_offered(suffix, _SUFFIXES, "The timeline is")
-    return _answer(call.database, call.request, job, _BY_SUFFIX.get(suffix))
+    return _answer(call, job, _BY_SUFFIX.get(suffix))
 
 
 @router.get(
@@ -135,7 +130,7 @@ def get_proof(job_id: str, call: CallDep) -> Response:
 )
 def list_outcomes(
     job_id: str,
-    database: DatabaseDep,
+    call: CallDep,
     paging: PagingDep,
     outcome: Annotated[Outcome | None, Query(description="Only this outcome.")] = None,
     reason: Annotated[str | None, Query(description="Only this code of a reason.")] = None,
@@ -143,7 +138,7 @@ def list_outcomes(
 ) -> Listed[TargetItem]:
     """List every target of the scenario once, with its outcome and why it was left out."""
     after = paging.after_number()
-    with database.reading() as session:
+    with call.database.reading() as session:
         intake.require_answer(session, intake.find_job(session, job_id))
         contents = answer_store.contents(session, job_id, "targets")
     entries = (
@@ -153,7 +148,7 @@ def list_outcomes(
     )
     found = (
         (position, target)
-        for entry, text in answer_store.texts(database.reading, job_id, entries)
+        for entry, text in answer_store.texts(call.database.reading, job_id, entries)
         if target_id is None or json.dumps(target_id) in text
         for position, target in enumerate(items_in(text), entry.first)
         if position > after
@@ -162,26 +157,29 @@ def list_outcomes(
         and reason in (None, (target["reason"] or {}).get("code"))
     )
     page = paging.answer(list(islice(found, paging.limit + 1)), lambda row: row[0])
-    return Listed(items=[TargetItem(**target) for _, target in page.rows], next=page.next)
+    return page.listed(lambda row: TargetItem(**row[1]))
 
 
-def _answer(database: Database, request: Request, job: JobRow, form: Form | None) -> Response:
+def _answer(call: Call, job: JobRow, form: Form | None) -> Response:
     """Return a timeline in a form, or as the document itself."""
-    suffix = "json" if form is None else form.suffix
+    suffix, etag = "json", etag_of_timeline(job.id)
+    if form is not None:
+        # How it is written may change with the version of the service.
+        suffix, etag = form.suffix, f'"{job.id}-{form.suffix}-{planner_core.__version__}"'
     headers = {
-        "ETag": _etag(job.id, form),
+        "ETag": etag,
         "Vary": "Accept",
         "Content-Disposition": f'inline; filename="timeline-{job.id}.{suffix}"',
     }
-    with database.reading() as session:
+    with call.database.reading() as session:
         finished_at = intake.require_answer(session, job)
-        if matches(request.headers.get("if-none-match"), headers["ETag"]):
+        if matches(call.request.headers.get("if-none-match"), etag):
             return Response(status_code=304, headers=headers)
         contents = answer_store.contents(session, job.id, *TIMELINE, "targets")
         content = "" if form is None else store.content_of(session, job.id)
 
     def texts(entries: Iterable[Entry]) -> Iterator[tuple[Entry, str]]:
-        return answer_store.texts(database.reading, job.id, entries)
+        return answer_store.texts(call.database.reading, job.id, entries)
 
     if form is None:
         entries = (entry for entry in contents if entry.kind in TIMELINE)
@@ -189,10 +187,3 @@ def _answer(database: Database, request: Request, job: JobRow, form: Form | None
         return StreamingResponse(pieces, media_type=_JSON, headers=headers)
     answered = Answered(contents, texts, content, finished_at)
     return StreamingResponse(form.write(answered), media_type=form.media_type, headers=headers)
-
-
-def _etag(job_id: str, form: Form | None) -> str:
-    if form is None:
-        return etag_of_timeline(job_id)
-    # How it is written may change with the version of the service.
-    return f'"{job_id}-{form.suffix}-{planner_core.__version__}"'

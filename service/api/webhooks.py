@@ -10,9 +10,8 @@ import sqlalchemy as sa
 from fastapi import APIRouter, Response
 from sqlalchemy.orm import Session
 
-from service.access.callers import Caller
-from service.api.conditional import created, readable, require_match, unless_known
-from service.api.deps import CallDep
+from service.api.conditional import matched, readable, unless_known
+from service.api.deps import Call, CallDep
 from service.api.errors import problem_responses
 from service.api.idempotency import OnceDep
 from service.api.paging import PagingDep, newest_first
@@ -20,7 +19,7 @@ from service.db import clock
 from service.db.rows import WebhookDeliveryRow, WebhookRow
 from service.problems.faults import refuse_one
 from service.problems.kinds import ServiceError
-from service.stores.finding import find_own, no_such, of_owner
+from service.stores.finding import no_such, of_owner
 from service.webhooks import outbox
 from service.webhooks.addresses import AddressRefused, require_good_url
 from service.wire.base import Listed
@@ -62,10 +61,8 @@ def create_webhook(body: WebhookIn, call: CallDep, once: OnceDep) -> CreatedWebh
         )
         session.add(row)
         session.flush()
-        call.audit.record(session, "create", "webhook", row.id)
         shown = CreatedWebhook(**_shown(row).model_dump(), secret=row.secret)
-        shown = created(call.response, shown, f"/v1/webhooks/{row.id}")
-        return once.keep(session, shown, shown_once=frozenset({"secret"}))
+        return once.created(session, "webhook", row.id, shown, shown_once={"secret"})
 
 
 @router.get("")
@@ -73,35 +70,31 @@ def list_webhooks(call: CallDep, paging: PagingDep) -> Listed[WebhookOut]:
     """List the webhooks of the key's owner, newest first; all for the scope `admin`."""
     query = sa.select(WebhookRow).where(of_owner(WebhookRow.owner, call.caller.visible_owner))
     with call.database.reading() as session:
-        page = newest_first(session, query, WebhookRow.id, paging)
-    return Listed(items=[_shown(row) for row in page.rows], next=page.next)
+        return newest_first(session, query, WebhookRow.id, paging).listed(_shown)
 
 
 @router.get("/{webhook_id}", response_model=WebhookOut, responses=readable())
 def get_webhook(webhook_id: str, call: CallDep) -> WebhookOut | Response:
     """Return one webhook."""
     with call.database.reading() as session:
-        shown = _shown(_find(session, webhook_id, call.caller))
-    return unless_known(call.request, call.response, shown)
+        return unless_known(call, _shown(_find(session, webhook_id, call)))
 
 
 @router.delete("/{webhook_id}", status_code=204, responses=problem_responses(404, 412))
 def delete_webhook(webhook_id: str, call: CallDep) -> None:
     """Delete a webhook and all that was or was to be sent to it."""
-    with call.database.transaction() as session:
-        row = _find(session, webhook_id, call.caller, to_change=True)
-        require_match(call.request, lambda: _shown(row))
+    with call.noted("delete", "webhook", webhook_id) as session:
+        row = matched(call, _find(session, webhook_id, call, to_change=True), _shown)
         sent = WebhookDeliveryRow.webhook_id == webhook_id
         session.execute(sa.delete(WebhookDeliveryRow).where(sent))
         session.delete(row)
-        call.audit.record(session, "delete", "webhook", webhook_id)
 
 
 @router.post("/{webhook_id}/test", status_code=202, responses=problem_responses(404, 409))
 def test_webhook(webhook_id: str, once: OnceDep, call: CallDep) -> DeliveryOut:
     """Send an event of type `test`; the deliveries tell how it fared."""
     with once.transaction() as session:
-        row = _find(session, webhook_id, call.caller)
+        row = _find(session, webhook_id, call)
         _require_enabled(row)
         if outbox.num_pending(session, row.id, _TEST) >= _MOST_TESTS:
             raise ServiceError(
@@ -120,9 +113,9 @@ def list_deliveries(webhook_id: str, call: CallDep, paging: PagingDep) -> Listed
     """List what was sent, newest first. Those that ended 30 days ago are forgotten."""
     query = sa.select(WebhookDeliveryRow).where(WebhookDeliveryRow.webhook_id == webhook_id)
     with call.database.reading() as session:
-        _find(session, webhook_id, call.caller)
+        _find(session, webhook_id, call)
         page = newest_first(session, query, WebhookDeliveryRow.id, paging)
-    return Listed(items=[from_row(DeliveryOut, row) for row in page.rows], next=page.next)
+        return page.listed(lambda row: from_row(DeliveryOut, row))
 
 
 @router.post(
@@ -133,7 +126,7 @@ def list_deliveries(webhook_id: str, call: CallDep, paging: PagingDep) -> Listed
 def redeliver(webhook_id: str, delivery_id: str, once: OnceDep, call: CallDep) -> DeliveryOut:
     """Send a message again, under a new `webhook-id`, whatever became of the first."""
     with once.transaction() as session:
-        row = _find(session, webhook_id, call.caller)
+        row = _find(session, webhook_id, call)
         _require_enabled(row)
         delivery = session.get(WebhookDeliveryRow, delivery_id)
         if delivery is None or delivery.webhook_id != webhook_id:
@@ -165,13 +158,8 @@ def _require_enabled(row: WebhookRow) -> None:
         )
 
 
-def _find(
-    session: Session, webhook_id: str, caller: Caller, *, to_change: bool = False
-) -> WebhookRow:
-    row = find_own(session, WebhookRow, webhook_id, caller.visible_owner, to_change=to_change)
-    if row is None:
-        raise no_such("webhook", webhook_id)
-    return row
+def _find(session: Session, webhook_id: str, call: Call, *, to_change: bool = False) -> WebhookRow:
+    return call.own(session, WebhookRow, "webhook", webhook_id, to_change=to_change)
 
 
 def _shown(row: WebhookRow) -> WebhookOut:

@@ -100,6 +100,7 @@ LEAST: Final = 1e-6
 SHORTEST_S: Final = 1e-3
 """One step of the clock that instants are told in."""
 
+Knot = Annotated[list[float], Field(min_length=2, max_length=2)]
 NonNegative = Annotated[float, Field(ge=0, le=MOST)]
 Positive = Annotated[float, Field(ge=LEAST, le=MOST)]
 Duration = Annotated[float, Field(ge=SHORTEST_S, le=MOST)]

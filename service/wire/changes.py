@@ -67,13 +67,8 @@ class RelaxIn(Body):
     @property
     def is_empty(self) -> bool:
         """Whether nothing is to be different."""
-        return not (
-            self.settings
-            or self.satellites
-            or self.targets
-            or self.horizon_end
-            or self.drop_actions
-        )
+        told = (self.settings, self.satellites, self.targets, self.horizon_end, self.drop_actions)
+        return not any(told)
 
 
 def _form_of_action(value: object) -> str:

@@ -11,6 +11,7 @@ from service.wire.base import (
     Duration,
     Id,
     Instant,
+    Knot,
     Name,
     NonNegative,
     Open,
@@ -25,7 +26,11 @@ Latitude = Annotated[float, Field(ge=-90, le=90, description="Geodetic (WGS84), 
 Longitude = Annotated[
     float, Field(ge=-180, le=360, description="East positive; both 190 and -170 are taken.")
 ]
+Mask = Annotated[list[Knot], Field(max_length=720)]
 Altitude = Annotated[float, Field(ge=-500, le=10000, description="Above the WGS84 ellipsoid.")]
+NarrowerOffNadir = Annotated[
+    float | None, Field(ge=0, le=90, description="Narrows the sensor's limit.")
+]
 MAX_TARGETS: Final = 100_000
 
 
@@ -38,9 +43,8 @@ class GroundStationIn(Body):
     alt_m: Altitude = 0.0
     min_elevation_deg: float = Field(5.0, ge=0, lt=90)
     min_contact_s: NonNegative = Field(0.0, description="Shorter passes are no contacts.")
-    elevation_mask: list[Annotated[list[float], Field(min_length=2, max_length=2)]] = Field(
+    elevation_mask: Mask = Field(
         [],
-        max_length=720,
         description="Knots [azimuth_deg, elevation_deg] of the horizon, azimuth ascending from "
         "north over east, linear between them and round the compass. The higher of mask and "
         "min_elevation_deg holds.",
@@ -63,12 +67,7 @@ class GroundStationPatch(Patch):
     alt_m: Altitude | None = None
     min_elevation_deg: Annotated[float, Field(ge=0, lt=90)] | None = None
     min_contact_s: NonNegative | None = None
-    elevation_mask: (
-        Annotated[
-            list[Annotated[list[float], Field(min_length=2, max_length=2)]], Field(max_length=720)
-        ]
-        | None
-    ) = Field(None, description="Replaces the mask as a whole.")
+    elevation_mask: Mask | None = Field(None, description="Replaces the mask as a whole.")
     antennas: Annotated[int, Field(ge=1, le=100)] | None = None
     setup_s: NonNegative | None = None
     downlink_gain: Positive | None = None
@@ -106,12 +105,8 @@ class TargetIn(LightIn):
     alt_m: Altitude = 0.0
     reward: NonNegative = 1.0
     collect_s: Duration = Field(30.0, description="How long one image takes.")
-    off_nadir_min_deg: float | None = Field(
-        None, ge=0, le=90, description="Narrows the sensor's limit."
-    )
-    off_nadir_max_deg: float | None = Field(
-        None, ge=0, le=90, description="Narrows the sensor's limit."
-    )
+    off_nadir_min_deg: NarrowerOffNadir = None
+    off_nadir_max_deg: NarrowerOffNadir = None
     min_elevation_deg: float | None = Field(
         None, ge=0, lt=90, description="Narrows the sensor's limit."
     )

@@ -35,31 +35,23 @@ class ProofOut(Wire):
     )
     contact_prices: tuple[float, ...] | None = Field(
         None,
-        description=(
-            "With a half-life: a multiplier for what each contact takes down, by recorder "
-            "capacity, in the order of the opportunities. All 0 where batteries alone prove it."
-        ),
+        description="With a half-life: a multiplier for what each contact takes down, by recorder "
+        "capacity, in the order of the opportunities. All 0 where batteries alone prove it.",
     )
     antenna_prices: tuple[float, ...] | None = Field(
         None,
-        description=(
-            "A multiplier for each group of contacts that want the same antennas at a time, by "
-            "station and in order of time."
-        ),
+        description="A multiplier for each group of contacts that want the same antennas at a "
+        "time, by station and in order of time.",
     )
     queue_levels: int | None = Field(
         None,
-        description=(
-            "With a half-life: the levels of energy in a collect, where programmes that know the "
-            "queue of the recorder prove the bound."
-        ),
+        description="With a half-life: the levels of energy in a collect, where programmes that "
+        "know the queue of the recorder prove the bound.",
     )
     exact_contacts: tuple[int, ...] | None = Field(
         None,
-        description=(
-            "With `queue_levels`: the contacts, by their place among the opportunities, whose "
-            "energy the programmes do not round."
-        ),
+        description="With `queue_levels`: the contacts, by their place among the opportunities, "
+        "whose energy the programmes do not round.",
     )
     elementary: bool | None = Field(
         None, description="Whether the prices are for paths that take a target once in each pass."

@@ -54,9 +54,7 @@ class ReplanIn(Body):
         "Those of the plan itself stay, but for what `skip` names.",
     )
     skip: list[PinnedActionIn] = Field(
-        [],
-        max_length=10_000,
-        description="Single actions that it may not hold, as in `pins.skip`.",
+        [], max_length=10_000, description="Single actions that it may not hold, as in `pins.skip`."
     )
     rewards: dict[Id, NonNegative] = Field(
         {}, max_length=10_000, description="By target: what its image earns from now on."

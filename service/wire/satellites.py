@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal, TypeVar
 
 from pydantic import AfterValidator, Discriminator, Field, StringConstraints, Tag, model_validator
 from pydantic_core import PydanticCustomError
@@ -24,6 +24,8 @@ from service.wire.base import (
     Wire,
 )
 from service.wire.imports import RejectedRow
+
+R = TypeVar("R")
 
 SunExclusion = Annotated[float | None, Field(ge=0, le=180)]
 PanelAngle = Annotated[float, Field(ge=0, le=180)]
@@ -53,8 +55,7 @@ class AgilityIn(Body):
         "sight move, which needs acceleration_deg_s2.",
     )
     sun_exclusion_deg: SunExclusion = Field(
-        None,
-        description="Least angle between boresight and sun in turns, which a flight checks.",
+        None, description="Least angle between boresight and sun in turns, which a flight checks."
     )
 
 
@@ -155,9 +156,7 @@ def _form_of_resources(value: object) -> str:
     return "object" if isinstance(value, (dict, ResourcesIn)) else "preset"
 
 
-def _shortest(
-    resources: Preset | PresetResourcesIn | ResourcesIn,
-) -> Preset | PresetResourcesIn | ResourcesIn:
+def _shortest(resources: R) -> R | Preset:
     """Return a preset that changes nothing by its name alone: one question has one hash."""
     if not isinstance(resources, PresetResourcesIn):
         return resources
@@ -165,13 +164,14 @@ def _shortest(
     return resources.preset if resources == plain else resources
 
 
-ResourcesField = Annotated[
+PresetOr = Annotated[
     Annotated[Preset, Tag("preset")]
     | Annotated[PresetResourcesIn, Tag("changed_preset")]
-    | Annotated[ResourcesIn, Tag("object")],
+    | Annotated[R, Tag("object")],
     Discriminator(_form_of_resources),
     AfterValidator(_shortest),
 ]
+ResourcesField = PresetOr[ResourcesIn]
 
 
 _MOST_LINES: Final = 110_000
@@ -221,13 +221,7 @@ class OwnResources(Body):
     panel_angle_deg: PanelAngle | None = None
 
 
-OwnResourcesField = Annotated[
-    Annotated[Preset, Tag("preset")]
-    | Annotated[PresetResourcesIn, Tag("changed_preset")]
-    | Annotated[OwnResources, Tag("object")],
-    Discriminator(_form_of_resources),
-    AfterValidator(_shortest),
-]
+OwnResourcesField = PresetOr[OwnResources]
 
 
 class Figures(Body):
@@ -253,10 +247,8 @@ def sent_by(body: Figures | Patch) -> Json:
     sent = body.model_dump(mode="json", exclude_unset=True, exclude={"resources"})
     if "resources" in body.model_fields_set:
         resources = getattr(body, "resources", None)
-        if isinstance(resources, OwnResources):
+        if isinstance(resources, Body):
             resources = resources.model_dump(mode="json", exclude_none=True)
-        elif isinstance(resources, PresetResourcesIn):
-            resources = resources.model_dump(mode="json")
         sent["resources"] = resources
     return {name: value for name, value in sent.items() if value is not None}
 

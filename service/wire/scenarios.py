@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, FailFast, Field, GetJsonSchemaHandler, mod
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from service.wire.base import Body, Duration, Fraction, Id, Instant, Name, Open, Stored, Wire
+from service.wire.base import Body, Duration, Fraction, Id, Instant, Knot, Name, Open, Stored, Wire
 from service.wire.pins import PinsIn, PlacedOutage, StateIn
 from service.wire.places import GroundStationIn, TargetIn
 from service.wire.plan_before import ReplanOfFile
@@ -28,9 +28,7 @@ class HorizonIn(Body):
     end: Instant
 
 
-Curve = Annotated[
-    list[Annotated[list[float], Field(min_length=2, max_length=2)]], Field(max_length=100)
-]
+Curve = Annotated[list[Knot], Field(max_length=100)]
 
 
 class QualityIn(Body):
@@ -59,17 +57,14 @@ Preference = Literal["early", "off_nadir", "sun", "balance", "margin", "few_cont
 class ObjectiveIn(Body):
     """What a plan earns for an image when it is taken, and what when it is on the ground."""
 
-    collected_share: float = Field(
+    collected_share: Fraction = Field(
         1.0,
-        ge=0.0,
-        le=1.0,
         description="The part of its worth that an image earns when it is taken. The rest it earns "
         "when its last bit is on the ground. Without resources images earn all when taken.",
     )
     half_life_s: float | None = Field(
         None,
         gt=0.0,
-        allow_inf_nan=False,
         description="The rest halves with every such time between the end of the collect and its "
         "last bit on the ground; null for no decay.",
     )

@@ -10,10 +10,7 @@ from pydantic import BaseModel, ValidationError
 
 M = TypeVar("M", bound=BaseModel)
 
-_BOUNDS: Final = {
-    "greater_than_equal": "ge",
-    "less_than_equal": "le",
-}
+_BOUNDS: Final = {"greater_than_equal": "ge", "less_than_equal": "le"}
 """Kinds of errors that a value within its range does not make, and where the range stands."""
 _PLAIN_TEXT: Final = "stored"
 
@@ -35,7 +32,7 @@ def from_store(model: type[M], values: Mapping[str, Any]) -> M:
         return beyond_ranges(model.model_validate, values, error)
 
 
-def from_row(model: type[M], row: object, **more: object) -> M:
+def from_row(model: type[M], row: object, /, **more: object) -> M:
     """Return a row in a shape: what it has under the names of the shape's fields, and ``more``."""
     names = [name for name in model.model_fields if name not in more and hasattr(row, name)]
     return from_store(model, {name: getattr(row, name) for name in names} | more)

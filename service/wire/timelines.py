@@ -55,20 +55,18 @@ class ViolationOut(Wire):
     )
 
 
-class AgesOut(Wire):
-    """How old images are when their last bit is on the ground, in seconds."""
-
-    mean: float
-    median: float
-    p90: float = Field(description="Nine of ten are no older.")
-    max: float
-
-
 class SpreadOut(Wire):
     """A figure over all images."""
 
     mean: float
     median: float
+
+
+class AgesOut(SpreadOut):
+    """How old images are when their last bit is on the ground, in seconds."""
+
+    p90: float = Field(description="Nine of ten are no older.")
+    max: float
 
 
 class ImageFiguresOut(Wire):
