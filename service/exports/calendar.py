@@ -19,7 +19,7 @@ from icalendar import Alarm, Calendar, Event
 
 import planner_core
 from planner_core.domain import GroundStation
-from service.answers.answered import Answered, Document, in_chunks
+from service.answers.answered import Answered, Document, chunked
 
 ALARM: Final = timedelta(minutes=10)
 
@@ -28,12 +28,9 @@ _SECOND: Final = timedelta(seconds=1)
 _EPOCH: Final = datetime(2020, 1, 1, tzinfo=UTC)
 
 
+@chunked
 def write(answered: Answered) -> Iterator[str]:
     """Yield the calendar of all contacts."""
-    return in_chunks(_parts(answered))
-
-
-def _parts(answered: Answered) -> Iterator[str]:
     head, tail = around("Contacts")
     yield head
     stations = {station.id: station for station in answered.question.ground_stations}

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from planner_core.domain import GroundStation, Horizon, Satellite
 from planner_core.orbits.ephemeris import Ephemeris, propagate
 from planner_core.orbits.ground_track import sub_points, visibility_ring
-from service.answers.answered import Answered, Document, compact, in_chunks, listed
+from service.answers.answered import Answered, Document, chunked, compact, listed
 from service.exports.antimeridian import Piece, area, pieces_of_line
 from service.wire.instants import instant_text
 
@@ -30,12 +30,9 @@ _NEVER: Final = 2**32 - 1
 _MILLISECOND: Final = timedelta(milliseconds=1)
 
 
+@chunked
 def write(answered: Answered) -> Iterator[str]:
     """Yield a FeatureCollection; each feature's property ``kind`` says what it is."""
-    return in_chunks(_parts(answered))
-
-
-def _parts(answered: Answered) -> Iterator[str]:
     names = ("job", "scenario_sha256", "plan_sha256", "horizon")
     head = {name: answered.head[name] for name in names}
     yield f'{{"type":"FeatureCollection",{compact(head)[1:-1]},"features":[\n'
