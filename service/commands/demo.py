@@ -11,7 +11,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Final
 
@@ -50,7 +50,9 @@ def demo(options: argparse.Namespace) -> int:
         if options.serve:
             print(f"\nStill serving at {url} (the dashboard; calls: {url}/docs).", flush=True)
             print("Ctrl-C ends it.", flush=True)
-            _wait_for_interrupt()
+            with suppress(KeyboardInterrupt):
+                while True:
+                    time.sleep(3600.0)
     return status
 
 
@@ -142,14 +144,6 @@ def _url_when_ready(process: subprocess.Popen[str], log: Path) -> str:
     said = log.read_text(encoding="utf-8", errors="replace").splitlines()[-_LAST_LINES:]
     status = f"It ended with status {process.wait()}; see {log}, which ends:"
     raise Failed("\n".join(["The service did not start.", status, *said]))
-
-
-def _wait_for_interrupt() -> None:
-    try:
-        while True:
-            time.sleep(3600.0)
-    except KeyboardInterrupt:
-        pass
 
 
 def _write(path: Path, document: Json) -> None:

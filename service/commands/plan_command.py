@@ -11,12 +11,12 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
-from planner_core.errors import PlannerError
 from service.client import Client, ClientError, ServiceError
+from service.client.transport import said
 from service.commands.outcome import Failed, WrongInput
 from service.commands.plan import follow_to_plan
-from service.commands.replan import follow_to_draft
-from service.commands.scenario_files import place_of, read_object, require_folder
+from service.commands.replan import print_draft
+from service.commands.scenario_files import place_of, read_object, require_folder, told_of
 
 _SUFFIXES: Final = (".json", ".csv", ".geojson", ".czml", ".ics")  # the service has the last word
 _OPTIONS: Final = {
@@ -29,12 +29,15 @@ _OPTIONS: Final = {
     "/name": "--name",
 }
 _OF_THE_INPUT: Final = (413, 422)
+_STORED: Final = "the plan"  # where no file is given
 
 
 def plan(options: argparse.Namespace) -> int:
     """Have a service plan a scenario, and follow it."""
-    with _placed(options.scenario):
-        _check(options)
+    with _placed(options.scenario or _STORED):
+        if (options.scenario is None) == (options.scenario_id is None):
+            raise WrongInput("give either SCENARIO.json or --scenario-id")
+        _check_out(options)
         scenario = options.scenario_id or read_object(options.scenario)
         with _client(options) as client:
             submit = partial(
@@ -52,23 +55,23 @@ def plan(options: argparse.Namespace) -> int:
 
 
 def replan(options: argparse.Namespace) -> int:
-    """Have a service replan a plan after what happened, and follow it."""
-    with _placed(options.happened):
+    """Have a service replan a plan after what happened, and follow it.
+
+    Where the job is cancelled, the best plan that it had by then is a draft all the same.
+    """
+    with _placed(options.happened or _STORED):
         _check_out(options)
         happened = {} if options.happened is None else read_object(options.happened)
-        happened |= {
-            name: value
-            for name, value in (("now", options.now), ("name", options.name))
-            if value is not None
-        }
+        happened |= said(now=options.now, name=options.name)
         if options.time_s is not None:
             limits = happened.get("limits")
             others = limits if isinstance(limits, dict) else {}
             happened["limits"] = {**others, "time_s": options.time_s}
         with _client(options) as client:
-            return follow_to_draft(
-                client, options.plan_id, happened, out=options.out, detach=options.detach
-            )
+            key = secrets.token_hex(16)
+            submit = partial(client.jobs.replan, options.plan_id, happened, idempotency_key=key)
+            tell = partial(print_draft, client, options.plan_id)
+            return follow_to_plan(client, submit, out=options.out, detach=options.detach, tell=tell)
 
 
 def _client(options: argparse.Namespace) -> Client:
@@ -79,12 +82,6 @@ def _client(options: argparse.Namespace) -> Client:
         return Client(options.url, key)
     except ValueError as error:
         raise WrongInput(str(error)) from error
-
-
-def _check(options: argparse.Namespace) -> None:
-    if (options.scenario is None) == (options.scenario_id is None):
-        raise WrongInput("give either SCENARIO.json or --scenario-id")
-    _check_out(options)
 
 
 def _check_out(options: argparse.Namespace) -> None:
@@ -98,24 +95,20 @@ def _check_out(options: argparse.Namespace) -> None:
 
 
 @contextmanager
-def _placed(scenario: Path | None) -> Iterator[None]:
-    try:
-        yield
-    except ServiceError as error:
-        if error.status not in _OF_THE_INPUT:
+def _placed(file: Path | str) -> Iterator[None]:
+    with told_of(file):
+        try:
+            yield
+        except ServiceError as error:
+            if error.status not in _OF_THE_INPUT:
+                raise Failed(str(error)) from error
+            raise WrongInput(_faults(error, file)) from error
+        except ClientError as error:
             raise Failed(str(error)) from error
-        raise WrongInput(_faults(error, scenario)) from error
-    except ClientError as error:
-        raise Failed(str(error)) from error
-    except PlannerError as error:
-        raise WrongInput(f"{scenario}: {error.detail}") from error
-    except OSError as error:
-        raise WrongInput(f"{error.filename}: {error.strerror}") from error
 
 
-def _faults(error: ServiceError, scenario: Path | None) -> str:
+def _faults(error: ServiceError, file: Path | str) -> str:
     """Return what the service found wrong, a line for each fault."""
-    file = scenario or "the plan"
     lines = []
     for fault in error.errors:
         pointer = fault.pointer or ""

@@ -14,7 +14,7 @@ from service.commands.outcome import Failed, WrongInput
 
 
 @contextmanager
-def told_of(scenario: Path) -> Iterator[None]:
+def told_of(scenario: Path | str) -> Iterator[None]:
     """Tell what is wrong with a scenario file, or with the search that it is given to."""
     try:
         yield
