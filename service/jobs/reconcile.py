@@ -104,12 +104,11 @@ class Reconciler:
         last = running & (JobRow.lost_runs + 1 >= self._max_attempts)
         lost = JobRow.lost_runs + 1
         detail = f"The worker died or was cut off {self._max_attempts} times while it ran this job."
-        too_many = lease.Outcome.failed("too_many_attempts", detail)
-        cancelled = lease.Outcome(state="cancelled")
+        failed = {"state": "failed", "error": {"code": "too_many_attempts", "detail": detail}}
         with self._database.transaction() as session:
             done = (
-                lease.end_expired(session, job_id, cancelling, outcome=cancelled)
-                or lease.end_expired(session, job_id, last, outcome=too_many, lost_runs=lost)
+                lease.end(session, job_id, cancelling, state="cancelled")
+                or lease.end(session, job_id, last, lost_runs=lost, **failed)
                 or lease.redispatch(session, self._queue, running, job_id, lost_runs=lost)
             )
         if done:

@@ -21,9 +21,9 @@ from service.db.clock import now, utc_now
 from service.db.ids import new_id
 from service.db.rows import JobRow, PlanRow, WebhookDeliveryRow, WebhookRow
 from service.db.session import changed
-from service.webhooks import events
 from service.wire.base import dumped
 from service.wire.plans import PlanChange
+from service.wire.stored import from_row
 from service.wire.webhooks import EventOut, JobEnd, TestData
 
 TAKEN_S: Final = 60.0
@@ -53,16 +53,24 @@ class Parcel:
 
 
 def tell_end_of(session: Session, job_id: str) -> None:
-    """Queue a delivery for each webhook of the job's owner that asked for this end."""
+    """Queue a delivery for each webhook of the job's owner that asked for this end.
+
+    It tells enough to decide whether to fetch the rest.
+    """
     job = session.get_one(JobRow, job_id, populate_existing=True)
-    _tell(session, job.tenant, f"job.{job.state}", events.end_of(job), job_id)
+    address = f"/v1/jobs/{job_id}"
+    links = {"job": address, "timeline": f"{address}/timeline"}
+    data = from_row(JobEnd, job, job_id=job_id, warnings=job.warnings or (), links=links)
+    _tell(session, job.tenant, f"job.{job.state}", data, job_id)
 
 
 def tell_plan(
     session: Session, plan: PlanRow, reason: str | None, effective_from: datetime | None
 ) -> None:
     """Queue a delivery for each webhook of the plan's owner that asked for this transition."""
-    data = events.change_of(plan, reason, effective_from)
+    links = {"plan": f"/v1/plans/{plan.id}", "job": f"/v1/jobs/{plan.job_id}"}
+    told = {"plan_id": plan.id, "reason": reason, "effective_from": effective_from, "links": links}
+    data = from_row(PlanChange, plan, **told)
     _tell(session, plan.owner, f"plan.{plan.state}", data, None)
 
 
