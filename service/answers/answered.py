@@ -9,7 +9,15 @@ from datetime import datetime
 from functools import wraps
 from typing import ParamSpec
 
-from service.answers.blocks import Document, Entry, head_in, items_in, rest_in, satellite_in
+from service.answers.blocks import (
+    Document,
+    Entry,
+    batches,
+    head_in,
+    items_in,
+    rest_in,
+    satellite_in,
+)
 from service.scenarios.stored_question import StoredQuestion
 
 __all__ = ["Answered", "Document", "chunked", "compact", "in_chunks", "listed"]
@@ -121,16 +129,7 @@ def in_chunks(parts: Iterable[str]) -> Iterator[str]:
     >>> list(in_chunks(["a", "b"]))
     ['ab']
     """
-    waiting: list[str] = []
-    size = 0
-    for part in parts:
-        waiting.append(part)
-        size += len(part)
-        if size >= _CHUNK:
-            yield "".join(waiting)
-            waiting, size = [], 0
-    if waiting:
-        yield "".join(waiting)
+    return map("".join, batches(parts, len, _CHUNK))
 
 
 def chunked(write: Callable[P, Iterable[str]]) -> Callable[P, Iterator[str]]:

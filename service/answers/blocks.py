@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import islice
 from typing import Any, Final, Literal, TypeVar
@@ -160,6 +160,20 @@ def items_in(text: str) -> list[Document]:
     """Return the items of ``actions`` or ``targets``."""
     items: list[Document] = json.loads(f"[{text.removeprefix(_BETWEEN)}]")
     return items
+
+
+def batches(items: Iterable[T], size_of: Callable[[T], int], most: int) -> Iterator[list[T]]:
+    """Yield items a few at a time: of this size together, or one that is larger alone."""
+    batch: list[T] = []
+    size = 0
+    for item in items:
+        if batch and size + size_of(item) > most:
+            yield batch
+            batch, size = [], 0
+        batch.append(item)
+        size += size_of(item)
+    if batch:
+        yield batch
 
 
 def timeline_text(blocks: Iterable[Block]) -> str:

@@ -200,7 +200,8 @@ class _Run:
             blocks, opportunities = tuple(self._blocks), self._opportunity_block
             return Answered(replace(message.answer, blocks=blocks, opportunity_block=opportunities))
         if isinstance(message, Refused | Stopped):
-            return self._settled(message)
+            is_late = isinstance(message, Stopped) and not self._cancelled
+            return self._out_of_time() if is_late else message
         if isinstance(message, Block):
             self._blocks.append(message)
         elif isinstance(message, OpportunitiesFollow):
@@ -231,11 +232,6 @@ class _Run:
         self._kill_at_s = math.inf
         with suppress(psutil.NoSuchProcess):  # it has ended; its last words are still to be read
             self._grace = Grace(self.process.pid or 0, self._phase or "access")
-
-    def _settled(self, ending: Ending) -> Ending:
-        if isinstance(ending, Stopped) and not self._cancelled:
-            return self._out_of_time()
-        return ending
 
     def _crashed(self) -> Ending | Lost:
         self.process.join(_LAST_WORDS_S)
