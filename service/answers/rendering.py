@@ -20,8 +20,13 @@ from planner_core.referee.replay import plan_sha256
 from planner_core.referee.timeline import JudgedAction, Resourceline, Slew, Timeline, Violation
 from planner_core.run import Judged
 from planner_core.valuation import clear_probabilities
-from service.answers.figures import ages_of, in_mbit, num_delivered, satellite_totals
-from service.answers.image_figures import ImageFigures
+from service.answers.figures import (
+    ImageFigures,
+    ages_of,
+    in_mbit,
+    num_delivered,
+    satellite_totals,
+)
 from service.wire.base import Json
 from service.wire.jobs import FiguresOut
 from service.wire.outcomes import ReasonOut, TargetItem

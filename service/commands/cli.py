@@ -174,7 +174,7 @@ def _plain_name(text: str) -> str:
 
 def _add_plan(commands: Any) -> None:
     about = "have a service plan a scenario, and follow it"
-    parser = _command(commands, "plan", "plan_command:plan", about)
+    parser = _command(commands, "plan", "plan:plan", about)
     parser.add_argument("scenario", type=Path, nargs="?", metavar="SCENARIO.json")
     parser.add_argument("--scenario-id", metavar="ID", help="a stored scenario, not a file")
     _add_search(parser)
@@ -185,7 +185,7 @@ def _add_plan(commands: Any) -> None:
 
 def _add_replan(commands: Any) -> None:
     about = "have a service replan after what happened"
-    parser = _command(commands, "replan", "plan_command:replan", about)
+    parser = _command(commands, "replan", "plan:replan", about)
     parser.add_argument("plan_id", metavar="PLAN", help="the id of the plan that goes on")
     parser.add_argument(
         "happened", type=Path, nargs="?", metavar="HAPPENED.json",

@@ -141,14 +141,12 @@ def _table(
 def _variants(
     spacings_s: Sequence[float], *, anywhere: bool
 ) -> Iterator[tuple[str, dict[str, Any]]]:
-    yield "one, centred", {"collect_spacing_s": None, "continuous_starts": False}
+    centred = {"collect_spacing_s": None, "continuous_starts": False}
+    yield "one, centred", centred
     for spacing_s in spacings_s:
-        yield (
-            f"every {spacing_s:g} s",
-            {"collect_spacing_s": spacing_s, "continuous_starts": False},
-        )
+        yield f"every {spacing_s:g} s", centred | {"collect_spacing_s": spacing_s}
     if anywhere:
-        yield "anywhere", {"collect_spacing_s": None, "continuous_starts": True}
+        yield "anywhere", centred | {"continuous_starts": True}
 
 
 def _from_plan(row: _Row, content: Mapping[str, Any]) -> dict[str, Any]:

@@ -12,8 +12,8 @@ _HEADER = ("change", "cause", "satellite", "action", "of", "was at", "is at")
 def print_draft(client: Client, plan_id: str, job: Job) -> None:
     """Print which draft a job has left of a plan, and a line for each action that it changes."""
     draft = client.plans.draft_of(job)
-    changes = client.plans.changes(draft.id)
     print(f"\ndraft {draft.id}, after {plan_id}")
+    changes = client.plans.changes(draft.id)
     print(_changes_text(changes) if changes.items else "Nothing changes.")
 
 

@@ -254,15 +254,10 @@ class _Run:
             self._expire_at_s = math.inf
             self._say(Command.EXPIRE)
             self._grant_grace()
-        if now_s >= self._kill_at_s or self._has_spent_its_grace():
+        # A process that has ended is not killed: its last words are still to be read.
+        if now_s >= self._kill_at_s or (self._grace is not None and self._grace.is_over()):
             return Stopped() if self._cancelled else self._out_of_time()
         return None
-
-    def _has_spent_its_grace(self) -> bool:
-        try:
-            return self._grace is not None and self._grace.is_over()
-        except psutil.NoSuchProcess:
-            return False  # it has ended; its last words are still to be read
 
     def _out_of_time(self) -> Refused:
         if not self._started:

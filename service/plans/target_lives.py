@@ -188,10 +188,10 @@ def _delivered(
             _last_outcome(contact) == "executed",
         )
         .distinct()
+        .order_by(contact.end)
     )
     for satellite_id, start, end in session.execute(done):
         spans[satellite_id].append((start, end))
-    ends = {own_id: sorted(own, key=lambda span: span[1]) for own_id, own in spans.items()}
     wanted = sa.select(
         collect.target_id, collect.satellite_id, collect.start, collect.delivered_at
     ).where(
@@ -206,10 +206,10 @@ def _delivered(
         and delivered_at is not None
         and (image := taken.get(target_id)) is not None
         and (image.satellite_id, image.start) == (satellite_id, start)
-        and _is_within(ends.get(satellite_id, ()), delivered_at)
+        and _is_within(spans.get(satellite_id, []), delivered_at)
     )
 
 
-def _is_within(spans: list[tuple[datetime, datetime]] | tuple[()], at: datetime) -> bool:
+def _is_within(spans: list[tuple[datetime, datetime]], at: datetime) -> bool:
     first = bisect_left(spans, at - _ROUNDING, key=lambda span: span[1])
     return first < len(spans) and spans[first][0] <= at
