@@ -117,7 +117,9 @@ def target_blocks(targets: Iterable[Document]) -> Iterator[Block]:
             text=_items_text(some, is_first=first == 0),
             first=first,
             num_items=len(some),
-            tally=Counter(_tallied(target) for target in some),
+            tally=Counter(
+                f"{target['outcome']}/{(target['reason'] or {}).get('code', '')}" for target in some
+            ),
         )
         first += len(some)
 
@@ -184,10 +186,6 @@ def timeline_text(blocks: Iterable[Block]) -> str:
 def targets_text(blocks: Iterable[Block]) -> str:
     """Return the list of targets among blocks as a whole."""
     return f"[{''.join(block.text for block in blocks if block.kind == 'targets')}]"
-
-
-def _tallied(target: Document) -> str:
-    return f"{target['outcome']}/{(target['reason'] or {}).get('code', '')}"
 
 
 def _items_text(items: Iterable[Document], *, is_first: bool) -> str:

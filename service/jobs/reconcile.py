@@ -16,7 +16,7 @@ from service.db.clock import utc_now
 from service.db.rows import JobRow
 from service.db.session import Database
 from service.jobs import lease
-from service.jobs.queue import Claim, JobQueue
+from service.jobs.queue import JobQueue
 
 log = logging.getLogger(__name__)
 
@@ -59,7 +59,8 @@ class Reconciler:
         if self._may_judge(now):
             for job_id in self._expired():
                 self._recover(job_id)
-        claims = self._old_claims(now)
+        oldest = now - timedelta(seconds=self._lease_s)
+        claims = [claim for claim in self._queue.claims() if claim.claimed_at < oldest]
         current = self._current(claim.job_id for claim in claims)
         for claim in claims:
             if current.get(claim.job_id) == (claim.dispatch, "queued"):
@@ -113,10 +114,6 @@ class Reconciler:
             )
         if done:
             log.warning("recovered a job whose worker is gone", extra={"job_id": job_id})
-
-    def _old_claims(self, now: datetime) -> list[Claim]:
-        oldest = now - timedelta(seconds=self._lease_s)
-        return [claim for claim in self._queue.claims() if claim.claimed_at < oldest]
 
     def _current(self, job_ids: Iterable[str]) -> dict[str, tuple[int, str]]:
         wanted = sa.select(JobRow.id, JobRow.dispatch, JobRow.state).where(

@@ -12,6 +12,7 @@ import sqlalchemy as sa
 from pydantic import BaseModel, ValidationError
 from sqlalchemy.orm import Session
 
+from planner_core.domain import Scenario
 from planner_core.errors import Fault, InvalidScenario, pointing
 from planner_core.mistakes import usual_mistakes
 from planner_core.orbits.checks import check_element_age, check_propagation, orbit_warnings
@@ -96,10 +97,7 @@ def freeze(
 
 def freeze_file(file: ScenarioFile, limits: ScenarioLimits) -> FrozenScenario:
     """Return the frozen form of a file that `translate.read_file` has made; errors as above."""
-    limits.check(horizon_from(file.horizon), len(file.satellites), len(file.targets))
-    scenario = scenario_from_file(file)
-    check_propagation(scenario)
-    check_element_age(scenario)
+    scenario = checked_scenario(file, limits)
     content = canonical_of_file(file)
     return FrozenScenario(
         name=file.name,
@@ -107,6 +105,15 @@ def freeze_file(file: ScenarioFile, limits: ScenarioLimits) -> FrozenScenario:
         sha256=sha256_of(content),
         summary=_summary(file, (*orbit_warnings(scenario), *usual_mistakes(scenario))),
     )
+
+
+def checked_scenario(file: ScenarioFile, limits: ScenarioLimits) -> Scenario:
+    """Return the scenario of a file that is not too large, and whose elements carry so far."""
+    limits.check(horizon_from(file.horizon), len(file.satellites), len(file.targets))
+    scenario = scenario_from_file(file)
+    check_propagation(scenario)
+    check_element_age(scenario)
+    return scenario
 
 
 def save(
