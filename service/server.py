@@ -7,7 +7,7 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from typing import Final
 
 import httpx
@@ -23,7 +23,7 @@ from service.main import create_app
 from service.process.connections import Protocol, allow_connections
 from service.process.logs import configure_logging
 from service.process.stopping import StopRequest
-from service.process.tracing import CannotTrace, start_tracing
+from service.process.tracing import start_tracing
 from service.settings import Settings
 
 _READY_WITHIN_S: Final = 300.0  # a first start may have kernels to compile
@@ -56,13 +56,9 @@ def require_key(settings: Settings) -> None:
     if settings.is_local or settings.static_keys:
         return
     upgrade(settings.database_url)
-    database = Database(settings.database_url)
-    try:
-        with database.reading() as session:
-            if key_store.has_good_key(session):
-                return
-    finally:
-        database.close()
+    with closing(Database(settings.database_url)) as database, database.reading() as session:
+        if key_store.has_good_key(session):
+            return
     raise NoKey(
         f"Will not listen on {settings.host} without a key: make one with slewline keys create, "
         "or set SLEWLINE_API_KEYS."
@@ -109,13 +105,16 @@ def serve(settings: Settings, *, with_workers: bool) -> int:
         require_key(settings)
         listener = stack.enter_context(listen(settings.host, settings.port))
         configure_logging()
-        stack.enter_context(_traced(settings))
+        if (provider := start_tracing(settings, "api")) is not None:
+            stack.callback(provider.shutdown)
         prepare_database(settings)
         heavy.start()
         api = stack.enter_context(_running_api(settings, listener, heavy.path))
         health = "live"
         if with_workers and settings.workers:
-            stack.enter_context(_running_workers(settings))
+            supervisor = Supervisor(settings)
+            stack.callback(supervisor.stop)
+            supervisor.start()
             health = "ready"
         url = address_of(listener)
 
@@ -127,19 +126,6 @@ def serve(settings: Settings, *, with_workers: bool) -> int:
         while not is_over():
             stop.wait(_LOOK_EVERY_S)
     return 0 if stop.is_asked() else 1
-
-
-@contextmanager
-def _traced(settings: Settings) -> Iterator[None]:
-    try:
-        provider = start_tracing(settings, "api")
-    except CannotTrace as error:
-        raise CannotServe(str(error)) from error
-    try:
-        yield
-    finally:
-        if provider is not None:
-            provider.shutdown()
 
 
 @contextmanager
@@ -164,16 +150,6 @@ def _running_api(
         server.should_exit = True
         thread.join()
         queue.close()
-
-
-@contextmanager
-def _running_workers(settings: Settings) -> Iterator[None]:
-    supervisor = Supervisor(settings)
-    supervisor.start()
-    try:
-        yield
-    finally:
-        supervisor.stop()
 
 
 def _wait_for(url: str, is_over: Callable[[], bool]) -> bool:

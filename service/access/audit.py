@@ -8,37 +8,28 @@ from typing import Final
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
 
-from service.access.callers import Caller
+from service.access.callers import Caller, Scope
 from service.db.clock import utc_now
 from service.db.ids import new_id
 from service.db.rows import AuditEventRow
 
-COMMAND_LINE: Final = "command line"
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Audit:
-    """Writes down the changes of one request.
+    """Writes down the changes of one request."""
 
-    Parameters
-    ----------
-    caller
-        None for whoever has the database itself: the command line.
-    """
-
-    caller: Caller | None
+    caller: Caller
     request_id: str | None
 
     def record(self, session: Session, action: str, kind: str, *object_ids: str) -> None:
         """Add one event for each object to the caller's transaction."""
         if not object_ids:
             return
-        caller = self.caller
         shared = {
             "at": utc_now(),
-            "owner": caller.owner if caller else COMMAND_LINE,
-            "key_id": caller.key_id if caller else None,
-            "key_name": caller.key_name if caller else None,
+            "owner": self.caller.owner,
+            "key_id": self.caller.key_id,
+            "key_name": self.caller.key_name,
             "request_id": self.request_id,
             "action": action,
             "kind": kind,
@@ -49,4 +40,7 @@ class Audit:
         )
 
 
-BY_COMMAND_LINE: Final = Audit(caller=None, request_id=None)
+BY_COMMAND_LINE: Final = Audit(
+    caller=Caller(owner="command line", scope=Scope.ADMIN), request_id=None
+)
+"""Whoever has the database itself."""

@@ -5,17 +5,10 @@ from __future__ import annotations
 import time
 from collections import OrderedDict
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Final
 
 MOST_CALLERS: Final = 50_000
 """Beyond this the bucket that was used the longest ago is forgotten, and is full again."""
-
-
-@dataclass(slots=True)
-class _Bucket:
-    tokens: float
-    filled_s: float
 
 
 class RateLimiter:
@@ -28,7 +21,7 @@ class RateLimiter:
         self._per_s = per_s
         self._burst = burst
         self._clock = clock
-        self._buckets: OrderedDict[str, _Bucket] = OrderedDict()
+        self._buckets: OrderedDict[str, tuple[float, float]] = OrderedDict()
 
     def take(self, caller: str) -> float:
         """Count one request.
@@ -38,14 +31,11 @@ class RateLimiter:
         Seconds until the caller may ask again, 0 where the request may pass.
         """
         now_s = self._clock()
-        bucket = self._buckets.setdefault(caller, _Bucket(self._burst, now_s))
-        self._buckets.move_to_end(caller)
+        # Put back at the end: the first one is that which was used the longest ago.
+        tokens, filled_s = self._buckets.pop(caller, (self._burst, now_s))
+        tokens = min(self._burst, tokens + (now_s - filled_s) * self._per_s)
+        wait_s = max(0.0, (1.0 - tokens) / self._per_s)
+        self._buckets[caller] = tokens if wait_s else tokens - 1.0, now_s
         if len(self._buckets) > MOST_CALLERS:
             self._buckets.popitem(last=False)
-        gained = (now_s - bucket.filled_s) * self._per_s
-        bucket.tokens = min(self._burst, bucket.tokens + gained)
-        bucket.filled_s = now_s
-        if bucket.tokens < 1.0:
-            return (1.0 - bucket.tokens) / self._per_s
-        bucket.tokens -= 1.0
-        return 0.0
+        return wait_s

@@ -6,11 +6,23 @@ import json
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from datetime import datetime
+from functools import wraps
+from typing import ParamSpec
 
-from service.answers.blocks import Document, Entry, head_in, items_in, rest_in, satellite_in
+from service.answers.blocks import (
+    Document,
+    Entry,
+    batches,
+    head_in,
+    items_in,
+    rest_in,
+    satellite_in,
+)
 from service.scenarios.stored_question import StoredQuestion
 
-__all__ = ["Answered", "Document", "compact", "in_chunks", "listed"]
+__all__ = ["Answered", "Document", "chunked", "compact", "in_chunks", "listed"]
+
+P = ParamSpec("P")
 
 Texts = Callable[[Iterable[Entry]], Iterator[tuple[Entry, str]]]
 """Yields blocks with their texts."""
@@ -117,13 +129,14 @@ def in_chunks(parts: Iterable[str]) -> Iterator[str]:
     >>> list(in_chunks(["a", "b"]))
     ['ab']
     """
-    waiting: list[str] = []
-    size = 0
-    for part in parts:
-        waiting.append(part)
-        size += len(part)
-        if size >= _CHUNK:
-            yield "".join(waiting)
-            waiting, size = [], 0
-    if waiting:
-        yield "".join(waiting)
+    return map("".join, batches(parts, len, _CHUNK))
+
+
+def chunked(write: Callable[P, Iterable[str]]) -> Callable[P, Iterator[str]]:
+    """Let a writer yield parts as small as they come: what is sent is joined to chunks."""
+
+    @wraps(write)
+    def written(*arguments: P.args, **named: P.kwargs) -> Iterator[str]:
+        return in_chunks(write(*arguments, **named))
+
+    return written

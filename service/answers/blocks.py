@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import islice
 from typing import Any, Final, Literal, TypeVar
@@ -117,7 +117,9 @@ def target_blocks(targets: Iterable[Document]) -> Iterator[Block]:
             text=_items_text(some, is_first=first == 0),
             first=first,
             num_items=len(some),
-            tally=Counter(_tallied(target) for target in some),
+            tally=Counter(
+                f"{target['outcome']}/{(target['reason'] or {}).get('code', '')}" for target in some
+            ),
         )
         first += len(some)
 
@@ -162,6 +164,20 @@ def items_in(text: str) -> list[Document]:
     return items
 
 
+def batches(items: Iterable[T], size_of: Callable[[T], int], most: int) -> Iterator[list[T]]:
+    """Yield items a few at a time: of this size together, or one that is larger alone."""
+    batch: list[T] = []
+    size = 0
+    for item in items:
+        if batch and size + size_of(item) > most:
+            yield batch
+            batch, size = [], 0
+        batch.append(item)
+        size += size_of(item)
+    if batch:
+        yield batch
+
+
 def timeline_text(blocks: Iterable[Block]) -> str:
     """Return the timeline among blocks as a whole."""
     return "".join(block.text for block in blocks if block.kind in TIMELINE)
@@ -170,10 +186,6 @@ def timeline_text(blocks: Iterable[Block]) -> str:
 def targets_text(blocks: Iterable[Block]) -> str:
     """Return the list of targets among blocks as a whole."""
     return f"[{''.join(block.text for block in blocks if block.kind == 'targets')}]"
-
-
-def _tallied(target: Document) -> str:
-    return f"{target['outcome']}/{(target['reason'] or {}).get('code', '')}"
 
 
 def _items_text(items: Iterable[Document], *, is_first: bool) -> str:

@@ -17,16 +17,16 @@ from service.wire.instants import instant_text
 from service.wire.outcomes import AttemptOut, ExplanationOut
 from service.wire.timelines import TimelineOut
 
-_KEPT = 200
 _KEPT_JOBS = 2
 
 
 class Explainer(Background):
     """Explains targets beside the requests; the jobs looked at last stay compiled."""
 
+    _kept, _told = 200, "The explanation is being worked out."
+
     def __init__(self) -> None:
-        told = "The explanation is being worked out."
-        super().__init__("explanations", kept=_KEPT, told=told)
+        super().__init__()
         # Only the thread of the background touches these.
         self._jobs: dict[str, Rebuilt] = {}
 

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
 import numpy as np
 
 from planner_core.access.station_passes import StationPass, overlapping, station_passes
-from planner_core.domain import Horizon, Satellite
+from planner_core.domain import Satellite
 from service.scenarios.stored_question import StoredQuestion
+from service.wire.base import fields_of
 from service.wire.passes import PassConflictOut, PassOut
 from service.wire.timelines import ActionOut, ResourceCurvesOut, TimelineOut
 
@@ -53,11 +54,13 @@ def passes_of_plan(
     """Return the passes that are wanted, by AOS."""
     found = station_passes(question.satellites, question.ground_stations, question.horizon)
     contacts = _contacts(question.satellites, timeline)
-    held = [_contacts_in(one, question, contacts) for one in found]
-    shown = (
-        _shown(question, found, row, others, held) for row, others in enumerate(overlapping(found))
+    alone = [_pass(question, one, contacts) for one in found]
+    conflicts = [PassConflictOut(**fields_of(one, PassConflictOut)) for one in alone]
+    passes = (
+        one.model_copy(update={"conflicts": tuple(conflicts[other] for other in others)})
+        for one, others in zip(alone, overlapping(found), strict=True)
     )
-    return [one for one in shown if wanted.wants(one)]
+    return [one for one in passes if wanted.wants(one)]
 
 
 def _contacts(
@@ -97,29 +100,18 @@ def _volume_mbit(
     return round(down * resources.recorder_capacity_mbit, _KEPT_MBIT)
 
 
-def _contacts_in(
+def _pass(
+    question: StoredQuestion,
     one: StationPass,
-    question: StoredQuestion,
     contacts: dict[tuple[str, str], list[_Contact]],
-) -> list[_Contact]:
-    satellite, station = question.satellites[one.satellite], question.ground_stations[one.station]
-    own = contacts.get((satellite.id, station.id), [])
-    aos, los = _instants(question.horizon, (one.aos_s, one.los_s))
-    starts = [contact.start for contact in own]
-    return own[bisect_left(starts, aos) : bisect_right(starts, los)]
-
-
-def _shown(
-    question: StoredQuestion,
-    found: Sequence[StationPass],
-    row: int,
-    others: Sequence[int],
-    held: Sequence[Sequence[_Contact]],
 ) -> PassOut:
-    one = found[row]
+    """Return a pass, without those that overlap it."""
     satellite, station = question.satellites[one.satellite], question.ground_stations[one.station]
-    aos, tca, los = _instants(question.horizon, (one.aos_s, one.tca_s, one.los_s))
-    volumes = [contact.volume_mbit for contact in held[row] if contact.volume_mbit is not None]
+    aos, tca, los = map(question.horizon.instant, (one.aos_s, one.tca_s, one.los_s))
+    own = contacts.get((satellite.id, station.id), [])
+    starts = [contact.start for contact in own]
+    held = own[bisect_left(starts, aos) : bisect_right(starts, los)]
+    volumes = [contact.volume_mbit for contact in held if contact.volume_mbit is not None]
     return PassOut(
         station_id=station.id,
         station_name=station.name,
@@ -131,24 +123,8 @@ def _shown(
         max_elevation_deg=round(one.max_elevation_deg, 3),
         aos_cut=one.aos_cut,
         los_cut=one.los_cut,
-        planned=bool(held[row]),
-        action_ids=tuple(contact.action_id for contact in held[row]),
+        planned=bool(held),
+        action_ids=tuple(contact.action_id for contact in held),
         volume_mbit=round(sum(volumes), _KEPT_MBIT) if volumes else None,
-        conflicts=tuple(_conflict(question, found[other], bool(held[other])) for other in others),
+        conflicts=(),
     )
-
-
-def _conflict(question: StoredQuestion, one: StationPass, planned: bool) -> PassConflictOut:
-    satellite = question.satellites[one.satellite]
-    aos, los = _instants(question.horizon, (one.aos_s, one.los_s))
-    return PassConflictOut(
-        satellite_id=satellite.id,
-        satellite_name=satellite.name,
-        aos=aos,
-        los=los,
-        planned=planned,
-    )
-
-
-def _instants(horizon: Horizon, offsets_s: Iterable[float]) -> tuple[datetime, ...]:
-    return tuple(horizon.instant(each) for each in offsets_s)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -86,14 +86,11 @@ def records_of_csv(data: bytes) -> Records:
     found = read_csv(data, _REQUIRED, _REQUIRED, most=_MOST_ACTIONS)
     # A plan may be empty; a file without a header is none.
     faults = [f for f in found.faults if f.code != "empty_file" or not data.strip()]
-    records = tuple(
-        Record(
-            fields={k: unguarded(v) if isinstance(v, str) else v for k, v in one.fields.items()},
-            row=one.row,
-        )
-        for one in found.records
-    )
-    return Records(records=records, faults=tuple(faults))
+    records = []
+    for one in found.records:
+        texts = {name: unguarded(v) for name, v in one.fields.items() if isinstance(v, str)}
+        records.append(replace(one, fields={**one.fields, **texts}))
+    return Records(records=tuple(records), faults=tuple(faults))
 
 
 def records_of_json(data: bytes) -> Records:

@@ -10,7 +10,7 @@ from typing import Final, get_args
 import numpy as np
 
 from planner_core.access.scenario_opportunities import view_at
-from planner_core.domain import Scenario
+from planner_core.domain import Resources, Scenario
 from planner_core.mistakes import mistakes_of_accesses, usual_mistakes
 from planner_core.orbits.sgp4_record import GRAVITY
 from planner_core.problem import Problem
@@ -20,8 +20,13 @@ from planner_core.referee.replay import plan_sha256
 from planner_core.referee.timeline import JudgedAction, Resourceline, Slew, Timeline, Violation
 from planner_core.run import Judged
 from planner_core.valuation import clear_probabilities
-from service.answers.figures import ages_of, in_mbit, num_delivered, satellite_totals
-from service.answers.image_figures import ImageFigures
+from service.answers.figures import (
+    ImageFigures,
+    ages_of,
+    in_mbit,
+    num_delivered,
+    satellite_totals,
+)
 from service.wire.base import Json
 from service.wire.jobs import FiguresOut
 from service.wire.outcomes import ReasonOut, TargetItem
@@ -196,7 +201,6 @@ class Documents(Wording):
         )
         for index, (satellite, line, lit) in enumerate(parts):
             gaps = lit.gaps(judged.problem.horizon_s)
-            limits = satellite.resources
             about = SatelliteTimelineOut(
                 id=satellite.id,
                 name=satellite.name,
@@ -206,13 +210,7 @@ class Documents(Wording):
                     self.scenario, self.problem, judged.timeline, index, self._images.of(index)
                 ),
                 eclipses=[HorizonOut(start=self.instant(a), end=self.instant(b)) for a, b in gaps],
-                resources=None
-                if line.resources is None
-                else self._curves(
-                    line.resources,
-                    battery_min_fraction=limits.battery_min_fraction,
-                    recorder_max_fraction=limits.recorder_max_fraction,
-                ),
+                resources=self._curves(line.resources, satellite.resources),
             )
             yield about, (self._action(f"a{next(numbers)}", action) for action in line.actions)
 
@@ -307,12 +305,15 @@ class Documents(Wording):
             recorder_fraction_end=_rounded(action.recorder_end, 9),
         )
 
-    def _curves(self, line: Resourceline, **limits: float) -> ResourceCurvesOut:
+    def _curves(self, line: Resourceline | None, limits: Resources) -> ResourceCurvesOut | None:
+        if line is None:
+            return None
         return ResourceCurvesOut(
             time=[self.instant(float(t)) for t in line.time_s],
             battery_fraction=[round(float(v), 9) for v in line.battery],
             recorder_fraction=[round(float(v), 9) for v in line.recorder],
-            **limits,
+            battery_min_fraction=limits.battery_min_fraction,
+            recorder_max_fraction=limits.recorder_max_fraction,
         )
 
 

@@ -5,17 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from datetime import datetime
+from operator import attrgetter
 from typing import Any, Final
 
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
 
-from service.answers.blocks import TIMELINE, Block, Entry, Kind, contents_of
+from service.answers.blocks import TIMELINE, Block, Entry, Kind, batches, contents_of
 from service.db.clock import utc_now
 from service.db.rows import JobBlockRow, JobResultRow
 
 _AT_ONCE: Final = 1 << 17
 """Characters that are read or written in one statement."""
+_SIZE: Final = attrgetter("size")
 _TOLD: Final = ("position", "kind", "first", "num_items", "size")
 """What a table of contents and its row tell alike."""
 
@@ -31,7 +33,7 @@ def save(
             created_at=utc_now(),
         )
     )
-    for some in _batches(contents_of(blocks)):
+    for some in batches(contents_of(blocks), _SIZE, _AT_ONCE):
         rows = [
             {name: getattr(entry, name) for name in _TOLD}
             | {"job_id": job_id, "tally": dict(entry.tally) or None}
@@ -65,7 +67,7 @@ def texts(
     Each few are read in a transaction of their own: who is slow to take them keeps no connection
     from others, and answers never change.
     """
-    for some in _batches(entries):
+    for some in batches(entries, _SIZE, _AT_ONCE):
         wanted = sa.select(JobBlockRow.position, JobBlockRow.text).where(
             JobBlockRow.job_id == job_id,
             JobBlockRow.position.in_([entry.position for entry in some]),
@@ -91,16 +93,3 @@ def _whole(session: Session, job_id: str, *kinds: Kind) -> str | None:
         JobBlockRow.job_id == job_id, JobBlockRow.kind.in_(kinds)
     )
     return "".join(session.scalars(wanted.order_by(JobBlockRow.position))) or None
-
-
-def _batches(entries: Iterable[Entry]) -> Iterator[list[Entry]]:
-    batch: list[Entry] = []
-    size = 0
-    for entry in entries:
-        if batch and size + entry.size > _AT_ONCE:
-            yield batch
-            batch, size = [], 0
-        batch.append(entry)
-        size += entry.size
-    if batch:
-        yield batch

@@ -18,7 +18,12 @@ from planner_core.reasons.what_if import Change, what_if
 from service.answers.rebuilt import stored_plan
 from service.scenarios.background import Background
 from service.scenarios.canonical import sha256_of
-from service.scenarios.change_pointers import Places, place_in_relax, pointing_into
+from service.scenarios.change_pointers import (
+    place_in_relax,
+    places_of,
+    places_of_body,
+    pointing_into,
+)
 from service.scenarios.freezing import FrozenScenario, freeze_file
 from service.scenarios.opportunities import Described
 from service.scenarios.pin_inputs import pinned_action, pins_in
@@ -29,8 +34,6 @@ from service.wire.base import read
 from service.wire.changes import ChangeIn
 from service.wire.scenarios import ScenarioFile
 from service.wire.timelines import IDLE_MODES, TimelineOut
-
-_KEPT = 8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -60,9 +63,7 @@ class Asked:
 class Variations(Background):
     """Works out changed questions beside the requests."""
 
-    def __init__(self) -> None:
-        told = "The change is being worked out."
-        super().__init__("variations", kept=_KEPT, told=told)
+    _kept, _told = 8, "The change is being worked out."
 
     def get(self, asked: Asked, described: Described) -> Variation:
         """Return the changed question; 503 ``still_computing`` where that takes long.
@@ -89,7 +90,7 @@ def vary(asked: Asked, described: Described, budget: Budget) -> Variation:
     _check_names(scenario, change, force, forbid)
     timeline = None if asked.timeline is None else read(TimelineOut, asked.timeline)
     dropped = _dropped(asked, timeline)
-    with pointing_into(change, Places.of(scenario.pins, forbid, force, len(dropped))):
+    with pointing_into(change, places_of(scenario.pins, forbid, force, len(dropped))):
         problem = build_problem(scenario, computed, budget)
         plan = Plan() if timeline is None else stored_plan(timeline, scenario, problem)
         wanted = Change(force=force, forbid=(*forbid, *dropped))
@@ -176,7 +177,7 @@ def _check_names(
     force: tuple[PinnedAction, ...],
     forbid: tuple[PinnedAction, ...],
 ) -> None:
-    with pointing_into(change, Places.of_body(force, forbid)):
+    with pointing_into(change, places_of_body(force, forbid)):
         Pins(keep=force, skip=forbid).check(
             [satellite.id for satellite in scenario.satellites],
             {target.id for target in scenario.targets},

@@ -78,28 +78,19 @@ class WaitTimedOut(ClientError):
 
 def error_of(response: httpx.Response) -> ServiceError:
     """Return the error that an answer tells, a problem document or not."""
-    retry_after_s = seconds_asked(response)
     try:
         told = read(ProblemOut, response.content)
+        about = {name: told[name] for name in ("code", "detail", "errors", "request_id")}
     except ValidationError:
         # A proxy on the way, for example, which answers in HTML.
         where = response.headers.get("location")
         detail = response.reason_phrase or "no explanation"
-        return ServiceError(
-            status=response.status_code,
-            code=f"http_{response.status_code}",
-            detail=f"{detail}, to {where}" if where else detail,
-            request_id=response.headers.get("x-request-id"),
-            retry_after_s=retry_after_s,
-        )
-    return ServiceError(
-        status=response.status_code,
-        code=told.code,
-        detail=told.detail,
-        errors=told.errors,
-        request_id=told.request_id,
-        retry_after_s=retry_after_s,
-    )
+        about = {
+            "code": f"http_{response.status_code}",
+            "detail": f"{detail}, to {where}" if where else detail,
+            "request_id": response.headers.get("x-request-id"),
+        }
+    return ServiceError(status=response.status_code, retry_after_s=seconds_asked(response), **about)
 
 
 def seconds_asked(response: httpx.Response) -> float | None:

@@ -19,7 +19,7 @@ from planner_core.referee.timeline import Timeline
 from service.answers.reading import READERS, Reading, UnreadableTimeline, plan_in
 from service.commands.outcome import FAILED, OK, WrongInput
 from service.commands.scenario_files import read_object, told_of
-from service.commands.summary import table
+from service.commands.summary import cell, table
 from service.scenarios.canonical import canonical, sha256_of
 from service.scenarios.translate import scenario_from_content
 from service.wire.instants import instant_text
@@ -75,14 +75,13 @@ _HEADER = ("validity", "reward", "collects", "contacts", "battery", "recorder")
 def _row(problem: Problem, reading: Reading, verdict: Timeline, validity: str) -> tuple[str, ...]:
     kinds = Counter(int(problem.opportunities.kind[a.opportunity]) for a in reading.plan.actions)
     collects = kinds[COLLECT]
-    lowest, highest = verdict.battery_min, verdict.recorder_max
     return (
         validity,
         f"{verdict.reward:g}",
         str(collects),
         str(kinds.total() - collects),
-        "-" if lowest is None else f"{lowest:.1%}",
-        "-" if highest is None else f"{highest:.1%}",
+        cell(verdict.battery_min, ".1%"),
+        cell(verdict.recorder_max, ".1%"),
     )
 
 

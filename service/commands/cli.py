@@ -67,19 +67,18 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
 
     serve = _command(commands, "serve", "serving:serve", "run the API and local workers")
+    serve.set_defaults(with_workers=True)
     _add_address(serve)
     serve.add_argument("--workers", type=int, help="worker processes (2)")
     _add_database(serve)
 
-    api = _command(commands, "api", "serving:api", "run the API alone")
+    api = _command(commands, "api", "serving:serve", "run the API alone")
+    api.set_defaults(with_workers=False)
     _add_address(api)
     _add_database(api)
 
-    worker = _command(commands, "worker", "serving:worker", "run one worker")
-    _add_database(worker)
-
-    migrate = _command(commands, "migrate", "serving:migrate", "create or update the database")
-    _add_database(migrate)
+    _add_database(_command(commands, "worker", "serving:worker", "run one worker"))
+    _add_database(_command(commands, "migrate", "serving:migrate", "create or update the database"))
 
     backup = _command(commands, "backup", "serving:backup", "copy a SQLite database that is in use")
     backup.add_argument("file", type=Path, metavar="FILE", help="a new file")
@@ -91,9 +90,9 @@ def _parser() -> argparse.ArgumentParser:
     demo.add_argument("--serve", action="store_true", help="keep serving afterwards")
     demo.add_argument("--out", type=Path, default=Path("demo-output"), help="folder for timelines")
 
-    _add_solve(
-        _command(commands, "solve", "solve:solve", "plan a scenario file, without a service")
-    )
+    solve = _command(commands, "solve", "solve:solve", "plan a scenario file, without a service")
+    solve.add_argument("scenario", type=Path, metavar="SCENARIO.json")
+    _add_search(solve)
 
     check = _command(
         commands, "check", "check:check", "have the referee judge a timeline of any origin"
@@ -113,16 +112,8 @@ def _parser() -> argparse.ArgumentParser:
     _add_search(spacing, solver="certified", time_s=60.0, out="write the table here, as CSV")
 
     _add_keys(_command(commands, "keys", "", "make, list and revoke API keys"))
-    _add_plan(
-        _command(
-            commands, "plan", "plan_command:plan", "have a service plan a scenario, and follow it"
-        )
-    )
-    _add_replan(
-        _command(
-            commands, "replan", "plan_command:replan", "have a service replan after what happened"
-        )
-    )
+    _add_plan(commands)
+    _add_replan(commands)
 
     _command(commands, "openapi", "serving:openapi", "print the description of the HTTP API")
     return parser
@@ -181,12 +172,9 @@ def _plain_name(text: str) -> str:
     return text
 
 
-def _add_solve(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("scenario", type=Path, metavar="SCENARIO.json")
-    _add_search(parser)
-
-
-def _add_plan(parser: argparse.ArgumentParser) -> None:
+def _add_plan(commands: Any) -> None:
+    about = "have a service plan a scenario, and follow it"
+    parser = _command(commands, "plan", "plan:plan", about)
     parser.add_argument("scenario", type=Path, nargs="?", metavar="SCENARIO.json")
     parser.add_argument("--scenario-id", metavar="ID", help="a stored scenario, not a file")
     _add_search(parser)
@@ -195,7 +183,9 @@ def _add_plan(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--priority", type=int, help="0 to 9, the most urgent (5)")
 
 
-def _add_replan(parser: argparse.ArgumentParser) -> None:
+def _add_replan(commands: Any) -> None:
+    about = "have a service replan after what happened"
+    parser = _command(commands, "replan", "plan:replan", about)
     parser.add_argument("plan_id", metavar="PLAN", help="the id of the plan that goes on")
     parser.add_argument(
         "happened", type=Path, nargs="?", metavar="HAPPENED.json",

@@ -14,6 +14,7 @@ from planner_core.budget import Budget
 from service.commands.outcome import FAILED, OK
 from service.commands.scenario_files import read_object, require_folder, told_of
 from service.commands.solve import Search, answer_of
+from service.commands.summary import cell
 from service.scenarios.translate import quality_from, read_file
 
 SPACINGS_S: Final = (60.0, 30.0, 15.0)
@@ -58,8 +59,8 @@ class _Row:
             str(self.num_opportunities),
             f"{self.reward:g}",
             f"{gain:+.1%}",
-            "-" if totals["bound"] is None else f"{totals['bound']:g}",
-            "-" if totals["gap"] is None else f"{totals['gap']:.1%}",
+            cell(totals["bound"], "g"),
+            cell(totals["gap"], ".1%"),
             f"{self.timeline['runtime_s']['solve']:.1f}",
             self.timeline["termination"],
             self.timeline["validity"],
@@ -103,8 +104,7 @@ def compare_spacing(options: argparse.Namespace) -> int:
     ends the search that runs, and the comparison.
     """
     with told_of(options.scenario):
-        if options.out is not None:
-            require_folder(options.out)
+        require_folder(options.out)
         content = read_object(options.scenario)
         has_quality = bool(quality_from(read_file(content).quality))
         search = _Search.of(options)
@@ -141,14 +141,12 @@ def _table(
 def _variants(
     spacings_s: Sequence[float], *, anywhere: bool
 ) -> Iterator[tuple[str, dict[str, Any]]]:
-    yield "one, centred", {"collect_spacing_s": None, "continuous_starts": False}
+    centred = {"collect_spacing_s": None, "continuous_starts": False}
+    yield "one, centred", centred
     for spacing_s in spacings_s:
-        yield (
-            f"every {spacing_s:g} s",
-            {"collect_spacing_s": spacing_s, "continuous_starts": False},
-        )
+        yield f"every {spacing_s:g} s", centred | {"collect_spacing_s": spacing_s}
     if anywhere:
-        yield "anywhere", {"collect_spacing_s": None, "continuous_starts": True}
+        yield "anywhere", centred | {"continuous_starts": True}
 
 
 def _from_plan(row: _Row, content: Mapping[str, Any]) -> dict[str, Any]:

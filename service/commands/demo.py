@@ -11,9 +11,9 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import IO, Final
+from typing import Final
 
 from service.client import Client, ClientError, Scenario
 from service.commands import demo_mission
@@ -50,7 +50,9 @@ def demo(options: argparse.Namespace) -> int:
         if options.serve:
             print(f"\nStill serving at {url} (the dashboard; calls: {url}/docs).", flush=True)
             print("Ctrl-C ends it.", flush=True)
-            _wait_for_interrupt()
+            with suppress(KeyboardInterrupt):
+                while True:
+                    time.sleep(3600.0)
     return status
 
 
@@ -113,25 +115,27 @@ def create_mission(client: Client) -> Scenario:
 def _service(port: int, workers: int, log: Path) -> Iterator[str]:
     """Run ``slewline serve`` on a temporary database; yield its URL."""
     with tempfile.TemporaryDirectory(prefix="slewline-") as place, log.open("wb") as log_file:
-        process = _start(port, workers, f"sqlite:///{place}/slewline.db", log_file)
+        address = ["--host", "127.0.0.1", "--port", str(port)]
+        rest = [
+            "--workers",
+            str(max(workers, 1)),
+            "--database-url",
+            f"sqlite:///{place}/slewline.db",
+        ]
+        process = subprocess.Popen(  # noqa: S603 - our own command
+            [sys.executable, "-m", "service", "serve", *address, *rest],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=log_file,
+            text=True,
+            env=os.environ | {"SLEWLINE_REQUIRE_KEYS": "false"},
+            start_new_session=True,  # so that Ctrl-C reaches this process alone, which ends it
+        )
         try:
             yield _url_when_ready(process, log)
         finally:
             process.terminate()
             process.wait()
-
-
-def _start(port: int, workers: int, database_url: str, log: IO[bytes]) -> subprocess.Popen[str]:
-    options = ["--host", "127.0.0.1", "--port", str(port), "--workers", str(max(workers, 1))]
-    return subprocess.Popen(  # noqa: S603 - our own command
-        [sys.executable, "-m", "service", "serve", *options, "--database-url", database_url],
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=log,
-        text=True,
-        env=os.environ | {"SLEWLINE_REQUIRE_KEYS": "false"},
-        start_new_session=True,  # so that Ctrl-C reaches only this process, which ends the other
-    )
 
 
 def _url_when_ready(process: subprocess.Popen[str], log: Path) -> str:
@@ -142,14 +146,6 @@ def _url_when_ready(process: subprocess.Popen[str], log: Path) -> str:
     said = log.read_text(encoding="utf-8", errors="replace").splitlines()[-_LAST_LINES:]
     status = f"It ended with status {process.wait()}; see {log}, which ends:"
     raise Failed("\n".join(["The service did not start.", status, *said]))
-
-
-def _wait_for_interrupt() -> None:
-    try:
-        while True:
-            time.sleep(3600.0)
-    except KeyboardInterrupt:
-        pass
 
 
 def _write(path: Path, document: Json) -> None:

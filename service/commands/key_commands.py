@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing
 from datetime import datetime
 
 from service.access import key_store
@@ -15,7 +14,6 @@ from service.commands.outcome import OK, WrongInput
 from service.commands.serving import settings_of
 from service.commands.summary import table
 from service.db.migrate import upgrade
-from service.db.rows import ApiKeyRow
 from service.db.session import Database
 
 _HEADER = ("id", "name", "owner", "scope", "made", "expires", "state")
@@ -42,7 +40,12 @@ def list_keys(options: argparse.Namespace) -> int:
     """Print a table of all keys, those that are no longer good included."""
     with _database(options) as database, database.reading() as session:
         keys = key_store.every_key(session)
-    print(table([_HEADER, *_lines(keys)]))
+    rows = [
+        (key.id, key.name, key.owner, key.scope, _day(key.created_at), _day(key.expires_at),
+         "good" if is_good else "revoked" if key.revoked_at else "expired")
+        for key, is_good in keys
+    ]  # fmt: skip
+    print(table([_HEADER, *rows]))
     return OK
 
 
@@ -60,31 +63,11 @@ def revoke_key(options: argparse.Namespace) -> int:
     return OK
 
 
-@contextmanager
-def _database(options: argparse.Namespace) -> Iterator[Database]:
-    """Yield the database, which has its tables by then."""
+def _database(options: argparse.Namespace) -> closing[Database]:
+    """Return the database, which has its tables by then and is closed by who uses it."""
     url = settings_of(options).database_url
     upgrade(url)
-    database = Database(url)
-    try:
-        yield database
-    finally:
-        database.close()
-
-
-def _lines(keys: Sequence[tuple[ApiKeyRow, bool]]) -> list[tuple[str, ...]]:
-    return [
-        (
-            key.id,
-            key.name,
-            key.owner,
-            key.scope,
-            _day(key.created_at),
-            _day(key.expires_at),
-            "good" if is_good else "revoked" if key.revoked_at else "expired",
-        )
-        for key, is_good in keys
-    ]
+    return closing(Database(url))
 
 
 def _day(instant: datetime) -> str:

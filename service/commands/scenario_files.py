@@ -14,7 +14,7 @@ from service.commands.outcome import Failed, WrongInput
 
 
 @contextmanager
-def told_of(scenario: Path) -> Iterator[None]:
+def told_of(scenario: Path | str) -> Iterator[None]:
     """Tell what is wrong with a scenario file, or with the search that it is given to."""
     try:
         yield
@@ -38,9 +38,9 @@ def read_object(path: Path) -> dict[str, Any]:
     return content
 
 
-def require_folder(out: Path) -> None:
+def require_folder(out: Path | None) -> None:
     """Refuse a file whose folder is not there: better said before the search than after it."""
-    if not out.parent.is_dir():
+    if out is not None and not out.parent.is_dir():
         raise FileNotFoundError(errno.ENOENT, "No such folder", str(out.parent))
 
 

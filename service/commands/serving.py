@@ -36,24 +36,16 @@ def settings_of(options: argparse.Namespace) -> Settings:
 
 
 def serve(options: argparse.Namespace) -> int:
-    """Run the API and local workers."""
-    return _run_server(settings_of(options), with_workers=True)
-
-
-def api(options: argparse.Namespace) -> int:
-    """Run the API alone."""
-    return _run_server(settings_of(options), with_workers=False)
-
-
-def _run_server(settings: Settings, *, with_workers: bool) -> int:
+    """Run the API, ``with_workers`` or alone."""
     with importing():
-        from service.server import CannotServe, NoKey, serve
+        from service import server
+        from service.process.tracing import CannotTrace
 
     try:
-        return serve(settings, with_workers=with_workers)
-    except NoKey as error:
+        return server.serve(settings_of(options), with_workers=options.with_workers)
+    except server.NoKey as error:
         raise WrongInput(str(error)) from error
-    except CannotServe as error:
+    except (server.CannotServe, CannotTrace) as error:
         raise Failed(str(error)) from error
 
 

@@ -29,8 +29,7 @@ def solve(options: argparse.Namespace) -> int:
     At the end of its time, or by Ctrl-C, the search ends with its best plan so far.
     """
     with told_of(options.scenario):
-        if options.out is not None:
-            require_folder(options.out)
+        require_folder(options.out)
         request = Search.of(options).request(read_object(options.scenario))
         timeline = json.loads(answer_of(request, Budget(options.time_s)).timeline)
         if options.out is not None:

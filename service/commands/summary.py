@@ -21,14 +21,14 @@ def summary_row(timeline: Mapping[str, Any]) -> tuple[str, ...]:
     return (
         timeline["solver"]["name"],
         f"{totals['reward']:g}",
-        _cell(totals["bound"], "g"),
-        _cell(totals["gap"], ".2%"),
+        cell(totals["bound"], "g"),
+        cell(totals["gap"], ".2%"),
         str(totals["collects"]),
         str(totals["contacts"]),
         str(totals["targets"]["downlinked"]),
-        _cell(totals["downlinked_fraction"], ".2f"),
-        _cell(totals["battery_min_fraction"], ".1%"),
-        _cell(totals["recorder_max_fraction"], ".1%"),
+        cell(totals["downlinked_fraction"], ".2f"),
+        cell(totals["battery_min_fraction"], ".1%"),
+        cell(totals["recorder_max_fraction"], ".1%"),
         f"{runtime_s['solve']:.3f}",
         f"{sum(runtime_s.values()):.2f}",
         timeline["validity"],
@@ -54,5 +54,6 @@ def table(rows: Sequence[Sequence[str]]) -> str:
     )
 
 
-def _cell(value: float | None, layout: str) -> str:
+def cell(value: float | None, layout: str) -> str:
+    """Return a number for a table, a dash where there is none."""
     return "-" if value is None else format(value, layout)

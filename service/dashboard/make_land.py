@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import antimeridian
+import numpy as np
 
 LAND_FILE: Final = Path(__file__).with_name("static") / "land.json"
 
@@ -38,12 +39,8 @@ def rings_of(topology: dict[str, Any]) -> list[Ring]:
 
 def _positions(arc: list[list[int]], transform: dict[str, list[float]]) -> Ring:
     # Quantised, and each position as the step from the one before.
-    (scale_x, scale_y), (first_x, first_y) = transform["scale"], transform["translate"]
-    x = y = 0
-    positions = []
-    for step_x, step_y in arc:
-        x, y = x + step_x, y + step_y
-        positions.append([x * scale_x + first_x, y * scale_y + first_y])
+    steps = np.cumsum(arc, axis=0)
+    positions: Ring = (steps * transform["scale"] + transform["translate"]).tolist()
     return positions
 
 

@@ -52,24 +52,10 @@ def why_unavailable(error: BaseException) -> str | None:
     if isinstance(driver_error, sqlite3.Error):
         # The low byte is the error; what stands above it are its kinds.
         code = getattr(driver_error, "sqlite_errorcode", None)
-        why = None if code is None else _SQLITE.get(code & 0xFF)
-        if why is None and "no such savepoint" in str(driver_error):
-            return _why_before(error)
-        return why
+        return None if code is None else _SQLITE.get(code & 0xFF)
     state = getattr(driver_error, "sqlstate", None)
     if state is None:
         # The driver itself speaks, not the server.
         lost = error.connection_invalidated or isinstance(error, sa.exc.OperationalError)
         return _AWAY if lost else None
     return _POSTGRESQL.get(state) or _POSTGRESQL.get(state[:2])
-
-
-def _why_before(error: BaseException) -> str | None:
-    """Return why of what came before: SQLite without room gives up savepoints by itself."""
-    before = error.__context__
-    while before is not None:
-        why = why_unavailable(before)
-        if why is not None:
-            return why
-        before = before.__context__
-    return None

@@ -24,15 +24,11 @@ def upgrade(database_url: str) -> None:
     engine = make_engine(database_url, timeout_s=None)
     try:
         with engine.begin() as connection:
-            _wait_for_turn(connection)
+            if connection.dialect.name == "postgresql":
+                connection.execute(sa.select(sa.func.pg_advisory_xact_lock(_ADVISORY_LOCK)))
             command.upgrade(config_on(connection), "head")
     finally:
         engine.dispose()
-
-
-def _wait_for_turn(connection: sa.Connection) -> None:
-    if connection.dialect.name == "postgresql":
-        connection.execute(sa.select(sa.func.pg_advisory_xact_lock(_ADVISORY_LOCK)))
 
 
 def config_on(connection: sa.Connection) -> Config:

@@ -45,7 +45,8 @@ def make_postgresql_engine(
         _dialect: object, _record: object, arguments: list[Any], parameters: dict[str, Any]
     ) -> psycopg.Connection[Any]:
         own = parameters.get("options", "")
-        given = {**_SILENCE, **parameters, "options": f"{_session(timeout_s)} {own}".strip()}
+        told = {"options": f"{_session(timeout_s)} {own}".strip()}
+        given = {"connect_timeout": CONNECT_WITHIN_S, **_SILENCE, **parameters, **told}
         connection = _PatientOnlySoLong.connect(*arguments, **given)
         connection.answer_within_s = None if timeout_s is None else timeout_s + _LATER_THAN_SERVER_S
         return connection
@@ -56,7 +57,6 @@ def make_postgresql_engine(
 
 
 _SILENCE: Final = {
-    "connect_timeout": CONNECT_WITHIN_S,
     "keepalives_idle": _SILENCE_S // 3,
     "keepalives_interval": _SILENCE_S // 3,
     "keepalives_count": 2,
@@ -66,12 +66,7 @@ _SILENCE: Final = {
 
 def _session(timeout_s: float | None) -> str:
     """Return what the server is told: to notice as well when we have gone, and free our locks."""
-    settings: dict[str, float] = {
-        "tcp_keepalives_idle": _SILENCE_S // 3,
-        "tcp_keepalives_interval": _SILENCE_S // 3,
-        "tcp_keepalives_count": 2,
-        "tcp_user_timeout": _SILENCE_S * 1000,
-    }
+    settings = {f"tcp_{name.removeprefix('tcp_')}": value for name, value in _SILENCE.items()}
     if timeout_s is not None:
         settings["statement_timeout"] = round(timeout_s * 1000)
         settings["idle_in_transaction_session_timeout"] = _IDLE_IN_TRANSACTION_S * 1000

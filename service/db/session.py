@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import sqlalchemy as sa
+from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.orm import Session
 
 from service.db.columns import Row
@@ -83,6 +84,14 @@ def take_turns(session: Session, name: str) -> None:
     """
     if session.get_bind().dialect.name == "postgresql":
         session.execute(sa.select(sa.func.pg_advisory_xact_lock(sa.func.hashtext(name))))
+
+
+def inserted(session: Session, table: type[Row], **values: Any) -> bool:
+    """Insert a row, unless there is one of its keys, be it from this moment; return whether so."""
+    dialect = postgresql if session.get_bind().dialect.name == "postgresql" else sqlite
+    statement = dialect.insert(table).values(**values).on_conflict_do_nothing()
+    own = statement.returning(*sa.inspect(table).primary_key)
+    return session.execute(own).first() is not None
 
 
 def changed(

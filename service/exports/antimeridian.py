@@ -16,7 +16,7 @@ Floats = npt.NDArray[np.float64]
 _OVER_THE_POLE_DEG = 90.0
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class Piece:
     """A part of a line that lies between -180 and 180 degrees. Shape ``(n,)`` each."""
 
@@ -41,39 +41,21 @@ def pieces_of_line(lon_deg: Floats, lat_deg: Floats, t_s: Floats) -> Iterator[Pi
     step_deg = (np.diff(lon_deg) + 180.0) % 360.0 - 180.0
     is_polar = np.abs(step_deg) > _OVER_THE_POLE_DEG
     is_cut = is_polar | (np.abs(np.diff(lon_deg)) > 180.0)
-    first = 0
-    entry: tuple[float, float, float] | None = None
+    points = np.stack([lon_deg, lat_deg, t_s], axis=1)
+    first, entry = 0, points[:0]
     for row in np.flatnonzero(is_cut).tolist():
         if is_polar[row]:
-            pole_deg = float(np.copysign(90.0, lat_deg[row]))
-            at_s = float(t_s[row] + t_s[row + 1]) / 2.0
-            leave = (float(lon_deg[row]), pole_deg, at_s)
-            arrive = (float(lon_deg[row + 1]), pole_deg, at_s)
+            at = np.copysign(90.0, lat_deg[row]), (t_s[row] + t_s[row + 1]) / 2.0
+            ends = np.array([[[lon_deg[row], *at]], [[lon_deg[row + 1], *at]]])
         else:
-            edge_deg = float(np.copysign(180.0, lon_deg[row]))
+            edge_deg = np.copysign(180.0, lon_deg[row])
             # A step from 180 to -180 goes nowhere.
             share = (edge_deg - lon_deg[row]) / (step_deg[row] or 1.0)
-            crossing_deg = float(lat_deg[row] + share * (lat_deg[row + 1] - lat_deg[row]))
-            at_s = float(t_s[row] + share * (t_s[row + 1] - t_s[row]))
-            leave = (edge_deg, crossing_deg, at_s)
-            arrive = (-edge_deg, crossing_deg, at_s)
-        yield _piece(lon_deg, lat_deg, t_s, slice(first, row + 1), entry, leave)
-        first, entry = row + 1, arrive
-    yield _piece(lon_deg, lat_deg, t_s, slice(first, len(lon_deg)), entry, None)
-
-
-def _piece(
-    lon_deg: Floats,
-    lat_deg: Floats,
-    t_s: Floats,
-    rows: slice,
-    entry: tuple[float, float, float] | None,
-    leave: tuple[float, float, float] | None,
-) -> Piece:
-    columns = np.stack([lon_deg[rows], lat_deg[rows], t_s[rows]], axis=1)
-    ends = [np.array(end).reshape(-1, 3) for end in (entry or (), leave or ())]
-    whole = np.concatenate([ends[0], columns, ends[1]])
-    return Piece(lon_deg=whole[:, 0], lat_deg=whole[:, 1], t_s=whole[:, 2])
+            at = points[row, 1:] + share * (points[row + 1, 1:] - points[row, 1:])
+            ends = np.array([[[edge_deg, *at]], [[-edge_deg, *at]]])
+        yield Piece(*np.concatenate([entry, points[first : row + 1], ends[0]]).T)
+        first, entry = row + 1, ends[1]
+    yield Piece(*np.concatenate([entry, points[first:]]).T)
 
 
 def area(lon_deg: Floats, lat_deg: Floats, decimals: int) -> dict[str, Any]:

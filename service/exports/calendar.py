@@ -19,7 +19,7 @@ from icalendar import Alarm, Calendar, Event
 
 import planner_core
 from planner_core.domain import GroundStation
-from service.answers.answered import Answered, Document, in_chunks
+from service.answers.answered import Answered, Document, chunked
 
 ALARM: Final = timedelta(minutes=10)
 
@@ -28,12 +28,9 @@ _SECOND: Final = timedelta(seconds=1)
 _EPOCH: Final = datetime(2020, 1, 1, tzinfo=UTC)
 
 
+@chunked
 def write(answered: Answered) -> Iterator[str]:
     """Yield the calendar of all contacts."""
-    return in_chunks(_parts(answered))
-
-
-def _parts(answered: Answered) -> Iterator[str]:
     head, tail = around("Contacts")
     yield head
     stations = {station.id: station for station in answered.question.ground_stations}
@@ -84,7 +81,8 @@ def entry(start: datetime, end: datetime, station: GroundStation, made_at: datet
     event.add("dtstart", start.replace(microsecond=0))
     event.add("dtend", end.replace(microsecond=0) + _SECOND * (end.microsecond > 0))
     event.add("location", station.name)
-    event.add("geo", (round(station.lat_deg, 6), round(_signed(station.lon_deg), 6)))
+    east_deg = station.lon_deg - 360.0 if station.lon_deg > 180.0 else station.lon_deg
+    event.add("geo", (round(station.lat_deg, 6), round(east_deg, 6)))
     return event
 
 
@@ -104,10 +102,6 @@ def uid(kind: str, satellite_id: str, station_id: str, middle: datetime, seen: C
     part = seen[key]
     seen[key] += 1
     return str(uuid5(NAMESPACE_URL, f"slewline:{kind}:{key}:{part}"))
-
-
-def _signed(lon_deg: float) -> float:
-    return lon_deg - 360.0 if lon_deg > 180.0 else lon_deg
 
 
 def _description(head: Document, action: Document) -> str:

@@ -16,7 +16,7 @@ import numpy as np
 
 from planner_core.domain import GroundStation, Horizon, Satellite, Target
 from planner_core.orbits.ephemeris import propagate
-from service.answers.answered import Answered, Document, compact, in_chunks, listed
+from service.answers.answered import Answered, Document, chunked, compact, listed
 from service.wire.instants import instant_text
 
 _DEGREE: Final = 5
@@ -38,12 +38,9 @@ _TRACKS: Final = (
 )  # fmt: skip
 
 
+@chunked
 def write(answered: Answered) -> Iterator[str]:
     """Yield an array of packets, the document's own first."""
-    return in_chunks(_parts(answered))
-
-
-def _parts(answered: Answered) -> Iterator[str]:
     yield "[\n"
     yield from listed(compact(packet) for packet in _packets(answered))
     yield "\n]\n"

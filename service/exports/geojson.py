@@ -14,7 +14,7 @@ import numpy.typing as npt
 from planner_core.domain import GroundStation, Horizon, Satellite
 from planner_core.orbits.ephemeris import Ephemeris, propagate
 from planner_core.orbits.ground_track import sub_points, visibility_ring
-from service.answers.answered import Answered, Document, compact, in_chunks, listed
+from service.answers.answered import Answered, Document, chunked, compact, listed
 from service.exports.antimeridian import Piece, area, pieces_of_line
 from service.wire.instants import instant_text
 
@@ -30,12 +30,9 @@ _NEVER: Final = 2**32 - 1
 _MILLISECOND: Final = timedelta(milliseconds=1)
 
 
+@chunked
 def write(answered: Answered) -> Iterator[str]:
     """Yield a FeatureCollection; each feature's property ``kind`` says what it is."""
-    return in_chunks(_parts(answered))
-
-
-def _parts(answered: Answered) -> Iterator[str]:
     names = ("job", "scenario_sha256", "plan_sha256", "horizon")
     head = {name: answered.head[name] for name in names}
     yield f'{{"type":"FeatureCollection",{compact(head)[1:-1]},"features":[\n'
@@ -58,7 +55,7 @@ def _features(answered: Answered) -> Iterator[Document]:
             yield _reach(station, altitude_km, satellite_ids)
 
 
-def _feature(kind: str, own_id: str, geometry: Document, properties: Document) -> Document:
+def _feature(kind: str, own_id: str, geometry: Document, **properties: object) -> Document:
     return {
         "type": "Feature",
         "id": f"{kind}/{own_id}",
@@ -84,23 +81,21 @@ def _targets(answered: Answered) -> Iterator[Document]:
             "target",
             target.id,
             _point(target.lon_deg, target.lat_deg),
-            {
-                "target_id": target.id,
-                "target_name": target.name,
-                "target_catalog_id": target.catalog_id,
-                "outcome": told["outcome"],
-                "reason": reason and reason["code"],
-                "reason_detail": reason and reason["detail"],
-                "action_id": told["action_id"],
-                "satellite_id": told["satellite_id"],
-                "satellite_name": names.get(told["satellite_id"]),
-                "start": done["start"],
-                "end": done["end"],
-                "delivered_at": before.get(target.id) or done["delivered_at"],
-                "reward": target.reward,
-                "worth": told.get("worth"),
-                **{name: done[name] for name in _OF_IMAGES},
-            },
+            target_id=target.id,
+            target_name=target.name,
+            target_catalog_id=target.catalog_id,
+            outcome=told["outcome"],
+            reason=reason and reason["code"],
+            reason_detail=reason and reason["detail"],
+            action_id=told["action_id"],
+            satellite_id=told["satellite_id"],
+            satellite_name=names.get(told["satellite_id"]),
+            start=done["start"],
+            end=done["end"],
+            delivered_at=before.get(target.id) or done["delivered_at"],
+            reward=target.reward,
+            worth=told.get("worth"),
+            **{name: done[name] for name in _OF_IMAGES},
         )
 
 
@@ -152,14 +147,12 @@ def _stations(answered: Answered) -> Iterator[Document]:
             "station",
             station.id,
             _point(station.lon_deg, station.lat_deg),
-            {
-                "station_id": station.id,
-                "station_name": station.name,
-                "name": station.name,
-                "min_elevation_deg": station.min_elevation_deg,
-                "antennas": station.antennas,
-                "contacts": contacts[station.id],
-            },
+            station_id=station.id,
+            station_name=station.name,
+            name=station.name,
+            min_elevation_deg=station.min_elevation_deg,
+            antennas=station.antennas,
+            contacts=contacts[station.id],
         )
 
 
@@ -178,13 +171,11 @@ def _track(satellite: Satellite, horizon: Horizon, path: Ephemeris) -> Document:
             "type": "LineString" if is_one else "MultiLineString",
             "coordinates": lines[0] if is_one else lines,
         },
-        {
-            "satellite_id": satellite.id,
-            "satellite_name": satellite.name,
-            "name": satellite.name,
-            "norad_cat_id": satellite.orbit.norad_cat_id,
-            "times": times[0] if is_one else times,
-        },
+        satellite_id=satellite.id,
+        satellite_name=satellite.name,
+        name=satellite.name,
+        norad_cat_id=satellite.orbit.norad_cat_id,
+        times=times[0] if is_one else times,
     )
 
 
@@ -213,11 +204,9 @@ def _reach(station: GroundStation, altitude_km: float, satellite_ids: list[str])
         "visibility",
         f"{station.id}/{altitude_km:g}",
         area(*ring, _DECIMALS),
-        {
-            "station_id": station.id,
-            "station_name": station.name,
-            "altitude_km": altitude_km,
-            "min_elevation_deg": station.min_elevation_deg,
-            "satellite_ids": satellite_ids,
-        },
+        station_id=station.id,
+        station_name=station.name,
+        altitude_km=altitude_km,
+        min_elevation_deg=station.min_elevation_deg,
+        satellite_ids=satellite_ids,
     )

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from typing import Final
 
-from service.answers.answered import Answered, Document, compact, in_chunks
+from service.answers.answered import Answered, Document, chunked, compact
 
 _MODES: Final = {
     "collect": ("collects", "#1b7f4b", "#ffffff"),
@@ -24,12 +24,9 @@ _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 _MILLISECOND: Final = timedelta(milliseconds=1)
 
 
+@chunked
 def write(answered: Answered) -> Iterator[str]:
     """Yield the plan; groups that would be empty are left out."""
-    return in_chunks(_parts(answered))
-
-
-def _parts(answered: Answered) -> Iterator[str]:
     stations = {station.id: station.name for station in answered.question.ground_stations}
     names = Counter(satellite["name"] for satellite in answered.satellites)
     yield "{\n"

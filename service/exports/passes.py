@@ -7,10 +7,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from datetime import datetime
 
 from planner_core.domain import GroundStation
-from planner_core.spreadsheets import guarded
-from service.answers.answered import in_chunks
+from service.answers.answered import chunked
 from service.exports.calendar import alarm, around, entry, uid
 from service.exports.table import line
+from service.wire.base import dumped
 from service.wire.instants import instant_text
 from service.wire.passes import PassOut
 
@@ -20,11 +20,21 @@ COLUMNS = (
 )  # fmt: skip
 
 
+@chunked
 def write_csv(passes: Iterable[PassOut]) -> Iterator[str]:
-    """Yield one row for each pass; names that a spreadsheet would run are guarded."""
-    return in_chunks(_lines(passes))
+    """Yield one row for each pass."""
+    yield line(COLUMNS)
+    for one in passes:
+        told = dumped(one) | {
+            "duration_s": (one.los - one.aos).total_seconds(),
+            "planned": "true" if one.planned else "false",
+            "conflicts": "; ".join(other.satellite_name for other in one.conflicts),
+            "action_ids": "; ".join(one.action_ids),
+        }
+        yield line(told[name] for name in COLUMNS)
 
 
+@chunked
 def write_ics(
     passes: Iterable[PassOut], stations: Mapping[str, GroundStation], made_at: datetime
 ) -> Iterator[str]:
@@ -37,32 +47,6 @@ def write_ics(
     made_at
         When the plan was made: of two calendars, the newer one counts.
     """
-    return in_chunks(_entries(passes, stations, made_at))
-
-
-def _lines(passes: Iterable[PassOut]) -> Iterator[str]:
-    yield line(COLUMNS)
-    for one in passes:
-        yield line(
-            (
-                guarded(one.station_id),
-                guarded(one.station_name),
-                guarded(one.satellite_id),
-                guarded(one.satellite_name),
-                *map(instant_text, (one.aos, one.tca, one.los)),
-                (one.los - one.aos).total_seconds(),
-                one.max_elevation_deg,
-                "true" if one.planned else "false",
-                one.volume_mbit,
-                guarded("; ".join(other.satellite_name for other in one.conflicts)),
-                "; ".join(one.action_ids),
-            )
-        )
-
-
-def _entries(
-    passes: Iterable[PassOut], stations: Mapping[str, GroundStation], made_at: datetime
-) -> Iterator[str]:
     head, tail = around("Passes")
     yield head
     seen: Counter[str] = Counter()

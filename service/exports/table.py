@@ -11,10 +11,9 @@ import csv
 import io
 from collections.abc import Iterable, Iterator
 from datetime import datetime
-from typing import Any
 
 from planner_core.spreadsheets import guarded
-from service.answers.answered import Answered, Document, in_chunks
+from service.answers.answered import Answered, Document, chunked
 
 COLUMNS = (
     "action_id", "satellite_id", "satellite_name", "mode", "start", "end", "duration_s",
@@ -25,19 +24,23 @@ COLUMNS = (
 )  # fmt: skip
 
 
+@chunked
 def write(answered: Answered) -> Iterator[str]:
     """Yield the table, satellite by satellite, in order of start."""
-    return in_chunks(_lines(answered))
-
-
-def _lines(answered: Answered) -> Iterator[str]:
     yield line(COLUMNS)
     for satellite, action in answered.each_action():
-        station_name = guarded(_station_name(answered, action))
-        # Answers of earlier releases do not have them.
-        behind = (action.get(name) for name in ("delivered_at", "age_s", "clear_probability"))
-        target_name = guarded(action.get("target_name"))
-        yield line((*_cells(satellite, action), station_name, *behind, target_name))
+        start, end = (datetime.fromisoformat(action[name]) for name in ("start", "end"))
+        told = {
+            **action,
+            "action_id": action["id"],
+            "satellite_id": satellite["id"],
+            "satellite_name": satellite["name"],
+            "duration_s": (end - start).total_seconds(),
+            "station_name": _station_name(answered, action),
+            **{f"slew_{name}": value for name, value in (action["slew"] or {}).items()},
+        }
+        # Answers of earlier releases do not have all columns.
+        yield line(told.get(name) for name in COLUMNS)
 
 
 def _station_name(answered: Answered, action: Document) -> str | None:
@@ -49,35 +52,8 @@ def _station_name(answered: Answered, action: Document) -> str | None:
 
 
 def line(cells: Iterable[object]) -> str:
-    """Return a line of a table."""
+    """Return a line of a table; texts that a spreadsheet would run are guarded."""
     written = io.StringIO(newline="")
-    csv.writer(written).writerow(cells)
+    safe = (guarded(cell) if isinstance(cell, str) else cell for cell in cells)
+    csv.writer(written).writerow(safe)
     return written.getvalue()
-
-
-def _cells(satellite: Document, action: Document) -> tuple[Any, ...]:
-    start, end = (datetime.fromisoformat(action[name]) for name in ("start", "end"))
-    slew = action["slew"] or {}
-    return (
-        action["id"],
-        guarded(satellite["id"]),
-        guarded(satellite["name"]),
-        action["mode"],
-        action["start"],
-        action["end"],
-        (end - start).total_seconds(),
-        guarded(action["target_id"]),
-        guarded(action["station_id"]),
-        action["opportunity_id"],
-        action["off_nadir_deg"],
-        action["azimuth_deg"],
-        slew.get("angle_deg"),
-        slew.get("needed_s"),
-        slew.get("available_s"),
-        action["reward"],
-        action["battery_fraction_end"],
-        action["recorder_fraction_end"],
-        # Answers of the first release do not have them.
-        action.get("worth"),
-        action.get("quality"),
-    )

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from datetime import datetime
+from functools import cache
 from itertools import islice
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +20,8 @@ from service.forecasts.axes import fault_of_axes, unwrapped
 from service.forecasts.fields import WHOLE, ByTarget, Field, Grid, time_ms_of
 from service.problems.faults import refuse, refuse_one, require_none
 from service.wire.base import Id, Instant
+
+T = TypeVar("T")
 
 _GRID: Final = ("time", "lat_deg", "lon_deg", "clear_probability")
 _BY_TARGET: Final = ("target_id", "time", "clear_probability")
@@ -62,11 +65,10 @@ class _Table:
         self.lines: list[int] = []
         self.faults: list[Fault] = []
         self._places = list(zip(wanted, positions, strict=True))
-        self._instants: dict[str, int] = {}
-        self._ids: dict[str, str] = {}
         self._read: dict[str, Callable[[str], Any]] = {
-            "time": self._time_ms,
-            "target_id": self._target_id,
+            # There are few instants and targets, and many lines.
+            "time": cache(lambda cell: time_ms_of(_valid(_INSTANT, cell))),
+            "target_id": cache(lambda cell: _valid(_ID, cell)),
             "lat_deg": lambda cell: _number(form.number(cell), -90.0, 90.0),
             "lon_deg": lambda cell: _number(form.number(cell), -180.0, 360.0),
             "clear_probability": lambda cell: _number(form.number(cell), 0.0, 1.0),
@@ -97,24 +99,12 @@ class _Table:
         if len(self.faults) == _MOST_FAULTS:
             raise refuse(self.faults)
 
-    def _time_ms(self, cell: str) -> int:
-        # A grid has few instants and many lines.
-        found = self._instants.get(cell)
-        if found is None:
-            try:
-                instant = _INSTANT.validate_python(cell)
-            except ValidationError as error:
-                raise ValueError(f"{error.errors()[0]['msg']}.") from None
-            found = self._instants[cell] = time_ms_of(instant)
-        return found
 
-    def _target_id(self, cell: str) -> str:
-        if cell not in self._ids:
-            try:
-                self._ids[cell] = _ID.validate_python(cell)
-            except ValidationError as error:
-                raise ValueError(f"{error.errors()[0]['msg']}.") from None
-        return self._ids[cell]
+def _valid(kind: TypeAdapter[T], cell: str) -> T:
+    try:
+        return kind.validate_python(cell)
+    except ValidationError as error:
+        raise ValueError(f"{error.errors()[0]['msg']}.") from None
 
 
 def _number(cell: str, least: float, most: float) -> float:

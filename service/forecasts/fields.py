@@ -47,8 +47,25 @@ class Skies:
     clear_probability: Floats
 
 
+class _Timed:
+    """What has values at some instants."""
+
+    __slots__ = ()
+    time_ms: Longs
+
+    @property
+    def first_ms(self) -> int:
+        """Return the first instant."""
+        return int(self.time_ms.min())
+
+    @property
+    def last_ms(self) -> int:
+        """Return the last instant."""
+        return int(self.time_ms.max())
+
+
 @dataclass(frozen=True, slots=True, eq=False)
-class Grid:
+class Grid(_Timed):
     """Values at every instant, latitude and longitude of a grid.
 
     Attributes
@@ -63,16 +80,6 @@ class Grid:
     lat_deg: Floats
     lon_deg: Floats
     value: Shares
-
-    @property
-    def first_ms(self) -> int:
-        """Return the first instant."""
-        return int(self.time_ms[0])
-
-    @property
-    def last_ms(self) -> int:
-        """Return the last instant."""
-        return int(self.time_ms[-1])
 
     def columns(self) -> dict[str, npt.NDArray[Any]]:
         """Return all that it says, as arrays."""
@@ -161,7 +168,7 @@ def _cells(axis_deg: Floats, at_deg: Floats) -> tuple[Longs, Floats]:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ByTarget:
+class ByTarget(_Timed):
     """Values of each target at instants of its own.
 
     Attributes
@@ -178,16 +185,6 @@ class ByTarget:
     first: Longs
     time_ms: Longs
     value: Shares
-
-    @property
-    def first_ms(self) -> int:
-        """Return the first instant of any target."""
-        return int(self.time_ms.min())
-
-    @property
-    def last_ms(self) -> int:
-        """Return the last instant of any target."""
-        return int(self.time_ms.max())
 
     def columns(self) -> dict[str, npt.NDArray[Any]]:
         """Return all that it says, as arrays."""

@@ -10,7 +10,6 @@ import io
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import Any, Final
 
@@ -93,22 +92,6 @@ def _require_plain(file: h5py.File) -> None:
         chunk = getattr(item, "chunks", None)
         if chunk and math.prod(chunk) * item.dtype.itemsize > _MOST_CHUNK_BYTES:
             raise _refused(f"The chunks of {name[:100]!r} are too large; write it in smaller ones.")
-
-
-@dataclass(frozen=True, slots=True)
-class _Packed:
-    """How stored numbers become values (CF, packed data)."""
-
-    scale: float
-    offset: float
-    missing: tuple[float, ...]
-
-    def values(self, stored: npt.NDArray[Any]) -> Floats:
-        """Return values, NaN where one is missing."""
-        values = stored.astype(np.float64)
-        for code in self.missing:
-            values[stored == code] = np.nan
-        return values * self.scale + self.offset
 
 
 class _Reading:
@@ -215,7 +198,7 @@ class _Reading:
 
     def _clear_at(self, time: int) -> npt.NDArray[np.uint16]:
         """Return the shares of one instant: latitudes by longitudes, the mean of all members."""
-        packed = self._packing()
+        missing, scale, offset = self._packing()
         dimensions = self._variable.dimensions
         member = self._axis_of["member"]
         number = self._variable.shape[dimensions.index(member)] if member else 1
@@ -224,13 +207,18 @@ class _Reading:
             own = {self._axis_of["time"]: time, member: one}
             kept = (self._axis_of["lat"], self._axis_of["lon"])
             where = tuple(slice(None) if d in kept else own.get(d, 0) for d in dimensions)
-            total = total + packed.values(np.asarray(self._variable[where]))
+            stored = np.asarray(self._variable[where])
+            values = stored.astype(np.float64)
+            for code in missing:
+                values[stored == code] = np.nan
+            total = total + (values * scale + offset)
         mean = np.asarray(total) / number
         if dimensions.index(self._axis_of["lat"]) > dimensions.index(self._axis_of["lon"]):
             mean = mean.T
         return self._shares(mean)
 
-    def _packing(self) -> _Packed:
+    def _packing(self) -> tuple[tuple[float, ...], float, float]:
+        """Return what stands for missing values, scale and offset of stored ones (CF)."""
         attributes = self._variable.attrs
         missing = [attributes[n] for n in ("_FillValue", "missing_value") if n in attributes]
         codes = tuple(float(code) for part in missing for code in np.ravel(part))
@@ -238,7 +226,7 @@ class _Reading:
             float(np.ravel(attributes.get(name, default))[0])
             for name, default in (("scale_factor", 1.0), ("add_offset", 0.0))
         )
-        return _Packed(scale, offset, codes)
+        return codes, scale, offset
 
     def _shares(self, mean: Floats) -> npt.NDArray[np.uint16]:
         part = mean * (0.01 if self._is_percent() else 1.0)

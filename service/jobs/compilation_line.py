@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import sys
 import time
+from functools import partial
 from typing import Final, TextIO
 
 from planner_core.jit import compiled_kernels, stored_signatures
@@ -25,7 +26,8 @@ class CompilationLine:
     """
 
     def __init__(self, began_s: float, share: float = 1.0, out: TextIO = sys.stdout) -> None:
-        self._began_s, self._shown_s, self._out = began_s, 0.0, out
+        self._began_s, self._shown_s, self._is_terminal = began_s, 0.0, out.isatty()
+        self._print = partial(print, file=out, flush=True)
         num_lines = {
             kernel.py_func.__qualname__: len(inspect.getsourcelines(kernel.py_func)[0])
             for kernel in compiled_kernels()
@@ -41,29 +43,27 @@ class CompilationLine:
         """Count a kernel."""
         if not self._is_open:
             self._is_open = True
-            print("Compiling the planning kernels (once) ...", file=self._out, flush=True)
+            self._print("Compiling the planning kernels (once) ...")
         self._done += self._left.pop(name, 0)
 
     def show(self) -> None:
         """Print how far it is: always in a terminal, now and then elsewhere."""
         now_s = time.monotonic()
-        is_terminal = self._out.isatty()
-        if self._done < _TOO_FEW * self._total or now_s - self._shown_s < (
-            0.5 if is_terminal else _EVERY_S
-        ):
+        every_s = 0.5 if self._is_terminal else _EVERY_S
+        if self._done < _TOO_FEW * self._total or now_s - self._shown_s < every_s:
             return
         self._shown_s = now_s
         share = min(self._done / self._total, 0.99)
         left_s = (now_s - self._began_s) * (1.0 - share) / share
         text = f"  {share:3.0%}, about {left_s:.0f} s left"
-        print(f"\r{text:<40}" if is_terminal else text, end="" if is_terminal else "\n",
-              file=self._out, flush=True)  # fmt: skip
+        if self._is_terminal:
+            self._print(f"\r{text:<40}", end="")
+        else:
+            self._print(text)
 
     def end(self) -> None:
         """Say how long it took."""
         if self._done:
-            begin = "\r" if self._out.isatty() else ""
+            begin = "\r" if self._is_terminal else ""
             took_s = time.monotonic() - self._began_s
-            print(
-                f"{begin}Kernels are ready ({took_s:.1f} s).".ljust(40), file=self._out, flush=True
-            )
+            self._print(f"{begin}Kernels are ready ({took_s:.1f} s).".ljust(40))

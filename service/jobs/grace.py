@@ -30,8 +30,11 @@ class Grace:
         self._most_cpu_s = GRACE_CPU_S[phase]
 
     def is_over(self) -> bool:
-        """Return whether it has spent its grace, or does nothing."""
-        cpu_s, now_s = self._cpu_s(), time.monotonic()
+        """Return whether it has spent its grace, or does nothing; not so where it has ended."""
+        try:
+            cpu_s, now_s = self._cpu_s(), time.monotonic()
+        except psutil.NoSuchProcess:
+            return False
         if cpu_s > self._moved_cpu_s + _STILL_S:
             self._moved_cpu_s, self._moved_s = cpu_s, now_s
         return cpu_s - self._began_cpu_s > self._most_cpu_s or now_s - self._moved_s > STALL_S

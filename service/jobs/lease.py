@@ -114,7 +114,7 @@ def finish(session: Session, lease: Lease, outcome: Outcome) -> bool:
     state: Any = outcome.state
     if state == "succeeded":
         state = sa.case((JobRow.state == "cancelling", "cancelled"), else_="succeeded")
-    is_ended = _end(
+    is_ended = end(
         session,
         lease.job_id,
         _held(lease),
@@ -145,7 +145,7 @@ def _adopt_replan(session: Session, job_id: str) -> None:
 def hand_back(session: Session, queue: JobQueue, lease: Lease) -> None:
     """Give a running job back to the queue; it does not count as an attempt."""
     cancelled = _held(lease) & (JobRow.state == "cancelling")
-    if _end(session, lease.job_id, cancelled, state="cancelled"):
+    if end(session, lease.job_id, cancelled, state="cancelled"):
         return
     redispatch(session, queue, _held(lease), lease.job_id)
 
@@ -192,26 +192,13 @@ def request_cancel(session: Session, job_id: str) -> bool:
     -------
     Whether the job was active; asking twice is no mistake.
     """
-    if _end(session, job_id, JobRow.state == "queued", state="cancelled", cancel_requested=True):
+    if end(session, job_id, JobRow.state == "queued", state="cancelled", cancel_requested=True):
         return True
     runs = sa.and_(JobRow.id == job_id, JobRow.state == "running")
     asked = {"state": "cancelling", "cancel_requested": True, "version": JobRow.version + 1}
     if _update(session, runs, **asked):
         return True
     return session.scalar(sa.select(JobRow.state).where(JobRow.id == job_id)) == "cancelling"
-
-
-def end_expired(
-    session: Session,
-    job_id: str,
-    guard: sa.ColumnElement[bool],
-    *,
-    outcome: Outcome,
-    **changes: Any,
-) -> bool:
-    """End a job whose worker is gone, if ``guard`` still holds."""
-    error = sa.null() if outcome.error is None else dict(outcome.error)
-    return _end(session, job_id, guard, state=outcome.state, error=error, **changes)
 
 
 def _held(lease: Lease) -> sa.ColumnElement[bool]:
@@ -222,7 +209,7 @@ def _held(lease: Lease) -> sa.ColumnElement[bool]:
     )
 
 
-def _end(session: Session, job_id: str, guard: sa.ColumnElement[bool], **values: Any) -> bool:
+def end(session: Session, job_id: str, guard: sa.ColumnElement[bool], **values: Any) -> bool:
     """Give a job its final state, if ``guard`` still holds; who waits for it will be told."""
     ended = {"finished_at": utc_now(), "lease_until": None, "version": JobRow.version + 1}
     if not _update(session, guard & (JobRow.id == job_id), **ended, **values):

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterable
+from contextlib import closing
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Final, Protocol
@@ -99,11 +100,8 @@ def _mark_disconnect(context: sa.engine.ExceptionContext) -> None:
 def migrate_queue(settings: Settings) -> None:
     """Create or update the queue's own tables, and the queue in them."""
     DBOS.migrate(settings.database_url)
-    queue = DbosQueue(settings.database_url, settings.database_timeout_s)
-    try:
+    with closing(DbosQueue(settings.database_url, settings.database_timeout_s)) as queue:
         queue.configure(tenant_limit=settings.max_running_per_tenant, poll_s=settings.queue_poll_s)
-    finally:
-        queue.close()
 
 
 class DbosQueue:

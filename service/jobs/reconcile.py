@@ -16,7 +16,7 @@ from service.db.clock import utc_now
 from service.db.rows import JobRow
 from service.db.session import Database
 from service.jobs import lease
-from service.jobs.queue import Claim, JobQueue
+from service.jobs.queue import JobQueue
 
 log = logging.getLogger(__name__)
 
@@ -59,7 +59,8 @@ class Reconciler:
         if self._may_judge(now):
             for job_id in self._expired():
                 self._recover(job_id)
-        claims = self._old_claims(now)
+        oldest = now - timedelta(seconds=self._lease_s)
+        claims = [claim for claim in self._queue.claims() if claim.claimed_at < oldest]
         current = self._current(claim.job_id for claim in claims)
         for claim in claims:
             if current.get(claim.job_id) == (claim.dispatch, "queued"):
@@ -104,20 +105,15 @@ class Reconciler:
         last = running & (JobRow.lost_runs + 1 >= self._max_attempts)
         lost = JobRow.lost_runs + 1
         detail = f"The worker died or was cut off {self._max_attempts} times while it ran this job."
-        too_many = lease.Outcome.failed("too_many_attempts", detail)
-        cancelled = lease.Outcome(state="cancelled")
+        failed = {"state": "failed", "error": {"code": "too_many_attempts", "detail": detail}}
         with self._database.transaction() as session:
             done = (
-                lease.end_expired(session, job_id, cancelling, outcome=cancelled)
-                or lease.end_expired(session, job_id, last, outcome=too_many, lost_runs=lost)
+                lease.end(session, job_id, cancelling, state="cancelled")
+                or lease.end(session, job_id, last, lost_runs=lost, **failed)
                 or lease.redispatch(session, self._queue, running, job_id, lost_runs=lost)
             )
         if done:
             log.warning("recovered a job whose worker is gone", extra={"job_id": job_id})
-
-    def _old_claims(self, now: datetime) -> list[Claim]:
-        oldest = now - timedelta(seconds=self._lease_s)
-        return [claim for claim in self._queue.claims() if claim.claimed_at < oldest]
 
     def _current(self, job_ids: Iterable[str]) -> dict[str, tuple[int, str]]:
         wanted = sa.select(JobRow.id, JobRow.dispatch, JobRow.state).where(

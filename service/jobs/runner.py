@@ -200,7 +200,8 @@ class _Run:
             blocks, opportunities = tuple(self._blocks), self._opportunity_block
             return Answered(replace(message.answer, blocks=blocks, opportunity_block=opportunities))
         if isinstance(message, Refused | Stopped):
-            return self._settled(message)
+            is_late = isinstance(message, Stopped) and not self._cancelled
+            return self._out_of_time() if is_late else message
         if isinstance(message, Block):
             self._blocks.append(message)
         elif isinstance(message, OpportunitiesFollow):
@@ -232,11 +233,6 @@ class _Run:
         with suppress(psutil.NoSuchProcess):  # it has ended; its last words are still to be read
             self._grace = Grace(self.process.pid or 0, self._phase or "access")
 
-    def _settled(self, ending: Ending) -> Ending:
-        if isinstance(ending, Stopped) and not self._cancelled:
-            return self._out_of_time()
-        return ending
-
     def _crashed(self) -> Ending | Lost:
         self.process.join(_LAST_WORDS_S)
         if self._cancelled:
@@ -258,15 +254,10 @@ class _Run:
             self._expire_at_s = math.inf
             self._say(Command.EXPIRE)
             self._grant_grace()
-        if now_s >= self._kill_at_s or self._has_spent_its_grace():
+        # A process that has ended is not killed: its last words are still to be read.
+        if now_s >= self._kill_at_s or (self._grace is not None and self._grace.is_over()):
             return Stopped() if self._cancelled else self._out_of_time()
         return None
-
-    def _has_spent_its_grace(self) -> bool:
-        try:
-            return self._grace is not None and self._grace.is_over()
-        except psutil.NoSuchProcess:
-            return False  # it has ended; its last words are still to be read
 
     def _out_of_time(self) -> Refused:
         if not self._started:

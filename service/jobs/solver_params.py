@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
+import operator
+from collections.abc import Callable, Mapping
 from dataclasses import Field
 from types import NoneType, UnionType
 from typing import Any, Final, Literal, Union, cast, get_args, get_origin, get_type_hints
 
 from planner_core.errors import InvalidParameters
 from planner_core.solvers.base import Solver
+from service.problems.faults import pointer_to
 
 _JSON_TYPES: Final[Mapping[object, str]] = {
     bool: "boolean",
@@ -22,7 +24,12 @@ _JSON_TYPES: Final[Mapping[object, str]] = {
     float: "number",
     str: "string",
 }
-_DOCUMENTED: Final = ("description", "minimum", "exclusiveMinimum", "maximum")
+_LIMITS: Final[Mapping[str, tuple[Callable[[float, float], bool], str]]] = {
+    "minimum": (operator.ge, "{} or more"),
+    "exclusiveMinimum": (operator.gt, "greater than {}"),
+    "maximum": (operator.le, "{} or less"),
+}
+_DOCUMENTED: Final = ("description", *_LIMITS)
 
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
@@ -116,21 +123,14 @@ def _checked(cls: type[Solver], field: Field[Any], value: object) -> object:
 
 
 def _check_limits(field: Field[Any], value: float) -> None:
-    limits = field.metadata
     if not math.isfinite(value):
         raise _refusal(field.name, "not_finite", "NaN and infinity are refused.")
-    if "minimum" in limits and value < limits["minimum"]:
-        raise _out_of_range(field, value, f"{limits['minimum']} or more")
-    if "exclusiveMinimum" in limits and value <= limits["exclusiveMinimum"]:
-        raise _out_of_range(field, value, f"greater than {limits['exclusiveMinimum']}")
-    if "maximum" in limits and value > limits["maximum"]:
-        raise _out_of_range(field, value, f"{limits['maximum']} or less")
-
-
-def _out_of_range(field: Field[Any], value: float, limit: str) -> InvalidParameters:
-    return _refusal(field.name, "value_out_of_range", f"{value!r} must be {limit}.")
+    for name, (is_within, words) in _LIMITS.items():
+        limit = field.metadata.get(name)
+        if limit is not None and not is_within(value, limit):
+            detail = f"{value!r} must be {words.format(limit)}."
+            raise _refusal(field.name, "value_out_of_range", detail)
 
 
 def _refusal(name: str, code: str, detail: str) -> InvalidParameters:
-    pointer = "/params/" + name.replace("~", "~0").replace("/", "~1")
-    return InvalidParameters(code, detail, pointer=pointer)
+    return InvalidParameters(code, detail, pointer=pointer_to("params", name))

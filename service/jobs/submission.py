@@ -68,19 +68,17 @@ def submit_comparison(
     session: Session, queue: JobQueue, specs: Sequence[JobSpec], *, label: str | None
 ) -> ComparisonRow:
     """Store a comparison and queue a job for each spec, all or none. All plan one scenario."""
-    own_id = new_id()
-    row = {
-        "id": own_id,
-        "scenario_id": specs[0].scenario_id,
-        "tenant": specs[0].owner,
-        "label": label,
-        "created_at": utc_now(),
-    }
-    session.execute(sa.insert(ComparisonRow).values(**row))
-    jobs = [submit(session, queue, spec) for spec in specs]
-    runs = [
-        {"comparison_id": own_id, "position": position, "job_id": job.id}
-        for position, job in enumerate(jobs)
-    ]
-    session.execute(sa.insert(ComparisonRunRow), runs)
-    return session.get_one(ComparisonRow, own_id)
+    comparison = ComparisonRow(
+        scenario_id=specs[0].scenario_id,
+        tenant=specs[0].owner,
+        label=label,
+        created_at=utc_now(),
+    )
+    session.add(comparison)
+    session.flush()
+    for position, spec in enumerate(specs):
+        job = submit(session, queue, spec)
+        run = ComparisonRunRow(comparison_id=comparison.id, position=position, job_id=job.id)
+        session.add(run)
+    session.flush()
+    return comparison

@@ -17,7 +17,7 @@ from contextlib import suppress
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from multiprocessing.queues import SimpleQueue
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numba.core import event
@@ -148,24 +148,23 @@ def _tell_compiled(told: SimpleQueue[str]) -> None:
 # What the warm-up plans -----------------------------------------------------------------------
 
 
-def _over_the_globe(*, is_worn: bool = False) -> Scenario:
+def _over_the_globe() -> Scenario:
     points = [(lat, lon) for lat in range(-80, 81, 20) for lon in range(-180, 180, 30)]
-    return _mission(points, use_resources=True, is_worn=is_worn)
+    return _mission(points, use_resources=True)
 
 
 def _flown() -> Scenario:
     """Return a mission with turns in motion, to the sun and back, and contacts in parts."""
     globe = _over_the_globe()
-    (plain,) = globe.satellites
+    plain = globe.satellites[0].resources
     agility = Agility(slew_rate_deg_s=2.0, acceleration_deg_s2=0.2, slew_model="moving")
-    down_per_s = plain.resources.downlink_per_s
     resources = replace(
-        plain.resources,
+        plain,
         sun_pointing="slew",
         eclipse_aware=True,
-        downlink_by_elevation=((0.0, down_per_s), (90.0, 2.0 * down_per_s)),
+        downlink_by_elevation=((0.0, plain.downlink_per_s), (90.0, 2.0 * plain.downlink_per_s)),
     )
-    return replace(globe, satellites=(replace(plain, agility=agility, resources=resources),))
+    return _refitted(globe, agility=agility, resources=resources)
 
 
 def _crowd(num_targets: int = 120, *, use_resources: bool = False) -> Scenario:
@@ -189,7 +188,10 @@ def _judge() -> None:
 
 def _judge_worn() -> None:
     """Have reasons looked for as only where a battery is low and a recorder full."""
-    worn = _over_the_globe(is_worn=True)
+    globe = _over_the_globe()
+    plain = globe.satellites[0].resources
+    low = replace(plain, initial_battery_fraction=0.31, initial_recorder_fraction=0.74)
+    worn = _refitted(globe, resources=low)
     _plan(worn, Rule())
     always = BlockedInterval(satellite_id="warm-up", start=worn.horizon.start, end=worn.horizon.end)
     with suppress(InvalidScenario):  # the recorder does not bear that no contact is left
@@ -236,13 +238,11 @@ def _continuous_with_resources() -> None:
 
 
 def _fleet() -> None:
-    few = _few()
-    _plan(replace(few, satellites=_two(few.satellites[0])), Rule(), Certified())
+    _plan(_two(_few()), Rule(), Certified())
 
 
 def _fleet_with_resources() -> None:
-    crowd = _crowd(use_resources=True)
-    _plan(replace(crowd, satellites=_two(crowd.satellites[0])), Certified(gap=0.1))
+    _plan(_two(_crowd(use_resources=True)), Certified(gap=0.1))
 
 
 def _shortage() -> None:
@@ -272,9 +272,7 @@ def _late() -> None:
 
 def _slow() -> None:
     """Have a satellite that gains by way of tasks what it cannot reach directly."""
-    crowd = _crowd()
-    slow = replace(crowd.satellites[0], agility=Agility(slew_rate_deg_s=_SLOW_DEG_S))
-    problem = _built(replace(crowd, satellites=(slow,)))
+    problem = _built(_refitted(_crowd(), agility=Agility(slew_rate_deg_s=_SLOW_DEG_S)))
     Graph().solve(problem, Budget(), 0)
     Milp(formulation="pairwise").solve(problem, Budget(), 0)
     arc_network_of(problem)
@@ -316,15 +314,19 @@ def _built(scenario: Scenario) -> Problem:
     return build_problem(scenario, compute_opportunities(scenario, budget), budget)
 
 
-def _two(satellite: Satellite) -> tuple[Satellite, Satellite]:
-    """Return a satellite and another that follows it."""
-    later = replace(mean_elements(satellite.orbit), mean_anomaly_deg=20.0, norad_cat_id=2)
-    return satellite, replace(satellite, id="later", orbit=later)
+def _refitted(scenario: Scenario, **changes: Any) -> Scenario:
+    """Return a mission whose satellite is changed."""
+    return replace(scenario, satellites=(replace(scenario.satellites[0], **changes),))
 
 
-def _mission(
-    points: Iterable[tuple[float, float]], *, use_resources: bool, is_worn: bool = False
-) -> Scenario:
+def _two(scenario: Scenario) -> Scenario:
+    """Return a mission in which another satellite follows its own."""
+    (first,) = scenario.satellites
+    orbit = replace(mean_elements(first.orbit), mean_anomaly_deg=20.0, norad_cat_id=2)
+    return replace(scenario, satellites=(first, replace(first, id="later", orbit=orbit)))
+
+
+def _mission(points: Iterable[tuple[float, float]], *, use_resources: bool) -> Scenario:
     orbit = OrbitElements(
         name="WARM-UP",
         norad_cat_id=1,
@@ -338,10 +340,6 @@ def _mission(
         mean_anomaly_deg=0.0,
     )
     resources = Resources.paper(orbit.period_s)
-    if is_worn:
-        resources = replace(
-            resources, initial_battery_fraction=0.31, initial_recorder_fraction=0.74
-        )
     return Scenario(
         horizon=Horizon(start=_START, end=_START + timedelta(hours=6)),
         satellites=(Satellite(id="warm-up", name="WARM-UP", orbit=orbit, resources=resources),),

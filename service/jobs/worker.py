@@ -165,11 +165,7 @@ class Worker:
         finally:
             renewal.end()
         span.enter_phase("store")
-        self._conclude(held, request, ending)
-        if isinstance(ending, Abandoned | Lost):
-            state = type(ending).__name__.lower()
-        else:
-            state = outcome_of(ending).state
+        state = self._conclude(held, request, ending)
         span.note_end(state, failed=isinstance(ending, Refused))
         log.info("a run ended", extra={"run": held.run, "solver": request.solver, "state": state})
 
@@ -187,20 +183,22 @@ class Worker:
 
     def _conclude(
         self, held: Lease, request: PlanRequest, ending: Ending | Abandoned | Lost
-    ) -> None:
+    ) -> str:
+        """Write how a run ended, and return it in a word."""
         if isinstance(ending, Lost):
             self._persist(lambda session: lease.let_go(session, held))
             # The next job shall not wait for a new one to fork from while its lease runs.
             self._runner.warm_up(lambda: not self._is_stopping())
-            return
+            return "lost"
         if isinstance(ending, Abandoned):
             self._persist(lambda session: lease.hand_back(session, self._queue, held))
-            return
+            return "abandoned"
         if isinstance(ending, Answered):
             self._share(request.scenario_sha256, ending.answer)
         outcome = outcome_of(ending)
         if not self._persist(lambda session: lease.finish(session, held, outcome)):
             log.warning("a job went on without this worker", extra={"job_id": held.job_id})
+        return outcome.state
 
     def _share(self, sha256: str, answer: PlanAnswer) -> None:
         """Store what other jobs of the scenario need not find out again."""

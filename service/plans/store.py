@@ -7,7 +7,6 @@ from datetime import datetime
 from typing import TypeVar
 
 import sqlalchemy as sa
-from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.orm import Session
 
 from service.access.callers import Caller
@@ -23,6 +22,7 @@ from service.db.rows import (
     PlanStateRow,
     PublisherRow,
 )
+from service.db.session import inserted
 from service.stores.finding import with_values
 from service.wire.base import Json, dumped
 from service.wire.pins import StateIn
@@ -135,9 +135,7 @@ def matching(
 
 def lock_publishing(session: Session, owner: str) -> None:
     """Let nobody else publish for this owner until the transaction ends."""
-    assert session.bind is not None
-    dialect = postgresql if session.bind.dialect.name == "postgresql" else sqlite
-    session.execute(dialect.insert(PublisherRow).values(owner=owner).on_conflict_do_nothing())
+    inserted(session, PublisherRow, owner=owner)
     session.execute(sa.select(PublisherRow).where(PublisherRow.owner == owner).with_for_update())
 
 

@@ -98,7 +98,7 @@ def lives_of(session: Session, plan_ids: Iterable[str]) -> Lives:
     ids = list(plan_ids)
     if not ids:
         return Lives()
-    taken = _first(session, _collects(ids, _TAKEN))
+    taken = _first(session, _taken(ids))
     return Lives(
         taken=taken,
         delivered=_delivered(session, ids, taken),
@@ -118,12 +118,13 @@ def _last_outcome(action: type[PlanActionRow]) -> sa.ScalarSelect[str]:
     )
 
 
+_OUTCOME: Final = _last_outcome(PlanActionRow)
 _Found = sa.Select[PlanActionRow, str, str | None]
 
 
-def _base(plan_ids: list[str], outcome: sa.ScalarSelect[str]) -> _Found:
+def _base(plan_ids: list[str]) -> _Found:
     return (
-        sa.select(PlanActionRow, PlanSatelliteRow.satellite_name, outcome)
+        sa.select(PlanActionRow, PlanSatelliteRow.satellite_name, _OUTCOME)
         .join(
             PlanSatelliteRow,
             sa.and_(
@@ -136,28 +137,26 @@ def _base(plan_ids: list[str], outcome: sa.ScalarSelect[str]) -> _Found:
     )
 
 
-def _collects(plan_ids: list[str], outcomes: tuple[str, ...]) -> _Found:
-    outcome = _last_outcome(PlanActionRow)
+def _taken(plan_ids: list[str]) -> _Found:
     # Of most actions nothing was reported: those that have a report are asked for first.
     reported = sa.exists().where(
         ExecutionRow.plan_id == PlanActionRow.plan_id,
         ExecutionRow.action_id == PlanActionRow.action_id,
     )
-    return _base(plan_ids, outcome).where(reported, outcome.in_(outcomes))
+    return _base(plan_ids).where(reported, _OUTCOME.in_(_TAKEN))
 
 
 def _planned(plan_ids: list[str]) -> _Found:
     """Return the query of what published plans have in the spans in which they are in force."""
-    outcome = _last_outcome(PlanActionRow)
     ends = PlanSatelliteRow.in_force_until
     return (
-        _base(plan_ids, outcome)
+        _base(plan_ids)
         .join(PlanRow, PlanRow.id == PlanActionRow.plan_id)
         .where(
             PlanRow.state == "published",
             PlanActionRow.start >= PlanSatelliteRow.in_force_from,
             sa.or_(ends.is_(None), PlanActionRow.start < ends),
-            sa.or_(outcome.is_(None), outcome.not_in(_NOT_DONE)),
+            sa.or_(_OUTCOME.is_(None), _OUTCOME.not_in(_NOT_DONE)),
         )
     )
 
@@ -189,10 +188,10 @@ def _delivered(
             _last_outcome(contact) == "executed",
         )
         .distinct()
+        .order_by(contact.end)
     )
     for satellite_id, start, end in session.execute(done):
         spans[satellite_id].append((start, end))
-    ends = {own_id: sorted(own, key=lambda span: span[1]) for own_id, own in spans.items()}
     wanted = sa.select(
         collect.target_id, collect.satellite_id, collect.start, collect.delivered_at
     ).where(
@@ -207,10 +206,10 @@ def _delivered(
         and delivered_at is not None
         and (image := taken.get(target_id)) is not None
         and (image.satellite_id, image.start) == (satellite_id, start)
-        and _is_within(ends.get(satellite_id, ()), delivered_at)
+        and _is_within(spans.get(satellite_id, []), delivered_at)
     )
 
 
-def _is_within(spans: list[tuple[datetime, datetime]] | tuple[()], at: datetime) -> bool:
+def _is_within(spans: list[tuple[datetime, datetime]], at: datetime) -> bool:
     first = bisect_left(spans, at - _ROUNDING, key=lambda span: span[1])
     return first < len(spans) and spans[first][0] <= at

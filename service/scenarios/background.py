@@ -23,21 +23,19 @@ class Background:
 
     A request waits for a while and is then told to ask again; the work goes on.
 
-    Parameters
-    ----------
-    kept
-        How many answers are kept at hand.
-    told
-        What a request is told that has to come back.
+    A subclass says with ``_kept`` how many answers are kept at hand, and with ``_told`` what a
+    request is told that has to come back.
     """
 
-    def __init__(self, name: str, *, kept: int, told: str):
+    _kept: int
+    _told: str
+
+    def __init__(self) -> None:
+        name = type(self).__name__.lower()
         self._pool = ThreadPoolExecutor(max_workers=1, thread_name_prefix=name)
         self._budget = Budget()
         self._lock = threading.Lock()
         self._known: OrderedDict[str, Future[Any]] = OrderedDict()
-        self._kept = kept
-        self._told = told
 
     def work_out(self, key: str, work: Callable[[Budget], T]) -> T:
         """Return what the work of this key gives; 503 ``still_computing`` where that takes long.

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from planner_core.errors import Fault, PlannerError
 from planner_core.pins import PinnedAction, Pins
@@ -16,55 +16,46 @@ from service.wire.pins import PinnedActionIn
 _PIN = re.compile(r"/pins/(keep|skip)/(\d+)")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Places:
-    """Where each pin of the changed scenario comes from; None for one of the scenario before."""
+Places = Mapping[str, Sequence[str | None]]
+"""Where each pin of the changed scenario comes from; None for one of the scenario before."""
 
-    keep: tuple[str | None, ...]
-    skip: tuple[str | None, ...]
 
-    @classmethod
-    def of(
-        cls,
-        pins: Pins,
-        forbid: Sequence[PinnedAction],
-        force: Sequence[PinnedAction],
-        num_dropped: int,
-    ) -> Places:
-        """Return those of ``reasons.what_if``: the new ones follow those there were."""
-        skipped = [f"/forbid/{i}" for i, one in enumerate(forbid) if not is_any_image(one)]
-        dropped = [f"/relax/drop_actions/{i}" for i in range(num_dropped)]
-        return cls(
-            keep=(*[None] * len(pins.keep), *(f"/force/{i}" for i in range(len(force)))),
-            skip=(*[None] * len(pins.skip), *skipped, *dropped),
-        )
+def places_of(
+    pins: Pins, forbid: Sequence[PinnedAction], force: Sequence[PinnedAction], num_dropped: int
+) -> Places:
+    """Return those of ``reasons.what_if``: the new ones follow those there were."""
+    skipped = [f"/forbid/{i}" for i, one in enumerate(forbid) if not is_any_image(one)]
+    dropped = [f"/relax/drop_actions/{i}" for i in range(num_dropped)]
+    return {
+        "keep": (*[None] * len(pins.keep), *(f"/force/{i}" for i in range(len(force)))),
+        "skip": (*[None] * len(pins.skip), *skipped, *dropped),
+    }
 
-    @classmethod
-    def of_body(cls, force: Sequence[PinnedAction], forbid: Sequence[PinnedAction]) -> Places:
-        """Return those of all that the body itself names."""
-        return cls(
-            keep=tuple(f"/force/{i}" for i in range(len(force))),
-            skip=tuple(f"/forbid/{i}" for i in range(len(forbid))),
-        )
 
-    def place(self, pin: re.Match[str]) -> str | None:
-        """Return where a pin comes from."""
-        places: tuple[str | None, ...] = getattr(self, pin[1])
-        return places[int(pin[2])]
+def places_of_body(force: Sequence[PinnedAction], forbid: Sequence[PinnedAction]) -> Places:
+    """Return those of all that the body itself names."""
+    return {
+        "keep": [f"/force/{i}" for i in range(len(force))],
+        "skip": [f"/forbid/{i}" for i in range(len(forbid))],
+    }
 
 
 @contextmanager
 def pointing_into(change: ChangeIn, places: Places) -> Iterator[None]:
     """Let faults of pins point into the change."""
+
+    def place(pin: re.Match[str]) -> str | None:
+        return places[pin[1]][int(pin[2])]
+
     try:
         yield
     except PlannerError as error:
         fault = error.fault
         pin = _PIN.match(fault.pointer or "")
-        detail = _PIN.sub(lambda found: places.place(found) or found[0], fault.detail)
+        detail = _PIN.sub(lambda found: place(found) or found[0], fault.detail)
         pointer = fault.pointer
         if pin is not None:
-            pointer = places.place(pin)
+            pointer = place(pin)
             if pointer is None:
                 detail = f"{pin[0]} of the job's scenario: {detail}"
             elif _is_object(change, pointer):

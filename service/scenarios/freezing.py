@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import Any, TypeVar
 
 import sqlalchemy as sa
 from pydantic import BaseModel, ValidationError
-from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
+from planner_core.domain import Scenario
 from planner_core.errors import Fault, InvalidScenario, pointing
 from planner_core.mistakes import usual_mistakes
 from planner_core.orbits.checks import check_element_age, check_propagation, orbit_warnings
 from service.db.ids import new_id
 from service.db.rows import GroundStationRow, SatelliteRow, ScenarioRow, TargetCatalogRow, TargetRow
-from service.db.session import Database
+from service.db.session import Database, inserted
 from service.problems.faults import faults_of_validation
 from service.scenarios.canonical import canonical_of_file, sha256_of
 from service.scenarios.frozen_forecasts import find_forecast, frozen_forecast
@@ -98,10 +97,7 @@ def freeze(
 
 def freeze_file(file: ScenarioFile, limits: ScenarioLimits) -> FrozenScenario:
     """Return the frozen form of a file that `translate.read_file` has made; errors as above."""
-    limits.check(horizon_from(file.horizon), len(file.satellites), len(file.targets))
-    scenario = scenario_from_file(file)
-    check_propagation(scenario)
-    check_element_age(scenario)
+    scenario = checked_scenario(file, limits)
     content = canonical_of_file(file)
     return FrozenScenario(
         name=file.name,
@@ -109,6 +105,15 @@ def freeze_file(file: ScenarioFile, limits: ScenarioLimits) -> FrozenScenario:
         sha256=sha256_of(content),
         summary=_summary(file, (*orbit_warnings(scenario), *usual_mistakes(scenario))),
     )
+
+
+def checked_scenario(file: ScenarioFile, limits: ScenarioLimits) -> Scenario:
+    """Return the scenario of a file that is not too large, and whose elements carry so far."""
+    limits.check(horizon_from(file.horizon), len(file.satellites), len(file.targets))
+    scenario = scenario_from_file(file)
+    check_propagation(scenario)
+    check_element_age(scenario)
+    return scenario
 
 
 def save(
@@ -124,33 +129,28 @@ def save(
     same = sa.select(ScenarioRow).where(ScenarioRow.sha256 == frozen.sha256)
     stored = session.scalar(same)
     if stored is None:
-        own_id = new_id()
         # Somebody else may store the same content at this moment; then both get that one.
-        with suppress(IntegrityError), session.begin_nested():
-            _insert(session, own_id, frozen, owner)
+        is_new = inserted(
+            session,
+            ScenarioRow,
+            id=new_id(),
+            sha256=frozen.sha256,
+            name=frozen.name,
+            summary=frozen.summary,
+            content=frozen.content,
+            created_at=datetime.now(UTC),
+        )
         stored = session.scalars(same).one()
-        if stored.id == own_id:
+        if is_new:
+            store.note_parts(session, stored.id, frozen.summary)
+            if owner is not None:
+                store.let_see(session, stored.id, owner)
             return stored, True
     if owner is not None:
         store.let_see_too(session, stored.id, owner)
         return stored, False
     # Who stores for all what somebody has for himself is not told of that.
     return stored, store.disown(session, stored.id)
-
-
-def _insert(session: Session, own_id: str, frozen: FrozenScenario, owner: str | None) -> None:
-    row = {
-        "id": own_id,
-        "sha256": frozen.sha256,
-        "name": frozen.name,
-        "summary": frozen.summary,
-        "content": frozen.content,
-        "created_at": datetime.now(UTC),
-    }
-    session.execute(sa.insert(ScenarioRow).values(**row))
-    store.note_parts(session, own_id, frozen.summary)
-    if owner is not None:
-        store.let_see(session, own_id, owner)
 
 
 def _in_ids(fault: Fault) -> str:

@@ -17,8 +17,6 @@ from service.scenarios.background import Background
 from service.scenarios.translate import scenario_from_content
 from service.stores import opportunity_store
 
-_KEPT = 4
-
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Described:
@@ -34,9 +32,7 @@ class OpportunityReader(Background):
     Scenarios are told apart by their hash, so that what is kept never goes stale.
     """
 
-    def __init__(self) -> None:
-        told = "The opportunities of this scenario are being computed."
-        super().__init__("opportunities", kept=_KEPT, told=told)
+    _kept, _told = 4, "The opportunities of this scenario are being computed."
 
     def get(self, database: Database, scenario_id: str, sha256: str) -> Described:
         """Return a scenario's opportunities; 503 ``still_computing`` where that takes long."""

@@ -92,7 +92,12 @@ def replan_file(file: ScenarioFile, body: ReplanIn, happened: Happened) -> Scena
             "horizon": HorizonIn(start=begins, end=end),
             "satellites": [_with_elements(one, happened.elements) for one in file.satellites],
             "states": _states(file, happened),
-            "targets": [_with_reward(target, body.rewards) for target in targets],
+            "targets": [
+                one.model_copy(update={"reward": body.rewards[one.id]})
+                if one.id in body.rewards
+                else one
+                for one in targets
+            ],
             "outages": outages,
             "objective": body.objective or file.objective,
             "pins": _pins(file.pins, body),
@@ -102,7 +107,7 @@ def replan_file(file: ScenarioFile, body: ReplanIn, happened: Happened) -> Scena
                 promises=_promises(file, body),
                 stability=body.stability,
                 elements=body.elements,
-                flown=_flown(file, happened),
+                flown=[*(file.replan.flown if file.replan else ()), *happened.flown],
                 before=_older(file, happened),
             ),
         }
@@ -152,18 +157,6 @@ def _older(file: ScenarioFile, happened: Happened) -> list[StateIn]:
         for began in _began(file)
         if began.satellite_id in happened.states or began.satellite_id in older
     ]
-
-
-def _flown(file: ScenarioFile, happened: Happened) -> list[FlownIn]:
-    """Return what was flown before this plan and the one before it."""
-    earlier = [] if file.replan is None else file.replan.flown
-    return [*earlier, *happened.flown]
-
-
-def _with_reward(target: FileTarget, rewards: Mapping[str, float]) -> FileTarget:
-    if target.id not in rewards:
-        return target
-    return target.model_copy(update={"reward": rewards[target.id]})
 
 
 def _pins(before: PinsIn, body: ReplanIn) -> PinsIn:

@@ -11,12 +11,10 @@ from sqlalchemy.orm import Session
 from planner_core.access.scenario_opportunities import compute_opportunities
 from planner_core.budget import Budget
 from planner_core.errors import Cancelled, InvalidScenario
-from planner_core.orbits.checks import check_element_age, check_propagation
 from service.db.rows import SatelliteRow
-from service.scenarios.freezing import satellites_of
+from service.scenarios.freezing import checked_scenario, satellites_of
 from service.scenarios.opportunities import Described
 from service.scenarios.scenario_limits import ScenarioLimits
-from service.scenarios.translate import horizon_from, scenario_from_file
 from service.stores.finding import alive
 from service.wire.scenarios import FileSatellite, FileTarget, HorizonIn, ScenarioFile
 
@@ -50,19 +48,15 @@ def views_of(
     InvalidScenario
         ``horizon_too_long``, ``scenario_too_large``; elements that are too old.
     """
-    horizon = HorizonIn(start=start, end=end)
-    limits.check(horizon_from(horizon), len(satellites), 1)
     file = ScenarioFile(
         release=2,
-        horizon=horizon,
+        horizon=HorizonIn(start=start, end=end),
         satellites=list(satellites),
         targets=[target],
         ground_stations=[],
         use_resources=False,
     )
-    scenario = scenario_from_file(file)
-    check_propagation(scenario)
-    check_element_age(scenario)
+    scenario = checked_scenario(file, limits)
     try:
         computed = compute_opportunities(scenario, Budget(_WITHIN_S))
     except Cancelled:

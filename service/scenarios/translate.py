@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain, count
 from typing import Any, TypeVar
 
 from pydantic import ValidationError
@@ -45,7 +46,6 @@ from service.wire.scenarios import (
     FileGroundStation,
     FileSatellite,
     HorizonIn,
-    ObjectiveIn,
     QualityIn,
     ScenarioFile,
 )
@@ -94,12 +94,8 @@ def _with_ids(items: Sequence[FileSatellite | FileGroundStation]) -> list[object
     taken = {item.id for item in items if item.id is not None}
     named: list[object] = []
     for item in items:
-        own = item.id
-        number = 1
-        while own is None:
-            candidate = item.name if number == 1 else f"{item.name}-{number}"
-            own = None if candidate in taken else candidate
-            number += 1
+        names = chain((item.name,), (f"{item.name}-{number}" for number in count(2)))
+        own = item.id or next(name for name in names if name not in taken)
         taken.add(own)
         named.append(item.model_copy(update={"id": own}))
     return named
@@ -125,18 +121,13 @@ def scenario_from_file(file: ScenarioFile) -> Scenario:
         continuous_starts=file.continuous_starts,
         quality=quality_from(file.quality),
         forecast=forecast_from(file),
-        objective=objective_from(file.objective),
+        objective=Objective(**dict(file.objective) | {"prefer": tuple(file.objective.prefer)}),
         allow_old_elements=file.allow_old_elements,
         pins=pins_from(file.pins),
         outages=tuple(outage_from(outage) for outage in file.outages),
         states=tuple(state_from(state) for state in file.states),
         replan=None if file.replan is None else replan_from(file.replan),
     )
-
-
-def objective_from(item: ObjectiveIn) -> Objective:
-    """Return the domain's objective."""
-    return Objective(**dict(item) | {"prefer": tuple(item.prefer)})
 
 
 def _each(part: str, items: Sequence[B], build: Callable[[B], T]) -> tuple[T, ...]:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
-
 import sqlalchemy as sa
-from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
 from service.db.clock import utc_now
 from service.db.rows import BoundRow
+from service.db.session import inserted
 from service.stores.opportunity_store import VERSION
 
 
@@ -25,7 +23,5 @@ def save(session: Session, sha256: str, value: float, proof: str) -> None:
     is_beaten = sa.or_(BoundRow.version != VERSION, BoundRow.value > value)
     row = {"version": VERSION, "value": value, "proof": proof, "created_at": utc_now()}
     # First the insert: where somebody else's comes between, it is there to be beaten.
-    with contextlib.suppress(IntegrityError), session.begin_nested():
-        session.execute(sa.insert(BoundRow).values(scenario_sha256=sha256, **row))
-        return
-    session.execute(sa.update(BoundRow).where(own, is_beaten).values(**row))
+    if not inserted(session, BoundRow, scenario_sha256=sha256, **row):
+        session.execute(sa.update(BoundRow).where(own, is_beaten).values(**row))

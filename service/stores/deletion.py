@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from datetime import datetime
-from typing import Any, Final
+from typing import Final
 
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
@@ -54,11 +54,10 @@ def delete_job(session: Session, job: JobRow) -> None:
         raise ServiceError(
             "invalid_transition", f"The job is {job.state}: cancel it, then it can be deleted."
         )
-    _require_unused(session, PlanRow, PlanRow.job_id == job.id, "The plan", "made of this job")
-    with_run = ComparisonRunRow.job_id == job.id
-    found = session.scalar(sa.select(ComparisonRunRow.comparison_id).where(with_run).limit(1))
-    if found is not None:
-        raise ServiceError("in_use", f"The comparison {found!r} has this job as a run.")
+    made = sa.select(PlanRow.id).where(PlanRow.job_id == job.id)
+    _require_none(session, made, "The plan {!r} is made of this job.")
+    ran = sa.select(ComparisonRunRow.comparison_id).where(ComparisonRunRow.job_id == job.id)
+    _require_none(session, ran, "The comparison {!r} has this job as a run.")
     _delete_jobs(session, [job.id])
 
 
@@ -81,7 +80,8 @@ def delete_plan(session: Session, plan: PlanRow) -> None:
         raise ServiceError(
             "invalid_transition", f"The plan is {plan.state}: withdraw it, then it can be deleted."
         )
-    _require_unused(session, PlanRow, PlanRow.parent_id == plan.id, "The plan", "a change of this")
+    changes = sa.select(PlanRow.id).where(PlanRow.parent_id == plan.id)
+    _require_none(session, changes, "The plan {!r} is a change of this.")
     for row in (ExecutionRow, PlanStateRow, PlanEventRow, PlanActionRow, PlanSatelliteRow):
         _delete(session, row, row.plan_id == plan.id)
     _delete(session, PlanRow, PlanRow.id == plan.id)
@@ -95,11 +95,11 @@ def delete_scenario(session: Session, scenario: ScenarioRow) -> None:
     ServiceError
         ``in_use`` where a job or a comparison has it.
     """
-    own = scenario.id
-    _require_unused(session, JobRow, JobRow.scenario_id == own, "The job", "of this scenario")
-    with_it = ComparisonRow.scenario_id == own
-    _require_unused(session, ComparisonRow, with_it, "The comparison", "of this scenario")
-    _delete_scenarios(session, [(own, scenario.sha256)])
+    tried = sa.select(JobRow.id).where(JobRow.scenario_id == scenario.id)
+    _require_none(session, tried, "The job {!r} is of this scenario.")
+    compared = sa.select(ComparisonRow.id).where(ComparisonRow.scenario_id == scenario.id)
+    _require_none(session, compared, "The comparison {!r} is of this scenario.")
+    _delete_scenarios(session, [(scenario.id, scenario.sha256)])
 
 
 def sweep(session: Session, before: datetime) -> int:
@@ -186,12 +186,10 @@ def _delete_scenarios(session: Session, rows: Sequence[tuple[str, str]]) -> None
     _delete(session, ScenarioRow, ScenarioRow.id.in_(ids))
 
 
-def _require_unused(
-    session: Session, row: type[Any], condition: sa.ColumnElement[bool], what: str, how: str
-) -> None:
-    found = session.scalar(sa.select(row.id).where(condition).limit(1))
+def _require_none(session: Session, users: sa.Select[str], detail: str) -> None:
+    found = session.scalar(users.limit(1))
     if found is not None:
-        raise ServiceError("in_use", f"{what} {found!r} is {how}.")
+        raise ServiceError("in_use", detail.format(found))
 
 
 def _delete(session: Session, row: type[Row], condition: sa.ColumnElement[bool]) -> None:

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from typing import Any, Final, cast
 
 import sqlalchemy as sa
-from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
 from service.db.clock import utc_now
 from service.db.rows import IdempotencyKeyRow
+from service.db.session import inserted
 
 _SWEPT_AT_ONCE: Final = 100
 
@@ -72,18 +72,15 @@ def claim(session: Session, keyed: Keyed) -> KeptAnswer | None:
     then sees its answer, or takes the key where the first has failed.
     """
     _sweep(session, keyed)
-    row = {
-        "tenant": keyed.tenant,
-        "key": keyed.key,
-        "request_sha256": keyed.request_sha256,
-        "created_at": utc_now(),
-    }
-    try:
-        with session.begin_nested():
-            session.execute(sa.insert(IdempotencyKeyRow).values(**row))
-    except IntegrityError:
-        return find(session, keyed)
-    return None
+    is_claimed = inserted(
+        session,
+        IdempotencyKeyRow,
+        tenant=keyed.tenant,
+        key=keyed.key,
+        request_sha256=keyed.request_sha256,
+        created_at=utc_now(),
+    )
+    return None if is_claimed else find(session, keyed)
 
 
 def keep(session: Session, keyed: Keyed, answer: KeptAnswer) -> None:

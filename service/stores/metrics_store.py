@@ -90,10 +90,8 @@ def orbit_ages(session: Session) -> Iterator[tuple[tuple[str, str], float]]:
         execution_options={"yield_per": 20},
     )
     ids = {own_id for summary in summaries for own_id in summary.get("satellite_ids", ())}
-    names = {
-        row.id: row.name
-        for row in session.scalars(alive(SatelliteRow).where(SatelliteRow.id.in_(ids)))
-    }
+    used = alive(SatelliteRow).where(SatelliteRow.id.in_(ids))
+    names = {row.id: row.name for row in session.scalars(used)}
     at = now(session)
     for own_id, elements in sorted(satellite_store.in_force(session, names).items()):
         yield (own_id, names[own_id]), (at - elements.epoch).total_seconds()

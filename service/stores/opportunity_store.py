@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
 from typing import Final
 
 import sqlalchemy as sa
-from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
 from planner_core.sources import opportunity_version
 from service.db.clock import utc_now
 from service.db.rows import OpportunitySetRow
+from service.db.session import inserted
 
 VERSION: Final = opportunity_version()
 """Blocks of other code are made anew: nobody has to remember that their form has changed."""
@@ -30,5 +29,4 @@ def save(session: Session, sha256: str, block: bytes) -> None:
     )
     session.execute(stale)
     row = {"scenario_sha256": sha256, "version": VERSION, "block": block, "created_at": utc_now()}
-    with contextlib.suppress(IntegrityError), session.begin_nested():
-        session.execute(sa.insert(OpportunitySetRow).values(**row))
+    inserted(session, OpportunitySetRow, **row)

@@ -114,56 +114,41 @@ def import_entries(
     these ``FIGURES``.
     """
     take_turns(session, _TURNS)
-    batch = _Import(_known_satellites(session), _known_epochs(session), figures)
-    results = [batch.take(entry) for entry in entries]
-    session.add_all(batch.new_satellites)
-    session.flush()  # the rows below refer to them
-    session.add_all(batch.new_elements)
-    return results
-
-
-class _Import:
-    """What a file adds to what is known."""
-
-    def __init__(
-        self,
-        known: dict[tuple[int, str], SatelliteRow],
-        epochs: set[tuple[str, int]],
-        figures: Mapping[str, Any],
-    ):
-        self._figures = figures
-        self._known = known
-        self._epochs = epochs
-        self.new_satellites: list[SatelliteRow] = []
-        self.new_elements: list[ElementSetRow] = []
-
-    def take(self, entry: Entry) -> ImportedEntry:
-        """Give a record to its satellite, known or new."""
+    known, epochs = _known_satellites(session), _known_epochs(session)
+    new_elements: list[ElementSetRow] = []
+    results = []
+    for entry in entries:
         elements = entry.elements
         name = (elements.name or f"NORAD {elements.norad_cat_id}")[:_LONGEST_NAME]
         key = _key(elements.norad_cat_id, name)
         if isinstance(elements, OrbitEphemeris):
-            key = self._only_one_named(name) or key
+            key = _only_one_named(known, name) or key
         status: Status = "elements_added"
-        if key not in self._known:
-            norad_cat_id = elements.norad_cat_id
-            self._known[key] = SatelliteRow(name=name, norad_cat_id=norad_cat_id, **self._figures)
-            self.new_satellites.append(self._known[key])
+        if key not in known:
+            known[key] = SatelliteRow(name=name, norad_cat_id=elements.norad_cat_id, **figures)
+            session.add(known[key])
             status = "created"
-        satellite = self._known[key]
-        if (satellite.id, _tick(elements.epoch)) in self._epochs:
+        satellite = known[key]
+        own_epoch = satellite.id, _tick(elements.epoch)
+        if own_epoch in epochs:
             status = "unchanged"
         else:
-            self._epochs.add((satellite.id, _tick(elements.epoch)))
-            self.new_elements.append(
+            epochs.add(own_epoch)
+            new_elements.append(
                 ElementSetRow(satellite_id=satellite.id, epoch=elements.epoch, orbit=entry.orbit)
             )
-        return ImportedEntry(satellite=satellite, status=status, entry=entry)
+        results.append(ImportedEntry(satellite=satellite, status=status, entry=entry))
+    session.flush()  # the rows below refer to those of new satellites
+    session.add_all(new_elements)
+    return results
 
-    def _only_one_named(self, name: str) -> tuple[int, str] | None:
-        """Return the key of the satellite of a name, where there is one and no other."""
-        keys = [key for key, row in self._known.items() if row.name == name]
-        return keys[0] if len(keys) == 1 else None
+
+def _only_one_named(
+    known: Mapping[tuple[int, str], SatelliteRow], name: str
+) -> tuple[int, str] | None:
+    """Return the key of the satellite of a name, where there is one and no other."""
+    keys = [key for key, row in known.items() if row.name == name]
+    return keys[0] if len(keys) == 1 else None
 
 
 def _known_satellites(session: Session) -> dict[tuple[int, str], SatelliteRow]:

@@ -6,14 +6,13 @@ Those that came with a job are seen by the owner of that job.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
 from typing import Any, Final, cast
 
 import sqlalchemy as sa
-from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
 from service.db.rows import ScenarioOwnerRow, ScenarioPartRow, ScenarioRow
+from service.db.session import inserted
 
 _KINDS: Final = {"satellite_ids": "satellite", "ground_station_ids": "station"}
 
@@ -34,8 +33,8 @@ def find(session: Session, scenario_id: str, owner: str | None) -> ScenarioRow |
 
 def let_see(session: Session, scenario_id: str, owner: str) -> None:
     """Let an owner see a scenario, and from now on nobody else who was not let."""
-    values = {"scenario_id": scenario_id, "owner": owner}
-    session.execute(sa.insert(ScenarioOwnerRow).values(**values))
+    # Another request of this owner may do the same at this moment.
+    inserted(session, ScenarioOwnerRow, scenario_id=scenario_id, owner=owner)
 
 
 def let_see_too(session: Session, scenario_id: str, owner: str) -> None:
@@ -43,9 +42,7 @@ def let_see_too(session: Session, scenario_id: str, owner: str) -> None:
     found = sa.select(ScenarioOwnerRow.owner).where(ScenarioOwnerRow.scenario_id == scenario_id)
     owners = session.scalars(found).all()
     if owners and owner not in owners:
-        # Another request of this owner may do the same at this moment.
-        with suppress(IntegrityError), session.begin_nested():
-            let_see(session, scenario_id, owner)
+        let_see(session, scenario_id, owner)
 
 
 def disown(session: Session, scenario_id: str) -> bool:

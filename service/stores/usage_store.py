@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from typing import Final
 
 import sqlalchemy as sa
-from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
 from service.db.rows import OwnerUsageRow
-from service.db.session import changed
+from service.db.session import changed, inserted
 from service.problems.kinds import ServiceError
 
 MB: Final = 1_000_000
@@ -23,9 +21,7 @@ def add(session: Session, owner: str, *, num_rows: int, num_bytes: int) -> tuple
     found = changed(session, OwnerUsageRow, OwnerUsageRow.owner == owner, rows, size, **more)
     if found is None:
         # Somebody else may be the first at this moment.
-        with suppress(IntegrityError), session.begin_nested():
-            nothing = {"owner": owner, "num_rows": 0, "num_bytes": 0}
-            session.execute(sa.insert(OwnerUsageRow).values(nothing))
+        inserted(session, OwnerUsageRow, owner=owner, num_rows=0, num_bytes=0)
         found = changed(session, OwnerUsageRow, OwnerUsageRow.owner == owner, rows, size, **more)
         assert found is not None
     return found[0], found[1]

@@ -68,7 +68,9 @@ class Courier:
         self._retry_after_s = retry_after_s
         self._busy: dict[str, str] = {}
         self._stopping = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="courier", daemon=True)
+        self._thread = threading.Thread(
+            target=lambda: asyncio.run(self._work()), name="courier", daemon=True
+        )
 
     def start(self) -> None:
         """Begin."""
@@ -79,9 +81,6 @@ class Courier:
         self._stopping.set()
         # It may stand before a database that hangs; nothing of it is needed any more.
         self._thread.join(_STOP_WITHIN_S)
-
-    def _run(self) -> None:
-        asyncio.run(self._work())
 
     async def _work(self) -> None:
         sending: set[asyncio.Task[None]] = set()

@@ -21,9 +21,9 @@ from service.db.clock import now, utc_now
 from service.db.ids import new_id
 from service.db.rows import JobRow, PlanRow, WebhookDeliveryRow, WebhookRow
 from service.db.session import changed
-from service.webhooks import events
 from service.wire.base import dumped
 from service.wire.plans import PlanChange
+from service.wire.stored import from_row
 from service.wire.webhooks import EventOut, JobEnd, TestData
 
 TAKEN_S: Final = 60.0
@@ -53,16 +53,24 @@ class Parcel:
 
 
 def tell_end_of(session: Session, job_id: str) -> None:
-    """Queue a delivery for each webhook of the job's owner that asked for this end."""
+    """Queue a delivery for each webhook of the job's owner that asked for this end.
+
+    It tells enough to decide whether to fetch the rest.
+    """
     job = session.get_one(JobRow, job_id, populate_existing=True)
-    _tell(session, job.tenant, f"job.{job.state}", events.end_of(job), job_id)
+    address = f"/v1/jobs/{job_id}"
+    links = {"job": address, "timeline": f"{address}/timeline"}
+    data = from_row(JobEnd, job, job_id=job_id, warnings=job.warnings or (), links=links)
+    _tell(session, job.tenant, f"job.{job.state}", data, job_id)
 
 
 def tell_plan(
     session: Session, plan: PlanRow, reason: str | None, effective_from: datetime | None
 ) -> None:
     """Queue a delivery for each webhook of the plan's owner that asked for this transition."""
-    data = events.change_of(plan, reason, effective_from)
+    links = {"plan": f"/v1/plans/{plan.id}", "job": f"/v1/jobs/{plan.job_id}"}
+    told = {"plan_id": plan.id, "reason": reason, "effective_from": effective_from, "links": links}
+    data = from_row(PlanChange, plan, **told)
     _tell(session, plan.owner, f"plan.{plan.state}", data, None)
 
 
@@ -156,44 +164,35 @@ def take(
     first = sa.select(sa.func.min(WebhookDeliveryRow.id)).where(is_due)
     first = first.group_by(WebhookDeliveryRow.webhook_id)
     found = session.execute(
-        sa.select(WebhookDeliveryRow.id, WebhookDeliveryRow.attempts, WebhookRow.owner)
+        sa.select(WebhookDeliveryRow.id, WebhookDeliveryRow.attempts, WebhookRow)
         .join(WebhookRow, WebhookRow.id == WebhookDeliveryRow.webhook_id)
         .where(WebhookDeliveryRow.id.in_(first))
         .order_by(WebhookDeliveryRow.id)
     ).all()
     parcels: list[Parcel] = []
     under_way = Counter(busy.values())
-    for delivery_id, attempts, owner in found:
-        if under_way[owner] >= of_an_owner:
+    for delivery_id, attempts, webhook in found:
+        if under_way[webhook.owner] >= of_an_owner:
             continue
         if len(parcels) == limit:
             break
-        under_way[owner] += 1
+        under_way[webhook.owner] += 1
+        attempt = attempts + 1
         # The guard lets only one of several workers have it.
-        taken = _update(
-            session, delivery_id, attempts, due_at=utc_now(TAKEN_S), attempts=attempts + 1
-        )
-        if taken:
-            parcels.append(_parcel(session, delivery_id))
+        taken = _update(session, delivery_id, attempts, due_at=utc_now(TAKEN_S), attempts=attempt)
+        if taken is not None:
+            parcels.append(
+                Parcel(
+                    id=delivery_id,
+                    webhook_id=webhook.id,
+                    owner=webhook.owner,
+                    attempt=attempt,
+                    url=webhook.url,
+                    secret=webhook.secret,
+                    payload=taken.payload,
+                )
+            )
     return parcels
-
-
-def _parcel(session: Session, delivery_id: str) -> Parcel:
-    wanted = (
-        sa.select(WebhookDeliveryRow, WebhookRow)
-        .join(WebhookRow, WebhookRow.id == WebhookDeliveryRow.webhook_id)
-        .where(WebhookDeliveryRow.id == delivery_id)
-    )
-    delivery, webhook = session.execute(wanted).one()
-    return Parcel(
-        id=delivery.id,
-        webhook_id=webhook.id,
-        owner=webhook.owner,
-        attempt=delivery.attempts,
-        url=webhook.url,
-        secret=webhook.secret,
-        payload=delivery.payload,
-    )
 
 
 def arrived(session: Session, parcel: Parcel, status: int) -> None:
@@ -244,7 +243,8 @@ def sweep(session: Session) -> None:
         session.execute(sa.delete(WebhookDeliveryRow).where(WebhookDeliveryRow.id.in_(ids)))
 
 
-def _update(session: Session, delivery_id: str, attempt: int, **values: Any) -> bool:
+def _update(session: Session, delivery_id: str, attempt: int, **values: Any) -> sa.Row[Any] | None:
+    """Change a delivery that is still at this attempt; return what it says, None if it is not."""
     row = WebhookDeliveryRow
     is_own = sa.and_(row.id == delivery_id, row.attempts == attempt, row.state == "pending")
-    return changed(session, row, is_own, row.id, **values) is not None
+    return changed(session, row, is_own, row.payload, **values)
