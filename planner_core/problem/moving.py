@@ -142,8 +142,8 @@ def _cruising_turn_s(
 ) -> float:  # fmt: skip
     """Return the time of such a turn that cruises at a rate; negative where none does.
 
-    All but short turns cruise at the rate limit. Of the cruise only the direction is unknown then, and that is nearly the
-    turn's: it is found in a few steps, where halving a span of time would take a hundred.
+    All but short turns cruise at the rate limit. Of the cruise only the direction is unknown then,
+    and that is nearly the turn's: it is found in a few steps, where halving would take a hundred.
     """
     length = _distance(turn, (0.0, 0.0, 0.0))
     left = turn

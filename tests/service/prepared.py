@@ -18,10 +18,12 @@ import subprocess
 import sys
 from collections.abc import Mapping, Sequence
 from functools import cache
+from pathlib import Path
 from typing import IO, Any, Final, NoReturn
 
 from service.process.imports import importing
 
+_ROOT: Final = Path(__file__).parents[2]
 _MOST_BYTES: Final = 1 << 17
 
 
@@ -126,7 +128,10 @@ def _server() -> tuple[socket.socket, dict[str, str]]:
     environment = dict(os.environ)
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     with theirs:
-        process = subprocess.Popen([sys.executable, "-m", __name__], stdin=theirs.fileno())
+        # A test may have gone to another folder before it asks for the first program.
+        process = subprocess.Popen(
+            [sys.executable, "-m", __name__], stdin=theirs.fileno(), cwd=_ROOT
+        )
 
     def end() -> None:
         ours.close()
