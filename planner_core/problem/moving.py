@@ -109,7 +109,7 @@ def moving_turn_s(
     turn: Vector, rate_from: Vector, rate_to: Vector,
     rate_deg_s: float, acceleration_deg_s2: float,
 ) -> float:  # fmt: skip
-    """Return the least time of such a turn, to a microsecond; see ``turns_in``.
+    """Return the least time of such a turn, to a microsecond or so; see ``turns_in``.
 
     >>> round(moving_turn_s((30.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0, 0.5), 3)
     32.0
@@ -121,11 +121,11 @@ def moving_turn_s(
     # Where bursts are long a slower cruise may be sooner there.
     slower = (1.0 - _SLOWER) * rate_deg_s
     slower_s = _cruising_turn_s(turn, rate_from, rate_to, slower, acceleration_deg_s2)
-    rated_s = cruising_s + 0.5 * _ACCURACY_S
+    enough_s = cruising_s + 0.5 * _ACCURACY_S
     if 0.0 < cruising_s < slower_s and turns_in(
-        rated_s, turn, rate_from, rate_to, rate_deg_s, acceleration_deg_s2
+        enough_s, turn, rate_from, rate_to, rate_deg_s, acceleration_deg_s2
     ):
-        return rated_s
+        return enough_s
     while high_s - low_s > _ACCURACY_S:
         middle_s = 0.5 * (low_s + high_s)
         if turns_in(middle_s, turn, rate_from, rate_to, rate_deg_s, acceleration_deg_s2):

@@ -117,8 +117,21 @@ def test_a_pass_adds_up_to_what_many_small_steps_do(seed: int) -> None:
     middle_s = ends_s[0] + (np.arange(20_000) + 0.5) * (ends_s[1] - ends_s[0]) / 20_000
     steps = np.interp(middle_s, time_s, rate.per_s) * (ends_s[1] - ends_s[0]) / 20_000
     assert float(np.diff(rate.until(ends_s))[0]) == pytest.approx(steps.sum(), rel=1e-4, abs=1e-6)
-    amount = rng.uniform(0.0, float(rate.until(time_s[-1:])[0]), 3)
-    assert rate.until(rate.when(amount)) == pytest.approx(amount, abs=1e-3)
+
+
+@given(seed=SEEDS)
+def test_an_amount_is_down_when_the_pass_says_so_and_not_before(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    time_s = np.sort(rng.uniform(0.0, 600.0, 20))
+    # Nothing comes down between two instants without a rate.
+    rate = PassRate(time_s=time_s, per_s=rng.uniform(0.0, 1.0, 20) * (rng.random(20) > 0.3))
+    whole = float(rate.until(time_s[-1:])[0])
+    amount = np.array([0.0, *rng.uniform(0.0, whole, 5), whole])
+    when_s = rate.when(amount)
+    assert rate.until(when_s) == pytest.approx(amount, abs=1e-9 * max(1.0, whole))
+    later = when_s > time_s[0]
+    before_s = np.maximum(when_s[later] - 0.01, time_s[0])
+    assert np.all(rate.until(before_s) < amount[later])
 
 
 @pytest.mark.parametrize("dynamics", ["physical", "paper"])

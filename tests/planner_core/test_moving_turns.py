@@ -44,6 +44,13 @@ def test_from_rest_to_rest_it_is_the_plain_slew(
     assert took == pytest.approx(slew_s(angle, rate, acceleration), rel=1e-3, abs=1e-3)
 
 
+def _drawn(rng: np.random.Generator, length: float) -> tuple[float, float, float]:
+    """Return a vector of this length in any direction."""
+    v = rng.normal(size=3)
+    x, y, z = (v * length / np.linalg.norm(v)).tolist()
+    return x, y, z
+
+
 @examples(200)
 @given(seed=SEEDS)
 def test_a_turn_can_be_flown_and_never_beats_the_rate_alone(seed: int) -> None:
@@ -51,13 +58,11 @@ def test_a_turn_can_be_flown_and_never_beats_the_rate_alone(seed: int) -> None:
     rng = np.random.default_rng(seed)
     rate, acceleration = float(rng.uniform(0.5, 3.0)), float(rng.uniform(0.05, 1.0))
 
-    def drawn(length: float) -> tuple[float, float, float]:
-        v = rng.normal(size=3)
-        x, y, z = (v * length / np.linalg.norm(v)).tolist()
-        return x, y, z
-
-    turn = drawn(float(rng.uniform(0.1, 120.0)))
-    before, after = drawn(float(rng.uniform(0.0, rate))), drawn(float(rng.uniform(0.0, rate)))
+    turn = _drawn(rng, float(rng.uniform(0.1, 120.0)))
+    before, after = (
+        _drawn(rng, float(rng.uniform(0.0, rate))),
+        _drawn(rng, float(rng.uniform(0.0, rate))),
+    )
     took = moving_turn_s(turn, before, after, rate, acceleration)
     assert took >= np.linalg.norm(turn) / rate - 1e-6
     longest = longest_turn_s(rate, acceleration)
@@ -74,6 +79,26 @@ def test_a_turn_can_be_flown_and_never_beats_the_rate_alone(seed: int) -> None:
     assert first + last <= took + 1e-6
     flown = 0.5 * (a + cruise) * first + cruise * (took - first - last) + 0.5 * (cruise + b) * last
     assert flown == pytest.approx(np.array(turn), abs=1e-4)
+
+
+@examples(200)
+@given(seed=SEEDS)
+def test_a_turn_takes_no_longer_than_halving_finds(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    rate, acceleration = float(rng.uniform(0.3, 3.0)), float(rng.uniform(0.02, 1.0))
+
+    turn = _drawn(rng, float(rng.uniform(0.1, 180.0)))
+    ends = _drawn(rng, float(rng.uniform(0.0, rate))), _drawn(rng, float(rng.uniform(0.0, rate)))
+    low_s, high_s = 0.0, longest_turn_s(rate, acceleration)
+    while high_s - low_s > 1e-7:
+        middle_s = 0.5 * (low_s + high_s)
+        if turns_in(middle_s, turn, *ends, rate, acceleration):
+            high_s = middle_s
+        else:
+            low_s = middle_s
+    took_s = moving_turn_s(turn, *ends, rate, acceleration)
+    assert turns_in(took_s, turn, *ends, rate, acceleration)
+    assert took_s <= high_s + 5e-6
 
 
 def test_rotations_bring_one_line_of_sight_to_the_other() -> None:

@@ -90,11 +90,11 @@ def _down_s(
 
 def served(problem: Problem, contacts: tuple[int, ...]) -> list[int]:
     """Return the contacts for which stations have an antenna, the earlier first."""
-    served = list[int]()
+    found = list[int]()
     for row in sorted(contacts, key=lambda row: float(problem.opportunities.start_s[row])):
-        if _is_served(problem, served, row):
-            served.append(row)
-    return served
+        if _is_served(problem, found, row):
+            found.append(row)
+    return found
 
 
 def _is_served(problem: Problem, chosen: list[int], row: int) -> bool:
