@@ -31,12 +31,10 @@ _TOGETHER = {
     "tests/service/client/test_resources.py": "client",
 }
 
-# What takes longest begins first, so that nobody waits for it in the end: what compiles all kernels
-# in the full profile, then all modules of more than 6 s of processor time in the quick one, by what
-# they take with all that they start. Of what shares a service one is named. The last waits for most
-# of its time.
+# What takes longest begins first, so that nobody waits for it in the end: all modules of more than
+# 6 s of processor time in the quick profile, by what they take with all that they start. Of what
+# shares a service one is named. The last waits for most of its time.
 _LONG = (
-    "tests/service/jobs/test_warm.py",
     "tests/planner_core/test_certified_delivered.py",
     "tests/service/test_readme.py",
     "tests/service/test_schemathesis.py",

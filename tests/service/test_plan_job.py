@@ -57,10 +57,9 @@ QUALITY = {"off_nadir_deg": [[0, 1], [30, 0.95], [50, 0.8]]}
 CHOSEN = [
     *(pytest.param(110, s, NEAR.get(s, {}), id=s) for s in sorted(SOLVERS)),
     *(
-        pytest.param(150, s, NEAR.get(s, {}), id=f"{s} of 150", marks=pytest.mark.full_size)
+        pytest.param(150, s, {}, id=f"{s} of 150, to the end", marks=pytest.mark.full_size)
         for s in sorted(SOLVERS)
     ),
-    *(pytest.param(150, s, {}, id=f"{s} to the end", marks=pytest.mark.full_size) for s in NEAR),
 ]
 
 

@@ -10,7 +10,6 @@ import os
 import shutil
 import stat
 import subprocess
-import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -21,29 +20,9 @@ import pytest
 from tests.patience import PATIENCE_S
 from tests.service import factories
 
-ROOT = Path(__file__).resolve().parents[3]
 AS_NOBODY = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"]
 # It may read all the same: the interpreter may lie in a folder of root's own.
 AS_NOBODY += ["--inh-caps=+dac_read_search", "--ambient-caps=+dac_read_search"]
-
-
-@pytest.fixture(scope="module")
-def prefix() -> Iterator[Path]:
-    """The program, installed in a folder that all may read."""
-    folder = Path(tempfile.mkdtemp())
-    folder.chmod(0o755)
-    try:
-        for step in ("libraries", "program"):
-            subprocess.run(
-                [ROOT / "docker" / "install", step, folder / "slewline"],
-                env=os.environ | {"PYTHON": sys.executable},
-                cwd=ROOT,
-                check=True,
-                umask=0o022,
-            )
-        yield folder / "slewline"
-    finally:
-        shutil.rmtree(folder)
 
 
 @pytest.fixture

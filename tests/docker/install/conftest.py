@@ -1,0 +1,98 @@
+"""What is installed, once for all tests of this folder, as users and as the image's build do."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+@dataclass(frozen=True, slots=True)
+class Distribution:
+    """An sdist, and the wheel that is built from it."""
+
+    sdist: Path
+    wheel: Path
+
+
+@dataclass(frozen=True, slots=True)
+class User:
+    """An environment with nothing but the wheel and what it asks for; where its user works."""
+
+    folder: Path
+
+    def run(self, program: str, *arguments: str) -> str:
+        """Run a program of the environment, and return what it says."""
+        return run(self.folder / "venv" / "bin" / program, *arguments, cwd=self.folder)
+
+
+@dataclass(frozen=True, slots=True)
+class Demonstrated:
+    """What ``slewline demo`` says in an environment where nothing was compiled, and then again."""
+
+    user: User
+    said: str
+    said_again: str
+
+
+def run(*command: str | Path, cwd: Path) -> str:
+    """Run a command that sees nothing of this tree but what it is told."""
+    environment = {name: text for name, text in os.environ.items() if name != "PYTHONPATH"}
+    environment["XDG_DATA_HOME"] = str(cwd / "data")
+    done = subprocess.run(
+        command, cwd=cwd, env=environment, stdout=subprocess.PIPE, text=True, check=True
+    )
+    return done.stdout
+
+
+@pytest.fixture(scope="session")
+def dist(tmp_path_factory: pytest.TempPathFactory) -> Distribution:
+    folder = tmp_path_factory.mktemp("dist")
+    run(sys.executable, "-m", "build", "--no-isolation", "--outdir", folder, cwd=ROOT)
+    (sdist,) = folder.glob("*.tar.gz")
+    (wheel,) = folder.glob("*.whl")
+    return Distribution(sdist, wheel)
+
+
+@pytest.fixture(scope="session")
+def user(dist: Distribution, tmp_path_factory: pytest.TempPathFactory) -> User:
+    user = User(tmp_path_factory.mktemp("user"))
+    run(sys.executable, "-m", "venv", user.folder / "venv", cwd=user.folder)
+    user.run(
+        "python", "-m", "pip", "-qq", "--disable-pip-version-check", "install", str(dist.wheel)
+    )
+    return user
+
+
+@pytest.fixture(scope="session")
+def demonstrated(user: User) -> Demonstrated:
+    said, said_again = (user.run("slewline", "demo") for _ in range(2))
+    return Demonstrated(user, said, said_again)
+
+
+@pytest.fixture(scope="session")
+def prefix() -> Iterator[Path]:
+    """The program as the image has it, in a folder that all may read."""
+    folder = Path(tempfile.mkdtemp())
+    folder.chmod(0o755)
+    try:
+        for step in ("libraries", "program"):
+            subprocess.run(
+                [ROOT / "docker" / "install", step, folder / "slewline"],
+                env=os.environ | {"PYTHON": sys.executable},
+                cwd=ROOT,
+                check=True,
+                umask=0o022,
+            )
+        yield folder / "slewline"
+    finally:
+        shutil.rmtree(folder)
