@@ -190,7 +190,7 @@ class StationLinks:
         return cls(gain=np.ones(num_stations), setup_s=np.zeros(num_stations))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Downlinks:
     """How fast the contacts of a scenario take data down.
 
@@ -221,10 +221,25 @@ class Downlinks:
         setup_s = self.stations.setup_s[station]
         useful_s = np.maximum(end_s - start_s - setup_s, 0.0)
         volume = useful_s * (rate_per_s * self.stations.gain[station])
-        known = [int(number) for number in np.unique(access) if int(number) in self.passes]
-        rates = PassRates.joined([self.passes[number] for number in known])
-        of = np.flatnonzero(np.isin(access, known))
-        which = np.searchsorted(known, access[of])
+        which = self.which(access)
+        of = np.flatnonzero(which >= 0)
         ready_s = np.minimum(start_s[of] + setup_s[of], end_s[of])
-        volume[of] = rates.until(which, end_s[of]) - rates.until(which, ready_s)
+        until_end, until_ready = (self.rates.until(which[of], t_s) for t_s in (end_s[of], ready_s))
+        volume[of] = until_end - until_ready
         return np.asarray(volume)
+
+    def which(self, access: Ints) -> Longs:
+        """Return which of ``rates`` each access has; -1 where the satellite's own rate holds."""
+        if not self.passes:
+            return np.full(len(access), -1)
+        at = np.minimum(np.searchsorted(self._numbers, access), len(self._numbers) - 1)
+        return np.where(self._numbers[at] == access, at, -1)
+
+    @cached_property
+    def rates(self) -> PassRates:
+        """All passes, by the numbers of their accesses."""
+        return PassRates.joined([self.passes[number] for number in self._numbers.tolist()])
+
+    @cached_property
+    def _numbers(self) -> Longs:
+        return np.array(sorted(self.passes), dtype=np.int64)
