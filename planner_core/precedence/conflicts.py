@@ -14,7 +14,8 @@ from planner_core.problem.slew import TIME_TOLERANCE_S
 def conflicts(problem: Problem, row: int, taken: Collection[int]) -> list[int]:
     """Return which of these rows cannot stand beside ``row``: no time to turn, or no antenna."""
     table, local = problem.opportunities, problem.local_row
-    others = np.array([other for other in taken if other != row], dtype=np.int64)
+    others = np.array(list(taken), dtype=np.int64)
+    others = others[others != row]
     satellite = int(table.satellite[row])
     own = others[table.satellite[others] == satellite]
     beside = local[own].astype(np.int64)
