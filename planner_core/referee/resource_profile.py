@@ -12,13 +12,13 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from planner_core.jit import inlined, kernel
 from planner_core.problem import (
     CONTACT,
     Bools,
     Floats,
+    Longs,
     Problem,
     SatelliteProblem,
 )
@@ -100,28 +100,36 @@ def _integrate_physical(
     is_contact = problem.opportunities.kind[columns.row] == CONTACT
     idle = idle_spans(problem, satellite, columns)
     pieces = flows(problem, satellite, columns.at(is_contact))
-    tasks = np.column_stack([columns.start_s, columns.end_s])
-    sunlit = np.array((satellite.sunlight.enter_s, satellite.sunlight.exit_s)).T.copy()
-    at_sun = np.column_stack([idle.sun_from_s, idle.sun_until_s])
     each = _Rates(
         float(r.collect_drain_per_s), float(r.contact_drain_per_s), float(r.idle_drain_per_s),
         float(r.sunpoint_charge_per_s), float(r.telemetry_per_s), float(r.collect_fill_per_s),
     )  # fmt: skip
-    spans = tasks, pieces[:, :2], sunlit, at_sun
-    for span in spans:
-        np.clip(span, 0.0, horizon_s, out=span)
+    lit = satellite.sunlight
+    spans = [
+        np.column_stack(ends).clip(0.0, horizon_s)
+        for ends in (
+            (columns.start_s, columns.end_s),
+            (pieces[:, 0], pieces[:, 1]),
+            (lit.enter_s, lit.exit_s),
+            (idle.sun_from_s, idle.sun_until_s),
+        )
+    ]
+    # Between these times rates are constant.
     times = np.unique(np.concatenate([[0.0, horizon_s], *(span.ravel() for span in spans)]))
-    power, fill, drain = _rates_over(times, tasks, is_contact, pieces, sunlit, at_sun, each)
+    tasks, flowing, sunlit, at_sun = (np.searchsorted(times, span) for span in spans)
+    power, fill, drain = _rates_over(
+        len(times) - 1, tasks, is_contact, flowing, pieces[:, 2].copy(), sunlit, at_sun, each
+    )
     held = r.initial_recorder_fraction
     first = (0.0, r.initial_battery_fraction, held, held, 0.0)
     states, at = states_under(times, power, fill, drain, first)
-    starts, stops = at[np.searchsorted(times, tasks).T]
+    starts, stops = at[tasks.T]
     return Profile(
         curve=Curve(*states.T.copy()),
         before=Curve(*states[starts].T.copy()),
         after=Curve(*states[stops].T.copy()),
         idle=idle,
-        sun_end=Curve(*states[at[np.searchsorted(times, at_sun[:, 1])]].T.copy()),
+        sun_end=Curve(*states[at[at_sun[:, 1]]].T.copy()),
     )
 
 
@@ -138,35 +146,34 @@ class _Rates(NamedTuple):
 
 @kernel
 def _rates_over(
-    times: Floats,
-    tasks: Floats,
+    num_pieces: int,
+    tasks: Longs,
     is_contact: Bools,
-    flows: Floats,
-    sunlit: Floats,
-    at_sun: Floats,
+    flowing: Longs,
+    per_s: Floats,
+    sunlit: Longs,
+    at_sun: Longs,
     each: _Rates,
 ) -> tuple[Floats, Floats, Floats]:
-    """Return power, fill and drain in each piece between two times.
+    """Return power, fill and drain in each piece of time.
 
     Parameters
     ----------
-    times
-        The ends of all spans, in order: between them rates are constant.
-    tasks, sunlit, at_sun
-        Spans. Shape ``(n, 2)`` each.
-    flows
-        The same of contacts, and how fast data comes down in them. Shape ``(n, 3)``.
+    tasks, flowing, sunlit, at_sun
+        Spans of pieces: the first, and the one after the last. Shape ``(n, 2)`` each.
+    per_s
+        How fast data comes down in each span of ``flowing``. Shape ``(n,)``.
     """
-    num_collects, num_contacts, drain, num_lit, num_at_sun = np.zeros((5, len(times) - 1))
+    num_collects, num_contacts, drain, num_lit, num_at_sun = np.zeros((5, num_pieces))
     for i in range(len(tasks)):
-        _cover(num_contacts if is_contact[i] else num_collects, times, tasks, i, 1.0)
-    for i in range(len(flows)):
-        _cover(drain, times, flows, i, flows[i, 2])
+        _cover(num_contacts if is_contact[i] else num_collects, tasks, i, 1.0)
+    for i in range(len(flowing)):
+        _cover(drain, flowing, i, per_s[i])
     for i in range(len(sunlit)):
-        _cover(num_lit, times, sunlit, i, 1.0)
+        _cover(num_lit, sunlit, i, 1.0)
     for i in range(len(at_sun)):
-        _cover(num_at_sun, times, at_sun, i, 1.0)
-    power = np.empty(len(times) - 1)
+        _cover(num_at_sun, at_sun, i, 1.0)
+    power = np.empty(num_pieces)
     for piece in range(len(power)):
         collects, contacts = num_collects[piece], num_contacts[piece]
         used = 0.0
@@ -179,21 +186,20 @@ def _rates_over(
 
 
 @inlined
-def _cover(covered: Floats, times: Floats, spans: Floats, i: int, weight: float) -> None:
-    """Add a weight to each piece between two times that span ``i`` covers.
+def _cover(covered: Floats, spans: Longs, i: int, weight: float) -> None:
+    """Add a weight to each piece of span ``i``.
 
-    All ends of spans are among the times. Only what covers a piece is summed: a difference of
-    running sums would leave roundings where there is nothing.
+    Only what covers a piece is summed: a difference of running sums would leave roundings where
+    there is nothing.
     """
-    first, last = np.searchsorted(times, spans[i, 0]), np.searchsorted(times, spans[i, 1])
-    for piece in range(first, last):
+    for piece in range(spans[i, 0], spans[i, 1]):
         covered[piece] += weight
 
 
 @kernel
 def states_under(
     times: Floats, power: Floats, fill: Floats, drain: Floats, first: _State
-) -> tuple[Floats, npt.NDArray[np.int64]]:
+) -> tuple[Floats, Longs]:
     """Return the states under the rates of each piece, and which of them stands at each time."""
     states = np.empty((_STATES_IN_PIECE * len(times), 5))
     at = np.empty(len(times), dtype=np.int64)
