@@ -57,10 +57,10 @@ class Places:
     def at(self, rows: npt.NDArray[np.integer]) -> Places:
         """Return the places in these rows (repeats allowed)."""
         return Places(
-            position_m=self.position_m[rows],
-            up=self.up[rows],
-            east=self.east[rows],
-            north=self.north[rows],
+            position_m=self.position_m.take(rows, axis=0),
+            up=self.up.take(rows, axis=0),
+            east=self.east.take(rows, axis=0),
+            north=self.north.take(rows, axis=0),
             lon_deg=self.lon_deg[rows],
         )
 
