@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
@@ -13,11 +12,19 @@ from planner_core.access.opportunities import Placed, place_contacts
 from planner_core.access.windows import Accesses
 from planner_core.domain import GroundStation, Resources, Satellite, Scenario
 from planner_core.orbits.ephemeris import Ephemeris, propagate
-from planner_core.orbits.places import Places, azimuth_elevation_deg
-from planner_core.problem import CONTACT, Downlinks, Opportunities, PassRate, StationLinks
+from planner_core.orbits.places import Places, elevations_deg
+from planner_core.problem import (
+    CONTACT,
+    Downlinks,
+    Opportunities,
+    PassRate,
+    PassRates,
+    StationLinks,
+)
 
 Bools = npt.NDArray[np.bool_]
 Floats = npt.NDArray[np.float64]
+Longs = npt.NDArray[np.int64]
 
 _STEP_S: Final = 4.0
 """Between instants of a rate: its integral is off by a thousandth at most, right overhead."""
@@ -25,21 +32,22 @@ _PARTS: Final = (0.3, 0.6)
 _APART_S: Final = 2.0
 """Between the starts of contacts, so that one in whole seconds tells which is meant."""
 _MS_PER_S: Final = 1000
+_CHUNK: Final = 16_384  # instants whose intermediate results fit the processor's cache
 
 
-class Pass(NamedTuple):
-    """One access to a station.
+class Passes(NamedTuple):
+    """The passes of one satellite.
 
     Attributes
     ----------
-    rate
-        How fast data comes down, the station's gain included.
+    rates
+        How fast data comes down in each, the station's gain included.
     culmination_s
-        When the satellite is highest, to a few seconds.
+        When the satellite is highest, to a few seconds. Shape ``(num_passes,)``.
     """
 
-    rate: PassRate
-    culmination_s: float
+    rates: PassRates
+    culmination_s: Floats
 
 
 def passes_of(
@@ -48,18 +56,26 @@ def passes_of(
     path: Ephemeris,
     places: Places,
     accesses: Accesses,
-) -> list[Pass]:
+) -> Passes:
     """Return the passes of one satellite, one for each of its accesses to ``stations``."""
-    found = []
-    for row, station_row in enumerate(accesses.place.tolist()):
-        start_s, end_s = float(accesses.start_s[row]), float(accesses.end_s[row])
-        time_s = np.linspace(start_s, end_s, max(2, math.ceil((end_s - start_s) / _STEP_S) + 1))
-        here = places.at(np.full(len(time_s), station_row))
-        _, elevation_deg = azimuth_elevation_deg(path, here, time_s)
-        per_s = stations[station_row].downlink_gain * resources.downlink_at(elevation_deg)
-        highest_s = float(time_s[np.argmax(elevation_deg)])
-        found.append(Pass(PassRate(time_s=time_s, per_s=per_s), highest_s))
-    return found
+    length_s = accesses.end_s - accesses.start_s
+    num_steps = np.maximum(np.ceil(length_s / _STEP_S), 1.0).astype(np.int64)
+    first = np.concatenate([[0], np.cumsum(num_steps + 1)])
+    of = np.repeat(np.arange(len(accesses)), num_steps + 1)
+    step_s = length_s / num_steps
+    time_s = (np.arange(len(of)) - first[of]) * step_s[of] + accesses.start_s[of]
+    time_s[first[1:] - 1] = accesses.end_s
+    elevation_deg = np.empty(len(of))
+    for begin in range(0, len(of), _CHUNK):
+        part = slice(begin, begin + _CHUNK)
+        here = places.at(accesses.place[of[part]])
+        elevation_deg[part] = elevations_deg(path, here, time_s[part])
+    gain = np.array([station.downlink_gain for station in stations], dtype=np.float64)
+    per_s = gain[accesses.place[of]] * resources.downlink_at(elevation_deg)
+    highest_deg = np.maximum.reduceat(elevation_deg, first[:-1]) if len(of) else elevation_deg
+    at_top = np.flatnonzero(elevation_deg == highest_deg[of])
+    _, top = np.unique(of[at_top], return_index=True)
+    return Passes(PassRates.of(time_s, per_s, first), time_s[at_top[top]])
 
 
 class PlacedContacts(NamedTuple):
@@ -81,7 +97,7 @@ class PlacedContacts(NamedTuple):
 def _place_parts(
     accesses: Accesses,
     stations: Sequence[GroundStation],
-    passes: Sequence[Pass],
+    passes: Passes,
     *,
     has_parts: bool,
     has_halves: bool,
@@ -95,48 +111,52 @@ def _place_parts(
     row, start_ms, end_ms = place_contacts(accesses, stations)
     rows, starts_ms, ends_ms = [row], [start_ms], [end_ms]
     is_half = [np.zeros(len(row), dtype=np.bool_)]
-    for one in row.tolist():
-        station = stations[int(accesses.place[one])]
-        parts = [_part_ms(passes[one], station, share) for share in _PARTS * has_parts]
-        halves = _halves_ms(passes[one], station) * has_halves
-        shortest_ms = max(1.0, station.min_contact_s * _MS_PER_S - 1e-3)
-        for offered, are_halves in ((parts, False), (halves, True)):
-            fits = [p for p in offered if p[1] - p[0] >= shortest_ms]
-            rows.append(np.full(len(fits), one))
-            starts_ms.append(np.array([start for start, _ in fits], dtype=np.int64))
-            ends_ms.append(np.array([end for _, end in fits], dtype=np.int64))
-            is_half.append(np.full(len(fits), are_halves))
+    setup_s = np.array([s.setup_s for s in stations], dtype=np.float64)[accesses.place[row]]
+    shortest_s = np.array([s.min_contact_s for s in stations], dtype=np.float64)
+    shortest_ms = np.maximum(shortest_s[accesses.place[row]] * _MS_PER_S - 1e-3, 1.0)
+    parts = [_part_s(passes, row, setup_s, share) for share in _PARTS * has_parts]
+    halves = _halves_s(passes, row, setup_s) if has_halves else []
+    for number, (start_s, end_s) in enumerate((*parts, *halves)):
+        # Rounded inward to the millisecond.
+        start_ms = np.ceil(start_s * _MS_PER_S).astype(np.int64)
+        end_ms = np.floor(end_s * _MS_PER_S).astype(np.int64)
+        fits = end_ms - start_ms >= shortest_ms
+        rows.append(row[fits])
+        starts_ms.append(start_ms[fits])
+        ends_ms.append(end_ms[fits])
+        is_half.append(np.full(np.count_nonzero(fits), number >= len(parts)))
     placed = np.concatenate(rows), np.concatenate(starts_ms), np.concatenate(ends_ms)
     return PlacedContacts(accesses, placed, np.concatenate(is_half))
 
 
-def _part_ms(one: Pass, station: GroundStation, share: float) -> tuple[int, int]:
-    """Return a part of a pass, its setup included, rounded inward to the millisecond."""
-    rate = one.rate
-    first_s = float(rate.time_s[0]) + station.setup_s
-    edges = rate.until(np.array([first_s, max(first_s, one.culmination_s), rate.time_s[-1]]))
-    first, top, last = edges.tolist()
-    cut_s = rate.when(np.array([top - share * (top - first), top + share * (last - top)]))
-    start_s = max(float(cut_s[0]) - station.setup_s, float(rate.time_s[0]))
-    return math.ceil(start_s * _MS_PER_S), math.floor(float(cut_s[1]) * _MS_PER_S)
+def _part_s(passes: Passes, row: Longs, setup_s: Floats, share: float) -> tuple[Floats, Floats]:
+    """Return start and end of a part of each of these passes, its setup included."""
+    rates = passes.rates
+    begin_s, end_s = rates.time_s[rates.first[row]], rates.time_s[rates.first[row + 1] - 1]
+    ready_s = begin_s + setup_s
+    first, last = rates.until(row, ready_s), rates.until(row, end_s)
+    top = rates.until(row, np.maximum(ready_s, passes.culmination_s[row]))
+    from_s = rates.when(row, top - share * (top - first))
+    to_s = rates.when(row, top + share * (last - top))
+    return np.maximum(from_s - setup_s, begin_s), to_s
 
 
-def _halves_ms(one: Pass, station: GroundStation) -> list[tuple[int, int]]:
-    """Return the halves of a pass by its data, the station's setup before each.
+def _halves_s(passes: Passes, row: Longs, setup_s: Floats) -> list[tuple[Floats, Floats]]:
+    """Return starts and ends of the halves of each of these passes, the setup before each.
 
     The first begins a little after the pass: bookings name a contact by its start. A pass so short
-    that the second would begin with the first has none.
+    that the second would begin with the first has none: there they are of no length.
     """
-    rate = one.rate
-    begin_s, end_s = float(rate.time_s[0]) + _APART_S, float(rate.time_s[-1])
-    first, last = rate.until(np.array([begin_s + station.setup_s, end_s])).tolist()
-    middle_s = float(rate.when(np.array([0.5 * (first + last)]))[0])
-    later_s = middle_s - station.setup_s
-    if later_s < begin_s + _APART_S:
-        return []
+    rates = passes.rates
+    begin_s = rates.time_s[rates.first[row]] + _APART_S
+    end_s = rates.time_s[rates.first[row + 1] - 1]
+    first, last = rates.until(row, begin_s + setup_s), rates.until(row, end_s)
+    middle_s = rates.when(row, 0.5 * (first + last))
+    later_s = middle_s - setup_s
+    has_halves = later_s >= begin_s + _APART_S
     return [
-        (math.ceil(from_s * _MS_PER_S), math.floor(to_s * _MS_PER_S))
-        for from_s, to_s in ((begin_s, middle_s), (later_s, end_s))
+        (begin_s, np.where(has_halves, middle_s, begin_s)),
+        (later_s, np.where(has_halves, end_s, later_s)),
     ]
 
 
@@ -209,7 +229,7 @@ def downlinks_of(scenario: Scenario, table: Opportunities) -> Downlinks:
         )
         path = propagate(satellite, scenario.horizon)
         found = passes_of(satellite.resources, stations, path, places, accesses)
-        rates |= {int(one): each.rate for one, each in zip(number, found, strict=True)}
+        rates |= dict(zip(number.tolist(), found.rates.each(), strict=True))
     links = StationLinks(
         gain=np.array([s.downlink_gain for s in stations], dtype=np.float64),
         setup_s=np.array([s.setup_s for s in stations], dtype=np.float64),

@@ -169,6 +169,7 @@ def compute_opportunities(scenario: Scenario, budget: Budget) -> ScenarioOpportu
         budget.proceed(Progress(phase="access", fraction=0.5 + index / num_steps))
         # Propagated again rather than kept: a month of a constellation's paths is a gigabyte.
         path = propagate(satellite, scenario.horizon)
+        collects.note_visible(satellite.sensor, path)
         for kind in kinds:
             described.fill(
                 index, kind, path, places[kind], satellite.sensor.nadir,
@@ -246,15 +247,19 @@ class _Collects:
         self._raise_to(OUTSIDE_TIMES, found.place[tasks.have_room(found, targets)])
         self._raise_to(BETWEEN_STARTS, in_time.place[tasks.have_room(in_time, targets)])
         self._raise_to(ACCESS_FOUND, in_time.place[placed[0]])
-        self._note_visible(served, path)
         return in_time, placed
 
-    def _note_visible(self, served: Longs, path: Ephemeris) -> None:
-        """Look for bare visibility, where it would bring a target nearer."""
+    def note_visible(self, sensor: Sensor, path: Ephemeris) -> None:
+        """Look for bare visibility, where it would bring a target nearer.
+
+        Once all satellites are placed few targets are left to look for.
+        """
         is_served = np.zeros(len(self.closeness), dtype=np.bool_)
-        is_served[served] = True
+        is_served[self._eligibility.served_by(sensor)] = True
         best = np.where(is_served, _RANK[OUTSIDE_LIMITS], _RANK[WRONG_SENSOR_TYPE])
         unseen = np.flatnonzero(self.closeness < best)
+        if not len(unseen):
+            return
         seen = find_accesses(path, self._places.at(unseen), Limits.above_horizon(len(unseen)))
         visible = unseen[seen.place]
         np.maximum.at(self.closeness, visible, best[visible])

@@ -15,7 +15,7 @@ from planner_core.access.limits import Limits
 from planner_core.access.windows import Accesses, find_accesses
 from planner_core.domain import GroundStation, Horizon, Satellite
 from planner_core.orbits.ephemeris import Ephemeris, propagate
-from planner_core.orbits.places import Places, azimuth_elevation_deg
+from planner_core.orbits.places import Places, elevations_deg
 
 Floats = npt.NDArray[np.float64]
 
@@ -98,7 +98,7 @@ def _with_culminations(
     if not len(accesses):
         return
     tca_s = _culmination_s(path, places.at(accesses.place), accesses.start_s, accesses.end_s)
-    _, highest_deg = azimuth_elevation_deg(path, places.at(accesses.place), tca_s)
+    highest_deg = elevations_deg(path, places.at(accesses.place), tca_s)
     for row in range(len(accesses)):
         yield StationPass(
             satellite=index,
@@ -129,7 +129,7 @@ def _culmination_s(path: Ephemeris, here: Places, start_s: Floats, end_s: Floats
     low_s, high_s = np.maximum(near_s - _STEP_S, start_s), np.minimum(near_s + _STEP_S, end_s)
 
     def height(t_s: Floats) -> Floats:
-        return azimuth_elevation_deg(path, here, t_s)[1]
+        return elevations_deg(path, here, t_s)
 
     for _ in range(math.ceil(math.log(_WITHIN_S / (2.0 * _STEP_S)) / math.log(_GOLDEN))):
         reach_s = _GOLDEN * (high_s - low_s)
@@ -147,5 +147,5 @@ def _culmination_s(path: Ephemeris, here: Places, start_s: Floats, end_s: Floats
 
 def _highest_sample_s(path: Ephemeris, here: Places, start_s: float, end_s: float) -> float:
     t_s = np.linspace(start_s, end_s, max(2, math.ceil((end_s - start_s) / _STEP_S) + 1))
-    elevation_deg = azimuth_elevation_deg(path, here.at(np.zeros(len(t_s), dtype=np.int32)), t_s)[1]
+    elevation_deg = elevations_deg(path, here.at(np.zeros(len(t_s), dtype=np.int32)), t_s)
     return float(t_s[np.argmax(elevation_deg)])

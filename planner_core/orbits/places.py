@@ -57,10 +57,10 @@ class Places:
     def at(self, rows: npt.NDArray[np.integer]) -> Places:
         """Return the places in these rows (repeats allowed)."""
         return Places(
-            position_m=self.position_m[rows],
-            up=self.up[rows],
-            east=self.east[rows],
-            north=self.north[rows],
+            position_m=self.position_m.take(rows, axis=0),
+            up=self.up.take(rows, axis=0),
+            east=self.east.take(rows, axis=0),
+            north=self.north.take(rows, axis=0),
             lon_deg=self.lon_deg[rows],
         )
 
@@ -111,10 +111,21 @@ def azimuth_elevation_deg(
     return _azimuth_elevation_deg(position - places.position_m, places)
 
 
+def elevations_deg(ephemeris: Ephemeris, places: Places, t_s: Floats) -> Floats:
+    """Return how high the satellite stands above each place."""
+    position, _ = ephemeris.state_itrf(t_s)
+    east, north, up = _east_north_up(position - places.position_m, places)
+    return np.degrees(np.arctan2(up, np.hypot(east, north)))
+
+
 def _azimuth_elevation_deg(sight: Floats, places: Places) -> tuple[Floats, Floats]:
-    east, north, up = (_row_dot(sight, v) for v in (places.east, places.north, places.up))
+    east, north, up = _east_north_up(sight, places)
     azimuth = np.degrees(np.arctan2(east, north)) % 360.0
     return azimuth, np.degrees(np.arctan2(up, np.hypot(east, north)))
+
+
+def _east_north_up(sight: Floats, places: Places) -> tuple[Floats, Floats, Floats]:
+    return _row_dot(sight, places.east), _row_dot(sight, places.north), _row_dot(sight, places.up)
 
 
 def line_of_sight_teme(ephemeris: Ephemeris, places: Places, t_s: Floats) -> Floats:

@@ -7,14 +7,15 @@ from collections.abc import Collection
 import numpy as np
 
 from planner_core.precedence.relation import fit_beside
-from planner_core.problem import CONTACT, Problem
+from planner_core.problem import CONTACT, Ints, Problem
 from planner_core.problem.slew import TIME_TOLERANCE_S
 
 
-def conflicts(problem: Problem, row: int, taken: Collection[int]) -> list[int]:
+def conflicts(problem: Problem, row: int, taken: Collection[int] | Ints) -> list[int]:
     """Return which of these rows cannot stand beside ``row``: no time to turn, or no antenna."""
     table, local = problem.opportunities, problem.local_row
-    others = np.array([other for other in taken if other != row], dtype=np.int64)
+    others = taken if isinstance(taken, np.ndarray) else np.array(list(taken), dtype=np.int64)
+    others = others[others != row]
     satellite = int(table.satellite[row])
     own = others[table.satellite[others] == satellite]
     beside = local[own].astype(np.int64)

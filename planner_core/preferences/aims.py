@@ -10,6 +10,7 @@ import numpy as np
 
 from planner_core.domain import Preference
 from planner_core.problem import COLLECT, Floats
+from planner_core.problem.plan import Columns
 from planner_core.referee.view import View
 
 
@@ -102,10 +103,9 @@ def _of_age(view: View) -> Floats:
     """Return how long images wait for the next contact of the plan, as a share of the horizon."""
     table, horizon_s = view.problem.opportunities, view.problem.horizon_s
     liking = np.zeros(len(table))
+    contacts = Columns.of(view.contacts)
     for index, satellite in enumerate(view.problem.satellites):
-        starts_s = [
-            c.start_s for c in view.contacts if table.satellite[c.opportunity] == index
-        ]  # in order
+        starts_s = contacts.start_s[table.satellite[contacts.row] == index]  # in order
         own = satellite.rows[satellite.kind == COLLECT]
         end_s = table.end_s[own]
         next_s = np.append(starts_s, np.inf)[np.searchsorted(starts_s, end_s)]

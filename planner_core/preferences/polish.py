@@ -117,13 +117,14 @@ def _with_windows(
     num_satellites = len(problem.satellites)
     most_moves = max(_LEAST_MOVES, _MOVES_AN_IMAGE * len(view.images) // num_satellites)
     num_moves, num_misses = _FIRST_MOVES, 0
+    worth = _worth_in(view)
     for _ in range(_MOST_ROUNDS):
         liking = liking_of(view, aim)
         if liking is None or num_misses == _MOST_MISSES or budget.is_spent():
             break
         others = [one for one in (liking_of(view, other) for other in aims[:-1]) if one is not None]
         liking = (liking + caution * sum(others)) / (1.0 + caution * len(others))
-        windows.go_by(_worth_in(view), liking)
+        windows.go_by(worth, liking)
         windows.adopt(view.plan)
         windows.make_moves_on_each(num_moves, budget)
         before = value_of(view, aim)

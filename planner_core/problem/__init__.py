@@ -18,7 +18,7 @@ from planner_core.problem.columns import (
     Longs,
     Singles,
 )
-from planner_core.problem.downlink import Downlinks, PassRate, StationLinks
+from planner_core.problem.downlink import Downlinks, PassRate, PassRates, StationLinks
 from planner_core.problem.pinned import Blocked, Kept, Pinned
 from planner_core.problem.problem import (
     Heading,
@@ -56,6 +56,7 @@ __all__ = [
     "Longs",
     "Opportunities",
     "PassRate",
+    "PassRates",
     "Pinned",
     "Problem",
     "SatelliteProblem",

@@ -76,8 +76,10 @@ def _first_down_s(
 def fastest_downlink_per_s(problem: Problem, satellite: SatelliteProblem, contacts: Longs) -> float:
     """Return the highest rate at any instant of these contacts; 0 without any."""
     links = problem.downlinks
-    access = problem.opportunities.access[satellite.rows[contacts]]
-    gain = links.stations.gain[satellite.place[contacts]]
+    access, first = np.unique(
+        problem.opportunities.access[satellite.rows[contacts]], return_index=True
+    )
+    gain = links.stations.gain[satellite.place[contacts[first]]]
     rates = (satellite.resources.downlink_per_s * gain).tolist()
     passes = [links.passes.get(int(number)) for number in access]
     known = zip(passes, rates, strict=True)

@@ -6,15 +6,20 @@ Both the referee and the solvers count with that same rate; each adds it up in i
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import itertools
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from planner_core.jit import kernel
+
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.integer]
+Longs = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -72,6 +77,98 @@ class PassRate:
         return steps_s, np.concatenate([[0.0], np.cumsum(parts)])
 
 
+class PassRates(NamedTuple):
+    """The rates of many passes, one after another: what ``PassRate`` says of one, of all at once.
+
+    A fleet has thousands of passes, and each of them is asked a few times.
+
+    Attributes
+    ----------
+    time_s, per_s
+        As of each pass. Shape ``(n,)``.
+    first
+        Where each pass begins, and ``n``. Shape ``(num_passes + 1,)``.
+    whole
+        What has come down of its pass at each instant. Shape ``(n,)``.
+    """
+
+    time_s: Floats
+    per_s: Floats
+    first: Longs
+    whole: Floats
+
+    @classmethod
+    def joined(cls, rates: Sequence[PassRate]) -> PassRates:
+        """Return these passes in their order."""
+        first = np.cumsum([0, *(len(rate.time_s) for rate in rates)])
+        time_s = np.concatenate([np.empty(0), *(rate.time_s for rate in rates)])
+        return cls.of(time_s, np.concatenate([np.empty(0), *(r.per_s for r in rates)]), first)
+
+    @classmethod
+    def of(cls, time_s: Floats, per_s: Floats, first: Longs) -> PassRates:
+        """Return the passes whose rates these are."""
+        return cls(time_s, per_s, first, _added_up(time_s, per_s, first))
+
+    def each(self) -> list[PassRate]:
+        """Return the passes one by one."""
+        return [
+            PassRate(time_s=self.time_s[begin:end], per_s=self.per_s[begin:end])
+            for begin, end in itertools.pairwise(self.first.tolist())
+        ]
+
+    def until(self, which: Longs, t_s: Floats) -> Floats:
+        """Return what comes down in each of these passes until an instant of its own."""
+        return _until(self.time_s, self.per_s, self.first, self.whole, which, t_s)
+
+    def when(self, which: Longs, amount: Floats) -> Floats:
+        """Return when an amount of its own has come down in each of these passes."""
+        return _when(self.time_s, self.per_s, self.first, self.whole, which, amount)
+
+
+@kernel
+def _added_up(time_s: Floats, per_s: Floats, first: Longs) -> Floats:
+    whole = np.zeros(len(time_s))
+    for one in range(len(first) - 1):
+        for k in range(first[one] + 1, first[one + 1]):
+            step_s = time_s[k] - time_s[k - 1]
+            whole[k] = whole[k - 1] + step_s * (per_s[k] + per_s[k - 1]) / 2
+    return whole
+
+
+@kernel
+def _until(
+    time_s: Floats, per_s: Floats, first: Longs, whole: Floats, which: Longs, t_s: Floats
+) -> Floats:
+    found = np.empty(len(which))
+    for i in range(len(which)):
+        begin, end = first[which[i]], first[which[i] + 1]
+        at = begin + np.searchsorted(time_s[begin:end], t_s[i], side="right") - 1
+        at = min(max(at, begin), end - 2)
+        step_s = time_s[at + 1] - time_s[at]
+        into_s = min(max(t_s[i] - time_s[at], 0.0), step_s)
+        slope = (per_s[at + 1] - per_s[at]) / step_s
+        found[i] = whole[at] + into_s * (per_s[at] + slope * into_s / 2.0)
+    return found
+
+
+@kernel
+def _when(
+    time_s: Floats, per_s: Floats, first: Longs, whole: Floats, which: Longs, amount: Floats
+) -> Floats:
+    found = np.empty(len(which))
+    for i in range(len(which)):
+        begin, end = first[which[i]], first[which[i] + 1]
+        at = begin + np.searchsorted(whole[begin:end], amount[i]) - 1
+        at = min(max(at, begin), end - 2)
+        step_s = time_s[at + 1] - time_s[at]
+        rise = (per_s[at + 1] - per_s[at]) / step_s
+        missing = max(amount[i] - whole[at], 0.0)
+        until = per_s[at] + np.sqrt(max(per_s[at] ** 2 + 2.0 * rise * missing, 0.0))
+        into_s = 2.0 * missing / until if until > 0.0 else 0.0
+        found[i] = time_s[at] + min(into_s, step_s)
+    return found
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StationLinks:
     """What each station does to a downlink. Shape ``(num_stations,)``.
@@ -93,7 +190,7 @@ class StationLinks:
         return cls(gain=np.ones(num_stations), setup_s=np.zeros(num_stations))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Downlinks:
     """How fast the contacts of a scenario take data down.
 
@@ -124,8 +221,25 @@ class Downlinks:
         setup_s = self.stations.setup_s[station]
         useful_s = np.maximum(end_s - start_s - setup_s, 0.0)
         volume = useful_s * (rate_per_s * self.stations.gain[station])
-        for row in np.flatnonzero([int(number) in self.passes for number in access]):
-            rate = self.passes[int(access[row])]
-            span_s = np.array([min(start_s[row] + setup_s[row], end_s[row]), end_s[row]])
-            volume[row] = float(np.diff(rate.until(span_s))[0])
+        which = self.which(access)
+        of = np.flatnonzero(which >= 0)
+        ready_s = np.minimum(start_s[of] + setup_s[of], end_s[of])
+        until_end, until_ready = (self.rates.until(which[of], t_s) for t_s in (end_s[of], ready_s))
+        volume[of] = until_end - until_ready
         return np.asarray(volume)
+
+    def which(self, access: Ints) -> Longs:
+        """Return which of ``rates`` each access has; -1 where the satellite's own rate holds."""
+        if not self.passes:
+            return np.full(len(access), -1)
+        at = np.minimum(np.searchsorted(self._numbers, access), len(self._numbers) - 1)
+        return np.where(self._numbers[at] == access, at, -1)
+
+    @cached_property
+    def rates(self) -> PassRates:
+        """All passes, by the numbers of their accesses."""
+        return PassRates.joined([self.passes[number] for number in self._numbers.tolist()])
+
+    @cached_property
+    def _numbers(self) -> Longs:
+        return np.array(sorted(self.passes), dtype=np.int64)

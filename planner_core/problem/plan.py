@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from planner_core.problem import Problem
+import numpy as np
+
+from planner_core.problem import Bools, Floats, Longs, Problem
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -15,6 +17,31 @@ class Action:
     start_s: float
     end_s: float
     opportunity: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Columns:
+    """Actions as arrays. Shape ``(n,)`` each."""
+
+    row: Longs
+    start_s: Floats
+    end_s: Floats
+
+    @classmethod
+    def of(cls, actions: Sequence[Action]) -> Columns:
+        """Return these actions in their order."""
+        table = np.array([(a.start_s, a.end_s, a.opportunity) for a in actions]).reshape(-1, 3)
+        start_s, end_s, row = table.T.copy()
+        return cls(row=row.astype(np.int64), start_s=start_s, end_s=end_s)
+
+    def at(self, which: Bools | Longs | slice) -> Columns:
+        """Return some of them."""
+        return Columns(row=self.row[which], start_s=self.start_s[which], end_s=self.end_s[which])
+
+    @property
+    def order(self) -> Longs:
+        """The actions in order, of equal ones the first first."""
+        return np.lexsort((self.row, self.end_s, self.start_s))
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,14 +54,11 @@ class Plan:
     def of(cls, problem: Problem, opportunities: Iterable[int]) -> Plan:
         """Return the plan that takes these opportunities at their own times."""
         table = problem.opportunities
-        return cls(
-            tuple(
-                sorted(
-                    Action(float(table.start_s[i]), float(table.end_s[i]), int(i))
-                    for i in opportunities
-                )
-            )
-        )
+        row = np.array(list(opportunities), dtype=np.int64)
+        columns = Columns(row=row, start_s=table.start_s[row], end_s=table.end_s[row])
+        ordered = columns.at(columns.order)
+        fields = ordered.start_s, ordered.end_s, ordered.row
+        return cls(tuple(map(Action, *(field.tolist() for field in fields))))
 
     def with_kept(self, problem: Problem) -> Plan:
         """Return the plan with all that must be taken, at its own times."""

@@ -7,6 +7,7 @@ next contact takes down data.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from typing import Final
@@ -15,7 +16,7 @@ import numpy as np
 
 from planner_core.jit import kernel
 from planner_core.problem import CONTACT, Floats, Longs, Problem, SatelliteProblem
-from planner_core.problem.plan import Action
+from planner_core.problem.plan import Action, Columns
 from planner_core.problem.slew import TIME_TOLERANCE_S
 from planner_core.referee.contact_flow import flow
 from planner_core.referee.resource_profile import Profile
@@ -40,12 +41,12 @@ def delivered_s(
     Seconds from the start of the horizon. Shape ``(len(actions),)``.
     """
     kind = problem.opportunities.kind
-    queued = np.array([point.recorded for point in profile.after])
-    found = on_ground_s(problem, satellite, actions, profile, queued)
-    contacts = [action for action in actions if kind[action.opportunity] == CONTACT]
-    is_contact = [kind[action.opportunity] == CONTACT for action in actions]
-    found[np.array(is_contact, dtype=np.bool_)] = np.nan
-    end_s = np.array([action.end_s for action in actions])
+    found = on_ground_s(problem, satellite, actions, profile, profile.after.recorded)
+    columns = Columns.of(actions)
+    is_contact = kind[columns.row] == CONTACT
+    contacts = list(itertools.compress(actions, is_contact.tolist()))
+    found[is_contact] = np.nan
+    end_s = columns.end_s
     # Of an image without data all is down before it is taken: it waits for a contact all the same.
     for own in np.flatnonzero(found < end_s - TIME_TOLERANCE_S).tolist():
         found[own] = _next_flow_s(problem, satellite, contacts, end_s[own])
@@ -120,10 +121,12 @@ def _removal(
         return profile.curve.time_s, profile.curve.removed
     # Events book a contact at its start: its bits come down one after another from there.
     points = [(0.0, 0.0)]
-    for action, before, after in zip(actions, profile.before, profile.after, strict=True):
-        if after.removed > before.removed:
+    for action, before, after in zip(
+        actions, profile.before.removed.tolist(), profile.after.removed.tolist(), strict=True
+    ):
+        if after > before:
             pieces = flow(problem, satellite, action)
-            points += _one_after_another(pieces, before.removed, after.removed)
+            points += _one_after_another(pieces, before, after)
     table = np.array(points)
     return table[:, 0].copy(), table[:, 1].copy()
 

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from planner_core.problem import Problem, SatelliteProblem
-from planner_core.problem.plan import Action
+from planner_core.problem import Bools, Floats, Problem, SatelliteProblem
+from planner_core.problem.plan import Columns
 from planner_core.problem.slew import TIME_TOLERANCE_S
-from planner_core.problem.sun_turns import sun_turn_s, sun_turns
+from planner_core.problem.sun_turns import SunTurns, sun_turn_s, sun_turns
 from planner_core.referee.sight import lines_of_sight
+
+_known: WeakKeyDictionary[Problem, Floats] = WeakKeyDictionary()
+"""Turns from each opportunity to the sun, and back; NaN for those that nobody asked for yet."""
 
 
 class Idle(NamedTuple):
-    """A span without tasks, and the part of it that is spent at the sun.
+    """Spans without tasks, in order of start, and the part of each that is spent at the sun.
+
+    Shape ``(n,)`` each.
 
     Attributes
     ----------
@@ -27,67 +32,78 @@ class Idle(NamedTuple):
         To the sun, at the start of the horizon what is left of it; and from it, none at its end.
     """
 
-    start_s: float
-    end_s: float
-    sun_from_s: float
-    sun_until_s: float
-    turn_to_s: float
-    turn_back_s: float
+    start_s: Floats
+    end_s: Floats
+    sun_from_s: Floats
+    sun_until_s: Floats
+    turn_to_s: Floats
+    turn_back_s: Floats
 
     @property
-    def is_at_sun(self) -> bool:
+    def is_at_sun(self) -> Bools:
         """Whether there is time to go to the sun and back."""
-        return self.sun_until_s > self.sun_from_s + TIME_TOLERANCE_S
+        return np.asarray(self.sun_until_s > self.sun_from_s + TIME_TOLERANCE_S)
 
 
-def idle_spans(
-    problem: Problem, satellite: SatelliteProblem, actions: Sequence[Action]
-) -> tuple[Idle, ...]:
+def idle_spans(problem: Problem, satellite: SatelliteProblem, actions: Columns) -> Idle:
     """Return the idle spans of a satellite around its own actions, in order of start.
 
     The satellite begins the horizon with its panels at the sun where it is not known to look
     elsewhere.
     """
     out_s, back_s = _turns_s(problem, satellite, actions)
-    spans = []
-    free_from_s, turn_to_s = 0.0, _first_turn_s(satellite)
-    for after, turn, turn_back_s in zip(
-        (*actions, None), (*out_s, 0.0), (*back_s, 0.0), strict=True
-    ):
-        until_s = problem.horizon_s if after is None else after.start_s
-        if until_s > free_from_s + TIME_TOLERANCE_S:
-            sun_from_s = free_from_s + turn_to_s
-            sun_until_s = max(sun_from_s, until_s - turn_back_s)
-            spans.append(
-                Idle(free_from_s, until_s, sun_from_s, sun_until_s, turn_to_s, turn_back_s)
-            )
-        if after is not None and after.end_s > free_from_s:
-            free_from_s, turn_to_s = after.end_s, turn
-    return tuple(spans)
+    until_s, turn_back_s = np.append(actions.start_s, problem.horizon_s), np.append(back_s, 0.0)
+    # Of the start of the horizon and the tasks before, the first that ends last.
+    end_s = np.append(0.0, actions.end_s)
+    free_from_s = np.maximum.accumulate(end_s)
+    is_later = np.diff(free_from_s, prepend=-1.0) > 0.0
+    last = np.maximum.accumulate(np.where(is_later, np.arange(len(end_s)), 0))
+    turn_to_s = np.append(_first_turn_s(satellite), out_s)[last]
+    sun_from_s = free_from_s + turn_to_s
+    sun_until_s = np.maximum(sun_from_s, until_s - turn_back_s)
+    spans = free_from_s, until_s, sun_from_s, sun_until_s, turn_to_s, turn_back_s
+    has_time = until_s > free_from_s + TIME_TOLERANCE_S
+    return Idle(*(column[has_time] for column in spans))
 
 
 def _turns_s(
-    problem: Problem, satellite: SatelliteProblem, actions: Sequence[Action]
-) -> tuple[list[float], list[float]]:
-    """Return the turn from each action to the sun, and the one from there to it."""
-    r = satellite.resources
-    if r.sun_pointing == "free" or not actions:
-        nothing = [0.0] * len(actions)
+    problem: Problem, satellite: SatelliteProblem, actions: Columns
+) -> tuple[Floats, Floats]:
+    """Return the turn from each action to the sun, and the one from there to it.
+
+    From one plan of a search to the next most actions stay. The turns of those that are at the
+    instants of their opportunity are remembered.
+    """
+    if satellite.resources.sun_pointing == "free":
+        nothing = np.zeros(len(actions.row))
         return nothing, nothing
+    table, row = problem.opportunities, actions.row
+    if problem not in _known:
+        _known[problem] = np.full((2, len(table)), np.nan)
+    known = _known[problem]
+    is_own = (actions.start_s == table.start_s[row]) & (actions.end_s == table.end_s[row])
+    turns_s: Floats = np.where(is_own, known[:, row], np.nan)
+    new = np.flatnonzero(np.isnan(turns_s[0]))
+    if len(new):
+        turns_s[:, new] = _new_turns_s(problem, satellite, actions.at(new))
+        known[:, row[is_own]] = turns_s[:, is_own]
+    return turns_s[0], turns_s[1]
+
+
+def _new_turns_s(problem: Problem, satellite: SatelliteProblem, actions: Columns) -> SunTurns:
     at_start, moves = lines_of_sight(problem, actions, is_end=False)
     at_end, moved = lines_of_sight(problem, actions, is_end=True)
-    turns = sun_turns(
-        r,
+    return sun_turns(
+        satellite.resources,
         satellite.agility,
         satellite.sun,
-        start_s=np.array([action.start_s for action in actions]),
-        end_s=np.array([action.end_s for action in actions]),
+        start_s=actions.start_s,
+        end_s=actions.end_s,
         looks=at_start,
         looked=at_end,
         moves=moves,
         moved=moved,
     )
-    return turns.out_s.tolist(), turns.back_s.tolist()
 
 
 def _first_turn_s(satellite: SatelliteProblem) -> float:

@@ -55,6 +55,9 @@ def limits_broken(
     )
     found = []
     for code, is_broken, worsens, is_at_end, limit in checked:
+        excursions = _excursions(problem, profile.curve, code, limit)
+        if not excursions:
+            continue
         parts = [
             _Part(
                 position,
@@ -64,11 +67,11 @@ def limits_broken(
                 is_frozen=is_frozen(position) and not is_at_end(after),
             )
             for position, before, after in zip(
-                positions, profile.before, profile.after, strict=True
+                positions, profile.before.points(), profile.after.points(), strict=True
             )
             if is_broken(after) or (problem.dynamics == "physical" and is_broken(before))
         ]
-        for start_s, end_s, first, worst in _excursions(problem, profile.curve, code, limit):
+        for start_s, end_s, first, worst in excursions:
             is_given = start_s == began_s or is_unavoidable(problem, index, code, first, start_s)
             blamed = tuple(
                 part.position

@@ -30,6 +30,8 @@ def breaches(problem: Problem, plan: Plan) -> list[Violation]:
         )
     ]
     kept_rows = {kept.row for kept in pinned.kept}
+    if not (pinned.blocked or pinned.forbidden or pinned.skipped or pinned.follows):
+        return found  # nothing is ruled out
     for position, action in enumerate(plan.actions):
         row = action.opportunity
         satellite, kind = int(table.satellite[row]), int(table.kind[row])

@@ -15,20 +15,19 @@ from typing import NamedTuple
 import numpy as np
 
 from planner_core.problem import COLLECT, CONTACT, Floats, Problem
-from planner_core.problem.plan import Plan
+from planner_core.problem.plan import Columns, Plan
 from planner_core.referee.brought_down import brought_down_of
 from planner_core.referee.delivery import delivered_s
 from planner_core.referee.idle_time import Idle
 from planner_core.referee.limits import limits_broken
 from planner_core.referee.pinned_plan import breaches
-from planner_core.referee.resource_profile import Point, Profile, integrate, thin
-from planner_core.referee.rules import stations, turns, windows
+from planner_core.referee.resource_profile import Curve, Profile, integrate, thin
+from planner_core.referee.rules import slews, stations, turns, windows
 from planner_core.referee.timeline import (
     Collected,
     JudgedAction,
     Resourceline,
     SatelliteTimeline,
-    Slew,
     Timeline,
     Violation,
 )
@@ -64,18 +63,10 @@ def replay(problem: Problem, plan: Plan, *, in_detail: bool = True) -> Timeline:
     in_detail
         Whether actions and curves are listed by satellite; a search needs the verdict alone.
     """
-    by_satellite: list[list[int]] = [[] for _ in problem.satellites]
-    for position, action in enumerate(plan.actions):
-        by_satellite[problem.opportunities.satellite[action.opportunity]].append(position)
-    for positions in by_satellite:
-        positions.sort(key=lambda p: plan.actions[p])
-
+    order, by_satellite = _in_order(problem, plan)
     violations: list[Violation] = windows(problem, plan)
-    slews: dict[int, Slew | None] = {}
     for index, positions in enumerate(by_satellite):
-        found, slewed = turns(problem, plan, index, positions)
-        violations += found
-        slews |= slewed
+        violations += turns(problem, plan, index, positions)
     violations += stations(problem, plan)
     violations += breaches(problem, plan)
 
@@ -91,7 +82,7 @@ def replay(problem: Problem, plan: Plan, *, in_detail: bool = True) -> Timeline:
     blamed = {p for v in violations for p in v.blamed}
     down_s = _delivered(problem, plan, by_satellite, profiles)
     worth = _worth(problem, plan, down_s)
-    collected, duplicates = _collected(problem, plan, blamed, worth, down_s)
+    collected, duplicates = _collected(problem, plan, order, blamed, worth, down_s)
     violations += duplicates
     earned = {c.position: c.worth for c in collected.values()}
     brought_down = brought_down_of(problem, plan, by_satellite, profiles)
@@ -99,9 +90,9 @@ def replay(problem: Problem, plan: Plan, *, in_detail: bool = True) -> Timeline:
     return Timeline(
         satellites=tuple(
             _satellite_timeline(
-                problem, plan, positions, slews, _Images(earned, worth, down_s), profile
+                problem, plan, index, positions, _Images(earned, worth, down_s), profiles[index]
             )
-            for positions, profile in zip(by_satellite, profiles, strict=True)
+            for index, positions in enumerate(by_satellite)
             if in_detail
         ),
         violations=tuple(sorted(violations, key=lambda v: (v.at_s, v.satellite, v.code))),
@@ -115,8 +106,22 @@ def replay(problem: Problem, plan: Plan, *, in_detail: bool = True) -> Timeline:
     )
 
 
+def _in_order(problem: Problem, plan: Plan) -> tuple[list[int], list[list[int]]]:
+    """Return the positions of all actions in order, and those of each satellite."""
+    columns = Columns.of(plan.actions)
+    order = columns.order
+    satellite = problem.opportunities.satellite[columns.row[order]]
+    by_satellite = [order[satellite == index].tolist() for index in range(len(problem.satellites))]
+    return order.tolist(), by_satellite
+
+
 def _collected(
-    problem: Problem, plan: Plan, blamed: set[int], worth: Floats, down_s: Floats
+    problem: Problem,
+    plan: Plan,
+    order: Sequence[int],
+    blamed: set[int],
+    worth: Floats,
+    down_s: Floats,
 ) -> tuple[dict[int, Collected], list[Violation]]:
     """Return the best unbroken collect of each target, and a warning for each other one.
 
@@ -125,9 +130,10 @@ def _collected(
     table = problem.opportunities
     rows = np.array([action.opportunity for action in plan.actions], dtype=np.int64)
     is_collect, place = (table.kind[rows] == COLLECT).tolist(), table.place[rows].tolist()
+    satellite = table.satellite[rows].tolist()
     earned, image_down_s = worth.tolist(), down_s.tolist()
     images: dict[int, list[int]] = {}
-    for position in sorted(range(len(plan.actions)), key=plan.actions.__getitem__):
+    for position in order:
         if is_collect[position] and position not in blamed:
             images.setdefault(place[position], []).append(position)
     collected: dict[int, Collected] = {}
@@ -138,26 +144,37 @@ def _collected(
             duplicates += [_has_been_imaged(problem, plan, position) for position in positions]
             continue
         best = max(positions, key=earned.__getitem__)
+        if len(positions) > 1:
+            duplicates += _beside_better(problem, plan, positions, best)
         is_down = not math.isnan(image_down_s[best])
         collected[target] = Collected(
             position=best,
-            satellite=int(table.satellite[rows[best]]),
+            satellite=satellite[best],
             worth=earned[best],
             delivered_s=image_down_s[best] if is_down else None,
             age_s=image_down_s[best] - plan.actions[best].end_s if is_down else None,
         )
-        is_earlier = True
-        for position in positions:
-            if position == best:
-                is_earlier = False
-                continue
-            why = "has a better image later" if is_earlier else "is collected already"
-            duplicates.append(
-                Violation(code="duplicate", satellite=int(table.satellite[rows[position]]),
-                          needed=1.0, available=2.0, at_s=plan.actions[position].start_s,
-                          blamed=(), detail=f"Target {problem.target_ids[target]} {why}.")
-            )  # fmt: skip
     return collected, duplicates
+
+
+def _beside_better(
+    problem: Problem, plan: Plan, positions: Sequence[int], best: int
+) -> list[Violation]:
+    """Return a warning for each image of a target but the best."""
+    found = []
+    why = "has a better image later"
+    for position in positions:
+        if position == best:
+            why = "is collected already"
+            continue
+        row = plan.actions[position].opportunity
+        target = problem.target_ids[int(problem.opportunities.place[row])]
+        found.append(
+            Violation(code="duplicate", satellite=int(problem.opportunities.satellite[row]),
+                      needed=1.0, available=2.0, at_s=plan.actions[position].start_s,
+                      blamed=(), detail=f"Target {target} {why}.")
+        )  # fmt: skip
+    return found
 
 
 def _has_been_imaged(problem: Problem, plan: Plan, position: int) -> Violation:
@@ -208,8 +225,8 @@ class _Images(NamedTuple):
 def _satellite_timeline(
     problem: Problem,
     plan: Plan,
+    index: int,
     positions: Sequence[int],
-    slews: Mapping[int, Slew | None],
     images: _Images,
     profile: Profile | None,
 ) -> SatelliteTimeline:
@@ -218,9 +235,11 @@ def _satellite_timeline(
     own = [plan.actions[position].opportunity for position in positions]
     are_contacts = (table.kind[own] == CONTACT).tolist()
     worth, delivered_s = images.worth[positions].tolist(), images.delivered_s[positions].tolist()
+    turned = slews(problem, index, [plan.actions[position] for position in positions])
+    after = profile.after.points() if profile else []
     for order, position in enumerate(positions):
         action = plan.actions[position]
-        level = profile.after[order] if profile else None
+        level = after[order] if profile else None
         is_contact, down_s = are_contacts[order], delivered_s[order]
         actions.append(
             JudgedAction(
@@ -229,7 +248,7 @@ def _satellite_timeline(
                 end_s=action.end_s,
                 opportunity=action.opportunity,
                 position=position,
-                slew=slews[position],
+                slew=turned[order],
                 reward=images.earned.get(position, 0.0),
                 worth=None if is_contact else worth[order],
                 delivered_s=None if math.isnan(down_s) else down_s,
@@ -240,7 +259,7 @@ def _satellite_timeline(
     if profile is None:
         return SatelliteTimeline(actions=tuple(actions), resources=None)
     time_s, battery, recorder = thin(profile.curve)
-    idle = [_idle_action(*pair) for pair in zip(profile.idle, profile.sun_end, strict=True)]
+    idle = _idle_actions(profile.idle, profile.sun_end)
     # Of a task and what is idle at one instant, as of overlapping tasks, the earlier stands first.
     actions = list(heapq.merge(actions, idle, key=lambda action: action.start_s))
     return SatelliteTimeline(
@@ -249,19 +268,33 @@ def _satellite_timeline(
     )
 
 
-def _idle_action(span: Idle, level: Point) -> JudgedAction:
-    """Return a stay at the sun, or a wait where there is no time for one."""
-    is_at_sun = span.is_at_sun
-    return JudgedAction(
-        mode="sunpoint" if is_at_sun else "hold",
-        start_s=span.sun_from_s if is_at_sun else span.start_s,
-        end_s=span.sun_until_s if is_at_sun else span.end_s,
-        opportunity=None,
-        position=None,
-        slew=None,
-        reward=0.0,
-        battery_end=level.battery,
-        recorder_end=level.recorder,
-        turn_to_s=span.turn_to_s if is_at_sun else None,
-        turn_back_s=span.turn_back_s if is_at_sun else None,
+def _idle_actions(idle: Idle, left: Curve) -> list[JudgedAction]:
+    """Return stays at the sun, and waits where there is no time for one."""
+    at_sun = idle.is_at_sun
+    columns = (
+        at_sun,
+        np.where(at_sun, idle.sun_from_s, idle.start_s),
+        np.where(at_sun, idle.sun_until_s, idle.end_s),
+        idle.turn_to_s,
+        idle.turn_back_s,
+        left.battery,
+        left.recorder,
     )
+    return [
+        JudgedAction(
+            mode="sunpoint" if is_at_sun else "hold",
+            start_s=start_s,
+            end_s=end_s,
+            opportunity=None,
+            position=None,
+            slew=None,
+            reward=0.0,
+            battery_end=battery,
+            recorder_end=recorder,
+            turn_to_s=turn_to_s if is_at_sun else None,
+            turn_back_s=turn_back_s if is_at_sun else None,
+        )
+        for is_at_sun, start_s, end_s, turn_to_s, turn_back_s, battery, recorder in zip(
+            *(column.tolist() for column in columns), strict=True
+        )
+    ]

@@ -6,25 +6,24 @@ trust them: it integrates every second here, piece by piece, in its own way.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from planner_core.jit import inlined, kernel
 from planner_core.problem import (
     CONTACT,
     Bools,
     Floats,
+    Longs,
     Problem,
     SatelliteProblem,
 )
-from planner_core.problem.plan import Action
-from planner_core.referee.contact_flow import flow
+from planner_core.problem.plan import Action, Columns
+from planner_core.referee.contact_flow import flow, flows
 from planner_core.referee.idle_time import Idle, idle_spans
 
 _SAME: Final = 1e-9  # of a capacity
@@ -52,6 +51,11 @@ class Curve(NamedTuple):
     recorded: Floats
     removed: Floats
 
+    def points(self) -> list[Point]:
+        """Return the states one by one."""
+        columns = (column.tolist() for column in self)
+        return [Point(*state) for state in zip(*columns, strict=True)]
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Profile:
@@ -62,18 +66,18 @@ class Profile:
     curve
         Limits need to be tested at its instants only.
     before, after
-        The state in which each action starts, and the one that it leaves.
+        The states in which actions start, and those that they leave.
     idle
         What the satellite does between its actions, in order.
     sun_end
-        The state in which it leaves the sun in each of these spans.
+        The states in which it leaves the sun in each of these spans.
     """
 
     curve: Curve
-    before: tuple[Point, ...]
-    after: tuple[Point, ...]
-    idle: tuple[Idle, ...]
-    sun_end: tuple[Point, ...]
+    before: Curve
+    after: Curve
+    idle: Idle
+    sun_end: Curve
 
 
 def integrate(problem: Problem, satellite: SatelliteProblem, actions: Sequence[Action]) -> Profile:
@@ -92,38 +96,41 @@ def _integrate_physical(
     turns and waiting charge nothing.
     """
     r, horizon_s = satellite.resources, problem.horizon_s
-    rows = np.array([action.opportunity for action in actions], dtype=np.int64)
-    is_contact = problem.opportunities.kind[rows] == CONTACT
-    idle = idle_spans(problem, satellite, actions)
-    contacts = itertools.compress(actions, is_contact.tolist())
-    flows = [flow(problem, satellite, contact) for contact in contacts]
-    pieces = np.concatenate([np.empty((0, 3)), *flows])
-    tasks = np.array([(a.start_s, a.end_s) for a in actions]).reshape(-1, 2)
-    sunlit = np.array((satellite.sunlight.enter_s, satellite.sunlight.exit_s)).T.copy()
-    at_sun = np.array([(span.sun_from_s, span.sun_until_s) for span in idle]).reshape(-1, 2)
+    columns = Columns.of(actions)
+    is_contact = problem.opportunities.kind[columns.row] == CONTACT
+    idle = idle_spans(problem, satellite, columns)
+    pieces = flows(problem, satellite, columns.at(is_contact))
     each = _Rates(
         float(r.collect_drain_per_s), float(r.contact_drain_per_s), float(r.idle_drain_per_s),
         float(r.sunpoint_charge_per_s), float(r.telemetry_per_s), float(r.collect_fill_per_s),
     )  # fmt: skip
-    times, power, fill, drain = _rates_over(
-        float(horizon_s), tasks, is_contact, pieces, sunlit, at_sun, each
+    lit = satellite.sunlight
+    spans = [
+        np.column_stack(ends).clip(0.0, horizon_s)
+        for ends in (
+            (columns.start_s, columns.end_s),
+            (pieces[:, 0], pieces[:, 1]),
+            (lit.enter_s, lit.exit_s),
+            (idle.sun_from_s, idle.sun_until_s),
+        )
+    ]
+    # Between these times rates are constant.
+    times = np.unique(np.concatenate([[0.0, horizon_s], *(span.ravel() for span in spans)]))
+    tasks, flowing, sunlit, at_sun = (np.searchsorted(times, span) for span in spans)
+    power, fill, drain = _rates_over(
+        len(times) - 1, tasks, is_contact, flowing, pieces[:, 2].copy(), sunlit, at_sun, each
     )
     held = r.initial_recorder_fraction
     first = (0.0, r.initial_battery_fraction, held, held, 0.0)
     states, at = states_under(times, power, fill, drain, first)
-    starts, stops = at[np.searchsorted(times, tasks).T]
+    starts, stops = at[tasks.T]
     return Profile(
         curve=Curve(*states.T.copy()),
-        before=_points(states[starts]),
-        after=_points(states[stops]),
+        before=Curve(*states[starts].T.copy()),
+        after=Curve(*states[stops].T.copy()),
         idle=idle,
-        sun_end=_points(states[at[np.searchsorted(times, at_sun[:, 1])]]),
+        sun_end=Curve(*states[at[at_sun[:, 1]]].T.copy()),
     )
-
-
-def _points(states: Floats) -> tuple[Point, ...]:
-    """Return the rows as points. Shape ``(n, 5)``."""
-    return tuple(map(Point._make, states.tolist()))
 
 
 class _Rates(NamedTuple):
@@ -139,43 +146,34 @@ class _Rates(NamedTuple):
 
 @kernel
 def _rates_over(
-    horizon_s: float,
-    tasks: Floats,
+    num_pieces: int,
+    tasks: Longs,
     is_contact: Bools,
-    flows: Floats,
-    sunlit: Floats,
-    at_sun: Floats,
+    flowing: Longs,
+    per_s: Floats,
+    sunlit: Longs,
+    at_sun: Longs,
     each: _Rates,
-) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return the times between which rates are constant, and power, fill and drain in each piece.
+) -> tuple[Floats, Floats, Floats]:
+    """Return power, fill and drain in each piece of time.
 
     Parameters
     ----------
-    tasks, sunlit, at_sun
-        Spans, which are cut to the horizon in place. Shape ``(n, 2)`` each.
-    flows
-        The same of contacts, and how fast data comes down in them. Shape ``(n, 3)``.
+    tasks, flowing, sunlit, at_sun
+        Spans of pieces: the first, and the one after the last. Shape ``(n, 2)`` each.
+    per_s
+        How fast data comes down in each span of ``flowing``. Shape ``(n,)``.
     """
-    groups = tasks, flows, sunlit, at_sun
-    ends = np.empty(2 + 2 * (len(tasks) + len(flows) + len(sunlit) + len(at_sun)))
-    ends[0], ends[1] = 0.0, horizon_s
-    at = 2
-    for spans in groups:
-        for i in range(len(spans)):
-            for k in range(2):
-                spans[i, k] = ends[at] = min(max(spans[i, k], 0.0), horizon_s)
-                at += 1
-    times = np.unique(ends)
-    num_collects, num_contacts, drain, num_lit, num_at_sun = np.zeros((5, len(times) - 1))
+    num_collects, num_contacts, drain, num_lit, num_at_sun = np.zeros((5, num_pieces))
     for i in range(len(tasks)):
-        _cover(num_contacts if is_contact[i] else num_collects, times, tasks, i, 1.0)
-    for i in range(len(flows)):
-        _cover(drain, times, flows, i, flows[i, 2])
+        _cover(num_contacts if is_contact[i] else num_collects, tasks, i, 1.0)
+    for i in range(len(flowing)):
+        _cover(drain, flowing, i, per_s[i])
     for i in range(len(sunlit)):
-        _cover(num_lit, times, sunlit, i, 1.0)
+        _cover(num_lit, sunlit, i, 1.0)
     for i in range(len(at_sun)):
-        _cover(num_at_sun, times, at_sun, i, 1.0)
-    power = np.empty(len(times) - 1)
+        _cover(num_at_sun, at_sun, i, 1.0)
+    power = np.empty(num_pieces)
     for piece in range(len(power)):
         collects, contacts = num_collects[piece], num_contacts[piece]
         used = 0.0
@@ -184,25 +182,24 @@ def _rates_over(
         elif num_lit[piece] > 0.0 and num_at_sun[piece] > 0.0:
             used = each.charge
         power[piece] = used - each.idle_drain
-    return times, power, each.telemetry + num_collects * each.fill, drain
+    return power, each.telemetry + num_collects * each.fill, drain
 
 
 @inlined
-def _cover(covered: Floats, times: Floats, spans: Floats, i: int, weight: float) -> None:
-    """Add a weight to each piece between two times that span ``i`` covers.
+def _cover(covered: Floats, spans: Longs, i: int, weight: float) -> None:
+    """Add a weight to each piece of span ``i``.
 
-    All ends of spans are among the times. Only what covers a piece is summed: a difference of
-    running sums would leave roundings where there is nothing.
+    Only what covers a piece is summed: a difference of running sums would leave roundings where
+    there is nothing.
     """
-    first, last = np.searchsorted(times, spans[i, 0]), np.searchsorted(times, spans[i, 1])
-    for piece in range(first, last):
+    for piece in range(spans[i, 0], spans[i, 1]):
         covered[piece] += weight
 
 
 @kernel
 def states_under(
     times: Floats, power: Floats, fill: Floats, drain: Floats, first: _State
-) -> tuple[Floats, npt.NDArray[np.int64]]:
+) -> tuple[Floats, Longs]:
     """Return the states under the rates of each piece, and which of them stands at each time."""
     states = np.empty((_STATES_IN_PIECE * len(times), 5))
     at = np.empty(len(times), dtype=np.int64)
@@ -278,15 +275,19 @@ def _integrate_events(
             telemetry = 0.0
         previous_sunlit_s = float(sunlit_s[event])
         points.append(point)
-    idle = idle_spans(problem, satellite, actions)
+    idle = idle_spans(problem, satellite, Columns.of(actions))
     level_at = {action.start_s: level for action, level in zip(actions, before, strict=True)}
     return Profile(
-        curve=Curve(*np.array(points).T.copy()),
-        before=tuple(before),
-        after=tuple(after),
+        curve=_curve(points),
+        before=_curve(before),
+        after=_curve(after),
         idle=idle,
-        sun_end=tuple(level_at.get(span.end_s, point) for span in idle),
+        sun_end=_curve([level_at.get(end_s, point) for end_s in idle.end_s.tolist()]),
     )
+
+
+def _curve(points: Sequence[Point]) -> Curve:
+    return Curve(*np.array(points).reshape(-1, 5).T.copy())
 
 
 def _book(

@@ -5,10 +5,12 @@ from __future__ import annotations
 import heapq
 from collections.abc import Sequence
 
+import numpy as np
+
 from planner_core.problem import COLLECT, CONTACT, Problem
-from planner_core.problem.plan import Action, Plan
+from planner_core.problem.plan import Action, Columns, Plan
 from planner_core.problem.slew import TIME_TOLERANCE_S
-from planner_core.referee.sight import turn_from_start, turns_between
+from planner_core.referee.sight import are_in_time, turn_from_start, turns_between
 from planner_core.referee.timeline import Slew, Violation, ViolationCode
 
 
@@ -16,14 +18,13 @@ def windows(problem: Problem, plan: Plan) -> list[Violation]:
     """Each action lies in its access and in the horizon, and has its opportunity's length."""
     table = problem.opportunities
     found = []
-    for position, action in enumerate(plan.actions):
+    for position in _outside(problem, plan):
+        action = plan.actions[position]
         i = action.opportunity
         first_s = max(0.0, float(table.access_start_s[i]))
         last_s = min(problem.horizon_s, float(table.access_end_s[i]))
         early_s, late_s = first_s - action.start_s, action.end_s - last_s
         length_s = float(table.end_s[i] - table.start_s[i])
-        is_own_start = problem.continuous_starts and table.kind[i] == COLLECT
-        shift_s = abs(action.start_s - float(table.start_s[i]))
         if early_s > TIME_TOLERANCE_S:
             at_s, needed, available = action.start_s, first_s, action.start_s
             detail = f"It starts {early_s:.3f} s before its access."
@@ -33,11 +34,9 @@ def windows(problem: Problem, plan: Plan) -> list[Violation]:
         elif abs(action.end_s - action.start_s - length_s) > TIME_TOLERANCE_S:
             at_s, needed, available = action.start_s, length_s, action.end_s - action.start_s
             detail = f"It lasts {available:.3f} s instead of {length_s:.3f} s."
-        elif shift_s > TIME_TOLERANCE_S and not is_own_start:
+        else:
             at_s, needed, available = action.start_s, float(table.start_s[i]), action.start_s
             detail = "It is not one of the scenario's opportunities."
-        else:
-            continue
         found.append(
             Violation(code="window", satellite=int(table.satellite[i]), at_s=at_s, needed=needed,
                       available=available, detail=detail, blamed=(position,))
@@ -45,18 +44,59 @@ def windows(problem: Problem, plan: Plan) -> list[Violation]:
     return found
 
 
-def turns(
-    problem: Problem, plan: Plan, index: int, positions: Sequence[int]
-) -> tuple[list[Violation], dict[int, Slew | None]]:
+def _outside(problem: Problem, plan: Plan) -> list[int]:
+    """Return the positions of actions that do not keep to their opportunity."""
+    table, columns = problem.opportunities, Columns.of(plan.actions)
+    row, start_s, end_s = columns.row, columns.start_s, columns.end_s
+    first_s = np.maximum(table.access_start_s[row], 0.0)
+    last_s = np.minimum(table.access_end_s[row], problem.horizon_s)
+    longer_s = end_s - start_s - (table.end_s[row] - table.start_s[row])
+    shift_s = np.abs(start_s - table.start_s[row])
+    if problem.continuous_starts:
+        shift_s[table.kind[row] == COLLECT] = 0.0
+    off_s = np.max([first_s - start_s, end_s - last_s, np.abs(longer_s), shift_s], axis=0)
+    return np.flatnonzero(off_s > TIME_TOLERANCE_S).tolist()
+
+
+def turns(problem: Problem, plan: Plan, index: int, positions: Sequence[int]) -> list[Violation]:
     """Tasks of one satellite neither overlap nor follow faster than it turns: C(a, b)."""
-    found: list[Violation] = []
-    slews: dict[int, Slew | None] = {}
-    previous: Action | None = None
-    busy_until: Action | None = None
     actions = [plan.actions[position] for position in positions]
-    between = [(0.0, 0.0), *turns_between(problem, index, actions)][: len(actions)]
-    for position, action, (angle_deg, needed_s) in zip(positions, actions, between, strict=True):
-        slews[position] = first = _first_slew(problem, index, action)
+    found = _first_turns(problem, index, actions, positions)
+    columns = Columns.of(actions)
+    before, after = columns.at(slice(-1)), columns.at(slice(1, None))
+    gap_s = after.start_s - np.maximum.accumulate(before.end_s)
+    available_s = after.start_s - before.end_s
+    is_late = ~are_in_time(problem, index, before, after) | (gap_s < -TIME_TOLERANCE_S)
+    late = np.flatnonzero(is_late)
+    if not len(late):
+        return found
+    turned = turns_between(problem, index, before.at(late), after.at(late))
+    for i, (angle_deg, needed_s) in zip(late.tolist(), turned, strict=True):
+        code: ViolationCode
+        if gap_s[i] < -TIME_TOLERANCE_S:
+            code, needed, available = "overlap", 0.0, float(gap_s[i])
+            detail = f"It starts {-available:.3f} s before the task ahead of it ends."
+        elif available_s[i] < needed_s - TIME_TOLERANCE_S:
+            code, needed, available = "slew", needed_s, float(available_s[i])
+            detail = f"The turn of {angle_deg:.2f} deg takes {needed_s:.3f} s."
+        else:
+            continue
+        found.append(
+            Violation(code=code, satellite=index, at_s=float(after.start_s[i]), needed=needed,
+                      available=available, detail=detail, blamed=(positions[i + 1],))
+        )  # fmt: skip
+    return found
+
+
+def _first_turns(
+    problem: Problem, index: int, actions: Sequence[Action], positions: Sequence[int]
+) -> list[Violation]:
+    """No task begins before its satellite can have turned to it from where it looked at first."""
+    found: list[Violation] = []
+    if problem.satellites[index].heading is None:
+        return found
+    for position, action in zip(positions, actions, strict=True):
+        first = _first_slew(problem, index, action)
         if first is not None and first.available_s < first.needed_s - TIME_TOLERANCE_S:
             detail = (
                 f"The turn of {first.angle_deg:.2f} deg from where it looked at the start takes "
@@ -67,26 +107,22 @@ def turns(
                           needed=first.needed_s, available=first.available_s, detail=detail,
                           blamed=(position,))
             )  # fmt: skip
-        if previous is not None and busy_until is not None:
-            available_s = action.start_s - previous.end_s
-            slews[position] = Slew(angle_deg=angle_deg, needed_s=needed_s, available_s=available_s)
-            gap_s = action.start_s - busy_until.end_s
-            code: ViolationCode | None = None
-            if gap_s < -TIME_TOLERANCE_S:
-                code, needed, available = "overlap", 0.0, gap_s
-                detail = f"It starts {-gap_s:.3f} s before the task ahead of it ends."
-            elif available_s < needed_s - TIME_TOLERANCE_S:
-                code, needed, available = "slew", needed_s, available_s
-                detail = f"The turn of {angle_deg:.2f} deg takes {needed_s:.3f} s."
-            if code is not None:
-                found.append(
-                    Violation(code=code, satellite=index, at_s=action.start_s, needed=needed,
-                              available=available, detail=detail, blamed=(position,))
-                )  # fmt: skip
-        previous = action
-        if busy_until is None or action.end_s > busy_until.end_s:
-            busy_until = action
-    return found, slews
+    return found
+
+
+def slews(problem: Problem, index: int, actions: Sequence[Action]) -> list[Slew | None]:
+    """Return the turn before each action of a satellite, in order; of the first where known."""
+    columns = Columns.of(actions)
+    before, after = columns.at(slice(-1)), columns.at(slice(1, None))
+    turned = turns_between(problem, index, before, after)
+    available_s = (after.start_s - before.end_s).tolist()
+    return [
+        *(_first_slew(problem, index, action) for action in actions[:1]),
+        *(
+            Slew(angle_deg=angle_deg, needed_s=needed_s, available_s=room_s)
+            for (angle_deg, needed_s), room_s in zip(turned, available_s, strict=True)
+        ),
+    ]
 
 
 def _first_slew(problem: Problem, index: int, action: Action) -> Slew | None:

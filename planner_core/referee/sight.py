@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Sequence
-
 import numpy as np
 
 from planner_core.jit import kernel
-from planner_core.problem import Floats, Problem, line_of_sight
+from planner_core.problem import Bools, Floats, Problem, line_of_sight
 from planner_core.problem.moving import moving_turn_s, rotation_deg, turns_in
-from planner_core.problem.plan import Action
+from planner_core.problem.plan import Action, Columns
 from planner_core.problem.slew import (
     INSTANT,
     TIME_TOLERANCE_S,
@@ -23,39 +20,81 @@ from planner_core.problem.sun_turns import angle_to_sun_deg, sun_turn_s
 _Triple = tuple[float, float, float]
 
 
-def lines_of_sight(
-    problem: Problem, actions: Sequence[Action], *, is_end: bool
-) -> tuple[Floats, Floats]:
+def lines_of_sight(problem: Problem, actions: Columns, *, is_end: bool) -> tuple[Floats, Floats]:
     """Return lines of sight at starts or ends of actions, and how they move; ``(n, 3)`` each."""
     table = problem.opportunities
-    rows = np.array([action.opportunity for action in actions], dtype=np.int64)
+    rows = actions.row
     if is_end:
-        at_s, known_s = [action.end_s for action in actions], table.end_s[rows]
+        at_s, known_s = actions.end_s, table.end_s[rows]
         lines, rates = table.los_end[rows], table.los_rate_end[rows]
     else:
-        at_s, known_s = [action.start_s for action in actions], table.start_s[rows]
+        at_s, known_s = actions.start_s, table.start_s[rows]
         lines, rates = table.los_start[rows], table.los_rate_start[rows]
     lines = lines.astype(np.float64)
-    for own in np.flatnonzero(np.abs(np.array(at_s) - known_s) > TIME_TOLERANCE_S).tolist():
-        lines[own] = line_of_sight(problem, int(rows[own]), at_s[own])
+    for own in np.flatnonzero(np.abs(at_s - known_s) > TIME_TOLERANCE_S).tolist():
+        lines[own] = line_of_sight(problem, int(rows[own]), float(at_s[own]))
     return lines, rates.astype(np.float64)
 
 
-def turns_between(
-    problem: Problem, index: int, actions: Sequence[Action]
-) -> list[tuple[float, float]]:
-    """Return angle (deg) and time (s, settling included) of a satellite's turns, one after another.
+def are_in_time(problem: Problem, index: int, before: Columns, after: Columns) -> Bools:
+    """Return which turns of a satellite surely fit between the actions that they lead between.
 
-    Parameters
-    ----------
-    actions
-        Of the satellite, in order: a turn leads from each to the next.
+    The least time of a turn is found by halving. Whether it fits is one step of that.
     """
-    if len(actions) < 2:
-        return []
+    lines_from, moved = lines_of_sight(problem, before, is_end=True)
+    lines_to, moves = lines_of_sight(problem, after, is_end=False)
     agility = problem.satellites[index].agility
-    lines_from, moved = lines_of_sight(problem, actions[:-1], is_end=True)
-    lines_to, moves = lines_of_sight(problem, actions[1:], is_end=False)
+    if not agility.tracks:
+        moved = moves = moves[:0]
+    return _fit(
+        lines_from,
+        lines_to,
+        moved,
+        moves,
+        after.start_s - before.end_s,
+        float(agility.settle_s),
+        float(agility.slew_rate_deg_s),
+        float(agility.acceleration_deg_s2 or INSTANT),
+    )
+
+
+@kernel
+def _fit(
+    lines_from: Floats,
+    lines_to: Floats,
+    rates_from: Floats,
+    rates_to: Floats,
+    available_s: Floats,
+    settle_s: float,
+    rate_deg_s: float,
+    acceleration_deg_s2: float,
+) -> Bools:
+    """Return which turns fit; without rates at their ends from rest to rest."""
+    fits = np.empty(len(available_s), dtype=np.bool_)
+    for i in range(len(available_s)):
+        u = lines_from[i, 0], lines_from[i, 1], lines_from[i, 2]
+        v = lines_to[i, 0], lines_to[i, 1], lines_to[i, 2]
+        if len(rates_from) == 0:
+            turn_s = slew_s(angle_between_deg(u, v), rate_deg_s, acceleration_deg_s2)
+            fits[i] = turn_s + settle_s <= available_s[i]
+            continue
+        rate_from = rates_from[i, 0], rates_from[i, 1], rates_from[i, 2]
+        rate_to = rates_to[i, 0], rates_to[i, 1], rates_to[i, 2]
+        turn, room_s = rotation_deg(u, v), available_s[i] - settle_s + TIME_TOLERANCE_S
+        fits[i] = turns_in(room_s, turn, rate_from, rate_to, rate_deg_s, acceleration_deg_s2)
+    return fits
+
+
+def turns_between(
+    problem: Problem, index: int, before: Columns, after: Columns
+) -> list[tuple[float, float]]:
+    """Return angle (deg) and time (s, settling included) of a satellite's turns.
+
+    Each leads from the end of one action to the start of another.
+    """
+    agility = problem.satellites[index].agility
+    lines_from, moved = lines_of_sight(problem, before, is_end=True)
+    lines_to, moves = lines_of_sight(problem, after, is_end=False)
     if not agility.tracks:
         moved = moves = moves[:0]
     angles_deg, needed_s = _turns(
@@ -63,7 +102,7 @@ def turns_between(
         lines_to,
         moved,
         moves,
-        np.array([b.start_s - a.end_s for a, b in itertools.pairwise(actions)]),
+        after.start_s - before.end_s,
         float(agility.settle_s),
         float(agility.slew_rate_deg_s),
         float(agility.acceleration_deg_s2 or INSTANT),
@@ -115,7 +154,7 @@ def turn_from_start(problem: Problem, index: int, action: Action) -> tuple[float
     heading, agility = satellite.heading, satellite.agility
     if heading is None:
         return None
-    lines, rates = lines_of_sight(problem, [action], is_end=False)
+    lines, rates = lines_of_sight(problem, Columns.of([action]), is_end=False)
     v, moving = lines[0], _triple(rates[0])
     if heading.line_of_sight is None:
         x, y, z = moving

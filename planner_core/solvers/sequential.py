@@ -115,18 +115,18 @@ def blocked_rows(problem: Problem, satellite: SatelliteProblem, taken: list[int]
     elsewhere = set(problem.kept_rows.tolist())
     if elsewhere:
         elsewhere -= set(satellite.rows.tolist())
-    booked: Ints = np.array(
-        sorted(i for i in elsewhere.union(taken) if table.kind[i] == CONTACT), dtype=np.int32
-    )
+    booked: Ints = np.array(list(elsewhere.union(taken)), dtype=np.int32)
+    booked = booked[table.kind[booked] == CONTACT]
     if len(booked) == 0:
         return blocked
-    own = np.flatnonzero(satellite.kind == CONTACT)
-    station = satellite.place[own]
-    overlaps = (
-        (table.place[booked] == station[:, None])
-        & (table.start_s[booked] < satellite.end_s[own][:, None])
-        & (table.end_s[booked] > satellite.start_s[own][:, None])
-    )
-    blocked[own] = np.count_nonzero(overlaps, axis=1) >= problem.station_antennas[station]
+    for station in np.unique(table.place[booked]):
+        there = booked[table.place[booked] == station]
+        own = np.flatnonzero((satellite.kind == CONTACT) & (satellite.place == station))
+        # Those that have begun before the end, without those that end before the start.
+        num_busy = np.searchsorted(np.sort(table.start_s[there]), satellite.end_s[own])
+        num_busy -= np.searchsorted(
+            np.sort(table.end_s[there]), satellite.start_s[own], side="right"
+        )
+        blocked[own] = num_busy >= problem.station_antennas[station]
     blocked[problem.kept_local(satellite)] = 0
     return blocked

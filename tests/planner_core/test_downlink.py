@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -10,7 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from planner_core.access.passes import Passes, _place_parts, passes_of
 from planner_core.access.scenario_opportunities import compute_opportunities
+from planner_core.access.windows import Accesses
 from planner_core.budget import Budget
 from planner_core.build import build_problem
 from planner_core.certified.proofs.resource_bound import quick_bound, resource_value
@@ -19,6 +22,8 @@ from planner_core.domain import Dynamics, GroundStation, Resources, Scenario, Ta
 from planner_core.errors import InvalidScenario
 from planner_core.mdp.resource_columns import STRICT, take
 from planner_core.mdp.track import NO_TASK, compile_track
+from planner_core.orbits.ephemeris import propagate
+from planner_core.orbits.places import Places, azimuth_elevation_deg
 from planner_core.pins import PinnedAction, Pins
 from planner_core.problem import (
     COLLECT,
@@ -27,6 +32,7 @@ from planner_core.problem import (
     Downlinks,
     Opportunities,
     PassRate,
+    PassRates,
     Problem,
     StationLinks,
 )
@@ -132,6 +138,107 @@ def test_an_amount_is_down_when_the_pass_says_so_and_not_before(seed: int) -> No
     later = when_s > time_s[0]
     before_s = np.maximum(when_s[later] - 0.01, time_s[0])
     assert np.all(rate.until(before_s) < amount[later])
+
+
+def _drawn_rate(rng: np.random.Generator) -> PassRate:
+    start_s, length_s = round(float(rng.uniform(0.0, 900.0)), 3), float(rng.uniform(0.5, 600.0))
+    num = int(rng.integers(2, 40))
+    # Nothing comes down between two instants without a rate.
+    per_s = rng.uniform(0.0, 1.0, num) * (rng.random(num) > 0.2)
+    return PassRate(time_s=np.linspace(start_s, start_s + length_s, num), per_s=per_s)
+
+
+@given(seed=SEEDS)
+def test_many_passes_at_once_say_what_each_says(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    each = [_drawn_rate(rng) for _ in range(rng.integers(0, 6))]
+    joined = PassRates.joined(each)
+    which = rng.integers(0, len(each), 30) if each else np.empty(0, dtype=np.int64)
+    t_s = np.array([rng.uniform(each[i].time_s[0] - 5.0, each[i].time_s[-1] + 5.0) for i in which])
+    down = [float(each[i].until(t)[0]) for i, t in zip(which, t_s[:, None], strict=True)]
+    assert joined.until(which, t_s).tolist() == down
+    when_s = [float(each[i].when(np.array([d]))[0]) for i, d in zip(which, down, strict=True)]
+    assert joined.when(which, np.array(down)).tolist() == when_s
+    assert [one.time_s.tolist() for one in joined.each()] == [one.time_s.tolist() for one in each]
+    assert [one.per_s.tolist() for one in joined.each()] == [one.per_s.tolist() for one in each]
+
+
+def _part_ms(rate: PassRate, culmination_s: float, setup_s: float, share: float) -> tuple[int, int]:
+    first_s = float(rate.time_s[0]) + setup_s
+    edges = rate.until(np.array([first_s, max(first_s, culmination_s), rate.time_s[-1]]))
+    first, top, last = edges.tolist()
+    cut_s = rate.when(np.array([top - share * (top - first), top + share * (last - top)]))
+    start_s = max(float(cut_s[0]) - setup_s, float(rate.time_s[0]))
+    return math.ceil(start_s * 1000), math.floor(float(cut_s[1]) * 1000)
+
+
+def _halves_ms(rate: PassRate, setup_s: float) -> list[tuple[int, int]]:
+    begin_s, end_s = float(rate.time_s[0]) + 2.0, float(rate.time_s[-1])
+    first, last = rate.until(np.array([begin_s + setup_s, end_s])).tolist()
+    middle_s = float(rate.when(np.array([0.5 * (first + last)]))[0])
+    if middle_s - setup_s < begin_s + 2.0:
+        return []
+    spans_s = (begin_s, middle_s), (middle_s - setup_s, end_s)
+    return [(math.ceil(a * 1000), math.floor(b * 1000)) for a, b in spans_s]
+
+
+@given(seed=SEEDS, has_parts=st.booleans(), has_halves=st.booleans())
+def test_parts_of_many_passes_are_those_of_each(
+    seed: int, has_parts: bool, has_halves: bool
+) -> None:
+    rng = np.random.default_rng(seed)
+    stations = [
+        replace(SVALBARD, setup_s=0.0, min_contact_s=20.0),
+        replace(TROLL, setup_s=float(rng.uniform(0.0, 90.0)), min_contact_s=0.001),
+    ]
+    rates = [_drawn_rate(rng) for _ in range(rng.integers(0, 8))]
+    ends_s = np.array([(rate.time_s[0], rate.time_s[-1]) for rate in rates]).reshape(-1, 2)
+    nothing = np.zeros(len(rates), dtype=np.bool_)
+    place = rng.integers(0, 2, len(rates)).astype(np.int32)
+    accesses = Accesses(place=place, start_s=ends_s[:, 0], end_s=ends_s[:, 1],
+                        starts_cut=nothing, ends_cut=nothing)  # fmt: skip
+    top_s = rng.uniform(ends_s[:, 0], ends_s[:, 1])
+    passes = Passes(PassRates.joined(rates), top_s)
+    placed = _place_parts(accesses, stations, passes, has_parts=has_parts, has_halves=has_halves)
+    wanted = set[tuple[int, int, int, bool]]()
+    whole = {int(row) for row, _, _ in zip(*placed.placed, strict=True)}
+    for row in whole:
+        station = stations[place[row]]
+        spans = [(*(round(s * 1000) for s in ends_s[row].tolist()), False)]
+        parts = [_part_ms(rates[row], top_s[row], station.setup_s, s) for s in (0.3, 0.6)]
+        halves = _halves_ms(rates[row], station.setup_s)
+        offered = [(*one, False) for one in parts * has_parts]
+        offered += [(*one, True) for one in halves * has_halves]
+        shortest_ms = max(1.0, station.min_contact_s * 1000 - 1e-3)
+        spans += [one for one in offered if one[1] - one[0] >= shortest_ms]
+        wanted |= {(row, *span) for span in spans}
+    found = zip(*(column.tolist() for column in (*placed.placed, placed.is_half)), strict=True)
+    assert set(found) == wanted
+
+
+def test_passes_of_a_satellite_are_sampled_as_each_alone() -> None:
+    scenario = _mission()
+    path = propagate(scenario.satellites[0], scenario.horizon)
+    places = Places.of(scenario.ground_stations)
+    table = compute_opportunities(scenario, Budget()).opportunities
+    rows = np.flatnonzero(table.kind == CONTACT)
+    nothing = np.zeros(len(rows), dtype=np.bool_)
+    accesses = Accesses(place=table.place[rows], start_s=table.access_start_s[rows],
+                        end_s=table.access_end_s[rows], starts_cut=nothing,
+                        ends_cut=nothing)  # fmt: skip
+    passes = passes_of(BY_ELEVATION, scenario.ground_stations, path, places, accesses)
+    assert len(rows) > 0
+    for row, rate in enumerate(passes.rates.each()):
+        station = int(accesses.place[row])
+        start_s, end_s = accesses.start_s[row], accesses.end_s[row]
+        time_s = np.linspace(start_s, end_s, max(2, math.ceil((end_s - start_s) / 4.0) + 1))
+        _, height_deg = azimuth_elevation_deg(
+            path, places.at(np.full(len(time_s), station)), time_s
+        )
+        gain = scenario.ground_stations[station].downlink_gain
+        assert (rate.time_s == time_s).all()
+        assert (rate.per_s == gain * BY_ELEVATION.downlink_at(height_deg)).all()
+        assert passes.culmination_s[row] == time_s[np.argmax(height_deg)]
 
 
 @pytest.mark.parametrize("dynamics", ["physical", "paper"])

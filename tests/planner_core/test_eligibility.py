@@ -13,7 +13,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner_core.access.scenario_opportunities import ScenarioOpportunities, compute_opportunities
+from planner_core.access.scenario_opportunities import (
+    _REASONS,
+    ScenarioOpportunities,
+    compute_opportunities,
+)
 from planner_core.budget import Budget
 from planner_core.build import build_problem
 from planner_core.domain import Scenario, Sensor, Target
@@ -240,6 +244,28 @@ def test_a_target_that_may_not_be_imaged_has_its_proven_reason(
     if words:
         assert (outcome.reason.code, outcome.reason.certainty) == ("no_access", "proven")
         assert words in outcome.reason.detail
+
+
+def test_of_several_satellites_the_reason_is_the_one_nearest_to_a_collect() -> None:
+    low = low_and_typed()
+    polar = satellite(orbit(), name="polar", sensor=Sensor(sensor_type="infrared"))
+    kinds: list[dict[str, Any]] = [
+        {"sensor_type": sensor_type, "lat_deg": lat_deg, "lon_deg": lon_deg, **more}
+        for sensor_type in (None, "visible", "infrared")
+        for lat_deg in (0.5, 20.0, 60.0, 89.0)
+        for lon_deg in (0.0, 120.0)
+        for more in ({}, {"collect_s": 3000.0}, {"due": at(-86400.0)})
+    ]
+    targets = tuple(target(**{**kind, "id": f"t{i}"}) for i, kind in enumerate(kinds))
+    both = replace(low, satellites=(*low.satellites, polar), targets=targets)
+    found = compute_opportunities(both, Budget()).target_access
+    each = [
+        compute_opportunities(replace(both, satellites=(one,)), Budget()).target_access.tolist()
+        for one in both.satellites
+    ]
+    nearest_first = _REASONS.tolist()[::-1]
+    assert found.tolist() == [min(one, key=nearest_first.index) for one in zip(*each, strict=True)]
+    assert len(set(found.tolist())) > 4
 
 
 def test_a_grid_that_no_access_meets_is_said_so() -> None:

@@ -19,7 +19,7 @@ from planner_core.errors import InvalidScenario
 from planner_core.precedence.relation import is_transitive_on
 from planner_core.problem import may_follow
 from planner_core.problem.moving import longest_turn_s, moving_turn_s, rotation_deg, turns_in
-from planner_core.problem.plan import Plan
+from planner_core.problem.plan import Columns, Plan
 from planner_core.problem.slew import slew_s
 from planner_core.problem.sun_turns import sun_turns
 from planner_core.referee.idle_time import idle_spans
@@ -139,9 +139,9 @@ def test_turns_to_the_sun_and_back_are_those_of_the_referee(seed: int) -> None:
     )  # fmt: skip
     problem = replace(problem, opportunities=table)
     for k, row in enumerate(own.rows.tolist()):
-        spans = idle_spans(problem, own, Plan.of(problem, (row,)).actions)
-        before = [span.turn_back_s for span in spans if span.end_s <= own.start_s[k]]
-        after = [span.turn_to_s for span in spans if span.start_s >= own.end_s[k]]
+        spans = idle_spans(problem, own, Columns.of(Plan.of(problem, (row,)).actions))
+        before = spans.turn_back_s[spans.end_s <= own.start_s[k]].tolist()
+        after = spans.turn_to_s[spans.start_s >= own.end_s[k]].tolist()
         assert before == pytest.approx([turns.back_s[k]] * len(before))
         assert after == pytest.approx([turns.out_s[k]] * len(after))
         assert after

@@ -120,11 +120,12 @@ def _best_of_gaps(view: View) -> list[int]:
     for index, satellite in enumerate(view.problem.satellites):
         is_own = table.satellite[taken] == index
         # Tasks of others matter where they hold an antenna.
-        beside = taken[is_own | is_contact].tolist()
+        beside = np.append(taken[is_own | is_contact], np.array(chosen, dtype=np.int32))
         for rows in _by_gap(view, satellite, taken[is_own]):
             for row in rows:
-                if not conflicts(view.problem, row, [*beside, *chosen]):
+                if not conflicts(view.problem, row, beside):
                     chosen.append(row)
+                    beside = np.append(beside, row)
                     break
     return chosen
 

@@ -35,6 +35,8 @@ class ResourceWindows:
         self._turn = 0
         is_locked = _locked_targets(problem)
         table = problem.opportunities
+        self._contacts = np.flatnonzero(table.kind == CONTACT)
+        self._shut_by, self._is_shut = self._contacts[:0], dict[int, Bools]()
         self._grounds = [
             Ground(
                 network=strict_network_of(problem, satellite),
@@ -108,12 +110,19 @@ class ResourceWindows:
             )  # fmt: skip
 
     def _shut(self, index: int) -> Bools:
-        """Return the tasks of a satellite whose antenna another one holds."""
-        table = self._problem.opportunities
-        others = self._taken.is_taken & (table.satellite != index) & (table.kind == CONTACT)
-        taken = [int(row) for row in np.flatnonzero(others)]
-        shut: Bools = blocked_rows(self._problem, self._problem.satellites[index], taken) != 0
-        return shut
+        """Return the tasks of a satellite whose antenna another one holds.
+
+        A polish moves no contact: while they stay, so does what they shut.
+        """
+        taken = self._contacts[self._taken.is_taken[self._contacts]]
+        if not np.array_equal(taken, self._shut_by):
+            self._shut_by, self._is_shut = taken, {}
+        if index not in self._is_shut:
+            satellite = self._problem.satellites[index]
+            others = taken[self._problem.opportunities.satellite[taken] != index]
+            blocked = blocked_rows(self._problem, satellite, others.tolist())
+            self._is_shut[index] = blocked != 0
+        return self._is_shut[index]
 
     @property
     def plan(self) -> Plan:

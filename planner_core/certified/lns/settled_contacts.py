@@ -45,7 +45,7 @@ def worth_with(
     """
     table = problem.opportunities
     down_s = np.full(len(table), np.inf)
-    taken = np.zeros(0, dtype=np.int64)
+    taken, every = np.zeros(0, dtype=np.int64), np.array(contacts, dtype=np.int32)
     if plan is not None:
         verdict = verdict or replay(problem, plan, in_detail=False)
         images = verdict.collected.values()
@@ -54,7 +54,7 @@ def worth_with(
     for index, satellite in enumerate(problem.satellites):
         own = satellite.rows[satellite.kind == COLLECT]
         queue = taken[table.satellite[taken] == index]
-        passes = np.array([c for c in contacts if table.satellite[c] == index], dtype=np.int32)
+        passes = every[table.satellite[every] == index]
         free = own[np.isin(own, queue, invert=True)]
         down_s[free] = _down_s(problem, passes, queue, down_s[queue], free)
     age_s = down_s - table.end_s

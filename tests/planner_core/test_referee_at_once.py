@@ -1,0 +1,193 @@
+"""What the referee works out for all actions at once, against loops that do it one by one."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from planner_core.problem import CONTACT, Heading, Problem
+from planner_core.problem.plan import Action, Columns, Plan
+from planner_core.problem.slew import TIME_TOLERANCE_S
+from planner_core.problem.sun_turns import sun_turns
+from planner_core.referee.contact_flow import flow, flows
+from planner_core.referee.idle_time import idle_spans
+from planner_core.referee.replay import replay
+from planner_core.referee.rules import slews, turns, windows
+from planner_core.referee.sight import lines_of_sight
+from planner_core.solvers.sequential import blocked_rows
+from tests.planner_core.problems import random_problem, sunny_problem
+from tests.planner_core.test_downlink import passes_problem
+
+SEEDS = st.integers(0, 10**6)
+
+
+def _drawn_plan(problem: Problem, rng: np.random.Generator) -> Plan:
+    """Return actions that overlap, follow each other too soon, or stand beside their window."""
+    rows = np.flatnonzero(rng.random(len(problem.opportunities)) < rng.choice([0.2, 0.5, 0.9]))
+    actions = []
+    for action in Plan.of(problem, rows.tolist()).actions:
+        early_s, late_s = rng.choice([0.0, 1e-7, 0.5, -40.0], 2, p=[0.7, 0.1, 0.1, 0.1])
+        actions.append(Action(action.start_s - early_s, action.end_s + late_s, action.opportunity))
+    return Plan(tuple(actions))
+
+
+def _own(problem: Problem, plan: Plan, index: int) -> list[int]:
+    satellite = problem.opportunities.satellite
+    own = [p for p, a in enumerate(plan.actions) if satellite[a.opportunity] == index]
+    return sorted(own, key=plan.actions.__getitem__)
+
+
+@given(seed=SEEDS, is_moving=st.booleans())
+def test_turns_are_judged_as_one_after_another(seed: int, is_moving: bool) -> None:
+    problem = sunny_problem(seed, num_satellites=2, is_moving=is_moving)
+    plan = _drawn_plan(problem, np.random.default_rng(seed))
+    for index in range(2):
+        positions = _own(problem, plan, index)
+        actions = [plan.actions[p] for p in positions]
+        wanted = []
+        busy_until_s = -np.inf
+        turned = slews(problem, index, actions)
+        for position, action, slew in zip(positions, actions, turned, strict=True):
+            gap_s = action.start_s - busy_until_s
+            if gap_s < -TIME_TOLERANCE_S:
+                wanted.append(("overlap", position, 0.0, gap_s))
+            elif slew is not None and slew.available_s < slew.needed_s - TIME_TOLERANCE_S:
+                wanted.append(("slew", position, slew.needed_s, slew.available_s))
+            busy_until_s = max(busy_until_s, action.end_s)
+        found = turns(problem, plan, index, positions)
+        assert [(v.code, *v.blamed, v.needed, v.available) for v in found] == wanted
+
+
+@given(seed=SEEDS)
+def test_windows_are_judged_as_one_by_one(seed: int) -> None:
+    problem = random_problem(seed, num_satellites=2, num_contacts=4)
+    problem = replace(problem, continuous_starts=bool(seed % 2))
+    plan = _drawn_plan(problem, np.random.default_rng(seed))
+    table = problem.opportunities
+    wanted = []
+    for position, a in enumerate(plan.actions):
+        row = a.opportunity
+        is_early = max(0.0, table.access_start_s[row]) - a.start_s > TIME_TOLERANCE_S
+        is_late = a.end_s - min(problem.horizon_s, table.access_end_s[row]) > TIME_TOLERANCE_S
+        length_s = table.end_s[row] - table.start_s[row]
+        is_longer = abs(a.end_s - a.start_s - length_s) > TIME_TOLERANCE_S
+        is_free = problem.continuous_starts and table.kind[row] != CONTACT
+        is_moved = not is_free and abs(a.start_s - table.start_s[row]) > TIME_TOLERANCE_S
+        if is_early or is_late or is_longer or is_moved:
+            wanted.append(position)
+    assert [position for v in windows(problem, plan) for position in v.blamed] == wanted
+
+
+def _idle_one_by_one(
+    problem: Problem, actions: Sequence[Action], first_turn_s: float
+) -> list[tuple[float, ...]]:
+    satellite, columns = problem.satellites[0], Columns.of(actions)
+    looks, moves = lines_of_sight(problem, columns, is_end=False)
+    looked, moved = lines_of_sight(problem, columns, is_end=True)
+    turned = sun_turns(
+        satellite.resources, satellite.agility, satellite.sun, start_s=columns.start_s,
+        end_s=columns.end_s, looks=looks, looked=looked, moves=moves, moved=moved,
+    )  # fmt: skip
+    spans: list[tuple[float, ...]] = []
+    free_from_s, turn_to_s = 0.0, first_turn_s
+    for after, out_s, back_s in zip(
+        (*actions, None), (*turned.out_s.tolist(), 0.0), (*turned.back_s.tolist(), 0.0), strict=True
+    ):
+        until_s = problem.horizon_s if after is None else after.start_s
+        if until_s > free_from_s + TIME_TOLERANCE_S:
+            sun_from_s = free_from_s + turn_to_s
+            sun_until_s = max(sun_from_s, until_s - back_s)
+            spans.append((free_from_s, until_s, sun_from_s, sun_until_s, turn_to_s, back_s))
+        if after is not None and after.end_s > free_from_s:
+            free_from_s, turn_to_s = after.end_s, out_s
+    return spans
+
+
+@given(seed=SEEDS, is_moving=st.booleans())
+def test_idle_time_is_that_of_a_walk_and_turns_that_are_remembered_stay(
+    seed: int, is_moving: bool
+) -> None:
+    problem = sunny_problem(seed, is_moving=is_moving)
+    rng = np.random.default_rng(seed)
+    for _ in range(4):
+        plan = _drawn_plan(problem, rng)
+        actions = sorted(plan.actions)
+        spans = idle_spans(problem, problem.satellites[0], Columns.of(actions))
+        found = list(zip(*(column.tolist() for column in spans), strict=True))
+        assert found == _idle_one_by_one(problem, actions, 0.0)
+
+
+def test_idle_time_begins_with_a_turn_from_where_the_satellite_looked() -> None:
+    problem = sunny_problem(1)
+    heading = Heading(free_from_s=0.0, line_of_sight=(1.0, 0.0, 0.0))
+    turned = replace(problem.satellites[0], heading=heading)
+    spans = idle_spans(problem, turned, Columns.of([]))
+    assert len(spans.start_s) == 1
+    assert spans.turn_to_s[0] == spans.sun_from_s[0] > 0.0
+
+
+@given(seed=SEEDS)
+def test_many_contacts_flow_as_each_does(seed: int) -> None:
+    problem = passes_problem(seed)
+    table, rng = problem.opportunities, np.random.default_rng(seed)
+    contacts = [
+        action
+        for action in _drawn_plan(problem, rng).actions
+        if table.kind[action.opportunity] == CONTACT
+    ]
+    own = problem.satellites[0]
+    each = [flow(problem, own, contact) for contact in contacts]
+    found = flows(problem, own, Columns.of(contacts))
+    assert found.tolist() == np.concatenate([np.empty((0, 3)), *each]).tolist()
+
+
+@given(seed=SEEDS, antennas=st.integers(1, 3))
+def test_contacts_are_blocked_that_overlap_too_many(seed: int, antennas: int) -> None:
+    problem = random_problem(seed, num_satellites=3, num_contacts=25, num_stations=2)
+    problem = replace(problem, station_antennas=np.full(2, antennas, dtype=np.int32))
+    table, rng = problem.opportunities, np.random.default_rng(seed)
+    taken = np.flatnonzero(rng.random(len(table)) < 0.5).tolist()
+    for satellite in problem.satellites:
+        wanted = []
+        for row in satellite.rows.tolist():
+            beside = [
+                other
+                for other in taken
+                if table.kind[other] == table.kind[row] == CONTACT
+                and table.place[other] == table.place[row]
+                and table.start_s[other] < table.end_s[row]
+                and table.end_s[other] > table.start_s[row]
+            ]
+            wanted.append(int(len(beside) >= antennas))
+        assert blocked_rows(problem, satellite, taken).tolist() == wanted
+
+
+@given(seed=SEEDS)
+def test_plans_are_in_order_whatever_order_they_are_made_in(seed: int) -> None:
+    problem = random_problem(seed, num_satellites=2, num_offers=2)
+    rng = np.random.default_rng(seed)
+    rows = rng.permutation(len(problem.opportunities))[: rng.integers(0, 12)].tolist()
+    table = problem.opportunities
+    actions = [Action(float(table.start_s[r]), float(table.end_s[r]), r) for r in rows]
+    assert Plan.of(problem, rows).actions == tuple(sorted(actions))
+
+
+@pytest.mark.parametrize("in_detail", [True, False])
+@given(seed=SEEDS)
+def test_an_order_of_actions_makes_no_difference_to_the_verdict(seed: int, in_detail: bool) -> None:
+    problem = sunny_problem(seed, num_satellites=2)
+    rng = np.random.default_rng(seed)
+    plan = _drawn_plan(problem, rng)
+    shuffled = Plan(tuple(plan.actions[i] for i in rng.permutation(len(plan.actions))))
+    verdicts = [replay(problem, each, in_detail=in_detail) for each in (plan, shuffled)]
+    first, second = ([replace(v, blamed=()) for v in t.violations] for t in verdicts)
+    assert sorted(map(repr, first)) == sorted(map(repr, second))
+    assert verdicts[0].reward == verdicts[1].reward
+    for one, other in itertools.pairwise(verdicts):
+        assert set(one.collected) == set(other.collected)
