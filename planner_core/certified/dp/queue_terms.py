@@ -54,7 +54,7 @@ def queues_of(
     rows
         Those of its tasks that count, ascending; all by default.
     earliest, fixing
-        Direct predecessors of contacts, and what leaves paths out (``latency.reductions``); any and
+        Direct predecessors of contacts, and what leaves paths out (``contact_reductions``); any and
         nothing by default. Shape ``(num_contacts + 1,)``.
     exact
         Tasks whose energy is not rounded, as ``energy_levels`` takes them; by default those that

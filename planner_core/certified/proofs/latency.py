@@ -44,7 +44,6 @@ from planner_core.problem import (
     COLLECT,
     CONTACT,
     Bools,
-    Bytes,
     Floats,
     Ints,
     Problem,
@@ -328,102 +327,45 @@ def latency_value(
     antenna_prices
         Of ``antenna_groups``; none by default.
     """
-    given = _multipliers(problem, prices, contact_prices, antenna_prices)
+    given = LatencyPrices.of(problem, prices, contact_prices, antenna_prices)
     relaxations = latency_relaxations(problem)
-    gained = (one.most(given.prices, given.tolls_of(one))[0] for one in relaxations)
+    gained = (one.most(given.targets, given.tolls_of(one))[0] for one in relaxations)
     return given.paid + sum(gained)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Reduction:
-    """What plans worth more than some level have in common, of one satellite.
+class LatencyPrices(NamedTuple):
+    """Prices as the programmes take them.
 
     Attributes
     ----------
-    earliest
-        In the order of its contacts, the earliest contact that may come directly before each; the
-        last entry is the earliest that may be a path's last. -1 stands for the start. Shape
-        ``(num_contacts + 1,)``.
-    fixing
-        What leaves out states of the programme over queues.
+    targets
+        A 0 at the end. Shape ``(num_targets + 1,)``.
+    by_volume, antenna
+        Of each opportunity, what a contact asks. Shape ``(n,)``.
+    paid
+        What all prices come to.
     """
 
-    earliest: Ints
-    fixing: Fixing
-
-
-def reductions(
-    problem: Problem,
-    prices: Floats,
-    contact_prices: Floats,
-    level: float,
-    per_collect: int,
-    exact: Bools,
-    stop: Bytes,
-) -> dict[int, Reduction]:
-    """Return what prices say of plans worth more than ``level``, by satellite.
-
-    Empty once ``stop`` is set; without satellites whose contacts share layers.
-
-    Parameters
-    ----------
-    per_collect
-        How many levels of energy a collect takes, here and in the programme that this is for.
-    exact
-        Opportunities whose energy both do not round. Shape ``(n,)``.
-    """
-    given = _multipliers(problem, prices, contact_prices, None)
-    most: dict[int, tuple[Floats, Fixing]] = {}
-    total = given.paid
-    indices = [index for index, one in enumerate(problem.satellites) if len(one)]
-    relaxations = latency_relaxations(problem, per_collect=per_collect, exact=exact)
-    for index, one in zip(indices, relaxations, strict=True):
-        if stop[0]:
-            return {}
-        pairs = one.most_by_pairs(given.prices, given.tolls_of(one))
-        if pairs is None:
-            total += one.most(given.prices, given.tolls_of(one))[0]
-        else:
-            most[index] = pairs
-            total += float(pairs[0].max())
-    return {
-        index: Reduction(
-            earliest=_earliest(total - float(pairs.max()) + pairs > level),
-            fixing=fixing._replace(least=level - total + float(pairs.max())),
-        )
-        for index, (pairs, fixing) in most.items()
-    }
-
-
-def _earliest(may_follow: Bools) -> Ints:
-    num_contacts = len(may_follow) - 1
-    # Where nothing leads to a contact its layer is empty: it would begin at the contact itself.
-    none = np.minimum(np.arange(num_contacts + 1), num_contacts - 1)
-    found = np.where(may_follow.any(axis=0), may_follow.argmax(axis=0) - 1, none)
-    return found.astype(np.int32)
-
-
-class _Multipliers(NamedTuple):
-    """Prices of targets, a 0 at the end; of contacts, by row of the table; what all come to."""
-
-    prices: Floats
+    targets: Floats
     by_volume: Floats
     antenna: Floats
     paid: float
 
+    @classmethod
+    def of(
+        cls, problem: Problem, targets: Floats, contacts: Floats, antennas: Floats | None
+    ) -> LatencyPrices:
+        """Return these prices, of contacts and antennas as ``latency_value`` has them."""
+        price = np.append(surplus(targets, problem.best_worth), 0.0)
+        by_volume = np.zeros(len(problem.opportunities))
+        by_volume[problem.opportunities.kind == CONTACT] = np.maximum(contacts, 0.0)
+        return cls(
+            targets=price,
+            by_volume=by_volume,
+            antenna=antenna_tolls(problem, antennas),
+            paid=float(price.sum()) + paid_for_antennas(problem, antennas),
+        )
+
     def tolls_of(self, one: LatencyRelaxation) -> Tolls:
+        """Return what the contacts of a satellite ask."""
         return Tolls(self.by_volume[one.contacts], self.antenna[one.contacts])
-
-
-def _multipliers(
-    problem: Problem, prices: Floats, contact_prices: Floats, antenna_prices: Floats | None
-) -> _Multipliers:
-    price = np.append(surplus(prices, problem.best_worth), 0.0)
-    by_volume = np.zeros(len(problem.opportunities))
-    by_volume[problem.opportunities.kind == CONTACT] = np.maximum(contact_prices, 0.0)
-    return _Multipliers(
-        prices=price,
-        by_volume=by_volume,
-        antenna=antenna_tolls(problem, antenna_prices),
-        paid=float(price.sum()) + paid_for_antennas(problem, antenna_prices),
-    )

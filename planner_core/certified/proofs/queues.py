@@ -16,7 +16,7 @@ import numpy as np
 from planner_core.certified.dp.contact_queues import most_by_queues
 from planner_core.certified.dp.queue_terms import queues_of
 from planner_core.certified.dp.resource_network import network_of
-from planner_core.certified.proofs.latency import Reduction, reductions
+from planner_core.certified.proofs.contact_reductions import Reduction, reductions
 from planner_core.certified.sizes import PROMISES
 from planner_core.precedence.relation import is_transitive_on
 from planner_core.problem import Bytes, Floats, Ints, Problem, SatelliteProblem
