@@ -26,29 +26,14 @@ import numpy as np
 import numpy.typing as npt
 
 from planner_core.bundles import bundle
+from planner_core.certified.dp.start_cells import Cells, Masks
 from planner_core.certified.sizes import OPENING_LEVELS
 from planner_core.certified.tolerances import EARLIER_S
 from planner_core.certified.tuning import TUNING
-from planner_core.jit import borrowing, borrowing_inner, kernel
-from planner_core.precedence.earliest_starts import (
-    EARLY_S,
-    Arrivals,
-    arrivals_of,
-    cell_of,
-)
-from planner_core.precedence.time_windows import Spans, View
+from planner_core.jit import borrowing, borrowing_inner
+from planner_core.precedence.earliest_starts import EARLY_S, cell_of
 from planner_core.problem import Floats, Ints
-from planner_core.problem.pointing import (
-    Agile,
-    Vector,
-    earliest_start_s,
-    needed_s,
-    position_m,
-    sight,
-)
-from planner_core.problem.slew import INSTANT, angle_between_deg, slew_s
-
-Masks = npt.NDArray[np.uint64]
+from planner_core.problem.pointing import Vector, earliest_start_s, needed_s, sight
 
 _NONE: Final = np.uint64(0)
 _ALL: Final = np.uint64(0xFFFF_FFFF_FFFF_FFFF)
@@ -59,40 +44,6 @@ _PLACE_OF_BIT: Final[Ints] = np.zeros(64, dtype=np.int32)
 for _bit in range(64):
     _PLACE_OF_BIT[(((1 << _bit) * int(_DE_BRUIJN)) & int(_ALL)) >> 58] = _bit
 _PER_TASK_S: Final = TUNING.tidy_s
-
-
-@bundle
-class Cells(NamedTuple):
-    """One satellite's tasks cut into cells, ready for labels.
-
-    Attributes
-    ----------
-    order
-        Cells by left edge. Shape ``(num_cells,)``.
-    task
-        Of each cell. Shape ``(num_cells,)``.
-    bit
-        By which a task is remembered while its access is open; 0 for not at all. Shape ``(n,)``.
-    opened
-        What opens in each second and the 0, 1, 3, 7, ... seconds after it.
-    alive
-        What is open at some time of each second.
-    is_first
-        Whether the task may come first: no other one can be done before it.
-    spare_s
-        How much later a chain may start that leaves out its next task.
-    """
-
-    spans: Spans
-    eye: View
-    arrivals: Arrivals
-    order: Ints
-    task: Ints
-    bit: Masks
-    opened: Masks
-    alive: Masks
-    is_first: npt.NDArray[np.bool_]
-    spare_s: float
 
 
 @bundle
@@ -120,133 +71,6 @@ def labels_of(cells: Cells, most: int) -> Labels:
         is_paid=np.empty(n * most, dtype=np.bool_),
         bit_weight=np.zeros(64),
     )
-
-
-def cells_of(spans: Spans, view: View, width_s: float) -> Cells | None:
-    """Return a satellite's cells; None where it turns more slowly than lines of sight do.
-
-    An acceleration limit only makes turns longer: here it is left out, for with it a later
-    start may be the earlier arrival.
-    """
-    view = view._replace(agile=Agile(view.agile.rate_deg_s, INSTANT, view.agile.settle_s))
-    share = greatest_rate_deg_s(spans, view) / view.agile.rate_deg_s
-    if share >= 1.0:
-        return None
-    least_s = float(spans.length_s.min()) if len(spans.row) else 1.0
-    arrivals = arrivals_of(spans, view, min(width_s, 0.9 * least_s))
-    count = np.diff(arrivals.first_cell)
-    task = np.repeat(np.arange(len(spans.row), dtype=np.int32), count)
-    edge_s = spans.open_s[task] + arrivals.width_s * (
-        np.arange(len(task)) - arrivals.first_cell[task]
-    )
-    bit = _bits(spans)
-    return Cells(
-        spans=spans,
-        eye=view,
-        arrivals=arrivals,
-        order=np.argsort(edge_s, kind="stable").astype(np.int32),
-        task=task,
-        bit=bit,
-        opened=_opened(spans, bit),
-        alive=_alive(spans, bit),
-        is_first=_first_tasks(spans, view),
-        spare_s=least_s * (1.0 - share) / (1.0 + share),
-    )
-
-
-@kernel
-def greatest_rate_deg_s(spans: Spans, view: View) -> float:
-    """Return a rate that the lines of sight of tasks never exceed.
-
-    The mean rate of each second, and what the rate can gain within one: the second derivative
-    of a direction is at most twice the square of its rate and acceleration over range.
-    """
-    most = 0.0
-    for i in range(len(spans.open_s)):
-        t_s = spans.open_s[i]
-        end_s = spans.close_s[i] + spans.length_s[i]
-        place = spans.place[i]
-        before = sight(view.path, view.places_m, place, t_s)
-        while t_s < end_s:
-            t_s += 1.0
-            now = sight(view.path, view.places_m, place, t_s)
-            x, y, z = position_m(view.path, t_s)
-            x, y, z = (
-                x - view.places_m[place, 0],
-                y - view.places_m[place, 1],
-                z - view.places_m[place, 2],
-            )
-            rate = math.radians(angle_between_deg(before, now))
-            gain = 3.0 * rate * rate + 25.0 / math.sqrt(x * x + y * y + z * z)
-            most = max(most, math.degrees(rate + gain))
-            before = now
-    return most
-
-
-@kernel
-def _bits(spans: Spans) -> Masks:
-    """Give each task a bit that no other one has while both accesses are open."""
-    bit = np.zeros(len(spans.open_s), dtype=np.uint64)
-    free_s = np.full(64, -np.inf)
-    for i in range(len(spans.open_s)):
-        for b in range(64):
-            # Whole seconds apart, as the table of what opens counts them.
-            if free_s[b] < math.floor(spans.open_s[i]) - 1.0:
-                free_s[b] = spans.close_s[i] + spans.length_s[i]
-                bit[i] = _ONE << np.uint64(b)
-                break
-    return bit
-
-
-@kernel
-def _opened(spans: Spans, bit: Masks) -> Masks:
-    last_s = 0.0
-    for i in range(len(spans.open_s)):
-        last_s = max(last_s, spans.close_s[i] + spans.length_s[i])
-    size = int(last_s) + 2
-    opened = np.zeros((OPENING_LEVELS, size), dtype=np.uint64)
-    for i in range(len(spans.open_s)):
-        opened[0, int(spans.open_s[i])] |= bit[i]
-    for level in range(1, OPENING_LEVELS):
-        half = 1 << (level - 1)
-        for t in range(size):
-            opened[level, t] = opened[level - 1, t] | opened[level - 1, min(t + half, size - 1)]
-    return opened
-
-
-@kernel
-def _alive(spans: Spans, bit: Masks) -> Masks:
-    last_s = 0.0
-    for i in range(len(spans.open_s)):
-        last_s = max(last_s, spans.close_s[i] + spans.length_s[i])
-    alive = np.zeros(int(last_s) + 2, dtype=np.uint64)
-    for i in range(len(spans.open_s)):
-        for t in range(int(spans.open_s[i]), int(spans.close_s[i]) + 1):
-            alive[t] |= bit[i]
-    return alive
-
-
-@kernel
-def _first_tasks(spans: Spans, view: View) -> npt.NDArray[np.bool_]:
-    """Return which tasks no other one can precede; a chain may begin with those alone."""
-    n = len(spans.open_s)
-    is_first = np.ones(n, dtype=np.bool_)
-    agile = view.agile
-    turn_s = slew_s(180.0, agile.rate_deg_s, agile.acceleration_deg_s2) + agile.settle_s
-    far_s = np.inf
-    for b in range(n):
-        if spans.open_s[b] >= far_s:
-            is_first[b:] = False
-            break
-        looks = sight(view.path, view.places_m, spans.place[b], spans.open_s[b])
-        for a in range(b):
-            end_s = spans.open_s[a] + spans.length_s[a]
-            looked = sight(view.path, view.places_m, spans.place[a], end_s)
-            if end_s + needed_s(agile, looked, looks) <= spans.open_s[b]:
-                is_first[b] = False
-                break
-        far_s = min(far_s, spans.open_s[b] + spans.length_s[b] + turn_s)
-    return is_first
 
 
 @borrowing

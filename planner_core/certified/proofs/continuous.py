@@ -16,13 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner_core.certified.dp.start_labels import (
-    Cells,
-    Labels,
-    cells_of,
-    heaviest,
-    labels_of,
-)
+from planner_core.certified.dp.start_cells import Cells, cells_of
+from planner_core.certified.dp.start_labels import Labels, heaviest, labels_of
 from planner_core.certified.proofs.bound import Bound, accessible
 from planner_core.certified.proofs.totals import totals_bound
 from planner_core.certified.sizes import LABELS_PER_CELL, MAX_PAIRS
