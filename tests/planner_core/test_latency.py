@@ -27,11 +27,13 @@ from planner_core.certified.proofs.latency import latency_value
 from planner_core.certified.proofs.resource_bound import quick_bound
 from planner_core.certified.signs import NEVER
 from planner_core.certified.solver import Certified
+from planner_core.certified.tuning import tuned
 from planner_core.domain import Objective
 from planner_core.problem import COLLECT, CONTACT, Floats, Problem
 from planner_core.problem.delivery import with_objective
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
+from planner_core.solvers.rule import Rule
 from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.budgets import Reports, bounds_told, expiring
@@ -314,3 +316,21 @@ def test_missions_without_contacts_or_without_data_have_bounds_too(
     problem = with_objective(problem, Objective(collected_share=0.5, half_life_s=300.0))
     assert quick_bound(problem, 0.0).value >= best_reward(problem) - 1e-9
     assert encloses(problem, best_reward(problem))
+
+
+def test_a_large_problem_has_a_better_plan_before_its_bounds() -> None:
+    """Where one answer takes long the plan must not wait for all that a bound needs."""
+    num_better = 0
+    for seed in range(10):
+        problem = random_problem(
+            seed, num_collects=200, num_targets=120, num_contacts=4, has_rewards=True
+        )
+        problem = with_objective(problem, Objective(collected_share=0.0, half_life_s=3000.0))
+        with tuned(large=3):
+            budget = expiring(lambda _: True)
+            timeline = replay(problem, Certified().solve(problem, budget, 0).plan)
+        first = replay(problem, Rule().solve(problem, Budget(), 0).plan)
+        assert timeline.is_valid
+        assert timeline.reward >= first.reward
+        num_better += timeline.reward > first.reward
+    assert num_better >= 5

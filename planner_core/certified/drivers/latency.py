@@ -38,6 +38,8 @@ def close_in_on_the_ground(search: ResourceSearch, unit: float) -> None:
     tried: set[tuple[int, ...]] = set()
     rng = np.random.default_rng(search.seed)
     num_idle = number = 0
+    if search.is_large:
+        _better_with_its_contacts(search)
     _lower(best, ascent, TUNING.rounds // 2)
     named = _Named(best, ascent)
     if len(best.problem.satellites) == 1:
@@ -68,6 +70,15 @@ def close_in_on_the_ground(search: ResourceSearch, unit: float) -> None:
             tried.difference_update(named.contacts[-1:])
         _lower(best, ascent, TUNING.several)
     _prove_at_last(best, ascent, named)
+
+
+def _better_with_its_contacts(search: ResourceSearch) -> None:
+    """Plan windows of the first plan anew, its contacts as they are."""
+    best = search.best
+    contacts = list(_contacts_of(best.problem, best.plan))
+    part = with_contacts(best.problem, contacts, best.plan, best.judge(best.plan))
+    search.offer(_bettered_by_windows(best, part, best.plan, search.seed))
+    best.report("plans")
 
 
 class _Named:
