@@ -24,10 +24,9 @@ is 0.1 to 0.4 points, and on a busy machine times scatter by a third: what count
 is worse on both sides, or by several images. A constant that no line marks has a wide range in
 which its value is as good as another.
 
-Left out: `aimed` and `tie`, which kernels freeze when they are compiled; what acts on
-`continuous-1000` alone, which was not run; and two families in which the last big step of the
-search falls near the end of the time (`weights-1000`, `fleet-stations-4x2000`): run beside other
-work, they said more of that work than of the constants.
+Left out: `aimed` and `tie`, which kernels freeze when they are compiled; and two families in which
+the last big step of the search falls near the end of the time (`weights-1000`,
+`fleet-stations-4x2000`): run beside other work, they said more of that work than of the constants.
 """
 
 _HEAD: Final = """\
@@ -61,10 +60,10 @@ class Finding:
         return self.line.points > POINTS or any(slower) or self.line.failures > 0
 
     @property
-    def time(self) -> float:
-        """The ratio of times over all gaps that were reached."""
+    def time(self) -> float | None:
+        """The ratio of times over all gaps that were reached, if any was."""
         known = [math.log(ratio) for ratio in self.line.ratios if ratio is not None]
-        return math.exp(sum(known) / len(known)) if known else math.nan
+        return math.exp(sum(known) / len(known)) if known else None
 
 
 def findings(trials: Iterable[Trial]) -> list[Finding]:
@@ -107,7 +106,7 @@ def strategy_table(found: Sequence[Finding]) -> str:
     for finding in found:
         line = finding.line
         gaps = [f"{line.gap_before:.2f}", f"{line.gap_after:.2f}", f"{line.points:+.2f}"]
-        times = ["-" if ratio is None else f"x {ratio:.2f}" for ratio in line.ratios]
+        times = [_times(ratio) for ratio in line.ratios]
         missed = "**yes**" if finding.is_worse else "no"
         rows.append([finding.change, line.family, str(line.num_cases), *gaps, *times, missed])
     return _table(head, rows)
@@ -132,7 +131,11 @@ def _cells(finding: Finding | None) -> list[str]:
         return ["", ""]
     if finding.line.failures:
         return ["fails", ""]
-    return [f"{finding.line.points:+.2f}", f"x {finding.time:.2f}"]
+    return [f"{finding.line.points:+.2f}", _times(finding.time)]
+
+
+def _times(ratio: float | None) -> str:
+    return "-" if ratio is None else f"x {ratio:.2f}"
 
 
 def _matters(of: Mapping[str, Finding]) -> str:
