@@ -116,7 +116,7 @@ def _integrate_physical(
     ]
     # Between these times rates are constant.
     times = np.unique(np.concatenate([[0.0, horizon_s], *(span.ravel() for span in spans)]))
-    tasks, flowing, sunlit, at_sun = (np.searchsorted(times, span) for span in spans)
+    tasks, flowing, sunlit, at_sun = (places_of(times, span) for span in spans)
     power, fill, drain = _rates_over(
         len(times) - 1, tasks, is_contact, flowing, pieces[:, 2].copy(), sunlit, at_sun, each
     )
@@ -131,6 +131,24 @@ def _integrate_physical(
         idle=idle,
         sun_end=Curve(*states[at[at_sun[:, 1]]].T.copy()),
     )
+
+
+@kernel
+def places_of(times: Floats, spans: Floats) -> Longs:
+    """Return where each end of some spans stands among ``times``, which hold them all.
+
+    Ends come up nearly in order: from one to the next it is a step or two.
+    """
+    found = np.empty(spans.shape, dtype=np.int64)
+    at = 0
+    for i in range(len(spans)):
+        for end in range(2):
+            while times[at] < spans[i, end]:
+                at += 1
+            while at > 0 and times[at - 1] >= spans[i, end]:
+                at -= 1
+            found[i, end] = at
+    return found
 
 
 class _Rates(NamedTuple):

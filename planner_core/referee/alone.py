@@ -1,0 +1,95 @@
+"""What the referee says of a satellite's own actions, whatever the others do.
+
+From one plan of a search to the next few satellites change, and what was said of the others holds:
+of README's fleet four in ten have been judged before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Final, NamedTuple
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from planner_core.problem import Floats, Problem
+from planner_core.problem.plan import Action, Plan
+from planner_core.referee.delivery import delivered_s
+from planner_core.referee.limits import limits_broken
+from planner_core.referee.resource_profile import Profile, integrate
+from planner_core.referee.rules import turns
+from planner_core.referee.timeline import Violation
+
+_MOST_KEPT: Final = 500_000
+"""Actions and points of curves that are remembered of a problem: 20 MB."""
+
+
+class Alone(NamedTuple):
+    """The verdict on a satellite's own actions, which are counted from 0.
+
+    Attributes
+    ----------
+    turns, limits
+        What they break between one and the next, and of battery and recorder.
+    profile
+        Battery and recorder under them; None where the problem knows none.
+    down_s
+        When the image of each is on the ground; NaN for never, and for contacts.
+    """
+
+    turns: list[Violation]
+    limits: list[Violation]
+    profile: Profile | None
+    down_s: Floats
+
+    @property
+    def size(self) -> int:
+        """How many actions and points of curves it holds."""
+        num_points = 0 if self.profile is None else len(self.profile.curve.time_s)
+        return len(self.down_s) + num_points
+
+
+def judged_alone(problem: Problem, index: int, actions: Iterable[Action]) -> Alone:
+    """Return the verdict on the actions of a satellite, in order of start."""
+    if problem not in _known:
+        _known[problem] = _Known()
+    return _known[problem].verdict(problem, index, tuple(actions))
+
+
+class _Known:
+    """The verdicts on satellites of a problem that were asked for last."""
+
+    def __init__(self) -> None:
+        self._verdicts: dict[tuple[int, tuple[Action, ...]], Alone] = {}
+        self._size = 0
+
+    def verdict(self, problem: Problem, index: int, actions: tuple[Action, ...]) -> Alone:
+        """Return a verdict that is known or worked out now."""
+        asked = index, actions
+        known = self._verdicts.pop(asked, None)
+        if known is None:
+            known = judge_alone(problem, index, actions)
+            self._size += known.size
+        self._verdicts[asked] = known
+        while self._size > _MOST_KEPT:
+            self._size -= self._verdicts.pop(next(iter(self._verdicts))).size
+        return known
+
+
+_known: WeakKeyDictionary[Problem, _Known] = WeakKeyDictionary()
+
+
+def judge_alone(problem: Problem, index: int, actions: tuple[Action, ...]) -> Alone:
+    """Return the same, worked out anew."""
+    plan, positions = Plan(actions), range(len(actions))
+    broken = turns(problem, plan, index, positions)
+    if not problem.use_resources:
+        return Alone(broken, [], None, np.full(len(actions), np.nan))
+    satellite = problem.satellites[index]
+    profile = integrate(problem, satellite, actions)
+    return Alone(
+        turns=broken,
+        limits=limits_broken(problem, plan, index, positions, profile),
+        profile=profile,
+        down_s=delivered_s(problem, satellite, actions, profile),
+    )
