@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -44,11 +45,16 @@ class Columns:
         return np.lexsort((self.row, self.end_s, self.start_s))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Plan:
     """Actions of all satellites, in order of start. The empty plan is a plan."""
 
     actions: tuple[Action, ...] = ()
+
+    @cached_property
+    def columns(self) -> Columns:
+        """The actions as arrays, which a verdict asks for again and again."""
+        return Columns.of(self.actions)
 
     @classmethod
     def of(cls, problem: Problem, opportunities: Iterable[int]) -> Plan:

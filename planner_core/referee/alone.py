@@ -6,14 +6,14 @@ of README's fleet four in ten have been judged before.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from typing import Final, NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from planner_core.problem import Floats, Problem
-from planner_core.problem.plan import Action, Plan
+from planner_core.problem.plan import Plan
 from planner_core.referee.delivery import delivered_s
 from planner_core.referee.limits import limits_broken
 from planner_core.referee.resource_profile import Profile, integrate
@@ -49,26 +49,27 @@ class Alone(NamedTuple):
         return len(self.down_s) + num_points
 
 
-def judged_alone(problem: Problem, index: int, actions: Iterable[Action]) -> Alone:
-    """Return the verdict on the actions of a satellite, in order of start."""
+def judged_alone(problem: Problem, index: int, plan: Plan, positions: Sequence[int]) -> Alone:
+    """Return the verdict on a satellite's actions of a plan, which are given in order."""
     if problem not in _known:
         _known[problem] = _Known()
-    return _known[problem].verdict(problem, index, tuple(actions))
+    return _known[problem].verdict(problem, index, plan, positions)
 
 
 class _Known:
     """The verdicts on satellites of a problem that were asked for last."""
 
     def __init__(self) -> None:
-        self._verdicts: dict[tuple[int, tuple[Action, ...]], Alone] = {}
+        self._verdicts: dict[tuple[int, bytes, bytes, bytes], Alone] = {}
         self._size = 0
 
-    def verdict(self, problem: Problem, index: int, actions: tuple[Action, ...]) -> Alone:
+    def verdict(self, problem: Problem, index: int, plan: Plan, positions: Sequence[int]) -> Alone:
         """Return a verdict that is known or worked out now."""
-        asked = index, actions
+        own = plan.columns.at(np.asarray(positions, dtype=np.int64))
+        asked = index, own.row.tobytes(), own.start_s.tobytes(), own.end_s.tobytes()
         known = self._verdicts.pop(asked, None)
         if known is None:
-            known = judge_alone(problem, index, actions)
+            known = judge_alone(problem, index, Plan(tuple(plan.actions[p] for p in positions)))
             self._size += known.size
         self._verdicts[asked] = known
         while self._size > _MOST_KEPT:
@@ -79,17 +80,17 @@ class _Known:
 _known: WeakKeyDictionary[Problem, _Known] = WeakKeyDictionary()
 
 
-def judge_alone(problem: Problem, index: int, actions: tuple[Action, ...]) -> Alone:
-    """Return the same, worked out anew."""
-    plan, positions = Plan(actions), range(len(actions))
-    broken = turns(problem, plan, index, positions)
+def judge_alone(problem: Problem, index: int, own: Plan) -> Alone:
+    """Return the verdict on a plan of one satellite, worked out anew."""
+    positions = range(len(own.actions))
+    broken = turns(problem, own, index, positions)
     if not problem.use_resources:
-        return Alone(broken, [], None, np.full(len(actions), np.nan))
+        return Alone(broken, [], None, np.full(len(positions), np.nan))
     satellite = problem.satellites[index]
-    profile = integrate(problem, satellite, actions)
+    profile = integrate(problem, satellite, own)
     return Alone(
         turns=broken,
-        limits=limits_broken(problem, plan, index, positions, profile),
+        limits=limits_broken(problem, own, index, positions, profile),
         profile=profile,
-        down_s=delivered_s(problem, satellite, actions, profile),
+        down_s=delivered_s(problem, satellite, own, profile),
     )

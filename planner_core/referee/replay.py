@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner_core.problem import COLLECT, CONTACT, Floats, Longs, Problem
-from planner_core.problem.plan import Columns, Plan
+from planner_core.problem.plan import Plan
 from planner_core.referee.alone import judged_alone
 from planner_core.referee.brought_down import brought_down_of
 from planner_core.referee.idle_time import Idle
@@ -65,7 +65,7 @@ def replay(problem: Problem, plan: Plan, *, in_detail: bool = True) -> Timeline:
     """
     order, by_satellite = _in_order(problem, plan)
     alone = [
-        judged_alone(problem, index, [plan.actions[p] for p in positions])
+        judged_alone(problem, index, plan, positions)
         for index, positions in enumerate(by_satellite)
     ]
     profiles = [own.profile for own in alone]
@@ -106,7 +106,7 @@ def replay(problem: Problem, plan: Plan, *, in_detail: bool = True) -> Timeline:
 
 def _in_order(problem: Problem, plan: Plan) -> tuple[Longs, list[list[int]]]:
     """Return the positions of all actions in order, and those of each satellite."""
-    columns = Columns.of(plan.actions)
+    columns = plan.columns
     order = columns.order
     satellite = problem.opportunities.satellite[columns.row[order]]
     by_satellite = [order[satellite == index].tolist() for index in range(len(problem.satellites))]
@@ -134,7 +134,7 @@ def _collected(
 
     Of equal ones the first is the best.
     """
-    table, columns = problem.opportunities, Columns.of(plan.actions)
+    table, columns = problem.opportunities, plan.columns
     is_image = table.kind[columns.row] == COLLECT
     is_image[list(blamed)] = False
     images = order[is_image[order]]
@@ -201,11 +201,10 @@ def _has_been_imaged(problem: Problem, plan: Plan, position: int) -> Violation:
 
 def _worth(problem: Problem, plan: Plan, down_s: Floats) -> Floats:
     """Return what the image of each action earns by itself, 0 for contacts."""
-    rows = np.array([action.opportunity for action in plan.actions], dtype=np.int64)
+    rows = plan.columns.row
     if not problem.counts_delivery:
         return problem.worth[rows]
-    end_s = np.array([action.end_s for action in plan.actions])
-    age_s = np.where(np.isnan(down_s), np.inf, down_s - end_s)
+    age_s = np.where(np.isnan(down_s), np.inf, down_s - plan.columns.end_s)
     return problem.worth_on_ground[rows] * share_earned(problem.objective, age_s)
 
 

@@ -208,16 +208,17 @@ def test_what_is_remembered_of_satellites_is_what_would_be_said_anew(
         patch.setattr(alone, "_MOST_KEPT", most)
         for plan in (*plans, *plans):
             for index in range(2):
-                actions = tuple(plan.actions[p] for p in _own(problem, plan, index))
-                found, wanted = (
-                    each(problem, index, actions) for each in (judged_alone, judge_alone)
+                positions = _own(problem, plan, index)
+                found = judged_alone(problem, index, plan, positions)
+                wanted = judge_alone(
+                    problem, index, Plan(tuple(plan.actions[p] for p in positions))
                 )
                 assert (found.turns, found.limits) == (wanted.turns, wanted.limits)
                 assert repr(found.down_s.tolist()) == repr(wanted.down_s.tolist())
                 if found.profile is not None and wanted.profile is not None:
                     curves = found.profile.curve, wanted.profile.curve
                     assert curves[0].points() == curves[1].points()
-                is_kept = judged_alone(problem, index, actions) is found
+                is_kept = judged_alone(problem, index, plan, positions) is found
                 assert is_kept == (found.size <= most)
 
 
