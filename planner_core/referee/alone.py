@@ -7,6 +7,7 @@ of README's fleet four in ten have been judged before.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from threading import Lock
 from typing import Final, NamedTuple
 from weakref import WeakKeyDictionary
 
@@ -57,24 +58,27 @@ def judged_alone(problem: Problem, index: int, plan: Plan, positions: Sequence[i
 
 
 class _Known:
-    """The verdicts on satellites of a problem that were asked for last."""
+    """The verdicts on satellites of a problem that were asked for last, by any thread."""
 
     def __init__(self) -> None:
         self._verdicts: dict[tuple[int, bytes, bytes, bytes], Alone] = {}
         self._size = 0
+        self._lock = Lock()
 
     def verdict(self, problem: Problem, index: int, plan: Plan, positions: Sequence[int]) -> Alone:
         """Return a verdict that is known or worked out now."""
         own = plan.columns.at(np.asarray(positions, dtype=np.int64))
         asked = index, own.row.tobytes(), own.start_s.tobytes(), own.end_s.tobytes()
-        known = self._verdicts.pop(asked, None)
-        if known is None:
-            known = judge_alone(problem, index, Plan(tuple(plan.actions[p] for p in positions)))
-            self._size += known.size
-        self._verdicts[asked] = known
-        while self._size > _MOST_KEPT:
-            self._size -= self._verdicts.pop(next(iter(self._verdicts))).size
-        return known
+        found = self._verdicts.get(asked)
+        if found is None:
+            found = judge_alone(problem, index, Plan(tuple(plan.actions[p] for p in positions)))
+        with self._lock:
+            before = self._verdicts.pop(asked, None)
+            self._verdicts[asked] = found
+            self._size += found.size if before is None else 0
+            while self._size > _MOST_KEPT:
+                self._size -= self._verdicts.pop(next(iter(self._verdicts))).size
+        return found
 
 
 _known: WeakKeyDictionary[Problem, _Known] = WeakKeyDictionary()

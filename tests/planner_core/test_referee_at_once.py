@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import itertools
+import sys
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -220,6 +223,22 @@ def test_what_is_remembered_of_satellites_is_what_would_be_said_anew(
                     assert curves[0].points() == curves[1].points()
                 is_kept = judged_alone(problem, index, plan, positions) is found
                 assert is_kept == (found.size <= most)
+
+
+def test_verdicts_are_remembered_for_several_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = sunny_problem(3, num_satellites=2)
+    rng = np.random.default_rng(3)
+    plans = [_drawn_plan(problem, rng) for _ in range(12)] * 20
+    monkeypatch.setattr(alone, "_MOST_KEPT", 60)  # a few of them
+    interval_s = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        with ThreadPoolExecutor(4) as threads:
+            found = list(threads.map(partial(replay, problem, in_detail=False), plans))
+    finally:
+        sys.setswitchinterval(interval_s)
+    for plan, timeline in zip(plans, found, strict=True):
+        assert timeline.violations == replay(problem, plan).violations
 
 
 @given(seed=SEEDS)
