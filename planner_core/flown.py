@@ -180,7 +180,7 @@ def carried(past: Past, part: Problem, of_data: Problem, given_start: Start) -> 
         done = tuple(replace(image, amount=0.0) for image in images if image.target >= 0)
         return Start(resources=resources, heading=heading, images=done)
     plan = Plan.of(part, range(len(part.opportunities)))
-    curve = integrate(part, satellite, plan.actions).curve
+    curve = integrate(part, satellite, plan).curve
     at_s = (horizon.start - past.state.at).total_seconds()
     battery = np.interp(at_s, curve.time_s, curve.battery)
     held = sum(image.amount for image in images)

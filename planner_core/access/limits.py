@@ -138,11 +138,12 @@ class Limits:
         )
         sun_exclusion_deg = np.full_like(own.lon_deg, _number(sensor.sun_exclusion_deg))
         rows = [
-            # The search leaves an interval at the first limit that never holds in it.
+            # The search leaves an interval at the first limit that never holds in it: where it is
+            # night, at once.
+            _at_most(codes.SUN_ELEVATION, 90.0 - highest("sun_elevation_min_deg")),
             _at_most(codes.OFF_NADIR, np.where(widest < 90.0, widest, np.nan)),
             _at_most(codes.ELEVATION, 90.0 - elevation),
             _at_least(codes.OFF_NADIR, np.where(narrowest > 0.0, narrowest, np.nan)),
-            _at_most(codes.SUN_ELEVATION, 90.0 - highest("sun_elevation_min_deg")),
             _at_least(codes.SUN_ELEVATION, 90.0 - lowest("sun_elevation_max_deg")),
             _at_most(codes.SUN_EXCLUSION, 180.0 - sun_exclusion_deg),
             _at_most(codes.LOCAL_TIME, half_deg),

@@ -87,11 +87,14 @@ class PlacedContacts(NamedTuple):
         Row of the pass, start and end in milliseconds. Shape ``(n,)`` each.
     is_half
         Which contacts are. Shape ``(n,)``.
+    rates
+        How fast data comes down in each pass, where that had to be known.
     """
 
     passes: Accesses
     placed: Placed
     is_half: Bools
+    rates: PassRates | None
 
 
 def _place_parts(
@@ -126,7 +129,7 @@ def _place_parts(
         ends_ms.append(end_ms[fits])
         is_half.append(np.full(np.count_nonzero(fits), number >= len(parts)))
     placed = np.concatenate(rows), np.concatenate(starts_ms), np.concatenate(ends_ms)
-    return PlacedContacts(accesses, placed, np.concatenate(is_half))
+    return PlacedContacts(accesses, placed, np.concatenate(is_half), passes.rates)
 
 
 def _part_s(passes: Passes, row: Longs, setup_s: Floats, share: float) -> tuple[Floats, Floats]:
@@ -204,13 +207,22 @@ def contacts_of(
     has_halves = len(scenario.satellites) > 1
     if not has_parts and not has_halves:
         placed = place_contacts(found, stations)
-        return PlacedContacts(found, placed, np.zeros(len(placed[0]), dtype=np.bool_))
+        return PlacedContacts(found, placed, np.zeros(len(placed[0]), dtype=np.bool_), None)
     passes = passes_of(resources, stations, path, places, found)
     return _place_parts(found, stations, passes, has_parts=has_parts, has_halves=has_halves)
 
 
-def downlinks_of(scenario: Scenario, table: Opportunities) -> Downlinks:
-    """Return how fast each contact of the table takes data down."""
+def downlinks_of(
+    scenario: Scenario, table: Opportunities, known: Sequence[PlacedContacts] = ()
+) -> Downlinks:
+    """Return how fast each contact of the table takes data down.
+
+    Parameters
+    ----------
+    known
+        The contacts of each satellite that the table was made of, where they are at hand. What
+        was worked out to place them is not worked out again.
+    """
     stations = scenario.ground_stations
     places = Places.of(stations)
     rates: dict[int, PassRate] = {}
@@ -220,6 +232,12 @@ def downlinks_of(scenario: Scenario, table: Opportunities) -> Downlinks:
         own = np.flatnonzero((table.satellite == index) & (table.kind == CONTACT))
         number, first = np.unique(table.access[own], return_index=True)
         row = own[first]
+        placed = known[index] if known else None
+        if placed is not None and placed.rates is not None:
+            each = _rates_by_pass(placed.passes, placed.rates)
+            begun = zip(table.place[row].tolist(), table.access_start_s[row].tolist(), strict=True)
+            rates |= zip(number.tolist(), map(each.__getitem__, begun), strict=True)
+            continue
         accesses = Accesses(
             place=table.place[row],
             start_s=table.access_start_s[row],
@@ -229,9 +247,15 @@ def downlinks_of(scenario: Scenario, table: Opportunities) -> Downlinks:
         )
         path = propagate(satellite, scenario.horizon)
         found = passes_of(satellite.resources, stations, path, places, accesses)
-        rates |= dict(zip(number.tolist(), found.rates.each(), strict=True))
+        rates |= zip(number.tolist(), found.rates.each(), strict=True)
     links = StationLinks(
         gain=np.array([s.downlink_gain for s in stations], dtype=np.float64),
         setup_s=np.array([s.setup_s for s in stations], dtype=np.float64),
     )
     return Downlinks(stations=links, passes=rates)
+
+
+def _rates_by_pass(passes: Accesses, rates: PassRates) -> dict[tuple[int, float], PassRate]:
+    """Return the rate of each pass by its station and start."""
+    begun = zip(passes.place.tolist(), passes.start_s.tolist(), strict=True)
+    return dict(zip(begun, rates.each(), strict=True))

@@ -9,7 +9,9 @@ from __future__ import annotations
 import io
 import json
 import zipfile
+import zlib
 from dataclasses import dataclass, fields, replace
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +19,12 @@ import numpy.typing as npt
 from planner_core.access import opportunities as tasks
 from planner_core.access.eligibility import Eligibility
 from planner_core.access.limits import Limits, TargetLimits
-from planner_core.access.passes import PlacedContacts, contacts_of, with_halves_to_share
+from planner_core.access.passes import (
+    PlacedContacts,
+    contacts_of,
+    downlinks_of,
+    with_halves_to_share,
+)
 from planner_core.access.windows import Accesses, find_accesses
 from planner_core.budget import Budget, Progress
 from planner_core.domain import Scenario, Sensor
@@ -35,6 +42,7 @@ from planner_core.problem import (
     OUTSIDE_LIMITS,
     OUTSIDE_TIMES,
     WRONG_SENSOR_TYPE,
+    Downlinks,
     Floats,
     Longs,
     Opportunities,
@@ -42,6 +50,11 @@ from planner_core.problem import (
 )
 
 Codes = npt.NDArray[np.int8]
+
+_NODES_KEPT: Final = 200_000
+"""Of paths, each of 144 bytes: those of 20 satellites over a week."""
+_SAMPLE: Final = 4096  # rows
+_WORTH_IT: Final = 0.8
 
 _REASONS = np.array(
     [
@@ -68,12 +81,15 @@ class ScenarioOpportunities:
         One per satellite, whether its battery minds the shadow or not.
     warnings
         Sentences for people.
+    downlinks
+        How fast contacts take data down, where it is at hand: it is not stored.
     """
 
     opportunities: Opportunities
     target_access: Codes
     sunlight: tuple[Sunlight, ...]
     warnings: tuple[str, ...]
+    downlinks: Downlinks | None = None
 
     def to_bytes(self, *, compress: bool = True) -> bytes:
         """Return a form that ``from_bytes`` reads back bit for bit."""
@@ -93,7 +109,9 @@ class ScenarioOpportunities:
         method = zipfile.ZIP_DEFLATED if compress else zipfile.ZIP_STORED
         with zipfile.ZipFile(buffer, "w", method, compresslevel=1) as archive:
             for name, values in columns.items():
-                with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+                # A member with an entry of its own is stored as it is.
+                file = f"{name}.npy" if _shrinks(values) else zipfile.ZipInfo(f"{name}.npy")
+                with archive.open(file, "w", force_zip64=True) as member:
                     np.lib.format.write_array(member, values, allow_pickle=False)
         return buffer.getvalue()
 
@@ -117,6 +135,15 @@ class ScenarioOpportunities:
             )
 
 
+def _shrinks(values: npt.NDArray[Any]) -> bool:
+    """Return whether it is worth the time to compress a column, by how its beginning shrinks.
+
+    Angles and lines of sight lose a tenth. They are two thirds of the table.
+    """
+    sample = values[:_SAMPLE].tobytes()
+    return len(zlib.compress(sample, 1)) < _WORTH_IT * len(sample)
+
+
 def compute_opportunities(scenario: Scenario, budget: Budget) -> ScenarioOpportunities:
     """Return every opportunity of a scenario, worked out satellite by satellite.
 
@@ -133,6 +160,7 @@ def compute_opportunities(scenario: Scenario, budget: Budget) -> ScenarioOpportu
     kinds = (COLLECT, CONTACT) if scenario.use_resources else (COLLECT,)
     collects = _Collects(scenario, places[COLLECT])
     contact = Limits.of_stations(scenario.ground_stations)
+    paths = _Paths(scenario)
     contacts: list[PlacedContacts] = []
     before_contacts: list[int] = []  # how many accesses there are, by satellite
     parts: list[tasks.Columns] = []
@@ -141,7 +169,7 @@ def compute_opportunities(scenario: Scenario, budget: Budget) -> ScenarioOpportu
     num_steps = 2 * len(scenario.satellites)
     for index, satellite in enumerate(scenario.satellites):
         budget.proceed(Progress(phase="access", fraction=index / num_steps))
-        path = propagate(satellite, scenario.horizon)
+        path = paths.of(index)
         found, placed = collects.placed(satellite.sensor, path, budget)
         parts.append(tasks.rows_of(index, COLLECT, found, num_accesses, placed))
         num_accesses += len(found)
@@ -167,8 +195,7 @@ def compute_opportunities(scenario: Scenario, budget: Budget) -> ScenarioOpportu
     del parts
     for index, satellite in enumerate(scenario.satellites):
         budget.proceed(Progress(phase="access", fraction=0.5 + index / num_steps))
-        # Propagated again rather than kept: a month of a constellation's paths is a gigabyte.
-        path = propagate(satellite, scenario.horizon)
+        path = paths.of(index)
         collects.note_visible(satellite.sensor, path)
         for kind in kinds:
             described.fill(
@@ -176,12 +203,36 @@ def compute_opportunities(scenario: Scenario, budget: Budget) -> ScenarioOpportu
                 with_rates=satellite.agility.tracks,
             )  # fmt: skip
     budget.proceed(Progress(phase="access", fraction=1.0))
+    table = described.table()
     return ScenarioOpportunities(
-        opportunities=described.table(),
+        opportunities=table,
         target_access=_REASONS[collects.closeness],
         sunlight=tuple(lit),
         warnings=orbit_warnings(scenario),
+        downlinks=downlinks_of(scenario, table, contacts),
     )
+
+
+class _Paths:
+    """The paths of a scenario's satellites, each asked for twice.
+
+    Those that are kept are not propagated again. A month of a constellation's would be a gigabyte.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._scenario = scenario
+        self._kept: dict[int, Ephemeris] = {}
+        self._num_nodes = 0
+
+    def of(self, index: int) -> Ephemeris:
+        """Return the path of a satellite."""
+        path = self._kept.get(index)
+        if path is None:
+            path = propagate(self._scenario.satellites[index], self._scenario.horizon)
+            if self._num_nodes + len(path.gmst_rad) <= _NODES_KEPT:
+                self._kept[index] = path
+                self._num_nodes += len(path.gmst_rad)
+        return path
 
 
 def _places(scenario: Scenario) -> dict[int, Places]:

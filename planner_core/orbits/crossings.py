@@ -17,7 +17,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from planner_core.jit import inner, kernel
+from planner_core.jit import inlined, inner, kernel
 from planner_core.orbits.frames import EARTH_RADIUS_M
 
 Floats = npt.NDArray[np.float64]
@@ -88,7 +88,7 @@ def _cross(a: Vector, b: Vector) -> Vector:
     )
 
 
-@inner
+@inlined
 def limit_value(limit: Limit, cubic: Floats, place: Floats, t: float) -> Value:
     """Return g and its rate at ``t`` seconds after the interval's start.
 

@@ -57,6 +57,7 @@ class Precedence(NamedTuple):
 _tables: WeakKeyDictionary[SatelliteProblem, Precedence] = WeakKeyDictionary()
 _closures: WeakKeyDictionary[SatelliteProblem, Precedence] = WeakKeyDictionary()
 _is_transitive: WeakKeyDictionary[SatelliteProblem, bool] = WeakKeyDictionary()
+_far_from: WeakKeyDictionary[SatelliteProblem, Ints] = WeakKeyDictionary()
 
 
 def direct_precedence(satellite: SatelliteProblem) -> Precedence:
@@ -162,16 +163,27 @@ def are_comparable(precedence: Precedence, a: int, b: int) -> bool:
     return comes_before(precedence, a, b) if a < b else comes_before(precedence, b, a)
 
 
-def excluded_beside(satellite: SatelliteProblem, rows: Ints) -> tuple[Longs, Longs]:
+def excluded_beside(
+    satellite: SatelliteProblem, rows: Ints, among: Ints | None = None
+) -> tuple[Longs, Longs]:
     """Return which tasks cannot stand in one plan with which of some local rows.
 
     As pairs in order: the position of one in ``rows``, and the local row of the other.
+
+    Parameters
+    ----------
+    among
+        The tasks to look at, in order; all without it.
     """
     begin, end = near_in_time(satellite, rows)
+    if among is not None:
+        begin, end = among.searchsorted(begin), among.searchsorted(end)
     count = end - begin
     position = np.repeat(np.arange(len(rows)), count)
     first_of = np.cumsum(count) - count
     other = np.arange(len(position)) - np.repeat(first_of - begin, count)
+    if among is not None:
+        other = among[other].astype(np.int64)
     one = rows[position].astype(np.int64)
     is_excluded = ~fit_beside(satellite, one, other) & (one != other)
     return position[is_excluded], other[is_excluded]
@@ -187,7 +199,10 @@ def fit_beside(satellite: SatelliteProblem, one: Longs, other: Longs) -> Bools:
 
 def near_in_time(satellite: SatelliteProblem, rows: Ints | Longs) -> tuple[Longs, Longs]:
     """Return for each of some local rows the span of those that it may exclude: first, last + 1."""
-    _, far_from = near_spans(satellite.transitions)
+    far_from = _far_from.get(satellite)
+    if far_from is None:
+        _, far_from = near_spans(satellite.transitions)
+        _far_from[satellite] = far_from
     # What begins before all turns to it must be over, and after all turns from it are, is free.
     begin = np.maximum.accumulate(far_from).searchsorted(rows, side="right")
     return begin, np.maximum(far_from[rows], rows + 1).astype(np.int64)

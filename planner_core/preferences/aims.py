@@ -9,8 +9,7 @@ from typing import Final
 import numpy as np
 
 from planner_core.domain import Preference
-from planner_core.problem import COLLECT, Floats
-from planner_core.problem.plan import Columns
+from planner_core.problem import COLLECT, CONTACT, Floats
 from planner_core.referee.view import View
 
 
@@ -103,7 +102,8 @@ def _of_age(view: View) -> Floats:
     """Return how long images wait for the next contact of the plan, as a share of the horizon."""
     table, horizon_s = view.problem.opportunities, view.problem.horizon_s
     liking = np.zeros(len(table))
-    contacts = Columns.of(view.contacts)
+    actions = view.plan.columns
+    contacts = actions.at(table.kind[actions.row] == CONTACT)
     for index, satellite in enumerate(view.problem.satellites):
         starts_s = contacts.start_s[table.satellite[contacts.row] == index]  # in order
         own = satellite.rows[satellite.kind == COLLECT]

@@ -79,10 +79,10 @@ def fastest_downlink_per_s(problem: Problem, satellite: SatelliteProblem, contac
     access, first = np.unique(
         problem.opportunities.access[satellite.rows[contacts]], return_index=True
     )
-    gain = links.stations.gain[satellite.place[contacts[first]]]
-    rates = (satellite.resources.downlink_per_s * gain).tolist()
-    passes = [links.passes.get(int(number)) for number in access]
-    known = zip(passes, rates, strict=True)
-    return max(
-        (rate if own is None else float(own.per_s.max()) for own, rate in known), default=0.0
+    fastest_per_s = (
+        satellite.resources.downlink_per_s * links.stations.gain[satellite.place[contacts[first]]]
     )
+    which = links.which(access)
+    is_known = which >= 0
+    fastest_per_s[is_known] = links.fastest_per_s[which[is_known]]
+    return float(fastest_per_s.max(initial=0.0))

@@ -241,5 +241,10 @@ class Downlinks:
         return PassRates.joined([self.passes[number] for number in self._numbers.tolist()])
 
     @cached_property
+    def fastest_per_s(self) -> Floats:
+        """The highest of each of these rates. Shape ``(num_passes,)``."""
+        return np.asarray(np.maximum.reduceat(self.rates.per_s, self.rates.first[:-1]))
+
+    @cached_property
     def _numbers(self) -> Longs:
         return np.array(sorted(self.passes), dtype=np.int64)

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from planner_core.problem import Bools, Floats, Longs, Problem
 
 
-@dataclass(frozen=True, slots=True, order=True)
-class Action:
-    """One task: an opportunity of the problem, taken from ``start_s`` to ``end_s``."""
+class Action(NamedTuple):
+    """One task: an opportunity of the problem, taken from ``start_s`` to ``end_s``.
+
+    A tuple: a search makes, sorts and compares them by the thousand.
+    """
 
     start_s: float
     end_s: float
@@ -30,7 +35,8 @@ class Columns:
     @classmethod
     def of(cls, actions: Sequence[Action]) -> Columns:
         """Return these actions in their order."""
-        table = np.array([(a.start_s, a.end_s, a.opportunity) for a in actions]).reshape(-1, 3)
+        fields = itertools.chain.from_iterable(actions)
+        table = np.fromiter(fields, np.float64, 3 * len(actions)).reshape(-1, 3)
         start_s, end_s, row = table.T.copy()
         return cls(row=row.astype(np.int64), start_s=start_s, end_s=end_s)
 
@@ -44,11 +50,16 @@ class Columns:
         return np.lexsort((self.row, self.end_s, self.start_s))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Plan:
     """Actions of all satellites, in order of start. The empty plan is a plan."""
 
     actions: tuple[Action, ...] = ()
+
+    @cached_property
+    def columns(self) -> Columns:
+        """The actions as arrays, which a verdict asks for again and again."""
+        return Columns.of(self.actions)
 
     @classmethod
     def of(cls, problem: Problem, opportunities: Iterable[int]) -> Plan:

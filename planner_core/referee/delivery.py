@@ -16,7 +16,7 @@ import numpy as np
 
 from planner_core.jit import kernel
 from planner_core.problem import CONTACT, Floats, Longs, Problem, SatelliteProblem
-from planner_core.problem.plan import Action, Columns
+from planner_core.problem.plan import Action, Plan
 from planner_core.problem.slew import TIME_TOLERANCE_S
 from planner_core.referee.contact_flow import flow
 from planner_core.referee.resource_profile import Profile
@@ -25,31 +25,29 @@ _AMOUNT_TOLERANCE: Final = 1e-9  # of a recorder's capacity, in comparing sums o
 
 
 def delivered_s(
-    problem: Problem, satellite: SatelliteProblem, actions: Sequence[Action], profile: Profile
+    problem: Problem, satellite: SatelliteProblem, own: Plan, profile: Profile
 ) -> Floats:
     """Return when each action's image is on the ground; NaN for never, and for contacts.
 
     Parameters
     ----------
-    actions
-        Of the satellite, in order of start.
+    own
+        Actions of the satellite.
     profile
         Its resources under them.
 
     Returns
     -------
-    Seconds from the start of the horizon. Shape ``(len(actions),)``.
+    Seconds from the start of the horizon. Shape ``(len(own.actions),)``.
     """
-    kind = problem.opportunities.kind
-    found = on_ground_s(problem, satellite, actions, profile, profile.after.recorded)
-    columns = Columns.of(actions)
-    is_contact = kind[columns.row] == CONTACT
-    contacts = list(itertools.compress(actions, is_contact.tolist()))
+    found = on_ground_s(problem, satellite, own.actions, profile, profile.after.recorded)
+    is_contact = problem.opportunities.kind[own.columns.row] == CONTACT
+    contacts = list(itertools.compress(own.actions, is_contact.tolist()))
     found[is_contact] = np.nan
-    end_s = columns.end_s
+    end_s = own.columns.end_s
     # Of an image without data all is down before it is taken: it waits for a contact all the same.
-    for own in np.flatnonzero(found < end_s - TIME_TOLERANCE_S).tolist():
-        found[own] = _next_flow_s(problem, satellite, contacts, end_s[own])
+    for image in np.flatnonzero(found < end_s - TIME_TOLERANCE_S).tolist():
+        found[image] = _next_flow_s(problem, satellite, contacts, end_s[image])
     return found
 
 

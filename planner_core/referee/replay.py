@@ -9,20 +9,20 @@ import hashlib
 import heapq
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from planner_core.problem import COLLECT, CONTACT, Floats, Problem
-from planner_core.problem.plan import Columns, Plan
+from planner_core.problem import COLLECT, CONTACT, Floats, Longs, Problem
+from planner_core.problem.plan import Plan
+from planner_core.referee.alone import judged_alone
 from planner_core.referee.brought_down import brought_down_of
-from planner_core.referee.delivery import delivered_s
 from planner_core.referee.idle_time import Idle
-from planner_core.referee.limits import limits_broken
 from planner_core.referee.pinned_plan import breaches
-from planner_core.referee.resource_profile import Curve, Profile, integrate, thin
-from planner_core.referee.rules import slews, stations, turns, windows
+from planner_core.referee.resource_profile import Curve, Profile, thin
+from planner_core.referee.rules import slews, stations, windows
 from planner_core.referee.timeline import (
     Collected,
     JudgedAction,
@@ -64,23 +64,21 @@ def replay(problem: Problem, plan: Plan, *, in_detail: bool = True) -> Timeline:
         Whether actions and curves are listed by satellite; a search needs the verdict alone.
     """
     order, by_satellite = _in_order(problem, plan)
+    alone = [
+        judged_alone(problem, index, plan, positions)
+        for index, positions in enumerate(by_satellite)
+    ]
+    profiles = [own.profile for own in alone]
     violations: list[Violation] = windows(problem, plan)
-    for index, positions in enumerate(by_satellite):
-        violations += turns(problem, plan, index, positions)
+    violations += _placed((own.turns for own in alone), by_satellite)
     violations += stations(problem, plan)
     violations += breaches(problem, plan)
-
-    profiles: list[Profile | None] = [None] * len(problem.satellites)
-    if problem.use_resources:
-        for index, positions in enumerate(by_satellite):
-            profile = integrate(
-                problem, problem.satellites[index], [plan.actions[p] for p in positions]
-            )
-            profiles[index] = profile
-            violations += limits_broken(problem, plan, index, positions, profile)
+    violations += _placed((own.limits for own in alone), by_satellite)
 
     blamed = {p for v in violations for p in v.blamed}
-    down_s = _delivered(problem, plan, by_satellite, profiles)
+    down_s = np.full(len(plan.actions), np.nan)
+    for own, positions in zip(alone, by_satellite, strict=True):
+        down_s[positions] = own.down_s
     worth = _worth(problem, plan, down_s)
     collected, duplicates = _collected(problem, plan, order, blamed, worth, down_s)
     violations += duplicates
@@ -106,19 +104,28 @@ def replay(problem: Problem, plan: Plan, *, in_detail: bool = True) -> Timeline:
     )
 
 
-def _in_order(problem: Problem, plan: Plan) -> tuple[list[int], list[list[int]]]:
+def _in_order(problem: Problem, plan: Plan) -> tuple[Longs, list[list[int]]]:
     """Return the positions of all actions in order, and those of each satellite."""
-    columns = Columns.of(plan.actions)
+    columns = plan.columns
     order = columns.order
     satellite = problem.opportunities.satellite[columns.row[order]]
     by_satellite = [order[satellite == index].tolist() for index in range(len(problem.satellites))]
-    return order.tolist(), by_satellite
+    return order, by_satellite
+
+
+def _placed(
+    violations: Iterable[Sequence[Violation]], by_satellite: Sequence[Sequence[int]]
+) -> Iterator[Violation]:
+    """Yield what satellites break alone, with the positions of those to blame in the plan."""
+    for found, positions in zip(violations, by_satellite, strict=True):
+        for one in found:
+            yield replace(one, blamed=tuple(positions[own] for own in one.blamed))
 
 
 def _collected(
     problem: Problem,
     plan: Plan,
-    order: Sequence[int],
+    order: Longs,
     blamed: set[int],
     worth: Floats,
     down_s: Floats,
@@ -127,34 +134,39 @@ def _collected(
 
     Of equal ones the first is the best.
     """
-    table = problem.opportunities
-    rows = np.array([action.opportunity for action in plan.actions], dtype=np.int64)
-    is_collect, place = (table.kind[rows] == COLLECT).tolist(), table.place[rows].tolist()
-    satellite = table.satellite[rows].tolist()
-    earned, image_down_s = worth.tolist(), down_s.tolist()
-    images: dict[int, list[int]] = {}
-    for position in order:
-        if is_collect[position] and position not in blamed:
-            images.setdefault(place[position], []).append(position)
-    collected: dict[int, Collected] = {}
+    table, columns = problem.opportunities, plan.columns
+    is_image = table.kind[columns.row] == COLLECT
+    is_image[list(blamed)] = False
+    images = order[is_image[order]]
+    place = table.place[columns.row[images]]
+    targets, first, count = np.unique(place, return_index=True, return_counts=True)
+    best = images[first]
     duplicates = []
-    on_board = {image.target for image in problem.on_board}
-    for target, positions in images.items():
-        if target in on_board:
+    is_known = np.isin(targets, [image.target for image in problem.on_board])
+    by_first = np.argsort(first)
+    for target in by_first[((count > 1) | is_known)[by_first]].tolist():
+        positions = images[place == targets[target]].tolist()
+        if is_known[target]:
             duplicates += [_has_been_imaged(problem, plan, position) for position in positions]
-            continue
-        best = max(positions, key=earned.__getitem__)
-        if len(positions) > 1:
-            duplicates += _beside_better(problem, plan, positions, best)
-        is_down = not math.isnan(image_down_s[best])
-        collected[target] = Collected(
-            position=best,
-            satellite=satellite[best],
-            worth=earned[best],
-            delivered_s=image_down_s[best] if is_down else None,
-            age_s=image_down_s[best] - plan.actions[best].end_s if is_down else None,
-        )
-    return collected, duplicates
+        else:
+            best[target] = max(positions, key=worth.__getitem__)
+            duplicates += _beside_better(problem, plan, positions, int(best[target]))
+    new = by_first[~is_known[by_first]]
+    best = best[new]
+    age_s = down_s[best] - columns.end_s[best]
+    rows = zip(
+        best.tolist(),
+        table.satellite[columns.row[best]].tolist(),
+        worth[best].tolist(),
+        _or_none(down_s[best]),
+        _or_none(age_s),
+        strict=True,
+    )
+    return dict(zip(targets[new].tolist(), map(Collected._make, rows), strict=True)), duplicates
+
+
+def _or_none(values: Floats) -> list[float | None]:
+    return [None if math.isnan(value) else value for value in values.tolist()]
 
 
 def _beside_better(
@@ -187,30 +199,12 @@ def _has_been_imaged(problem: Problem, plan: Plan, position: int) -> Violation:
     )  # fmt: skip
 
 
-def _delivered(
-    problem: Problem,
-    plan: Plan,
-    by_satellite: Sequence[Sequence[int]],
-    profiles: Sequence[Profile | None],
-) -> Floats:
-    """Return when the image of each action is on the ground; NaN for never, and for contacts."""
-    found = np.full(len(plan.actions), np.nan)
-    for satellite, positions, profile in zip(
-        problem.satellites, by_satellite, profiles, strict=True
-    ):
-        if profile is not None and len(positions):
-            own = [plan.actions[p] for p in positions]
-            found[positions] = delivered_s(problem, satellite, own, profile)
-    return found
-
-
 def _worth(problem: Problem, plan: Plan, down_s: Floats) -> Floats:
     """Return what the image of each action earns by itself, 0 for contacts."""
-    rows = np.array([action.opportunity for action in plan.actions], dtype=np.int64)
+    rows = plan.columns.row
     if not problem.counts_delivery:
         return problem.worth[rows]
-    end_s = np.array([action.end_s for action in plan.actions])
-    age_s = np.where(np.isnan(down_s), np.inf, down_s - end_s)
+    age_s = np.where(np.isnan(down_s), np.inf, down_s - plan.columns.end_s)
     return problem.worth_on_ground[rows] * share_earned(problem.objective, age_s)
 
 

@@ -22,7 +22,7 @@ from planner_core.problem import (
     Problem,
     SatelliteProblem,
 )
-from planner_core.problem.plan import Action, Columns
+from planner_core.problem.plan import Action, Columns, Plan
 from planner_core.referee.contact_flow import flow, flows
 from planner_core.referee.idle_time import Idle, idle_spans
 
@@ -80,23 +80,20 @@ class Profile:
     sun_end: Curve
 
 
-def integrate(problem: Problem, satellite: SatelliteProblem, actions: Sequence[Action]) -> Profile:
-    """Return the resources of ``satellite`` under its own ``actions``, in order of start."""
+def integrate(problem: Problem, satellite: SatelliteProblem, own: Plan) -> Profile:
+    """Return the resources of ``satellite`` under its own actions."""
     if problem.dynamics == "physical":
-        return _integrate_physical(problem, satellite, actions)
-    return _integrate_events(problem, satellite, actions)
+        return _integrate_physical(problem, satellite, own.columns)
+    return _integrate_events(problem, satellite, own)
 
 
-def _integrate_physical(
-    problem: Problem, satellite: SatelliteProblem, actions: Sequence[Action]
-) -> Profile:
+def _integrate_physical(problem: Problem, satellite: SatelliteProblem, columns: Columns) -> Profile:
     """Integrate over all time: each mode at its power and rate, and the sun in between.
 
     Panels charge in sunlight during the part of each idle span that is spent at the sun;
     turns and waiting charge nothing.
     """
     r, horizon_s = satellite.resources, problem.horizon_s
-    columns = Columns.of(actions)
     is_contact = problem.opportunities.kind[columns.row] == CONTACT
     idle = idle_spans(problem, satellite, columns)
     pieces = flows(problem, satellite, columns.at(is_contact))
@@ -116,7 +113,7 @@ def _integrate_physical(
     ]
     # Between these times rates are constant.
     times = np.unique(np.concatenate([[0.0, horizon_s], *(span.ravel() for span in spans)]))
-    tasks, flowing, sunlit, at_sun = (np.searchsorted(times, span) for span in spans)
+    tasks, flowing, sunlit, at_sun = (places_of(times, span) for span in spans)
     power, fill, drain = _rates_over(
         len(times) - 1, tasks, is_contact, flowing, pieces[:, 2].copy(), sunlit, at_sun, each
     )
@@ -131,6 +128,24 @@ def _integrate_physical(
         idle=idle,
         sun_end=Curve(*states[at[at_sun[:, 1]]].T.copy()),
     )
+
+
+@kernel
+def places_of(times: Floats, spans: Floats) -> Longs:
+    """Return where each end of some spans stands among ``times``, which hold them all.
+
+    Ends come up nearly in order: from one to the next it is a step or two.
+    """
+    found = np.empty(spans.shape, dtype=np.int64)
+    at = 0
+    for i in range(len(spans)):
+        for end in range(2):
+            while times[at] < spans[i, end]:
+                at += 1
+            while at > 0 and times[at - 1] >= spans[i, end]:
+                at -= 1
+            found[i, end] = at
+    return found
 
 
 class _Rates(NamedTuple):
@@ -240,11 +255,9 @@ def advance(point: _State, until_s: float, power: float, fill: float, drain: flo
     return stop_s, battery, kept, recorded + fill * dt, removed + max(taken, 0.0)
 
 
-def _integrate_events(
-    problem: Problem, satellite: SatelliteProblem, actions: Sequence[Action]
-) -> Profile:
+def _integrate_events(problem: Problem, satellite: SatelliteProblem, own: Plan) -> Profile:
     """Walk the authors' events: every opportunity's start, taken or sun-pointed towards."""
-    r = satellite.resources
+    r, actions = satellite.resources, own.actions
     taken: dict[int, list[int]] = {}
     for position, action in enumerate(actions):
         event = int(satellite.event[problem.local_row[action.opportunity]])
@@ -275,7 +288,7 @@ def _integrate_events(
             telemetry = 0.0
         previous_sunlit_s = float(sunlit_s[event])
         points.append(point)
-    idle = idle_spans(problem, satellite, Columns.of(actions))
+    idle = idle_spans(problem, satellite, own.columns)
     level_at = {action.start_s: level for action, level in zip(actions, before, strict=True)}
     return Profile(
         curve=_curve(points),

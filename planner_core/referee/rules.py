@@ -46,7 +46,7 @@ def windows(problem: Problem, plan: Plan) -> list[Violation]:
 
 def _outside(problem: Problem, plan: Plan) -> list[int]:
     """Return the positions of actions that do not keep to their opportunity."""
-    table, columns = problem.opportunities, Columns.of(plan.actions)
+    table, columns = problem.opportunities, plan.columns
     row, start_s, end_s = columns.row, columns.start_s, columns.end_s
     first_s = np.maximum(table.access_start_s[row], 0.0)
     last_s = np.minimum(table.access_end_s[row], problem.horizon_s)
@@ -60,9 +60,8 @@ def _outside(problem: Problem, plan: Plan) -> list[int]:
 
 def turns(problem: Problem, plan: Plan, index: int, positions: Sequence[int]) -> list[Violation]:
     """Tasks of one satellite neither overlap nor follow faster than it turns: C(a, b)."""
-    actions = [plan.actions[position] for position in positions]
-    found = _first_turns(problem, index, actions, positions)
-    columns = Columns.of(actions)
+    found = _first_turns(problem, index, [plan.actions[p] for p in positions], positions)
+    columns = plan.columns.at(np.asarray(positions, dtype=np.int64))
     before, after = columns.at(slice(-1)), columns.at(slice(1, None))
     gap_s = after.start_s - np.maximum.accumulate(before.end_s)
     available_s = after.start_s - before.end_s

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from planner_core.problem import Floats
 from planner_core.referee.brought_down import BroughtDown
@@ -107,9 +107,10 @@ class SatelliteTimeline:
     resources: Resourceline | None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Collected:
+class Collected(NamedTuple):
     """How a target was collected: by which plan action, and whether its image is down.
+
+    A tuple, as a search that asks for verdicts has thousands of each made.
 
     Attributes
     ----------

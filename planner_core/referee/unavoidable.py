@@ -50,8 +50,8 @@ def _at_best(problem: Problem, index: int, code: str) -> Curve:
         rows = _flown(problem, index)
         if code == "recorder":
             rows = sorted({*rows, *_contacts(problem, index)})
-        actions = sorted(Plan.of(problem, rows).actions)
-        found[code, index] = integrate(problem, problem.satellites[index], actions).curve
+        least = Plan.of(problem, rows)
+        found[code, index] = integrate(problem, problem.satellites[index], least).curve
     return found[code, index]
 
 

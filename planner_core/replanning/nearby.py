@@ -50,7 +50,7 @@ class Nearby:
         part = set(self.rows.tolist())
         others = [action for action in plan.actions if action.opportunity not in part]
         own = (
-            replace(action, opportunity=int(self.rows[action.opportunity]))
+            action._replace(opportunity=int(self.rows[action.opportunity]))
             for action in found.actions
         )
         return Plan(tuple(sorted((*others, *own))))

@@ -165,7 +165,7 @@ def _levels(problem: Problem, index: int, satellite: SatelliteProblem) -> Curve:
     """Return battery and recorder of a satellite that does what it must and nothing else."""
     table = problem.opportunities
     rows = [row for row in problem.kept_rows.tolist() if table.satellite[row] == index]
-    return integrate(problem, satellite, Plan.of(problem, rows).actions).curve
+    return integrate(problem, satellite, Plan.of(problem, rows)).curve
 
 
 def _with_relief(problem: Problem, index: int, rows: set[int]) -> set[int]:

@@ -74,13 +74,13 @@ def best_priced(problem: Problem, turn: Turn, *, looks_ahead: bool) -> Priced:
     worth = np.where(track.is_contact == 1, 0.0, problem.worth[turn.satellite.rows])
     is_new = (track.is_contact == 0) & (turn.collected[track.place] == 0)
     draw, image = _typical(track, worth, is_new)
-    network = strict_network_of(problem, turn.satellite)
+    network = strict_network_of(problem, turn.satellite) if looks_ahead else None
     breadth = _AHEAD if looks_ahead else 1
     best = Priced([], -1.0, 0.0, 0.0)
     for price in _PRICES:
         per_energy = price * image / draw
         ahead = np.zeros(len(worth))
-        if looks_ahead:
+        if network is not None:
             ahead = values_ahead(network, np.where(is_new, worth, 0.0), per_energy)
         for following in _FOLLOWING if price > 0.0 else (0.0,):
             for contact_above in _CONTACTS_ABOVE:

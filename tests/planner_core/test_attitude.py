@@ -309,7 +309,7 @@ def test_accesses_open_once_they_can_be_turned_to() -> None:
         length_s = action.end_s - action.start_s
         for early_s, is_fine in ((0.0, True), (0.002, False)):
             start_s = round(first_s - early_s, 3)
-            moved = replace(action, start_s=start_s, end_s=round(start_s + length_s, 3))
+            moved = action._replace(start_s=start_s, end_s=round(start_s + length_s, 3))
             timeline = replay(problem, Plan((moved,)))
             assert timeline.is_valid == is_fine
             assert ("slew" in {v.code for v in timeline.violations}) != is_fine

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+import io
+import zipfile
 from dataclasses import fields, replace
 from datetime import timedelta
 from pathlib import Path
@@ -235,6 +237,16 @@ def test_storage_gives_back_every_bit(computed: ScenarioOpportunities) -> None:
         assert one.enter_s.tobytes() == other.enter_s.tobytes()
         assert one.exit_s.tobytes() == other.exit_s.tobytes()
     assert computed.to_bytes() == again.to_bytes()
+
+
+def test_columns_are_compressed_where_that_makes_them_smaller(
+    computed: ScenarioOpportunities,
+) -> None:
+    with zipfile.ZipFile(io.BytesIO(computed.to_bytes())) as archive:
+        methods = {member.filename: member.compress_type for member in archive.infolist()}
+    assert methods["satellite.npy"] == methods["start_s.npy"] == zipfile.ZIP_DEFLATED
+    assert methods["los_rate_end.npy"] == zipfile.ZIP_DEFLATED  # nothing but 0
+    assert methods["los_start.npy"] == methods["azimuth_deg.npy"] == zipfile.ZIP_STORED
 
 
 def test_a_problem_has_every_row_once_and_its_satellites_rows(

@@ -123,7 +123,7 @@ def test_an_action_with_its_own_start_can_be_kept(judged: Judged) -> None:
     moved = replace(
         again.solution.plan,
         actions=tuple(
-            replace(a, start_s=a.start_s + 1.0, end_s=a.end_s + 1.0)
+            a._replace(start_s=a.start_s + 1.0, end_s=a.end_s + 1.0)
             if a.opportunity in again.problem.kept_rows
             else a
             for a in again.solution.plan.actions

@@ -11,8 +11,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner_core.access.passes import Passes, _place_parts, passes_of
-from planner_core.access.scenario_opportunities import compute_opportunities
+from planner_core.access.passes import Passes, _place_parts, downlinks_of, passes_of
+from planner_core.access.scenario_opportunities import (
+    ScenarioOpportunities,
+    compute_opportunities,
+)
 from planner_core.access.windows import Accesses
 from planner_core.budget import Budget
 from planner_core.build import build_problem
@@ -239,6 +242,28 @@ def test_passes_of_a_satellite_are_sampled_as_each_alone() -> None:
         assert (rate.time_s == time_s).all()
         assert (rate.per_s == gain * BY_ELEVATION.downlink_at(height_deg)).all()
         assert passes.culmination_s[row] == time_s[np.argmax(height_deg)]
+
+
+@pytest.mark.parametrize("num_satellites", [1, 3])
+def test_rates_that_are_at_hand_are_those_that_the_table_tells(num_satellites: int) -> None:
+    plain = replace(
+        satellite(orbit(raan_deg=40.0), name="plain"), resources=Resources.paper(5668.7)
+    )
+    flown = [
+        replace(satellite(orbit(mean_anomaly_deg=5.0 * i), name=str(i)), resources=BY_ELEVATION)
+        for i in range(num_satellites)
+    ]
+    scenario = _mission(satellites=(plain, *flown)[-num_satellites:])
+    found = compute_opportunities(scenario, Budget())
+    assert found.downlinks is not None
+    wanted = downlinks_of(scenario, found.opportunities)
+    assert found.downlinks.passes.keys() == wanted.passes.keys()
+    assert len(wanted.passes) > 0
+    for number, rate in wanted.passes.items():
+        assert found.downlinks.passes[number].time_s.tolist() == rate.time_s.tolist()
+        assert found.downlinks.passes[number].per_s.tolist() == rate.per_s.tolist()
+    again = ScenarioOpportunities.from_bytes(found.to_bytes())
+    assert again.downlinks is None
 
 
 @pytest.mark.parametrize("dynamics", ["physical", "paper"])

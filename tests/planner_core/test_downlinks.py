@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -9,12 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget
-from planner_core.certified.lns.downlinks import brought_down
+from planner_core.certified.lns.downlinks import _best_of_gaps, _by_gap, brought_down
 from planner_core.domain import Dynamics, Objective
+from planner_core.precedence.conflicts import conflicts
 from planner_core.problem import CONTACT
 from planner_core.problem.delivery import with_objective
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
+from planner_core.referee.view import View
 from planner_core.solvers.rule import Rule
 from tests.examples import examples
 from tests.planner_core.problems import TIGHT, varied_problem
@@ -69,6 +72,32 @@ def test_an_image_that_stays_on_board_is_taken_where_it_comes_down() -> None:
                 assert after.collected.keys() == before.collected.keys()
                 moved += after.reward > before.reward
     assert moved >= 5
+
+
+@examples(200)
+@given(
+    seed=st.integers(0, 10**6),
+    num_satellites=st.integers(1, 3),
+    antennas=st.integers(1, 2),
+    share=st.sampled_from([0.3, 0.7]),
+)
+def test_contacts_fit_that_conflict_with_none_of_the_plan(
+    seed: int, num_satellites: int, antennas: int, share: float
+) -> None:
+    problem = _problem(seed, "physical", num_satellites, num_contacts=9)
+    problem = replace(problem, station_antennas=np.full_like(problem.station_antennas, antennas))
+    table, rng = problem.opportunities, np.random.default_rng(seed)
+    taken = [row for row in Rule().solve(problem, Budget(), 0).plan.actions if rng.random() < share]
+    view = View.of(problem, Plan(tuple(taken)))
+    rows = np.array([action.opportunity for action in taken], dtype=np.int32)
+    chosen: list[int] = []
+    for index, satellite in enumerate(problem.satellites):
+        is_own = table.satellite[rows] == index
+        beside = rows[is_own | (table.kind[rows] == CONTACT)].tolist()
+        for offered in _by_gap(view, satellite, rows[is_own]):
+            fits = (row for row in offered if not conflicts(problem, row, [*beside, *chosen]))
+            chosen += [row for row in [next(fits, None)] if row is not None]
+    assert _best_of_gaps(view) == chosen
 
 
 def test_an_image_gets_its_contact() -> None:

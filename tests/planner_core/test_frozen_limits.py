@@ -232,7 +232,7 @@ def test_what_counts_as_inherited_no_plan_avoids(seed: int, dynamics: Dynamics) 
     event(f"inherited: {len(given_s)}")
     r = problem.satellites[0].resources
     for plan, _ in plans if given_s else ():
-        curve = integrate(problem, problem.satellites[0], plan.actions).curve
+        curve = integrate(problem, problem.satellites[0], plan).curve
         for code, at_s in given_s:
             if code == "battery":
                 assert _level(problem, curve, "battery", at_s) <= r.battery_min_fraction + 1e-6

@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 import itertools
+import sys
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner_core.problem import CONTACT, Heading, Problem
+from planner_core.problem import COLLECT, CONTACT, Heading, Problem
 from planner_core.problem.plan import Action, Columns, Plan
 from planner_core.problem.slew import TIME_TOLERANCE_S
 from planner_core.problem.sun_turns import sun_turns
+from planner_core.referee import alone
+from planner_core.referee.alone import judge_alone, judged_alone
 from planner_core.referee.contact_flow import flow, flows
 from planner_core.referee.idle_time import idle_spans
 from planner_core.referee.replay import replay
+from planner_core.referee.resource_profile import places_of
 from planner_core.referee.rules import slews, turns, windows
 from planner_core.referee.sight import lines_of_sight
 from planner_core.solvers.sequential import blocked_rows
@@ -191,3 +197,76 @@ def test_an_order_of_actions_makes_no_difference_to_the_verdict(seed: int, in_de
     assert verdicts[0].reward == verdicts[1].reward
     for one, other in itertools.pairwise(verdicts):
         assert set(one.collected) == set(other.collected)
+
+
+@pytest.mark.parametrize("most", [0, 60, 10**6])
+@given(seed=SEEDS, use_resources=st.booleans())
+def test_what_is_remembered_of_satellites_is_what_would_be_said_anew(
+    seed: int, use_resources: bool, most: int
+) -> None:
+    problem = sunny_problem(seed, num_satellites=2, use_resources=use_resources)
+    rng = np.random.default_rng(seed)
+    plans = [_drawn_plan(problem, rng) for _ in range(3)]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(alone, "_MOST_KEPT", most)
+        for plan in (*plans, *plans):
+            for index in range(2):
+                positions = _own(problem, plan, index)
+                found = judged_alone(problem, index, plan, positions)
+                wanted = judge_alone(
+                    problem, index, Plan(tuple(plan.actions[p] for p in positions))
+                )
+                assert (found.turns, found.limits) == (wanted.turns, wanted.limits)
+                assert repr(found.down_s.tolist()) == repr(wanted.down_s.tolist())
+                if found.profile is not None and wanted.profile is not None:
+                    curves = found.profile.curve, wanted.profile.curve
+                    assert curves[0].points() == curves[1].points()
+                is_kept = judged_alone(problem, index, plan, positions) is found
+                assert is_kept == (found.size <= most)
+
+
+def test_verdicts_are_remembered_for_several_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = sunny_problem(3, num_satellites=2)
+    rng = np.random.default_rng(3)
+    plans = [_drawn_plan(problem, rng) for _ in range(12)] * 20
+    monkeypatch.setattr(alone, "_MOST_KEPT", 60)  # a few of them
+    interval_s = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        with ThreadPoolExecutor(4) as threads:
+            found = list(threads.map(partial(replay, problem, in_detail=False), plans))
+    finally:
+        sys.setswitchinterval(interval_s)
+    for plan, timeline in zip(plans, found, strict=True):
+        assert timeline.violations == replay(problem, plan).violations
+
+
+@given(seed=SEEDS)
+def test_the_best_image_of_each_target_is_that_of_a_walk(seed: int) -> None:
+    problem = random_problem(seed, num_satellites=2, num_offers=3, has_quality=True)
+    table = problem.opportunities
+    plan = _drawn_plan(problem, np.random.default_rng(seed))
+    timeline = replay(problem, plan)
+    blamed = {p for violation in timeline.violations for p in violation.blamed}
+    best: dict[int, int] = {}
+    for position in sorted(range(len(plan.actions)), key=plan.actions.__getitem__):
+        row = plan.actions[position].opportunity
+        if table.kind[row] != COLLECT or position in blamed:
+            continue
+        first = best.setdefault(int(table.place[row]), position)
+        if problem.worth[row] > problem.worth[plan.actions[first].opportunity]:
+            best[int(table.place[row])] = position
+    found = timeline.collected
+    assert [(target, image.position) for target, image in found.items()] == list(best.items())
+    num_images = sum(table.kind[action.opportunity] == COLLECT for action in plan.actions)
+    num_broken = sum(table.kind[plan.actions[p].opportunity] == COLLECT for p in blamed)
+    duplicates = [v for v in timeline.violations if v.code == "duplicate"]
+    assert len(duplicates) == num_images - num_broken - len(best)
+
+
+@given(seed=SEEDS)
+def test_places_among_instants_are_those_that_a_search_finds(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    spans = rng.integers(0, 30, (12, 2)).astype(np.float64)
+    times = np.unique(np.append(spans, [0.0, 30.0]))
+    assert places_of(times, spans).tolist() == np.searchsorted(times, spans).tolist()

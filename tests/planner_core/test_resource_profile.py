@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.mdp.track import compile_track
+from planner_core.problem.plan import Plan
 from planner_core.referee.resource_profile import (
     Curve,
     advance,
@@ -77,7 +78,7 @@ def test_levels_at_the_start_may_be_whole_numbers() -> None:
         )
         for b, d in ((1, 0), (1.0, 0.0))
     )
-    profiles = [integrate(p, p.satellites[0], ()) for p in (whole, real)]
+    profiles = [integrate(p, p.satellites[0], Plan()) for p in (whole, real)]
     np.testing.assert_array_equal(profiles[0].curve, profiles[1].curve)
     # Kernels are compiled for what they are given: of the same types once.
     tracks = [

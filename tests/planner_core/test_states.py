@@ -64,7 +64,7 @@ def test_a_state_is_carried_as_the_referee_lets_a_satellite_idle(
     )  # fmt: skip
     begin = hours(1).start
     whole = _built(_mission(known, Horizon(start=begin, end=_later(before_s).end)))
-    curve = integrate(whole, whole.satellites[0], ()).curve
+    curve = integrate(whole, whole.satellites[0], Plan()).curve
     own = whole.satellites[0].id
     state = State(satellite_id=own, at=begin, battery_fraction=0.4, recorder_fraction=0.5)
     given = replace(known, initial_battery_fraction=1.0, initial_recorder_fraction=0.0)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
 from planner_core.budget import Budget
 from planner_core.certified.tuning import TUNING
 from planner_core.precedence.conflicts import conflicts
+from planner_core.precedence.relation import excluded_beside
 from planner_core.problem import CONTACT, Ints, Problem, SatelliteProblem
 from planner_core.problem.plan import Plan
 from planner_core.problem.slew import TIME_TOLERANCE_S
@@ -116,18 +117,30 @@ def _best_of_gaps(view: View) -> list[int]:
     table = view.problem.opportunities
     taken = np.array([action.opportunity for action in view.plan.actions], dtype=np.int32)
     is_contact = table.kind[taken] == CONTACT
-    chosen = list[int]()
+    contacts = taken[is_contact]
+    num_taken = len(contacts)
     for index, satellite in enumerate(view.problem.satellites):
-        is_own = table.satellite[taken] == index
-        # Tasks of others matter where they hold an antenna.
-        beside = np.append(taken[is_own | is_contact], np.array(chosen, dtype=np.int32))
-        for rows in _by_gap(view, satellite, taken[is_own]):
+        own = taken[table.satellite[taken] == index]
+        gaps = list(_by_gap(view, satellite, own))
+        fits = _fit_between(view.problem, satellite, [row for rows in gaps for row in rows], own)
+        for rows in gaps:
             for row in rows:
-                if not conflicts(view.problem, row, beside):
-                    chosen.append(row)
-                    beside = np.append(beside, row)
+                # Contacts of others matter where they hold an antenna.
+                if row in fits and not conflicts(view.problem, row, contacts):
+                    contacts = np.append(contacts, row)
                     break
+    chosen: list[int] = contacts[num_taken:].tolist()
     return chosen
+
+
+def _fit_between(
+    problem: Problem, satellite: SatelliteProblem, rows: Sequence[int], taken: Ints
+) -> set[int]:
+    """Return which of these rows a satellite has time for beside those that it has taken."""
+    local = problem.local_row
+    beside = np.sort(local[taken])
+    excluded, _ = excluded_beside(satellite, local[np.array(rows, dtype=np.int64)], beside)
+    return set(rows).difference(rows[position] for position in np.unique(excluded).tolist())
 
 
 def _by_gap(view: View, satellite: SatelliteProblem, taken: Ints) -> Iterator[list[int]]:

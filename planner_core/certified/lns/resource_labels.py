@@ -15,7 +15,7 @@ from planner_core.bundles import bundle
 from planner_core.certified.dp.resource_network import Network, give_between, may_be_next
 from planner_core.certified.signs import AT_START, NEVER, NOWHERE
 from planner_core.certified.sizes import LABELS_PER_TASK, RESOURCE_WINDOW_NODES
-from planner_core.jit import borrowing_inner
+from planner_core.jit import borrowing_inner, inlined
 from planner_core.problem import (
     Bools,
     Floats,
@@ -234,7 +234,7 @@ def best_label(
     return best_label
 
 
-@borrowing_inner
+@inlined
 def _extend(
     ground: Ground, room: Room, low: int, k: int, begin: int, count: int,
     value: float, energy: float, data: float, label: int,
@@ -263,7 +263,7 @@ def _extend(
     )  # fmt: skip
 
 
-@borrowing_inner
+@inlined
 def _keep(
     values: Floats, energies: Floats, datas: Floats, sources: Ints, begin: int, count: int,
     value: float, energy: float, data: float, source: int,

@@ -80,13 +80,14 @@ class ResourceWindows:
         """Go on from another plan."""
         table = self._problem.opportunities
         is_taken = np.zeros(len(table), dtype=np.bool_)
-        is_taken[[action.opportunity for action in plan.actions]] = True
+        is_taken[plan.columns.row] = True
         holder = np.full(len(self._problem.target_ids) + 1, FREE, dtype=np.int32)
         # The best image of a target counts, and the first of those.
         images = np.flatnonzero(is_taken & (table.kind == COLLECT))[::-1]
         images = images[np.argsort(self._problem.worth[images], kind="stable")]
         holder[table.place[images]] = images
         self._taken = Taken(is_taken=is_taken, holder=holder)
+        self._note_contacts()
 
     def make_moves(self, num_moves: int, budget: Budget) -> None:
         """Make about so many moves, unless the budget is spent before."""
@@ -94,7 +95,7 @@ class ResourceWindows:
             ground = self._grounds[self._turn % len(self._grounds)]
             self._turn += 1
             make_moves(
-                ground._replace(is_shut=self._shut(ground.number)), self._taken, self._room,
+                ground._replace(is_shut=self._shut(ground)), self._taken, self._room,
                 self._draws, min(num_moves, TUNING.moves_in_a_step), budget.stop,
             )  # fmt: skip
             num_moves -= TUNING.moves_in_a_step
@@ -105,18 +106,21 @@ class ResourceWindows:
             if budget.is_spent():
                 break
             make_moves(
-                ground._replace(is_shut=self._shut(ground.number)), self._taken, self._room,
+                ground._replace(is_shut=self._shut(ground)), self._taken, self._room,
                 self._draws, num_moves, budget.stop,
             )  # fmt: skip
 
-    def _shut(self, index: int) -> Bools:
-        """Return the tasks of a satellite whose antenna another one holds.
-
-        A polish moves no contact: while they stay, so does what they shut.
-        """
+    def _note_contacts(self) -> None:
+        """Forget what contacts shut, where these are no longer those of the plan."""
         taken = self._contacts[self._taken.is_taken[self._contacts]]
         if not np.array_equal(taken, self._shut_by):
             self._shut_by, self._is_shut = taken, {}
+
+    def _shut(self, ground: Ground) -> Bools:
+        """Return the tasks of a satellite whose antenna another one holds."""
+        if not ground.is_polish:  # which moves no contact
+            self._note_contacts()
+        index, taken = ground.number, self._shut_by
         if index not in self._is_shut:
             satellite = self._problem.satellites[index]
             others = taken[self._problem.opportunities.satellite[taken] != index]
