@@ -47,8 +47,8 @@ def build_problem(scenario: Scenario, computed: ScenarioOpportunities, budget: B
     images: list[ImageOnBoard] = []
     states = {state.satellite_id: state for state in scenario.states}
     sun = sun_path(scenario.horizon)
-    downlinks = computed.downlinks if table is computed.opportunities else None
-    downlinks = downlinks or downlinks_of(scenario, table)
+    is_own = table is computed.opportunities
+    downlinks = computed.downlinks_of(scenario) if is_own else downlinks_of(scenario, table)
     for index, satellite in enumerate(scenario.satellites):
         budget.proceed(Progress(phase="compile", fraction=index / len(scenario.satellites)))
         sees_shadow = scenario.use_resources and satellite.resources.eclipse_aware

@@ -11,7 +11,7 @@ import json
 import zipfile
 import zlib
 from dataclasses import dataclass, fields, replace
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -67,6 +67,13 @@ _REASONS = np.array(
 _RANK = {int(reason): rank for rank, reason in enumerate(_REASONS)}
 
 
+class KnownRates(NamedTuple):
+    """How fast the contacts of one scenario take data down. In another, stations may differ."""
+
+    scenario: Scenario
+    downlinks: Downlinks
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ScenarioOpportunities:
     """All that geometry has to say about a scenario; computed once, stored, used by any solver.
@@ -81,15 +88,21 @@ class ScenarioOpportunities:
         One per satellite, whether its battery minds the shadow or not.
     warnings
         Sentences for people.
-    downlinks
-        How fast contacts take data down, where it is at hand: it is not stored.
+    rates
+        How fast its contacts take data down, where that is at hand: it is not stored.
     """
 
     opportunities: Opportunities
     target_access: Codes
     sunlight: tuple[Sunlight, ...]
     warnings: tuple[str, ...]
-    downlinks: Downlinks | None = None
+    rates: KnownRates | None = None
+
+    def downlinks_of(self, scenario: Scenario) -> Downlinks:
+        """Return how fast contacts take data down in a scenario with these opportunities."""
+        if self.rates is not None and self.rates.scenario is scenario:
+            return self.rates.downlinks
+        return downlinks_of(scenario, self.opportunities)
 
     def to_bytes(self, *, compress: bool = True) -> bytes:
         """Return a form that ``from_bytes`` reads back bit for bit."""
@@ -209,7 +222,7 @@ def compute_opportunities(scenario: Scenario, budget: Budget) -> ScenarioOpportu
         target_access=_REASONS[collects.closeness],
         sunlight=tuple(lit),
         warnings=orbit_warnings(scenario),
-        downlinks=downlinks_of(scenario, table, contacts),
+        rates=KnownRates(scenario, downlinks_of(scenario, table, contacts)),
     )
 
 

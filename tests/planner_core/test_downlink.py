@@ -255,15 +255,19 @@ def test_rates_that_are_at_hand_are_those_that_the_table_tells(num_satellites: i
     ]
     scenario = _mission(satellites=(plain, *flown)[-num_satellites:])
     found = compute_opportunities(scenario, Budget())
-    assert found.downlinks is not None
-    wanted = downlinks_of(scenario, found.opportunities)
-    assert found.downlinks.passes.keys() == wanted.passes.keys()
+    assert found.rates is not None
+    at_hand, wanted = found.rates.downlinks, downlinks_of(scenario, found.opportunities)
+    assert found.downlinks_of(scenario) is at_hand
+    assert at_hand.passes.keys() == wanted.passes.keys()
     assert len(wanted.passes) > 0
     for number, rate in wanted.passes.items():
-        assert found.downlinks.passes[number].time_s.tolist() == rate.time_s.tolist()
-        assert found.downlinks.passes[number].per_s.tolist() == rate.per_s.tolist()
-    again = ScenarioOpportunities.from_bytes(found.to_bytes())
-    assert again.downlinks is None
+        assert at_hand.passes[number].time_s.tolist() == rate.time_s.tolist()
+        assert at_hand.passes[number].per_s.tolist() == rate.per_s.tolist()
+    assert ScenarioOpportunities.from_bytes(found.to_bytes()).rates is None
+    better = [replace(s, downlink_gain=2.0 * s.downlink_gain) for s in scenario.ground_stations]
+    other = found.downlinks_of(replace(scenario, ground_stations=tuple(better)))
+    for number, rate in wanted.passes.items():
+        assert other.passes[number].per_s == pytest.approx(2.0 * rate.per_s)
 
 
 @pytest.mark.parametrize("dynamics", ["physical", "paper"])
