@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from planner_core.jit import kernel
@@ -18,6 +20,19 @@ from planner_core.problem.slew import (
 from planner_core.problem.sun_turns import angle_to_sun_deg, sun_turn_s
 
 _Triple = tuple[float, float, float]
+
+
+class _Turns(NamedTuple):
+    """A satellite's turns and its agility; without rates at their ends from rest to rest."""
+
+    lines_from: Floats
+    lines_to: Floats
+    rates_from: Floats
+    rates_to: Floats
+    available_s: Floats
+    settle_s: float
+    rate_deg_s: float
+    acceleration_deg_s2: float
 
 
 def lines_of_sight(problem: Problem, actions: Columns, *, is_end: bool) -> tuple[Floats, Floats]:
@@ -41,12 +56,16 @@ def are_in_time(problem: Problem, index: int, before: Columns, after: Columns) -
 
     The least time of a turn is found by halving. Whether it fits is one step of that.
     """
+    return _fit(*_turns_asked(problem, index, before, after))
+
+
+def _turns_asked(problem: Problem, index: int, before: Columns, after: Columns) -> _Turns:
     lines_from, moved = lines_of_sight(problem, before, is_end=True)
     lines_to, moves = lines_of_sight(problem, after, is_end=False)
     agility = problem.satellites[index].agility
     if not agility.tracks:
         moved = moves = moves[:0]
-    return _fit(
+    return _Turns(
         lines_from,
         lines_to,
         moved,
@@ -69,7 +88,7 @@ def _fit(
     rate_deg_s: float,
     acceleration_deg_s2: float,
 ) -> Bools:
-    """Return which turns fit; without rates at their ends from rest to rest."""
+    """Return which turns fit."""
     fits = np.empty(len(available_s), dtype=np.bool_)
     for i in range(len(available_s)):
         u = lines_from[i, 0], lines_from[i, 1], lines_from[i, 2]
@@ -92,26 +111,12 @@ def turns_between(
 
     Each leads from the end of one action to the start of another.
     """
-    agility = problem.satellites[index].agility
-    lines_from, moved = lines_of_sight(problem, before, is_end=True)
-    lines_to, moves = lines_of_sight(problem, after, is_end=False)
-    if not agility.tracks:
-        moved = moves = moves[:0]
-    angles_deg, needed_s = _turns(
-        lines_from,
-        lines_to,
-        moved,
-        moves,
-        after.start_s - before.end_s,
-        float(agility.settle_s),
-        float(agility.slew_rate_deg_s),
-        float(agility.acceleration_deg_s2 or INSTANT),
-    )
+    angles_deg, needed_s = _angles_and_times(*_turns_asked(problem, index, before, after))
     return list(zip(angles_deg.tolist(), needed_s.tolist(), strict=True))
 
 
 @kernel
-def _turns(
+def _angles_and_times(
     lines_from: Floats,
     lines_to: Floats,
     rates_from: Floats,
@@ -121,7 +126,7 @@ def _turns(
     rate_deg_s: float,
     acceleration_deg_s2: float,
 ) -> tuple[Floats, Floats]:
-    """Return angles and times of turns; without rates at their ends from rest to rest."""
+    """Return angles and times of turns."""
     angles_deg, needed_s = np.empty(len(lines_from)), np.empty(len(lines_from))
     for i in range(len(lines_from)):
         u = lines_from[i, 0], lines_from[i, 1], lines_from[i, 2]

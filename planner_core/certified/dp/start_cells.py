@@ -77,6 +77,7 @@ def cells_of(spans: Spans, view: View, width_s: float) -> Cells | None:
         np.arange(len(task)) - arrivals.first_cell[task]
     )
     bit = _bits(spans)
+    num_seconds = int((spans.close_s + spans.length_s).max(initial=0.0)) + 2
     return Cells(
         spans=spans,
         eye=view,
@@ -84,8 +85,8 @@ def cells_of(spans: Spans, view: View, width_s: float) -> Cells | None:
         order=np.argsort(edge_s, kind="stable").astype(np.int32),
         task=task,
         bit=bit,
-        opened=_opened(spans, bit),
-        alive=_alive(spans, bit),
+        opened=_opened(spans, bit, num_seconds),
+        alive=_alive(spans, bit, num_seconds),
         is_first=_first_tasks(spans, view),
         spare_s=least_s * (1.0 - share) / (1.0 + share),
     )
@@ -136,27 +137,21 @@ def _bits(spans: Spans) -> Masks:
 
 
 @kernel
-def _opened(spans: Spans, bit: Masks) -> Masks:
-    last_s = 0.0
-    for i in range(len(spans.open_s)):
-        last_s = max(last_s, spans.close_s[i] + spans.length_s[i])
-    size = int(last_s) + 2
-    opened = np.zeros((OPENING_LEVELS, size), dtype=np.uint64)
+def _opened(spans: Spans, bit: Masks, num_seconds: int) -> Masks:
+    opened = np.zeros((OPENING_LEVELS, num_seconds), dtype=np.uint64)
     for i in range(len(spans.open_s)):
         opened[0, int(spans.open_s[i])] |= bit[i]
     for level in range(1, OPENING_LEVELS):
         half = 1 << (level - 1)
-        for t in range(size):
-            opened[level, t] = opened[level - 1, t] | opened[level - 1, min(t + half, size - 1)]
+        for t in range(num_seconds):
+            later = min(t + half, num_seconds - 1)
+            opened[level, t] = opened[level - 1, t] | opened[level - 1, later]
     return opened
 
 
 @kernel
-def _alive(spans: Spans, bit: Masks) -> Masks:
-    last_s = 0.0
-    for i in range(len(spans.open_s)):
-        last_s = max(last_s, spans.close_s[i] + spans.length_s[i])
-    alive = np.zeros(int(last_s) + 2, dtype=np.uint64)
+def _alive(spans: Spans, bit: Masks, num_seconds: int) -> Masks:
+    alive = np.zeros(num_seconds, dtype=np.uint64)
     for i in range(len(spans.open_s)):
         for t in range(int(spans.open_s[i]), int(spans.close_s[i]) + 1):
             alive[t] |= bit[i]
