@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget, Progress
+from planner_core.certified.lns import resource_search
 from planner_core.certified.lns.alternating import TurnSearch
 from planner_core.certified.lns.resource_search import ResourceWindows
 from planner_core.certified.proofs.documents import from_json, is_proven, to_json
@@ -143,3 +144,18 @@ def test_fleets_end_with_a_plan_and_a_bound_around_the_optimum(
     assert is_proven(problem, from_json(to_json(solution.proven))) is not False
     assert all(p.bound is not None and p.bound >= best - 1e-6 for p in reported)
     assert np.all(np.diff([p.reward or 0.0 for p in reported]) >= 0.0)
+
+
+def test_less_than_a_move_on_each_satellite_is_one_on_some_in_turn(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    problem = random_problem(0, num_satellites=3, num_collects=30, num_targets=20)
+    windows = ResourceWindows(problem, 0)
+    moved: list[tuple[int, int]] = []
+    monkeypatch.setattr(
+        resource_search, "make_moves",
+        lambda ground, taken, room, draws, num, stop: moved.append((ground.number, num)),
+    )  # fmt: skip
+    for num_moves in (4.7, 0.7, 0.7, 0.4, 0.01):
+        windows.make_moves_on_each(num_moves, Budget())
+    assert moved == [(0, 4), (1, 4), (2, 4), (0, 1), (1, 1), (2, 1), (0, 1), (1, 1), (2, 1)]

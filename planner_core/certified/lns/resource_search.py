@@ -100,14 +100,21 @@ class ResourceWindows:
             )  # fmt: skip
             num_moves -= TUNING.moves_in_a_step
 
-    def make_moves_on_each(self, num_moves: int, budget: Budget) -> None:
-        """Make so many moves on each satellite, unless the budget is spent before."""
-        for ground in self._grounds:
+    def make_moves_on_each(self, num_moves: float, budget: Budget) -> None:
+        """Make so many moves on each satellite, unless the budget is spent before.
+
+        Where that is less than one, one move on such a share of them, which take turns.
+        """
+        grounds, each = self._grounds, max(1, int(num_moves))
+        if num_moves < 1.0:
+            first, self._turn = self._turn, self._turn + max(1, round(num_moves * len(grounds)))
+            grounds = [grounds[turn % len(grounds)] for turn in range(first, self._turn)]
+        for ground in grounds:
             if budget.is_spent():
                 break
             make_moves(
                 ground._replace(is_shut=self._shut(ground)), self._taken, self._room,
-                self._draws, num_moves, budget.stop,
+                self._draws, each, budget.stop,
             )  # fmt: skip
 
     def _note_contacts(self) -> None:
