@@ -11,12 +11,12 @@ from typing import Final
 from planner_core.access.scenario_opportunities import ScenarioOpportunities, compute_opportunities
 from planner_core.budget import Budget, Progress, Termination
 from planner_core.build import build_problem
-from planner_core.certified.drivers.continuous import with_own_starts
 from planner_core.certified.lns.downlinks import brought_down
 from planner_core.certified.proofs import continuous
 from planner_core.certified.proofs.bound import Bound, is_optimal
 from planner_core.certified.proofs.lagrangian import lagrangian_bound
 from planner_core.certified.proofs.resource_bound import quick_bound
+from planner_core.certified.strategies.continuous import with_own_starts
 from planner_core.domain import Scenario
 from planner_core.preferences.polish import Effect, polished
 from planner_core.problem import Problem

@@ -67,6 +67,7 @@ class Incumbent:
         self.plan, timeline = self._in_its_best_form(whole)
         self.is_valid, self.reward = timeline.is_valid, timeline.reward
         self.bound = bound or accessible(problem)
+        self._lowest = self.bound.value
         self._is_proof = covers_starts or not problem.continuous_starts
 
     @property
@@ -83,6 +84,11 @@ class Incumbent:
     def is_done(self) -> bool:
         """Whether plan and bound are close enough, or the budget is spent."""
         return self.is_close or self.budget.is_spent()
+
+    @property
+    def distance(self) -> float:
+        """How far plan and bound are apart, before bounds are rounded to what plans can earn."""
+        return self._lowest - self.reward
 
     @property
     def better(self) -> float:
@@ -143,6 +149,7 @@ class Incumbent:
 
     def lower(self, bound: Bound) -> bool:
         """Note what no plan exceeds; return whether that is less than what was known."""
+        self._lowest = min(self._lowest, bound.value)
         value = rounded_bound(self.problem, bound.value, self.reward)
         if value >= self.bound.value:
             return False

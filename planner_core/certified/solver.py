@@ -6,17 +6,10 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from planner_core.budget import Budget
-from planner_core.certified.drivers.agility_only import Effort
-from planner_core.certified.drivers.continuous import (
-    among_opportunities,
-    bounded,
-    solve_continuous,
-)
-from planner_core.certified.drivers.fleet import solve_without_resources
-from planner_core.certified.drivers.resources import solve_with_resources
+from planner_core.certified.driver import Effort
+from planner_core.certified.strategies.every import solved
 from planner_core.problem import Problem
 from planner_core.solvers.base import Constraint, Outlook, Solution
-from planner_core.solvers.milp import Milp, is_free
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,17 +51,5 @@ class Certified:
 
     def solve(self, problem: Problem, budget: Budget, seed: int) -> Solution:
         """Return the best plan and its bound; the same for the same seed if time suffices."""
-        if problem.pointing is not None and not problem.use_resources:
-            return solve_continuous(problem, budget, seed, self.gap, self.moves_per_task)
-        if problem.use_resources or problem.turns_in_motion:
-            if problem.pointing is not None:
-                solution = solve_with_resources(
-                    problem, among_opportunities(budget), seed, self.gap
-                )
-                return bounded(problem, solution, budget, seed, self.gap)
-            return solve_with_resources(problem, budget, seed, self.gap)
-        if not is_free(problem):
-            return Milp(gap=self.gap).solve(problem, budget, seed)
-        return solve_without_resources(
-            problem, budget, seed, self.gap, Effort(moves_per_task=self.moves_per_task)
-        )
+        effort = Effort(moves_per_task=self.moves_per_task)
+        return solved(problem, budget, seed, self.gap, effort)

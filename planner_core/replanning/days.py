@@ -12,8 +12,8 @@ from typing import Final
 import numpy as np
 
 from planner_core.budget import Budget
-from planner_core.certified.drivers.resource_steps import ResourceSearch
 from planner_core.certified.incumbent import Incumbent
+from planner_core.certified.strategies.resource_steps import ResourceSearch
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import COLLECT, CONTACT, Ints, Problem
 from planner_core.problem.plan import Plan

@@ -25,12 +25,12 @@ from numba.core import event
 from planner_core.access.scenario_opportunities import compute_opportunities
 from planner_core.budget import Budget
 from planner_core.build import build_problem
-from planner_core.certified.drivers.agility_only import FreeSearch
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.alternating import TurnSearch
 from planner_core.certified.multipliers.energy import EnergyPaths, ascent_on_energy
 from planner_core.certified.multipliers.latency import LatencyAscent
 from planner_core.certified.proofs.queues import queue_value
+from planner_core.certified.strategies.agility import FreeSearch
 from planner_core.domain import (
     Agility,
     GroundStation,
@@ -254,7 +254,8 @@ def _shortage() -> None:
     ascent_on_energy(problem, paths, nothing, 1, 0).improve(1, Budget().stop)
     free = FreeSearch(Incumbent(replace(problem, use_resources=False), Budget(), 0.0), 0)
     free.price()
-    free.cut(1)
+    for _ in free.cut(1):
+        pass
     Mcts(worthless="sunpoint").solve(problem, Budget(), 0)
     excluded_beside(problem.satellites[0], problem.satellites[0].rows[:1])
 

@@ -11,8 +11,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget
-from planner_core.certified.drivers.resource_fleet import _FleetPricing
-from planner_core.certified.drivers.resource_steps import ResourceSearch
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.multipliers.latency import LatencyAscent
 from planner_core.certified.multipliers.resources import PriceSearch
@@ -22,6 +20,8 @@ from planner_core.certified.proofs.latency import latency_value
 from planner_core.certified.proofs.resource_bound import resource_value, whole_worth
 from planner_core.certified.proofs.satellite_relaxation import relaxations
 from planner_core.certified.solver import Certified
+from planner_core.certified.strategies.resource_fleet import _FleetPricing
+from planner_core.certified.strategies.resource_steps import ResourceSearch
 from planner_core.certified.tuning import tuned
 from planner_core.domain import Dynamics, Objective, Resources
 from planner_core.precedence.antennas import antenna_groups, antenna_tolls, paid_for_antennas

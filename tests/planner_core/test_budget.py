@@ -5,15 +5,14 @@ from __future__ import annotations
 import pytest
 
 from planner_core.budget import Budget, Progress, Termination
-from planner_core.certified.drivers import resource_steps, resources
-from planner_core.certified.drivers.agility_only import Effort
-from planner_core.certified.drivers.fleet import solve_without_resources
-from planner_core.certified.drivers.resource_steps import ResourceSearch
+from planner_core.certified.driver import Search
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.solver import Certified
+from planner_core.certified.strategies.every import STRATEGIES
+from planner_core.certified.strategies.resources import tasks_alone
+from planner_core.certified.strategies.whole_program import WholeProgram
 from planner_core.problem import Problem
 from planner_core.solvers.base import Solution
-from planner_core.solvers.milp import Milp
 from tests.planner_core.flat_earth import flat_problem
 from tests.planner_core.problems import random_problem
 
@@ -91,15 +90,15 @@ def test_fleets_with_continuous_starts_and_resources_work_on_all_threads(
 ) -> None:
     problem = flat_problem(2, num_targets=10, num_contacts=2, use_resources=True, spacing_s=60.0)
     given: list[int] = []
-    solve = resources.solve_with_resources
+    solved = Search.solved
 
-    def watched(problem: Problem, budget: Budget, seed: int, gap: float) -> Solution:
-        given.append(budget.num_threads)
-        return solve(problem, budget, seed, gap)
+    def watched(search: Search) -> Solution:
+        given.append(search.budget.num_threads)
+        return solved(search)
 
-    monkeypatch.setattr("planner_core.certified.solver.solve_with_resources", watched)
+    monkeypatch.setattr(Search, "solved", watched)
     Certified().solve(problem, Budget(num_threads=2), 0)
-    assert given == [2]
+    assert given == [2, 2]
 
 
 def test_agility_alone_leaves_most_of_the_time_to_plans_with_resources(
@@ -107,15 +106,14 @@ def test_agility_alone_leaves_most_of_the_time_to_plans_with_resources(
 ) -> None:
     problem = random_problem(3, num_collects=40, num_targets=20, num_contacts=4)
     left_s: list[float | None] = []
-    solve = solve_without_resources
+    solved = Search.solved
 
-    def watched(free: Problem, budget: Budget, seed: int, gap: float, effort: Effort) -> Solution:
-        left_s.append(budget.remaining_s())
-        return solve(free, budget, seed, gap, effort)
+    def watched(search: Search) -> Solution:
+        left_s.append(search.budget.remaining_s())
+        return solved(search)
 
-    monkeypatch.setattr(resource_steps, "solve_without_resources", watched)
-    whole = Budget(10_000.0)
-    ResourceSearch(Incumbent(problem, whole, 0.0), 0).without_resources()
+    monkeypatch.setattr(Search, "solved", watched)
+    tasks_alone(Search(Incumbent(problem, Budget(10_000.0), 0.0), 0, STRATEGIES))
     (alone_s,) = left_s
     assert alone_s is not None
     assert 0.0 < alone_s < 3_000.0
@@ -124,15 +122,17 @@ def test_agility_alone_leaves_most_of_the_time_to_plans_with_resources(
 def test_a_job_that_is_cancelled_in_its_last_part_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     problem = random_problem(3, num_collects=40, num_targets=20, num_contacts=4)
     ended: list[Termination] = []
-    solve = Milp.solve
+    solve = WholeProgram.solve
 
-    def cancelled(self: Milp, problem: Problem, budget: Budget, seed: int) -> Solution:
+    def cancelled(
+        self: WholeProgram, problem: Problem, budget: Budget, seed: int, gap: float
+    ) -> Solution:
         budget.cancel()
-        solution = solve(self, problem, budget, seed)
+        solution = solve(self, problem, budget, seed, gap)
         ended.append(solution.termination)
         return solution
 
-    monkeypatch.setattr(Milp, "solve", cancelled)
+    monkeypatch.setattr(WholeProgram, "solve", cancelled)
     monkeypatch.setattr(Incumbent, "is_within", lambda *_: False)
     budget = Budget()
     solution = Certified().solve(problem, budget, 0)

@@ -71,10 +71,11 @@ def assert_proven(problem: Problem, solution: Solution, best: float) -> None:
         assert timeline.reward >= best * (1.0 - SAME) - slack
     if solution.proven.is_elementary:
         assert is_proven(problem, solution.proven)
-    elif solution.proven.proof == "lagrangian":
-        assert solution.proven.certificate is not None
+    elif solution.proven.certificate is not None:
         assert is_refuted(problem, solution.proven.certificate)
         assert solution.proven.certificate.amount > best
+    elif solution.proven.proof == "lagrangian":
+        assert is_proven(problem, solution.proven)
     else:
         assert solution.proven.log
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget, Termination
-from planner_core.certified.drivers.continuous import solve_continuous, with_own_starts
+from planner_core.certified.driver import Effort
 from planner_core.certified.lns.continuous_search import ContinuousSearch
 from planner_core.certified.lns.insertion_with_resources import (
     filled_with_resources,
@@ -19,6 +19,8 @@ from planner_core.certified.lns.insertion_with_resources import (
 from planner_core.certified.proofs import documents as proofs
 from planner_core.certified.proofs.bound import accessible
 from planner_core.certified.proofs.continuous import ContinuousDual, continuous_value
+from planner_core.certified.strategies.continuous import with_own_starts
+from planner_core.certified.strategies.every import solved
 from planner_core.domain import Agility
 from planner_core.precedence.earliest_starts import follows_at_s
 from planner_core.precedence.time_windows import spans_of, view_of
@@ -32,11 +34,19 @@ from planner_core.problem import (
 )
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
+from planner_core.solvers.base import Solution
 from planner_core.solvers.registry import SOLVERS, Certified, Rule
 from tests.examples import examples
 from tests.planner_core.flat_earth import flat_problem
 
 SEEDS = st.integers(0, 10**6)
+
+
+def planned(problem: Problem, budget: Budget, seed: int, moves_per_task: float) -> Solution:
+    """Return what all strategies come to in so many moves."""
+    return solved(problem, budget, seed, 0.0, Effort(moves_per_task=moves_per_task))
+
+
 AGILITIES = st.sampled_from(
     [Agility(), Agility(slew_rate_deg_s=3.0), Agility(slew_rate_deg_s=1.0, settle_s=5.0),
      Agility(slew_rate_deg_s=1.5, acceleration_deg_s2=0.3), Agility(slew_rate_deg_s=0.3)]
@@ -80,13 +90,13 @@ def test_plans_are_valid_no_worse_than_they_began_and_below_the_bound(
         num_satellites=num_satellites, spacing_s=spacing_s,
     )  # fmt: skip
     rule = Rule().solve(problem, Budget(), 0)
-    solution = solve_continuous(problem, Budget(), seed, 0.0, 20.0)
+    solution = planned(problem, Budget(), seed, 20.0)
     timeline = replay(problem, solution.plan)
     assert not timeline.violations
     assert timeline.reward >= replay(problem, rule.plan).reward
     assert solution.bound is not None
     assert timeline.reward <= solution.bound + 1e-6
-    assert solution.plan == solve_continuous(problem, Budget(), seed, 0.0, 20.0).plan
+    assert solution.plan == planned(problem, Budget(), seed, 20.0).plan
     filled = with_own_starts(problem, rule, Budget())
     assert replay(problem, filled.plan).is_valid
     assert replay(problem, filled.plan).reward >= replay(problem, rule.plan).reward
@@ -111,7 +121,7 @@ def test_whatever_the_prices_the_bound_is_not_below_the_best_plan(
     for share in (0.0, 0.3, 1.0):
         prices = problem.best_worth * np.clip(rng.normal(share, 0.3, 6), 0.0, 1.0)
         assert dual.at(prices)[0] >= best - 1e-9
-    solution = solve_continuous(problem, Budget(), 0, 0.0, 20.0)
+    solution = planned(problem, Budget(), 0, 20.0)
     reward = replay(problem, solution.plan).reward
     assert reward <= best + 1e-9
     assert solution.bound is not None
@@ -124,7 +134,7 @@ def test_small_problems_end_at_the_optimum_and_most_are_proven() -> None:
     reached = proven = 0
     for seed in range(25):
         problem = flat_problem(seed, num_targets=6, horizon_s=450.0)
-        solution = solve_continuous(problem, Budget(), 0, 0.0, 30.0)
+        solution = planned(problem, Budget(), 0, 30.0)
         reached += replay(problem, solution.plan).reward == best_reward(problem)
         proven += solution.termination is Termination.OPTIMAL
     assert reached >= 23
@@ -139,7 +149,7 @@ def test_the_best_plan_on_a_grid_stays_below_the_bound(seed: int, num_satellites
     )
     grid = replace(problem, continuous_starts=False, pointing=None)
     best = Certified().solve(grid, Budget(), 0)
-    bound = solve_continuous(problem, Budget(), 0, 0.0, 5.0).proven
+    bound = planned(problem, Budget(), 0, 5.0).proven
     assert bound is not None
     assert replay(grid, best.plan).reward <= bound.value
     search = ContinuousSearch(problem, best.plan, Budget(), 0)
@@ -152,7 +162,7 @@ def test_the_best_plan_on_a_grid_stays_below_the_bound(seed: int, num_satellites
 
 def test_bounds_can_be_checked_and_false_ones_are_refused() -> None:
     problem = flat_problem(3, num_targets=14, horizon_s=700.0)
-    bound = solve_continuous(problem, Budget(), 0, 0.0, 10.0).proven
+    bound = planned(problem, Budget(), 0, 10.0).proven
     assert bound is not None
     again = proofs.from_json(proofs.to_json(bound))
     assert proofs.is_proven(problem, again)
@@ -170,7 +180,7 @@ def test_what_bounds_fixed_starts_is_not_taken_for_free_ones() -> None:
     assert bound is not None
     assert proofs.is_proven(grid, bound)
     assert not proofs.is_proven(problem, bound)
-    best = solve_continuous(problem, Budget(), 0, 0.0, 10.0)
+    best = planned(problem, Budget(), 0, 10.0)
     assert replay(problem, best.plan).reward > bound.value
     for name in ("rule", "milp", "forward_search"):
         assert SOLVERS[name]().solve(problem, Budget(), 0).proven is None
@@ -217,7 +227,7 @@ def test_windows_planned_anew_keep_what_must_be_and_often_better_the_plan() -> N
 def test_a_satellite_slower_than_its_lines_of_sight_has_the_bound_of_all_targets() -> None:
     slow = flat_problem(1, num_targets=10, agility=Agility(slew_rate_deg_s=0.2))
     assert ContinuousDual.of(slow, 10.0) is None
-    solution = solve_continuous(slow, Budget(), 0, 0.0, 5.0)
+    solution = planned(slow, Budget(), 0, 5.0)
     assert replay(slow, solution.plan).is_valid
     assert solution.bound == accessible(slow).value
     assert solution.proven is not None
@@ -270,6 +280,6 @@ def test_a_spent_budget_still_answers() -> None:
     problem = flat_problem(0, num_targets=12)
     budget = Budget()
     budget.cancel()
-    solution = solve_continuous(problem, budget, 0, 0.0, 30.0)
+    solution = planned(problem, budget, 0, 30.0)
     assert replay(problem, solution.plan).is_valid
     assert solution.termination in (Termination.CANCELLED, Termination.OPTIMAL)

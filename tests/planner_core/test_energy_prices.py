@@ -14,12 +14,12 @@ from hypothesis import strategies as st
 from planner_core.budget import Budget
 from planner_core.certified.dp.energy_labels import EnergyLevels, energy_levels, most_by_energy
 from planner_core.certified.dp.resource_network import Network, network_of
-from planner_core.certified.drivers.resource_steps import ResourceSearch
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.multipliers.ascent import Ascent
 from planner_core.certified.multipliers.energy import EnergyPaths, ascent_on_energy
 from planner_core.certified.proofs.bound import rounded_bound
 from planner_core.certified.proofs.documents import from_json, is_proven, to_json
+from planner_core.certified.strategies.resource_steps import ResourceSearch
 from planner_core.domain import Objective
 from planner_core.problem import Floats, Problem
 from planner_core.problem.delivery import with_objective

@@ -8,13 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget, Termination
-from planner_core.certified.drivers.agility_only import Effort
-from planner_core.certified.drivers.fleet import FleetSearch, solve_without_resources
+from planner_core.certified.driver import Effort
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.fleet_start import priced_start
 from planner_core.certified.mip.solution_pool import PlanPool
 from planner_core.certified.multipliers.paths import ascent_on_paths
 from planner_core.certified.proofs.documents import from_json, is_proven, to_json
+from planner_core.certified.strategies.every import solved
+from planner_core.certified.strategies.fleet import FleetSearch
 from planner_core.certified.tuning import tuned
 from planner_core.domain import Agility
 from planner_core.precedence.network import heaviest_paths, network_of
@@ -44,7 +45,8 @@ def searched(problem: Problem, budget: Budget, seed: int) -> FleetSearch:
     search = FleetSearch(Incumbent(problem, budget, 0.0), seed)
     search.price()
     search.start()
-    search.search(20.0)
+    for _ in search.search(20.0):
+        pass
     return search
 
 
@@ -100,7 +102,8 @@ def test_what_streams_are_worth_together_is_taken(monkeypatch: pytest.MonkeyPatc
 
     monkeypatch.setattr(PlanPool, "merge", merge)
     search = FleetSearch(Incumbent(problem, Budget(), 0.0), 0)
-    search.search(20.0)
+    for _ in search.search(20.0):
+        pass
     assert known[0] == 2  # a plan of each stream
     assert search.best.reward >= replay(problem, best).reward
 
@@ -185,7 +188,7 @@ def test_paths_of_a_fleet_need_no_table_of_pairs(monkeypatch: pytest.MonkeyPatch
     )
     effort = Effort(moves_per_task=5.0, max_rounds=0)
     with tuned(small_fleet=0):
-        solution = solve_without_resources(problem, Budget(), 0, 0.0, effort)
+        solution = solved(problem, Budget(), 0, 0.0, effort)
     assert solution.proven is not None
     assert 0.0 < replay(problem, solution.plan).reward <= solution.proven.value
     with pytest.raises(AssertionError):

@@ -11,10 +11,12 @@ from benchmarks.missions import paper_scenario, problem_of
 from benchmarks.objective import document
 from benchmarks.paper.settings import MCTS_TUNED, PAPER_FORWARD, PAPER_MCTS, make_solver
 from planner_core.budget import Budget, Termination
-from planner_core.certified.drivers.resource_steps import ResourceSearch
+from planner_core.certified.driver import Search
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.proofs import documents as proofs
 from planner_core.certified.proofs.resource_bound import quick_bound
+from planner_core.certified.strategies.every import STRATEGIES
+from planner_core.certified.strategies.resources import choices
 from planner_core.domain import Dynamics, GroundStation
 from planner_core.problem import ACCESS_FOUND, Problem
 from planner_core.referee.replay import replay
@@ -146,5 +148,7 @@ def test_shares_begin_with_the_plan_for_images_where_agility_alone_decides(share
     plan = Certified().solve(images, Budget(), 0).plan
     best = Incumbent(shares, Budget(), 0.01)
     best.lower(quick_bound(shares, best.reward))
-    ResourceSearch(best, 0).choose(best.bound.value / 2000)
+    search = Search(best, 0, STRATEGIES)
+    for _ in choices(search):
+        pass
     assert best.reward >= 0.98 * replay(shares, plan).reward

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from planner_core.budget import Budget, Progress, Termination
-from planner_core.certified.drivers.agility_only import FreeSearch
-from planner_core.certified.drivers.fleet import FleetSearch
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.mip.highs import Engine, Outcome
 from planner_core.certified.proofs.bound import Bound, is_optimal
+from planner_core.certified.strategies.agility import FreeSearch
+from planner_core.certified.strategies.fleet import FleetSearch
 from planner_core.certified.tolerances import SAME
 from planner_core.problem import COLLECT, Kept, Pinned, Problem
 from planner_core.problem.plan import Plan
@@ -48,8 +48,12 @@ def test_what_highs_leaves_open_is_not_called_optimal(
         return replace(outcome, bound=outcome.bound * (1.0 + share))
 
     monkeypatch.setattr(Engine, "search", leaves_open)
-    monkeypatch.setattr("planner_core.certified.solver.is_free", lambda _: False)
-    monkeypatch.setattr("planner_core.solvers.milp.is_free", lambda _: False)
+    # No other bound is to settle it.
+    monkeypatch.setattr(
+        "planner_core.certified.incumbent.accessible", lambda _: Bound(value=np.inf, proof="milp")
+    )
+    for module in ("certified.strategies.supports", "solvers.milp"):
+        monkeypatch.setattr(f"planner_core.{module}.is_free", lambda _: False)
     solution = solver.solve(problem, Budget(), 0)
     assert solution.bound is not None
     reward = replay(problem, solution.plan).reward

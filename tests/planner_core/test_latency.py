@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from types import SimpleNamespace
 from typing import Literal
 
 import numpy as np
@@ -16,9 +18,8 @@ from planner_core.certified.dp import contact_layers
 from planner_core.certified.dp.contact_layers import Layers, layers_of, most_by_contacts
 from planner_core.certified.dp.energy_labels import EnergyLevels, energy_levels
 from planner_core.certified.dp.resource_network import Network, network_of
-from planner_core.certified.drivers import resources
-from planner_core.certified.drivers.latency import DayByDay
-from planner_core.certified.drivers.resource_steps import ResourceSearch
+from planner_core.certified.driver import Search, Slices
+from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.settled_contacts import worth_with
 from planner_core.certified.multipliers.latency import LatencyAscent
 from planner_core.certified.proofs.bound import rounded_bound
@@ -27,6 +28,8 @@ from planner_core.certified.proofs.latency import latency_value
 from planner_core.certified.proofs.resource_bound import quick_bound
 from planner_core.certified.signs import NEVER
 from planner_core.certified.solver import Certified
+from planner_core.certified.strategies.half_life import DayByDay
+from planner_core.certified.strategies.whole_program import exhaust
 from planner_core.certified.tuning import tuned
 from planner_core.domain import Objective
 from planner_core.problem import COLLECT, CONTACT, Floats, Problem
@@ -271,19 +274,36 @@ def test_a_fleet_earns_more_than_by_a_plan_that_knows_of_no_half_life(seed: int)
     assert solution.bound >= reward
 
 
+def _search_beside_by(
+    work: Callable[[Incumbent, int], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Let something else be done where a search begins another."""
+
+    beside = Search.beside
+
+    def worked(
+        self: Search, best: Incumbent, seed: int, without: Slices | None = None
+    ) -> Search | SimpleNamespace:
+        if without is exhaust:
+            return SimpleNamespace(solved=partial(work, best, seed))
+        return beside(self, best, seed, without)
+
+    monkeypatch.setattr(Search, "beside", worked)
+
+
 def test_a_fleet_s_search_for_plans_is_interrupted_for_better_days(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """After a quarter of the time, then after half of what is left, and each time it ends."""
 
-    def told_30_times(search: ResourceSearch, _: float) -> None:
+    def told_30_times(best: Incumbent, seed: int) -> None:
         for _ in range(30):
-            search.best.report("plans")
+            best.report("plans")
         # Another plan for each seed.
-        search.best.plan = Plan(search.best.plan.actions[: search.seed])
+        best.plan = Plan(Rule().solve(best.problem, Budget(), 0).plan.actions[:seed])
 
     budget, left = Reports(100), list[int]()
-    monkeypatch.setattr(resources, "_close_in_on_worth", told_30_times)
+    _search_beside_by(told_30_times, monkeypatch)
     monkeypatch.setattr(DayByDay, "better", lambda *_: left.append(budget.left))
     problem = random_problem(2, num_collects=40, num_contacts=4, num_satellites=2)
     hurried = with_objective(problem, Objective(collected_share=0.0, half_life_s=4000.0))
@@ -296,9 +316,7 @@ def test_a_fleet_s_search_that_ends_with_the_same_plan_again_is_not_begun_afresh
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     ended = list[int]()
-    monkeypatch.setattr(
-        resources, "_close_in_on_worth", lambda search, _: ended.append(search.seed)
-    )
+    _search_beside_by(lambda _, seed: ended.append(seed), monkeypatch)
     problem = random_problem(2, num_collects=40, num_contacts=4, num_satellites=2)
     hurried = with_objective(problem, Objective(collected_share=0.0, half_life_s=4000.0))
     Certified().solve(hurried, Reports(100), 0)

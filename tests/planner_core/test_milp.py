@@ -18,6 +18,7 @@ from planner_core.certified.mip.highs import Engine
 from planner_core.certified.mip.model import plan_program
 from planner_core.certified.mip.program import Program, Rows
 from planner_core.certified.proofs.documents import is_proven
+from planner_core.certified.strategies.whole_program import relaxation_bound
 from planner_core.domain import Agility, Dynamics
 from planner_core.precedence.relation import is_transitive
 from planner_core.problem import (
@@ -27,7 +28,6 @@ from planner_core.problem import (
     Sunlight,
 )
 from planner_core.referee.replay import replay
-from planner_core.solvers.milp import relaxation_bound
 from planner_core.solvers.registry import Milp
 from tests.examples import examples
 from tests.planner_core.brute_force import best_reward

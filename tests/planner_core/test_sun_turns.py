@@ -15,6 +15,7 @@ from planner_core.certified.dp.energy_labels import energy_levels, most_by_energ
 from planner_core.certified.dp.resource_network import network_of
 from planner_core.certified.proofs.lagrangian import lagrangian_bound
 from planner_core.certified.proofs.resource_bound import quick_bound, resource_value
+from planner_core.certified.strategies.whole_program import relaxation_bound
 from planner_core.domain import Agility, Horizon, Resources, Scenario
 from planner_core.errors import InvalidScenario
 from planner_core.mdp.resource_columns import STRICT, take
@@ -26,7 +27,6 @@ from planner_core.problem.slew import slew_s
 from planner_core.problem.sun_turns import SunPath, sun_turn_s
 from planner_core.referee.replay import replay
 from planner_core.referee.timeline import Timeline
-from planner_core.solvers.milp import relaxation_bound
 from planner_core.solvers.priced import better_of, energy_of, is_priced, with_choices
 from planner_core.solvers.registry import SOLVERS, Certified, Milp
 from planner_core.solvers.sequential import Turn

@@ -14,7 +14,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from planner_core.certified.drivers.resource_steps import ResourceSearch
+from planner_core.budget import Budget, Progress
+from planner_core.certified.driver import Search
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.alternating import TurnSearch
 from planner_core.certified.lns.choices import ChoiceSearch
@@ -24,30 +25,44 @@ from planner_core.certified.lns.settled_contacts import served, with_contacts
 from planner_core.certified.multipliers.latency import LatencyAscent
 from planner_core.certified.multipliers.queues import priced_by_queues
 from planner_core.certified.proofs.bound import Bound, rounded_bound
+from planner_core.certified.proofs.lagrangian import lagrangian_bound
 from planner_core.certified.proofs.queues import queue_value
+from planner_core.certified.strategies.resource_steps import ResourceSearch
+from planner_core.certified.strategies.resources import choices
+from planner_core.certified.strategies.whole_program import exhaust
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import CONTACT, Floats, Problem
+from planner_core.problem.delivery import with_objective
 from planner_core.problem.plan import Plan
 from planner_core.problem.restrict import taking
 
 
-def close_in_on_the_ground(search: ResourceSearch, unit: float) -> None:
+def agility_bound(search: Search) -> Iterator[None]:
+    """Bound plans by agility alone."""
+    search.best.lower(lagrangian_bound(search.problem, search.best.reward))
+    yield
+
+
+def on_the_ground(search: Search) -> Iterator[None]:
     """Search for contacts, bounds and plans in turn, until none gets anywhere."""
-    best = search.best
-    ascent = LatencyAscent(best.problem, search.prices())
+    best, engine = search.best, search.engine(ResourceSearch)
+    ascent = LatencyAscent(best.problem, engine.prices())
     tried: set[tuple[int, ...]] = set()
     rng = np.random.default_rng(search.seed)
     num_idle = number = 0
-    if search.is_large:
-        _better_with_its_contacts(search)
+    if engine.is_large:
+        _better_with_its_contacts(engine)
+        yield
     _lower(best, ascent, TUNING.rounds // 2)
+    yield
     named = _Named(best, ascent)
     if len(best.problem.satellites) == 1:
         # A fleet's programmes take too long.
         _lower(best, ascent, 3 * TUNING.rounds // 2)
         named.begin()
+        yield
     if not named.contacts:
-        search.choose(unit)
+        yield from choices(search)
     while num_idle < TUNING.patience and not best.is_done:
         before = best.reward
         own = _contacts_of(best.problem, best.plan)
@@ -60,7 +75,8 @@ def close_in_on_the_ground(search: ResourceSearch, unit: float) -> None:
         contacts = next((one for one in offered if one not in tried), own)
         tried.add(contacts)
         levels = TUNING.levels_per_collect // (1 if number else 2)
-        _plan_with(best, contacts, named.prices, unit, search.seed + number, levels)
+        _plan_with(best, contacts, named.prices, engine.unit, search.seed + number, levels)
+        yield
         number += 1
         num_idle = 0 if best.reward > before else num_idle + 1
         if number == 1:
@@ -69,7 +85,75 @@ def close_in_on_the_ground(search: ResourceSearch, unit: float) -> None:
             named.prove_again()
             tried.difference_update(named.contacts[-1:])
         _lower(best, ascent, TUNING.several)
+        yield
     _prove_at_last(best, ascent, named)
+
+
+def days(search: Search) -> Iterator[None]:
+    """Plan a fleet without its half-life, and let its satellites plan their days anew from that.
+
+    The first search is interrupted for the second. Once it has ended it begins afresh. Two fleets
+    drawn at random earn 277.0 and 204.0 after 40 CPU seconds; with a quarter of the time for the
+    first, once, 267.3 and 197.9.
+    """
+    problem, best, engine = search.problem, search.best, search.engine(ResourceSearch)
+    plain = replace(problem, worth=problem.worth_on_ground, full_worth=None)
+    undecayed = with_objective(plain, replace(problem.objective, half_life_s=None))
+    days, breaks = DayByDay(engine), _Breaks(search.budget)
+    num_idle, ended = 0, list[Plan]()
+    while num_idle < TUNING.patience and not best.is_done:
+        before = best.reward
+        plan = _without_half_life(search, undecayed, search.seed + len(ended), days, breaks)
+        days.better(plan)
+        num_idle = 0 if best.reward > before else num_idle + 1
+        yield
+        if plan in ended:
+            break  # so few tasks that every search ends with the same
+        ended.append(plan)
+    days.prove()
+
+
+def _without_half_life(
+    search: Search, undecayed: Problem, seed: int, days: DayByDay, breaks: _Breaks
+) -> Plan:
+    """Return the best plan of the problem whose images keep their worth.
+
+    All plans on the way to it are offered to the search that counts the half-life.
+    """
+    engine = search.engine(ResourceSearch)
+
+    def look(_: Progress) -> None:
+        engine.offer(inner.plan)
+        engine.best.report("plans")
+        if breaks.is_due():
+            days.better(inner.plan)
+            breaks.end()
+
+    # A small fleet goes on with sets of contacts, and does not wait for the whole program here.
+    share = 1.0 if engine.is_fleet else TUNING.first_share
+    inner = Incumbent(undecayed, search.budget.part(share, look), search.best.gap)
+    search.beside(inner, seed, without=exhaust).solved()
+    return inner.plan
+
+
+class _Breaks:
+    """When a search is interrupted: after a share of the time, then after half of what is left."""
+
+    def __init__(self, budget: Budget) -> None:
+        self._budget = budget
+        self._next_s = (1.0 - TUNING.beginning) * self._left_s
+
+    @property
+    def _left_s(self) -> float:
+        return self._budget.remaining_s() or 0.0
+
+    def is_due(self) -> bool:
+        """Whether it is time; never where time has no end."""
+        return self._left_s < self._next_s
+
+    def end(self) -> None:
+        """Let the search go on."""
+        self._next_s = 0.5 * self._left_s
 
 
 def _better_with_its_contacts(search: ResourceSearch) -> None:

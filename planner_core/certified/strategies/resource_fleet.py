@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from planner_core.certified.drivers.resource_steps import ResourceSearch
+from planner_core.certified.driver import Search
 from planner_core.certified.lns.alternating import TurnSearch
 from planner_core.certified.mip.program_search import ProgramSearch
 from planner_core.certified.mip.solution_pool import PlanPool
@@ -15,37 +15,36 @@ from planner_core.certified.multipliers.ascent import Ascent, Steps
 from planner_core.certified.multipliers.energy import EnergyPaths, ascent_on_energy
 from planner_core.certified.multipliers.resources import PriceSearch
 from planner_core.certified.proofs.bound import Bound
+from planner_core.certified.strategies.resource_steps import ResourceSearch
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import Floats
 
 
-def close_in_fleet(search: ResourceSearch, unit: float) -> None:
-    """Search for plans and prices side by side, and for plans again until that gets nowhere.
+def side_by_side(search: Search) -> Iterator[None]:
+    """Search for plans and multipliers side by side, and for plans again until that fails.
 
     What is left of a small fleet HiGHS soon settles.
     """
-    turns = search.turns(unit)
+    engine, best = search.engine(ResourceSearch), search.best
+    turns = engine.turns(engine.unit)
     pool = PlanPool(search.problem, search.budget, search.seed)
     with ThreadPoolExecutor(search.budget.num_threads) as threads:
-        pricing = _FleetPricing(search)
-        while not (pricing.is_settled or search.best.is_done):
-            _take_turns(search, turns, pool, threads, pricing)
+        pricing = _FleetPricing(engine)
+        while not (pricing.is_settled or best.is_done):
+            _take_turns(engine, turns, pool, threads, pricing)
+            yield
         programs = None
-        if search.is_fleet and pricing.prices is not None:
+        if engine.is_fleet and pricing.prices is not None:
             programs = ProgramSearch(
-                search.problem,
-                pool,
-                pricing.prices,
-                pricing.losses,
-                search.budget,
-                search.seed,
+                search.problem, pool, pricing.prices, pricing.losses, search.budget, search.seed
             )
         idle_turns = 0
         while idle_turns < (TUNING.fleet_patience if programs else TUNING.tries):
-            if search.best.is_done:
+            if best.is_done:
                 return
-            is_better = _take_turns(search, turns, pool, threads, programs)
+            is_better = _take_turns(engine, turns, pool, threads, programs)
             idle_turns = 0 if is_better else idle_turns + 1
+            yield
 
 
 def _take_turns(

@@ -1,19 +1,15 @@
 """The steps with battery and recorder, each towards a better plan or a lower bound.
 
-Which step comes when, `resources.py` says for one satellite, `resource_fleet.py` for several.
+`resources.py` makes slices of them for one satellite, `resource_fleet.py` for several.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator
+from functools import cached_property
 
 import numpy as np
 
-from planner_core.budget import ignored
-from planner_core.certified.drivers.agility_only import Effort
-from planner_core.certified.drivers.commitments import best_commitment
-from planner_core.certified.drivers.fleet import solve_without_resources
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.alternating import TurnSearch
 from planner_core.certified.lns.choices import ChoiceSearch
@@ -26,11 +22,13 @@ from planner_core.certified.proofs.bound import Bound, rounded_bound
 from planner_core.certified.proofs.lagrangian import lagrangian_bound
 from planner_core.certified.proofs.latency import latency_value
 from planner_core.certified.sizes import MAX_PAIRS
+from planner_core.certified.strategies.commitments import best_commitment
+from planner_core.certified.strategies.supports import is_fleet, is_large
+from planner_core.certified.strategies.whole_program import relaxation_bound
 from planner_core.certified.tuning import TUNING
 from planner_core.precedence.relation import num_near_pairs
 from planner_core.problem import CONTACT, Bools, Floats
 from planner_core.problem.plan import Plan
-from planner_core.solvers.milp import Milp, relaxation_bound
 
 
 class ResourceSearch:
@@ -48,31 +46,41 @@ class ResourceSearch:
         self._brought_down: set[Plan] = set()  # what was tried with further contacts
 
     @property
-    def is_shared(self) -> bool:
-        """Whether there are several satellites."""
-        return sum(len(satellite) > 0 for satellite in self.problem.satellites) > 1
-
-    @property
     def is_fleet(self) -> bool:
         """Whether several satellites share so much that the whole program is too large."""
-        return self.is_shared and self.is_large
+        return is_fleet(self.problem)
 
     @property
     def is_large(self) -> bool:
         """Whether steps towards prices take long, and the whole program is out of reach."""
-        return len(self.problem.opportunities) > TUNING.large
+        return is_large(self.problem)
 
-    def choose(self, unit: float) -> None:
-        """Look for first plans among choices of tasks, and near those of agility alone."""
-        choices = ChoiceSearch(self.problem, unit, self.seed, self.budget.stop)
+    @cached_property
+    def unit(self) -> float:
+        """The unit of worth for exact programmes."""
+        unit, bound = self.best.unit, self.best.bound.value
+        if unit == 0.0 or bound / unit > TUNING.max_units:
+            return max(bound / TUNING.max_units, 1e-12)
+        return unit
+
+    def choose(self, alone: Callable[[], Bools]) -> Iterator[None]:
+        """Look for first plans among choices of tasks, and near those of agility alone.
+
+        Parameters
+        ----------
+        alone
+            Returns the tasks of a plan that agility alone bounds.
+        """
+        choices = ChoiceSearch(self.problem, self.unit, self.seed, self.budget.stop)
         choices.start(self.mask([]), TUNING.first_goal)
         self.offer(choices.plan)
         self.best.report("plans")
+        yield
         self._agility_decides = self._is_bound_by_agility()
         if self._agility_decides and not self.best.is_done:
-            preferred = self.without_resources()
-            choices.start(preferred, 1.0)
+            choices.start(alone(), 1.0)
             self.offer(choices.plan)
+            yield
 
     def _is_bound_by_agility(self) -> bool:
         """Return whether battery and recorder hardly bound the plans more than agility alone."""
@@ -85,6 +93,11 @@ class ResourceSearch:
         # 0 to 3 % above where agility decides (the demonstration's mission), 76 % and more where
         # energy does (the paper's draws).
         return alone.value <= (1.0 + TUNING.far_above) * self.best.bound.value
+
+    @cached_property
+    def turn_search(self) -> TurnSearch:
+        """The search for plans of one satellite, or of few."""
+        return self.turns(self.unit)
 
     def turns(self, unit: float) -> TurnSearch:
         """Return a search for plans that begins at the best, or where a commitment leads.
@@ -129,19 +142,6 @@ class ResourceSearch:
         more = brought_down(self.problem, plan, self.budget, self.best.judge)
         return (more is not plan and self.best.offer(more)) or is_better
 
-    def without_resources(self) -> Bools:
-        """Let agility alone bound the plans; return the tasks of the best plan then."""
-        free = replace(self.problem, use_resources=False)
-        # With starts 15 s apart this takes all the time there is: 253 of 290 after 20 s with all of
-        # it, 280 with a quarter (docs/bounds.md). Its plans are not for this problem: they are not
-        # reported.
-        quiet = self.budget.part(TUNING.beginning, ignored)
-        solution = solve_without_resources(free, quiet, self.seed, self.best.gap, Effort())
-        if solution.proven is not None:
-            self.best.lower(solution.proven)
-        self.best.report("without resources")
-        return self.mask(action.opportunity for action in solution.plan.actions)
-
     def relax_whole(self) -> None:
         """Bound plans by the relaxation of the whole program, where one image betters another.
 
@@ -155,19 +155,6 @@ class ResourceSearch:
             return
         self.best.lower(relaxation_bound(self.problem, self.budget, self.seed))
         self.best.report("relaxation")
-
-    def exhaust(self) -> None:
-        """Leave what remains to the whole program, which ends with a proof if time suffices.
-
-        Of 240 small missions drawn for the tests all were closed with it, and 222 without.
-        """
-        self.best.report("HiGHS")
-        quiet = self.budget.part(report=ignored)
-        solution = Milp(gap=self.best.gap).solve(self.problem, quiet, self.seed)
-        self.best.offer(solution.plan)
-        if solution.proven is not None:
-            self.best.lower(solution.proven)
-        self.best.report("HiGHS")
 
     def mask(self, rows: Iterable[int]) -> Bools:
         """Return which opportunities these are."""
@@ -191,8 +178,9 @@ class ResourceSearch:
             known = lagrangian_bound(self.problem, self.best.reward).prices
         return np.zeros(len(self.problem.target_ids)) if known is None else known
 
-    def first_prices(self) -> PriceSearch:
-        """Return a search for multipliers that begins where battery alone leads.
+    @cached_property
+    def price_search(self) -> PriceSearch:
+        """The search for multipliers, which begins where the battery alone leads.
 
         To ask the battery alone takes a fiftieth of the time; where that does not lead below what
         is known by much, the exact programme is not asked at its multipliers either.

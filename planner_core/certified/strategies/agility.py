@@ -1,4 +1,4 @@
-"""Without resources: prices, window search, cutting planes, and HiGHS for what is left.
+"""Without resources: multipliers, window search, cutting planes, and HiGHS for what is left.
 
 Whatever the prices of targets and cuts, they tell of each task what a plan that holds it can
 earn at most. Tasks that no better plan can hold are struck out, so that the rest becomes ever
@@ -8,11 +8,11 @@ smaller, for the search as well as for the proof.
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from collections.abc import Generator, Iterator
 
 import numpy as np
 
-from planner_core.budget import Budget
+from planner_core.certified.driver import Effort, Search
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.search import WindowSearch
 from planner_core.certified.mip.model import plan_program
@@ -40,28 +40,9 @@ from planner_core.problem import (
     Bools,
     Floats,
     Ints,
-    Problem,
 )
 from planner_core.problem.plan import Plan
 from planner_core.problem.restrict import restricted
-from planner_core.solvers.base import Solution
-from planner_core.solvers.rule import Rule
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Effort:
-    """How much is done before HiGHS is asked for the rest.
-
-    Attributes
-    ----------
-    moves_per_task
-        Moves of the window search for each opportunity.
-    max_rounds
-        Rounds of cutting planes.
-    """
-
-    moves_per_task: float = 30.0
-    max_rounds: int = 200
 
 
 class FreeSearch:
@@ -176,8 +157,11 @@ class FreeSearch:
         """Return the tasks that a plan worth this much can hold."""
         return self._rows[~is_below(self.through, amount)]
 
-    def cut(self, max_rounds: int) -> Master:
-        """Price with cutting planes until that leads no further; return the relaxation."""
+    def cut(self, max_rounds: int) -> Generator[None, None, Master]:
+        """Price with cutting planes, a round at a time, until that leads no further.
+
+        Returns the relaxation.
+        """
         self.shrink()
         priced = self.best.bound.value + self.best.unit
         master = Master(self._rest, self._rows, self.budget, self.seed)
@@ -205,6 +189,7 @@ class FreeSearch:
                 if not self.round_off(master, taken) or self.best.is_done:
                     break
                 bounds.clear()
+            yield
         return master
 
     def round_off(self, master: Master, taken: Floats) -> bool:
@@ -253,60 +238,72 @@ class FreeSearch:
             self._reported_s = now_s
             self.best.report("HiGHS searches")
 
-    def solution(self) -> Solution:
-        """Return the plan with what is known of it."""
+    def proof(self) -> Bound:
+        """Return the bound with all that proves it."""
         bound = self.best.bound
         # What multipliers prove elsewhere the steps prove too, to the tolerance of "better".
         is_certified = is_optimal(bound.value, self._certified, 0.0)
-        if bound.proof == "lagrangian" and is_certified and not bound.is_elementary:
-            value = max(bound.value, self._certified)
-            above = value + (self.best.unit or 4e-9 * max(1.0, value))
-            certificate = Certificate(amount=above, refutation=Refutation(steps=tuple(self.steps)))
-            bound = Bound(value=value, proof="lagrangian", certificate=certificate)
-        return self.best.solution(bound)
+        if bound.proof != "lagrangian" or not is_certified or bound.is_elementary:
+            return bound
+        value = max(bound.value, self._certified)
+        above = value + (self.best.unit or 4e-9 * max(1.0, value))
+        certificate = Certificate(amount=above, refutation=Refutation(steps=tuple(self.steps)))
+        return Bound(value=value, proof="lagrangian", certificate=certificate)
 
 
-def solve_free(problem: Problem, budget: Budget, seed: int, gap: float, effort: Effort) -> Solution:
-    """Return the best plan of a problem without resources, and its proof."""
-    best = Incumbent(problem, budget, gap)
-    best.offer(Rule().solve(problem, Budget(), seed).plan)
-    search = FreeSearch(best, seed)
-    if not best.is_done and not problem.offers_choice:
-        search.price()
-        best.report("prices")
-    if not best.is_done:
-        _approach(search, effort)
-    if not best.is_done:
-        search.shrink()
-        if search.is_small:
-            close_in(search, effort)
-        else:
-            search.best.report("too many starts for cutting planes")
-    return search.solution()
+def _engine(search: Search) -> FreeSearch:
+    engine = search.engine(FreeSearch)
+    search.proof = engine.proof
+    return engine
 
 
-def _approach(search: FreeSearch, effort: Effort) -> None:
-    """Better the plan by windows, and the bound by prices, until both lead no further."""
-    is_spaced = search.problem.offers_choice
-    moves = TUNING.moves_per_task * (TUNING.little if is_spaced else 1.0)
-    left, num_idle = effort.moves_per_task, 0.0
-    while left > 0 and num_idle < TUNING.tries * TUNING.moves_per_task and not search.best.is_done:
-        if is_spaced and not search.is_priced_out:
-            search.price_passes()
-        if not search.best.is_close:
-            left -= moves
-            is_better = search.search(moves, search.open_rows(search.best.reward))
-            num_idle = 0.0 if is_better else num_idle + moves
-            search.best.report("window search")
+def path_multipliers(search: Search) -> Iterator[None]:
+    """Ascend on the longest paths of a satellite, once."""
+    _engine(search).price()
+    search.best.report("prices")
+    yield
 
 
-def close_in(search: FreeSearch, effort: Effort) -> None:
-    """Cut and search until plan and bound meet or the budget is spent."""
-    search.price()
-    master = search.cut(effort.max_rounds)
-    while not search.best.is_done:
-        before = (search.best.bound, search.best.reward)
-        search.prove(master, search.best.better)
-        search.best.report("HiGHS")
-        if (search.best.bound, search.best.reward) == before:
+def pass_multipliers(search: Search) -> Iterator[None]:
+    """Ascend on paths that are paid once for a target in one pass over it."""
+    engine = _engine(search)
+    while not engine.is_priced_out:
+        engine.price_passes()
+        yield
+
+
+def windows(search: Search) -> Iterator[None]:
+    """Search windows of the plan, longer where that finds nothing."""
+    engine, left = _engine(search), search.effort.moves_per_task
+    moves = least = TUNING.little * TUNING.moves_per_task
+    while left > 0 and not search.best.is_close:
+        left -= moves
+        is_better = engine.search(moves, engine.open_rows(search.best.reward))
+        search.best.report("window search")
+        moves = least if is_better else min(2.0 * moves, TUNING.moves_per_task)
+        yield
+
+
+def cutting_planes(search: Search) -> Iterator[None]:
+    """Cut and search among what is open, until plan and bound meet."""
+    engine, best = _engine(search), search.best
+    engine.shrink()
+    if not engine.is_small:
+        best.report("too many starts for cutting planes")
+        return
+    yield from cut_and_prove(engine, search.effort)
+
+
+def cut_and_prove(engine: FreeSearch, effort: Effort) -> Iterator[None]:
+    """Cut, then let HiGHS look for a better plan, or prove that there is none."""
+    best = engine.best
+    engine.price()
+    yield
+    master = yield from engine.cut(effort.max_rounds)
+    while not best.is_done:
+        before = (best.bound, best.reward)
+        engine.prove(master, best.better)
+        best.report("HiGHS")
+        yield
+        if (best.bound, best.reward) == before:
             return

@@ -10,18 +10,12 @@ has a price and is not imaged, and takes only tasks that cost the bound little.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from planner_core.budget import Budget
-from planner_core.certified.drivers.agility_only import (
-    Effort,
-    FreeSearch,
-    close_in,
-    solve_free,
-)
+from planner_core.certified.driver import Search
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.fleet_start import priced_start
 from planner_core.certified.lns.search import WindowSearch, num_choices
@@ -29,12 +23,11 @@ from planner_core.certified.mip.solution_pool import PlanPool
 from planner_core.certified.multipliers.paths import ascent_on_paths
 from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.proofs.certificate import Multipliers
+from planner_core.certified.strategies.agility import FreeSearch, cut_and_prove
 from planner_core.certified.tuning import TUNING
 from planner_core.precedence.network import heaviest_through, network_of
-from planner_core.problem import COLLECT, Bools, Floats, Problem
+from planner_core.problem import COLLECT, Bools, Floats
 from planner_core.problem.plan import Plan
-from planner_core.solvers.base import Solution
-from planner_core.solvers.rule import Rule
 from planner_core.worth import weights
 
 
@@ -49,7 +42,8 @@ class FleetSearch:
         self._dual = ascent_on_paths(self.problem, self._network, TUNING.epochs, seed)
 
     @property
-    def _is_small(self) -> bool:
+    def is_small(self) -> bool:
+        """Whether it is searched in streams, and ends with cutting planes."""
         return len(self.problem.opportunities) <= TUNING.small_fleet
 
     @property
@@ -80,31 +74,39 @@ class FleetSearch:
         rows = priced_start(self._network, self._worth, np.append(self.prices, 0.0), taken, seed)
         return Plan.of(self.problem, rows).with_kept(self.problem)
 
-    def search(self, moves_per_task: float) -> None:
+    def search(self, moves_per_task: float) -> Iterator[None]:
         """Search windows, in several streams where the fleet is small, as far as that leads."""
         num_accesses = num_choices(self.problem)
-        num_streams = TUNING.tries if self._is_small else 1
-        offered = None if self._is_small else self.near_best()
+        num_streams = TUNING.tries if self.is_small else 1
+        offered = None if self.is_small else self.near_best()
         streams = [self.windows(number) for number in range(num_streams)]
-        left = int(moves_per_task * num_accesses)
         pool = PlanPool(self.problem, self.budget, self._seed)
+        left = int(moves_per_task * num_accesses)
+        # So long that a few without a better plan say something.
+        in_a_slice = int(TUNING.moves_per_task * num_accesses / TUNING.patience) + 1
         with ThreadPoolExecutor(self.budget.num_threads) as threads:
-            while left > 0 and not self.budget.is_spent():
-                num_moves = min(left, TUNING.moves_at_a_time)
-                going = [
-                    threads.submit(s.make_moves, num_moves, self.budget, offered) for s in streams
-                ]
-                for one in going:
-                    one.result()
-                left -= num_moves
-                if num_streams > 1 and left // TUNING.moves_at_a_time % TUNING.several == 0:
-                    self._merge(pool, streams)
-                reward = max(pool.reward, *(stream.reward for stream in streams))
-                self.best.report("window search", reward)
-                if self.best.is_within(self.best.gap, reward):
-                    break
-        for plan in (pool.plan, *(stream.plan for stream in streams)):
-            self.best.offer(plan)
+            while left > 0 and self._is_wanted(pool, streams):
+                end = max(left - in_a_slice, 0)
+                while left > end and self._is_wanted(pool, streams):
+                    num_moves = min(left, TUNING.several * TUNING.moves_at_a_time)
+                    going = [
+                        threads.submit(one.make_moves, num_moves, self.budget, offered)
+                        for one in streams
+                    ]
+                    for move in going:
+                        move.result()
+                    left -= num_moves
+                    if num_streams > 1:
+                        self._merge(pool, streams)
+                for plan in (pool.plan, *(stream.plan for stream in streams)):
+                    self.best.offer(plan)
+                yield
+
+    def _is_wanted(self, pool: PlanPool, streams: Sequence[WindowSearch]) -> bool:
+        """Return whether the search is to go on; tell how far it is."""
+        reward = max(pool.reward, *(stream.reward for stream in streams))
+        self.best.report("window search", reward)
+        return not (self.best.is_within(self.best.gap, reward) or self.budget.is_spent())
 
     def _merge(self, pool: PlanPool, streams: Sequence[WindowSearch]) -> None:
         """Seek what the plans of the streams are worth together."""
@@ -127,7 +129,7 @@ class FleetSearch:
     def windows(self, number: int) -> WindowSearch:
         """Return a window search from a start of its own, the first from the best plan."""
         preference = urgency = None
-        if not self._is_small:
+        if not self.is_small:
             urgency = np.minimum(self.prices / np.maximum(self.problem.best_worth, 1e-300), 1.0)
             preference = 1.0 + TUNING.preference * (0.5 - urgency)
         seed = self._seed + number
@@ -136,27 +138,27 @@ class FleetSearch:
         return windows
 
 
-def solve_without_resources(
-    problem: Problem, budget: Budget, seed: int, gap: float, effort: Effort
-) -> Solution:
-    """Return the best plan of a problem without resources, and its proof."""
-    if sum(len(satellite) > 0 for satellite in problem.satellites) < 2:
-        return solve_free(problem, budget, seed, gap, effort)
-    best = Incumbent(problem, budget, gap)
-    best.offer(Rule().solve(problem, Budget(), seed).plan)
-    best.report("first plan")
-    fleet = FleetSearch(best, seed)
-    fleet.price(TUNING.many_epochs)
-    fleet.start()
-    fleet.price()
-    fleet.start()
-    if not budget.is_spent():
-        fleet.search(effort.moves_per_task)
-    is_small = effort.max_rounds > 0 and len(problem.opportunities) <= TUNING.small_fleet
-    if not is_small or budget.is_spent():
-        return best.solution()
-    search = FreeSearch(best, seed)
-    search.step(Multipliers(prices=fleet.prices))
-    if not best.is_done:
-        close_in(search, effort)
-    return search.solution()
+def fleet_multipliers(search: Search) -> Iterator[None]:
+    """Ascend on the longest paths of all satellites, and plan at the multipliers."""
+    fleet = search.engine(FleetSearch)
+    for num_epochs in (TUNING.many_epochs, math.inf):
+        fleet.price(num_epochs)
+        fleet.start()
+        yield
+
+
+def windows(search: Search) -> Iterator[None]:
+    """Search windows, in several streams where the fleet is small."""
+    yield from search.engine(FleetSearch).search(search.effort.moves_per_task)
+
+
+def fleet_cutting_planes(search: Search) -> Iterator[None]:
+    """Cut and search a small fleet's plans as a satellite's."""
+    fleet = search.engine(FleetSearch)
+    if search.effort.max_rounds == 0:
+        return
+    engine = search.engine(FreeSearch)
+    search.proof = engine.proof
+    engine.step(Multipliers(prices=fleet.prices))
+    if not search.best.is_done:
+        yield from cut_and_prove(engine, search.effort)

@@ -1,0 +1,193 @@
+"""One driver for all problems: the strategy that gained most goes on.
+
+A strategy betters the plan or lowers the bound, a slice of work at a time. What a slice gains is
+by how much plan and bound have come nearer to each other. The next one goes to the strategy whose
+latest gained most, so that the work goes where it tells: to the bound where that is what is far
+off, to the plan where that is. Slices take about as long as each other. They are not timed, so that
+the same seed gives the same plan (docs/decisions/0012-one-driver.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from enum import Enum, auto
+from typing import Protocol, TypeAlias, TypeVar
+
+from planner_core.budget import Budget
+from planner_core.certified.incumbent import Incumbent
+from planner_core.certified.proofs.bound import Bound
+from planner_core.certified.tuning import TUNING
+from planner_core.problem import Problem
+from planner_core.solvers.base import Solution
+
+
+class Begin(Enum):
+    """When a strategy has its first slice."""
+
+    ALWAYS = auto()
+    """At once, whatever the time: what an answer cannot do without."""
+    NEXT = auto()
+    """Once those listed before it have begun."""
+    STALLED = auto()
+    """Once all that have begun are stalled."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Effort:
+    """How much is done before HiGHS is asked for the rest.
+
+    Attributes
+    ----------
+    moves_per_task
+        Moves of the window search for each opportunity.
+    max_rounds
+        Rounds of cutting planes.
+    """
+
+    moves_per_task: float = 30.0
+    max_rounds: int = 200
+
+
+Slices: TypeAlias = Callable[["Search"], Iterator[None]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Strategy:
+    """One way to better the plan or to lower the bound.
+
+    Attributes
+    ----------
+    supports
+        Which problems it is for.
+    slices
+        Does the work, and yields after each slice; it ends where more would be of no use.
+    begin
+        When it has its first slice.
+    patience
+        After how many slices in a row without a gain it is stalled; None where it sees that itself,
+        and ends.
+    """
+
+    name: str
+    supports: Callable[[Problem], bool]
+    slices: Slices
+    begin: Begin = Begin.NEXT
+    patience: Callable[[], int] | None = None
+
+
+class Engine(Protocol):
+    """What strategies work with: a state of its own about one incumbent."""
+
+    def __init__(self, best: Incumbent, seed: int) -> None: ...
+
+
+E = TypeVar("E", bound=Engine)
+
+
+@dataclass(eq=False)
+class Search:
+    """What the strategies of one search share.
+
+    Attributes
+    ----------
+    num_idle
+        How many slices in a row have gained nothing.
+    proof
+        Returns the bound with all that proves it, where that is gathered at the end.
+    """
+
+    best: Incumbent
+    seed: int
+    strategies: Sequence[Strategy]
+    effort: Effort = field(default_factory=Effort)
+    num_idle: int = 0
+    proof: Callable[[], Bound] | None = None
+    _engines: dict[type, object] = field(default_factory=dict)
+
+    @property
+    def problem(self) -> Problem:
+        """What is planned."""
+        return self.best.problem
+
+    @property
+    def budget(self) -> Budget:
+        """What may be spent."""
+        return self.best.budget
+
+    def engine(self, kind: type[E]) -> E:
+        """Return the engine of this kind, the same one for all strategies."""
+        if kind not in self._engines:
+            self._engines[kind] = kind(self.best, self.seed)
+        found = self._engines[kind]
+        assert isinstance(found, kind)
+        return found
+
+    def beside(self, best: Incumbent, seed: int, without: Slices | None = None) -> Search:
+        """Return a search for another problem, with the same strategies but for one."""
+        return Search(best, seed, [one for one in self.strategies if one.slices is not without])
+
+    def solved(self) -> Solution:
+        """Search until plan and bound are close enough, or no strategy gets any further."""
+        close_in(self)
+        return self.best.solution(self.proof() if self.proof else None)
+
+
+class _Turn:
+    """A strategy that has begun."""
+
+    def __init__(self, strategy: Strategy, search: Search) -> None:
+        self._patience, self._best = strategy.patience, search.best
+        self._slices = strategy.slices(search)
+        self.name = strategy.name
+        self.gain, self.num_waits, self.num_idle = 0.0, 0, 0
+        self.has_ended = False
+
+    @property
+    def is_stalled(self) -> bool:
+        """Whether its slices have not gained anything of late."""
+        return self._patience is not None and self.num_idle >= self._patience()
+
+    def go_on(self) -> None:
+        """Do a slice."""
+        before = self._best.distance
+        self.has_ended = next(self._slices, self) is self
+        self.gain, self.num_waits = before - self._best.distance, 0
+        trifle = TUNING.trifle * self._best.problem.typical_worth
+        self.num_idle = 0 if self.gain > trifle else self.num_idle + 1
+
+
+def close_in(search: Search) -> None:
+    """Let the strategies close in on the best plan and its bound, each slice by the latest gains.
+
+    None waits for more than a few slices of others.
+    """
+    left = [one for one in search.strategies if one.supports(search.problem)]
+    turns: list[_Turn] = []
+    while left or turns:
+        if search.best.is_done and not (left and left[0].begin is Begin.ALWAYS):
+            return
+        is_next = left and left[0].begin is not Begin.STALLED
+        if is_next or (left and all(turn.is_stalled for turn in turns)):
+            turns.append(_Turn(left.pop(0), search))
+            chosen = turns[-1]
+        else:
+            chosen = _chosen(turns)
+        for turn in turns:
+            turn.num_waits += 1
+        reward = search.best.reward
+        chosen.go_on()
+        search.num_idle = 0 if chosen.num_idle == 0 else search.num_idle + 1
+        if search.best.reward > reward:
+            for turn in turns:
+                turn.num_idle = 0
+        turns = [turn for turn in turns if not turn.has_ended]
+
+
+def _chosen(turns: Sequence[_Turn]) -> _Turn:
+    """Return who has waited too long, or else has gained most."""
+    going = [turn for turn in turns if not turn.is_stalled] or turns
+    longest = max(going, key=lambda turn: turn.num_waits)
+    if longest.num_waits >= TUNING.several:
+        return longest
+    return max(going, key=lambda turn: (turn.gain, turn.num_waits))

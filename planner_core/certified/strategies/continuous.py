@@ -1,0 +1,110 @@
+"""Plans with continuous starts and their bound, until they meet or the effort is spent."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from planner_core.budget import Budget, Termination
+from planner_core.certified.driver import Search
+from planner_core.certified.incumbent import Incumbent
+from planner_core.certified.lns.continuous_search import ContinuousSearch
+from planner_core.certified.lns.insertion_with_resources import (
+    filled_with_resources,
+    replanned_window,
+)
+from planner_core.certified.multipliers.chains import ascend_on_chains
+from planner_core.certified.proofs.bound import Bound
+from planner_core.certified.tuning import TUNING
+from planner_core.problem import Problem
+from planner_core.solvers.base import Solution
+
+
+def insertion(search: Search) -> Iterator[None]:
+    """Put into the gaps of the plan what fits."""
+    engine = search.engine(FreeStarts)
+    engine.search.fill()
+    engine.offer("insertion")
+    yield
+
+
+def windows(search: Search) -> Iterator[None]:
+    """Search windows of the plan."""
+    engine = search.engine(FreeStarts)
+    num_tasks = max((len(s.spans.row) for s in engine.search.satellites), default=0)
+    left = int(np.ceil(search.effort.moves_per_task * num_tasks / TUNING.moves_at_a_time))
+    for _ in range(left):
+        engine.search.move(TUNING.moves_at_a_time)
+        engine.offer("window search")
+        yield
+
+
+class FreeStarts:
+    """The search for plans with free starts, from the best plan as it begins."""
+
+    def __init__(self, best: Incumbent, seed: int) -> None:
+        self._best = best
+        self.search = ContinuousSearch(best.problem, best.plan, best.budget, seed)
+
+    def offer(self, message: str) -> None:
+        """Offer the plan that the search has come to."""
+        self._best.offer(self.search.plan)
+        self._best.report(message)
+
+
+def chain_multipliers(search: Search) -> Iterator[None]:
+    """Ascend on chains of tasks with free starts."""
+    for value, prices in ascend_on_chains(search.problem, search.budget.stop):
+        search.best.lower(Bound(value=value, proof="lagrangian", prices=prices))
+        search.best.report("prices")
+        yield
+
+
+def fixed_starts(search: Search) -> Iterator[None]:
+    """Plan among the starts that opportunities have, then put in what fits between them.
+
+    What bounds that search bounds no plan with free starts: it is not reported.
+    """
+    budget, best = search.budget, search.best
+    part = budget.part(
+        TUNING.first_share, lambda progress: budget.report(replace(progress, bound=None))
+    )
+    inner = Incumbent(replace(search.problem, pointing=None), part, best.gap)
+    search.beside(inner, search.seed).solved()
+    best.offer(inner.plan)
+    best.offer(filled_with_resources(search.problem, inner.plan, budget))
+    best.report("insertion")
+    yield
+
+
+def windows_with_resources(search: Search) -> Iterator[None]:
+    """Drop a few images and put in others, again and again, until that gets nowhere."""
+    best, rng = search.best, np.random.default_rng(search.seed)
+    plan, num_idle = best.plan, 0
+    while num_idle < TUNING.fleet_patience and plan.actions:
+        new = replanned_window(search.problem, plan, search.budget, rng)
+        if best.judge(new).reward >= best.judge(plan).reward:
+            plan = new
+        num_idle = 0 if best.offer(plan) else num_idle + 1
+        best.report("window search")
+        yield
+
+
+def with_own_starts(problem: Problem, solution: Solution, budget: Budget) -> Solution:
+    """Return another solver's answer with what fits between its tasks once those may move.
+
+    "Optimal" meant the starts that opportunities have.
+    """
+    if solution.termination is Termination.OPTIMAL and solution.proven is None:
+        solution = replace(solution, termination=Termination.HORIZON_COMPLETE)
+    if problem.pointing is None or solution.proven is not None or budget.is_cancelled:
+        # What has a bound here was searched with free starts already.
+        return solution
+    if problem.use_resources:
+        plan = filled_with_resources(problem, solution.plan, Budget())
+        return replace(solution, plan=plan)
+    search = ContinuousSearch(problem, solution.plan, Budget(), 0)
+    search.fill()
+    return replace(solution, plan=search.plan)

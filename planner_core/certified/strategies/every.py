@@ -1,0 +1,200 @@
+"""All strategies of ``certified``, in the order in which they begin."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from planner_core.budget import Budget
+from planner_core.certified.driver import Begin, Effort, Search, Strategy
+from planner_core.certified.incumbent import Incumbent
+from planner_core.certified.proofs.continuous import quick_bound
+from planner_core.certified.strategies import (
+    agility,
+    continuous,
+    first_plan,
+    fleet,
+    half_life,
+    resource_fleet,
+    resources,
+    whole_program,
+)
+from planner_core.certified.strategies.supports import (
+    has_free_starts,
+    has_steady_worth,
+    is_aging,
+    is_fleet,
+    is_free_fleet,
+    is_free_satellite,
+    is_shared,
+    is_small_free_fleet,
+    is_within_reach,
+)
+from planner_core.certified.tuning import TUNING
+from planner_core.problem import Problem
+from planner_core.solvers.base import Solution
+
+STRATEGIES: Final = (
+    Strategy(
+        name="rule",
+        supports=lambda _: True,
+        slices=first_plan.rule,
+        begin=Begin.ALWAYS,
+    ),
+    Strategy(
+        name="bound by energy and data",
+        supports=has_steady_worth,
+        slices=resources.resource_bound,
+        begin=Begin.ALWAYS,
+    ),
+    Strategy(
+        name="bound by agility",
+        supports=is_aging,
+        slices=half_life.agility_bound,
+        begin=Begin.ALWAYS,
+    ),
+    # Without resources, one satellite.
+    Strategy(
+        name="multipliers of paths",
+        supports=lambda p: is_free_satellite(p) and not p.offers_choice,
+        slices=agility.path_multipliers,
+    ),
+    Strategy(
+        name="multipliers of passes",
+        supports=lambda p: is_free_satellite(p) and p.offers_choice,
+        slices=agility.pass_multipliers,
+        patience=lambda: TUNING.patience,
+    ),
+    Strategy(
+        name="windows",
+        supports=is_free_satellite,
+        slices=agility.windows,
+        patience=lambda: TUNING.patience,
+    ),
+    Strategy(
+        name="cutting planes",
+        supports=is_free_satellite,
+        slices=agility.cutting_planes,
+        begin=Begin.STALLED,
+    ),
+    # Without resources, a fleet.
+    Strategy(
+        name="multipliers of a fleet's paths",
+        supports=is_free_fleet,
+        slices=fleet.fleet_multipliers,
+    ),
+    Strategy(
+        name="streams of windows",
+        supports=is_small_free_fleet,
+        slices=fleet.windows,
+        begin=Begin.STALLED,
+        patience=lambda: TUNING.patience,
+    ),
+    Strategy(
+        name="a fleet's cutting planes",
+        supports=is_small_free_fleet,
+        slices=fleet.fleet_cutting_planes,
+        begin=Begin.STALLED,
+    ),
+    Strategy(
+        name="windows of a large fleet",
+        supports=lambda p: is_free_fleet(p) and not is_small_free_fleet(p),
+        slices=fleet.windows,
+        begin=Begin.STALLED,
+    ),
+    # Battery and recorder.
+    Strategy(
+        name="plans and multipliers side by side",
+        supports=lambda p: has_steady_worth(p) and is_shared(p),
+        slices=resource_fleet.side_by_side,
+    ),
+    Strategy(
+        name="choices",
+        supports=lambda p: has_steady_worth(p) and not is_fleet(p),
+        slices=resources.choices,
+        begin=Begin.STALLED,
+    ),
+    Strategy(
+        name="windows and choices",
+        supports=lambda p: has_steady_worth(p) and not is_fleet(p),
+        slices=resources.windows_and_choices,
+        patience=lambda: TUNING.tries,
+    ),
+    Strategy(
+        name="whole relaxation",
+        supports=lambda p: has_steady_worth(p) and not is_fleet(p),
+        slices=resources.whole_relaxation,
+    ),
+    Strategy(
+        name="multipliers",
+        supports=lambda p: has_steady_worth(p) and not is_fleet(p),
+        slices=resources.multipliers,
+        patience=lambda: TUNING.several,
+    ),
+    Strategy(
+        name="programs with contacts fixed",
+        supports=lambda p: has_steady_worth(p) and not is_fleet(p),
+        slices=resources.programs,
+        patience=lambda: TUNING.several,
+    ),
+    # Images that lose worth as they age.
+    Strategy(
+        name="days planned anew",
+        supports=lambda p: is_aging(p) and is_shared(p),
+        slices=half_life.days,
+    ),
+    Strategy(
+        name="plans by their contacts",
+        supports=lambda p: is_aging(p) and not is_fleet(p),
+        slices=half_life.on_the_ground,
+        begin=Begin.STALLED,
+    ),
+    # Free starts.
+    Strategy(
+        name="fixed starts",
+        supports=lambda p: has_free_starts(p) and p.use_resources,
+        slices=continuous.fixed_starts,
+    ),
+    Strategy(
+        name="insertion",
+        supports=lambda p: has_free_starts(p) and not p.use_resources,
+        slices=continuous.insertion,
+        begin=Begin.ALWAYS,
+    ),
+    Strategy(
+        name="windows with free starts",
+        supports=lambda p: has_free_starts(p) and not p.use_resources,
+        slices=continuous.windows,
+    ),
+    Strategy(
+        name="multipliers of chains",
+        supports=has_free_starts,
+        slices=continuous.chain_multipliers,
+    ),
+    Strategy(
+        name="windows with free starts and resources",
+        supports=lambda p: has_free_starts(p) and p.use_resources,
+        slices=continuous.windows_with_resources,
+    ),
+    Strategy(
+        name="exhaust",
+        supports=is_within_reach,
+        slices=whole_program.exhaust,
+        begin=Begin.STALLED,
+    ),
+)
+"""Who may better plans and lower bounds, and of which problems."""
+
+
+def solved(
+    problem: Problem, budget: Budget, seed: int, gap: float, effort: Effort | None = None
+) -> Solution:
+    """Return the best plan and its bound, by all strategies that the problem has."""
+    is_free = has_free_starts(problem)
+    best = Incumbent(
+        problem,
+        budget,
+        gap,
+        bound=quick_bound(problem) if is_free else None,
+        covers_starts=is_free,
+    )
+    return Search(best, seed, STRATEGIES, effort or Effort()).solved()

@@ -1,0 +1,92 @@
+"""With battery and recorder, one satellite or few: plans and bounds by exact programmes.
+
+Where energy is short the programme without prices bounds the best plan within an image or two,
+and the same programme over choices of tasks finds one. Where targets are few as well, prices
+lower the bound. The relaxations of promising sets of contacts tell prices and, for each set, the
+few tasks that make a small mixed-integer program. Where agility alone decides, so does the proof
+without resources.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from planner_core.budget import ignored
+from planner_core.certified.driver import Search
+from planner_core.certified.incumbent import Incumbent
+from planner_core.certified.proofs.resource_bound import quick_bound
+from planner_core.certified.strategies.resource_steps import ResourceSearch
+from planner_core.certified.tuning import TUNING
+from planner_core.problem import Bools
+
+
+def _is_promising(search: Search) -> bool:
+    """Return whether any strategy has gained anything of late."""
+    return search.num_idle < TUNING.rounds
+
+
+def resource_bound(search: Search) -> Iterator[None]:
+    """Bound plans without a search."""
+    search.best.lower(quick_bound(search.problem, search.best.reward))
+    yield
+
+
+def choices(search: Search) -> Iterator[None]:
+    """Look for first plans among choices of tasks, and near those of agility alone."""
+    yield from search.engine(ResourceSearch).choose(lambda: tasks_alone(search))
+
+
+def tasks_alone(search: Search) -> Bools:
+    """Let agility alone bound the plans; return the tasks of the best plan then."""
+    engine, best = search.engine(ResourceSearch), search.best
+    # With starts 15 s apart this takes all the time there is: 253 of 290 after 20 s with all of
+    # it, 280 with a quarter (docs/bounds.md). Its plans are not for this problem: they are not
+    # reported.
+    quiet = search.budget.part(TUNING.beginning, ignored)
+    free = Incumbent(replace(search.problem, use_resources=False), quiet, best.gap)
+    solution = search.beside(free, search.seed).solved()
+    if solution.proven is not None:
+        best.lower(solution.proven)
+    best.report("without resources")
+    return engine.mask(action.opportunity for action in solution.plan.actions)
+
+
+def windows_and_choices(search: Search) -> Iterator[None]:
+    """Search windows and choices of tasks in turn, from the best plan that others have found."""
+    engine, best = search.engine(ResourceSearch), search.best
+    known = best.reward
+    while _is_promising(search):
+        if best.reward > known and engine.turn_search.problem is search.problem:
+            # Programs leave room for windows: under clouds 231.9 for 231.6, with rewards of 1 to
+            # 10 2,505 for 2,499 of 2,534 after 20 CPU seconds.
+            engine.turn_search.adopt(best.plan)
+        engine.search(engine.turn_search, TUNING.rounds)
+        known = best.reward
+        yield
+
+
+def whole_relaxation(search: Search) -> Iterator[None]:
+    """Bound plans by the relaxation of the whole program."""
+    search.engine(ResourceSearch).relax_whole()
+    yield
+
+
+def multipliers(search: Search) -> Iterator[None]:
+    """Lower the bound by multipliers of targets."""
+    engine = search.engine(ResourceSearch)
+    multipliers = engine.price_search
+    yield
+    while _is_promising(search):
+        engine.price(multipliers, TUNING.tries)
+        yield
+
+
+def programs(search: Search) -> Iterator[None]:
+    """Relax sets of contacts, and look for better plans by small programs with one of them."""
+    engine = search.engine(ResourceSearch)
+    while _is_promising(search):
+        is_new = engine.relax_sets(engine.price_search, engine.turn_search)
+        if not engine.fix_contacts(is_last=False) and not is_new:
+            engine.fix_contacts(is_last=True)
+        yield

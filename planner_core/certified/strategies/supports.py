@@ -1,0 +1,81 @@
+"""Which problems a strategy is for."""
+
+from __future__ import annotations
+
+from planner_core.certified.tuning import TUNING
+from planner_core.precedence.relation import is_transitive
+from planner_core.problem import Problem
+
+
+def is_shared(problem: Problem) -> bool:
+    """Whether several satellites have something to do."""
+    return sum(len(satellite) > 0 for satellite in problem.satellites) > 1
+
+
+def is_large(problem: Problem) -> bool:
+    """Whether steps with resources take long, and the whole program is out of reach."""
+    return len(problem.opportunities) > TUNING.large
+
+
+def is_fleet(problem: Problem) -> bool:
+    """Whether several satellites share so much that the whole program is too large."""
+    return is_shared(problem) and is_large(problem)
+
+
+def has_half_life(problem: Problem) -> bool:
+    """Whether images are worth less the later they come down."""
+    return problem.counts_delivery and problem.objective.half_life_s is not None
+
+
+def has_free_starts(problem: Problem) -> bool:
+    """Whether collects may start anywhere in their accesses."""
+    return problem.pointing is not None
+
+
+def has_limits(problem: Problem) -> bool:
+    """Whether battery, recorder or motion bound plans, among the starts of opportunities."""
+    return not has_free_starts(problem) and (problem.use_resources or problem.turns_in_motion)
+
+
+def is_free(problem: Problem) -> bool:
+    """Whether agility alone counts, among the starts of opportunities.
+
+    Pins fit in by themselves only where turning is transitive.
+    """
+    if problem.use_resources or problem.turns_in_motion or has_free_starts(problem):
+        return False
+    return not problem.pinned.kept or is_transitive(problem)
+
+
+def is_free_satellite(problem: Problem) -> bool:
+    """Whether agility alone counts, and one satellite has something to do."""
+    return is_free(problem) and not is_shared(problem)
+
+
+def is_free_fleet(problem: Problem) -> bool:
+    """Whether agility alone counts, and several satellites have something to do."""
+    return is_free(problem) and is_shared(problem)
+
+
+def is_small_free_fleet(problem: Problem) -> bool:
+    """Whether such a fleet is searched in streams, and ends with cutting planes."""
+    return is_free_fleet(problem) and len(problem.opportunities) <= TUNING.small_fleet
+
+
+def has_steady_worth(problem: Problem) -> bool:
+    """Whether limits bound plans, and images have one worth, whenever they come down."""
+    return has_limits(problem) and not has_half_life(problem)
+
+
+def is_aging(problem: Problem) -> bool:
+    """Whether limits bound plans, and images lose worth as they age."""
+    return has_limits(problem) and has_half_life(problem)
+
+
+def is_within_reach(problem: Problem) -> bool:
+    """Whether the whole program is worth a try at last."""
+    if has_free_starts(problem):
+        return False
+    if has_half_life(problem):
+        return has_limits(problem) and not is_large(problem)
+    return not (is_fleet(problem) if has_limits(problem) else is_free(problem))
