@@ -273,9 +273,11 @@ def pass_multipliers(search: Search) -> Iterator[None]:
 
 
 def windows(search: Search) -> Iterator[None]:
-    """Search windows of the plan, longer where that finds nothing."""
+    """Search windows of the plan; beside multipliers of passes longer where that finds nothing."""
     engine, left = _engine(search), search.effort.moves_per_task
-    moves = least = TUNING.little * TUNING.moves_per_task
+    is_beside = search.problem.offers_choice
+    least = TUNING.moves_per_task * (TUNING.little if is_beside else 1.0)
+    moves = least
     while left > 0 and not search.best.is_close:
         left -= moves
         is_better = engine.search(moves, engine.open_rows(search.best.reward))

@@ -65,10 +65,16 @@ STRATEGIES: Final = (
         patience=lambda: TUNING.patience,
     ),
     Strategy(
-        name="windows",
-        supports=is_free_satellite,
+        name="windows beside multipliers of passes",
+        supports=lambda p: is_free_satellite(p) and p.offers_choice,
         slices=agility.windows,
         patience=lambda: TUNING.patience,
+    ),
+    Strategy(
+        name="windows",
+        supports=lambda p: is_free_satellite(p) and not p.offers_choice,
+        slices=agility.windows,
+        patience=lambda: TUNING.tries,
     ),
     Strategy(
         name="cutting planes",

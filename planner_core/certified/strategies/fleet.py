@@ -88,7 +88,7 @@ class FleetSearch:
             while left > 0 and self._is_wanted(pool, streams):
                 end = max(left - in_a_slice, 0)
                 while left > end and self._is_wanted(pool, streams):
-                    num_moves = min(left, TUNING.several * TUNING.moves_at_a_time)
+                    num_moves = min(left, TUNING.moves_at_a_time)
                     going = [
                         threads.submit(one.make_moves, num_moves, self.budget, offered)
                         for one in streams
@@ -96,7 +96,7 @@ class FleetSearch:
                     for move in going:
                         move.result()
                     left -= num_moves
-                    if num_streams > 1:
+                    if num_streams > 1 and left // TUNING.moves_at_a_time % TUNING.several == 0:
                         self._merge(pool, streams)
                 for plan in (pool.plan, *(stream.plan for stream in streams)):
                     self.best.offer(plan)

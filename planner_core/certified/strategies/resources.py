@@ -87,6 +87,9 @@ def programs(search: Search) -> Iterator[None]:
     engine = search.engine(ResourceSearch)
     while _is_promising(search):
         is_new = engine.relax_sets(engine.price_search, engine.turn_search)
+        if is_new:
+            # How low the bound gets by them says which sets are worth a program.
+            engine.price(engine.price_search, TUNING.tries)
         if not engine.fix_contacts(is_last=False) and not is_new:
             engine.fix_contacts(is_last=True)
         yield
