@@ -26,14 +26,14 @@ _STATIONS: Final = {"fleet-stations-4x2000": 30.0}
 _AGE: Final = {"half-life-12h-1000": 12.0}
 _DELIVERED: Final = {"delivered-paper-500": 12.0}
 _ROOMS: Final[Mapping[str, Mapping[str, float]]] = {
-    "drivers.agility_only": {**_AGILITY, **_PASSES},
-    "drivers.resources": _ONE,
-    "drivers.resource_steps": _ONE,
-    "drivers.resource_fleet": _STATIONS,
-    "drivers.fleet": _FLEET,
-    "drivers.continuous": _FREE,
-    "drivers.commitments": {**_DELIVERED, **_STATIONS},
-    "drivers.latency": _AGE,
+    "strategies.agility": {**_AGILITY, **_PASSES},
+    "strategies.resources": _ONE,
+    "strategies.resource_steps": _ONE,
+    "strategies.resource_fleet": _STATIONS,
+    "strategies.fleet": _FLEET,
+    "strategies.continuous": _FREE,
+    "strategies.commitments": {**_DELIVERED, **_STATIONS},
+    "strategies.half_life": _AGE,
     "lns.alternating": {**_ONE, **_STATIONS},
     "lns.choices": _ONE,
     "lns.continuous_search": _FREE,

@@ -1,23 +1,24 @@
 """The strategies of ``certified`` and how each is switched off, by name.
 
-Everything that a change of the engine may rename stands in ``STRATEGIES``. Bounds stay valid in
-all variants: strategies are only left out, or begun at another time.
+Most are left out of the engine's own list, by their name there. Bounds stay valid in all variants.
 """
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import reduce
 from typing import Any, Final
 
+from planner_core.certified.driver import Turn
 from planner_core.certified.lns.search import WindowSearch
+from planner_core.certified.strategies import every
 from planner_core.certified.tuning import tune
 from planner_core.precedence.network import Network
 from planner_core.problem import Floats, Problem
 
-DRIVERS: Final = "planner_core.certified.drivers"
+ENGINE: Final = "planner_core.certified"
 NOTHING: Final = ""
 """The change that changes nothing."""
 
@@ -77,10 +78,6 @@ class Change:
         tune(**self.tuning)
 
 
-def _nothing(*_: object, **__: object) -> None:
-    """Do nothing, whatever is asked for."""
-
-
 class _Idle:
     """Takes the turns of another search without doing anything."""
 
@@ -101,36 +98,76 @@ def _without_urgency(
     return WindowSearch(problem, seed, network, preference)
 
 
-def _off(module: str, name: str, value: Callable[..., Any] = _nothing) -> tuple[Patch, ...]:
-    return (Patch(module=module, name=name, value=value),)
+def _all_in_turn(turns: Sequence[Turn]) -> Turn:
+    """Return who has waited longest, whatever the gains."""
+    going = [turn for turn in turns if not turn.is_stalled] or turns
+    return max(going, key=lambda turn: turn.num_waits)
 
 
+def _off(module: str, name: str, value: Callable[..., Any]) -> tuple[Patch, ...]:
+    return (Patch(module=f"{ENGINE}.{module}", name=name, value=value),)
+
+
+def _without(name: str) -> tuple[Patch, ...]:
+    """Leave out a strategy of the list.
+
+    Raises
+    ------
+    ValueError
+        Where there is none of this name.
+    """
+    left = tuple(one for one in every.STRATEGIES if one.name != name)
+    if len(left) == len(every.STRATEGIES):
+        raise ValueError(f"no strategy is called {name}")
+    return (Patch(module=f"{ENGINE}.strategies.every", name="STRATEGIES", value=left),)
+
+
+_AGILITY: Final = {"agility-500": 10.0, "agility-1000": 12.0, "weights-agility-1000": 12.0}
+_SPACED: Final = {"spaced-1000": 12.0}
+_FREE: Final = {"continuous-1000": 12.0}
 _RESOURCES: Final = {
     "paper-200": 10.0, "paper-500": 15.0, "weights-1000": 15.0, "paper-1000": 12.0,
 }  # fmt: skip
+_CLOUDS: Final = {"clouds-1000": 12.0}
+_DELIVERED: Final = {"delivered-paper-500": 12.0}
 _FLEET: Final = {"fleet-4x2000": 12.0, "fleet-2x500": 10.0}
 _STATIONS: Final = {"fleet-stations-4x2000": 60.0}
 _LARGE_FLEET: Final = {"fleet-24x10000": 60.0}
 _SMALL: Final = {"tight-150": 10.0, "tight-weights-300": 10.0, "physical-200": 10.0}
 
 STRATEGIES: Final[Mapping[str, Change]] = {
-    "cuts after a fleet": Change(patches=_off(f"{DRIVERS}.fleet", "close_in"), families=_FLEET),
-    "exhaust": Change(
-        patches=_off(f"{DRIVERS}.resource_steps", "ResourceSearch.exhaust"),
-        families=_RESOURCES | _SMALL,
+    "the order by gains": Change(
+        patches=_off("driver", "_chosen", _all_in_turn),
+        families=_SPACED | _FREE | _RESOURCES | _CLOUDS,
     ),
+    **{
+        name: Change(patches=_without(name), families=families)
+        for name, families in {
+            "windows": _AGILITY,
+            "cutting planes": _AGILITY | _SPACED,
+            "multipliers of passes": _SPACED,
+            "windows beside multipliers of passes": _SPACED,
+            "streams of windows": _FLEET,
+            "a fleet's cutting planes": _FLEET,
+            "choices": _RESOURCES | _DELIVERED,
+            "windows and choices": _RESOURCES,
+            "whole relaxation": _CLOUDS,
+            "multipliers": _RESOURCES,
+            "programs with contacts fixed": _RESOURCES,
+            "windows with free starts": _FREE,
+            "multipliers of chains": _FREE,
+            "exhaust": _RESOURCES | _SMALL,
+        }.items()
+    },
     "urgency": Change(
-        patches=_off(f"{DRIVERS}.fleet", "WindowSearch", _without_urgency),
+        patches=_off("strategies.fleet", "WindowSearch", _without_urgency),
         families=_LARGE_FLEET,
         num_draws=1,
     ),
     "preference": Change(tuning={"preference": 0.0}, families=_LARGE_FLEET, num_draws=1),
-    "turns of windows and choices": Change(
-        patches=_off(f"{DRIVERS}.resource_steps", "ResourceSearch.search"), families=_RESOURCES
-    ),
     "relaxations of a fleet's contacts": Change(tuning={"most_relaxed": 0}, families=_STATIONS),
     "program search": Change(
-        patches=_off(f"{DRIVERS}.resource_fleet", "ProgramSearch", _Idle), families=_STATIONS
+        patches=_off("strategies.resource_fleet", "ProgramSearch", _Idle), families=_STATIONS
     ),
 }
 """What is left out, or, where the name says so, done in another way."""

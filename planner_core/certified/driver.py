@@ -133,7 +133,7 @@ class Search:
         return self.best.solution(self.proof() if self.proof else None)
 
 
-class _Turn:
+class Turn:
     """A strategy that has begun."""
 
     def __init__(self, strategy: Strategy, search: Search) -> None:
@@ -163,13 +163,13 @@ def close_in(search: Search) -> None:
     None waits for more than a few slices of others.
     """
     left = [one for one in search.strategies if one.supports(search.problem)]
-    turns: list[_Turn] = []
+    turns: list[Turn] = []
     while left or turns:
         if search.best.is_done and not (left and left[0].begin is Begin.ALWAYS):
             return
         is_next = left and left[0].begin is not Begin.STALLED
         if is_next or (left and all(turn.is_stalled for turn in turns)):
-            turns.append(_Turn(left.pop(0), search))
+            turns.append(Turn(left.pop(0), search))
             chosen = turns[-1]
         else:
             chosen = _chosen(turns)
@@ -184,7 +184,7 @@ def close_in(search: Search) -> None:
         turns = [turn for turn in turns if not turn.has_ended]
 
 
-def _chosen(turns: Sequence[_Turn]) -> _Turn:
+def _chosen(turns: Sequence[Turn]) -> Turn:
     """Return who has waited too long, or else has gained most."""
     going = [turn for turn in turns if not turn.is_stalled] or turns
     longest = max(going, key=lambda turn: turn.num_waits)
