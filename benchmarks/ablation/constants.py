@@ -34,6 +34,7 @@ _ROOMS: Final[Mapping[str, Mapping[str, float]]] = {
     "strategies.continuous": _FREE,
     "strategies.commitments": {**_DELIVERED, **_STATIONS},
     "strategies.half_life": _AGE,
+    "strategies.half_life_steps": _AGE,
     "lns.alternating": {**_ONE, **_STATIONS},
     "lns.choices": _ONE,
     "lns.continuous_search": _FREE,

@@ -28,7 +28,7 @@ from planner_core.certified.proofs.latency import latency_value
 from planner_core.certified.proofs.resource_bound import quick_bound
 from planner_core.certified.signs import NEVER
 from planner_core.certified.solver import Certified
-from planner_core.certified.strategies.half_life import DayByDay
+from planner_core.certified.strategies.days import DayByDay
 from planner_core.certified.strategies.whole_program import exhaust
 from planner_core.certified.tuning import tuned
 from planner_core.domain import Objective

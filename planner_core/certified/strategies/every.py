@@ -11,6 +11,7 @@ from planner_core.certified.proofs.continuous import quick_bound
 from planner_core.certified.strategies import (
     agility,
     continuous,
+    days,
     first_plan,
     fleet,
     half_life,
@@ -146,7 +147,7 @@ STRATEGIES: Final = (
     Strategy(
         name="days planned anew",
         supports=lambda p: is_aging(p) and is_shared(p),
-        slices=half_life.days,
+        slices=days.days,
     ),
     Strategy(
         name="plans by their contacts",

@@ -24,6 +24,7 @@ from planner_core.certified.multipliers.paths import ascent_on_paths
 from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.proofs.certificate import Multipliers
 from planner_core.certified.strategies.agility import FreeSearch, cut_and_prove
+from planner_core.certified.strategies.supports import is_small_free_fleet
 from planner_core.certified.tuning import TUNING
 from planner_core.precedence.network import heaviest_through, network_of
 from planner_core.problem import COLLECT, Bools, Floats
@@ -40,11 +41,6 @@ class FleetSearch:
         self._network = network_of(self.problem)
         self._worth = self.problem.worth[self._network.row]
         self._dual = ascent_on_paths(self.problem, self._network, TUNING.epochs, seed)
-
-    @property
-    def is_small(self) -> bool:
-        """Whether it is searched in streams, and ends with cutting planes."""
-        return len(self.problem.opportunities) <= TUNING.small_fleet
 
     @property
     def prices(self) -> Floats:
@@ -77,15 +73,15 @@ class FleetSearch:
     def search(self, moves_per_task: float) -> Iterator[None]:
         """Search windows, in several streams where the fleet is small, as far as that leads."""
         num_accesses = num_choices(self.problem)
-        num_streams = TUNING.tries if self.is_small else 1
-        offered = None if self.is_small else self.near_best()
+        num_streams = TUNING.tries if is_small_free_fleet(self.problem) else 1
+        offered = None if is_small_free_fleet(self.problem) else self.near_best()
         streams = [self.windows(number) for number in range(num_streams)]
         pool = PlanPool(self.problem, self.budget, self._seed)
         left = int(moves_per_task * num_accesses)
         # So long that a few without a better plan say something.
         in_a_slice = int(TUNING.moves_per_task * num_accesses / TUNING.patience) + 1
         with ThreadPoolExecutor(self.budget.num_threads) as threads:
-            while left > 0 and self._is_wanted(pool, streams):
+            while left > 0 and not self.best.is_done:
                 end = max(left - in_a_slice, 0)
                 while left > end and self._is_wanted(pool, streams):
                     num_moves = min(left, TUNING.moves_at_a_time)
@@ -129,7 +125,7 @@ class FleetSearch:
     def windows(self, number: int) -> WindowSearch:
         """Return a window search from a start of its own, the first from the best plan."""
         preference = urgency = None
-        if not self.is_small:
+        if not is_small_free_fleet(self.problem):
             urgency = np.minimum(self.prices / np.maximum(self.problem.best_worth, 1e-300), 1.0)
             preference = 1.0 + TUNING.preference * (0.5 - urgency)
         seed = self._seed + number
