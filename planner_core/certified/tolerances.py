@@ -42,6 +42,10 @@ LEVEL: Final = 1e-6
 CHAINED: Final = 1e-9
 """Of HiGHS, in a long chain of levels, where each row may be off by as much."""
 
+TOUCHING: Final = -1e-9
+"""How far beyond the limits plans of a program may be, so that its bound holds for those that touch
+them."""
+
 INSIDE: Final = 1e-7
 """How far a program stays within the limits, so that the referee accepts its plans."""
 

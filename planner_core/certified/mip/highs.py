@@ -116,7 +116,7 @@ class Engine:
         self,
         start: Floats | None,
         gap: float,
-        heuristic_effort: float,
+        heuristic_effort: float | None,
         watch: Watch,
         max_nodes: int | None = None,
     ) -> Outcome:
@@ -130,7 +130,8 @@ class Engine:
         gap
             Relative distance of objective and bound at which to stop.
         heuristic_effort
-            Share of the work spent on looking for points rather than on the proof.
+            Share of the work spent on looking for points rather than on the proof; None for what
+            HiGHS does by itself.
         max_nodes
             How many parts of the search to look at; unlike a limit in seconds, the same
             everywhere.
@@ -143,7 +144,8 @@ class Engine:
         kinds = np.full(len(integer), int(highspy.HighsVarType.kInteger), dtype=np.uint8)
         highs.changeColsIntegrality(len(integer), integer, kinds)
         highs.setOptionValue("mip_rel_gap", gap)
-        highs.setOptionValue("mip_heuristic_effort", heuristic_effort)
+        if heuristic_effort is not None:
+            highs.setOptionValue("mip_heuristic_effort", heuristic_effort)
         if max_nodes is not None:
             highs.setOptionValue("mip_max_nodes", max_nodes)
         # Where it is not whole HiGHS begins with a program of its own over what is whole, which

@@ -8,7 +8,6 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 
@@ -21,7 +20,9 @@ from planner_core.certified.mip.highs import Engine, Outcome, Watch
 from planner_core.certified.mip.model import Formulation, PlanProgram, plan_program
 from planner_core.certified.mip.program import Rows
 from planner_core.certified.proofs.bound import Bound
-from planner_core.certified.sizes import MAX_PAIRS
+from planner_core.certified.sizes import MAX_PAIRS, PAUSE_S
+from planner_core.certified.tolerances import INSIDE, TOUCHING
+from planner_core.certified.tuning import TUNING
 from planner_core.precedence.relation import num_near_pairs
 from planner_core.problem import COLLECT, Floats, Problem
 from planner_core.problem.plan import Plan
@@ -30,16 +31,6 @@ from planner_core.solvers.base import Solution
 from planner_core.solvers.forward_search import ForwardSearch
 from planner_core.solvers.graph import Graph
 from planner_core.solvers.rule import Rule
-
-# The limits are strict, which no linear program can say. The first search lets plans touch
-# them, so that its bound is true; a second one stays clear where the first plan does touch.
-_TOUCHING: Final = -1e-9
-_CLEAR: Final = 1e-7
-_REPORT_EVERY_S: Final = 0.25
-_STALLED: Final = 1e-4  # of the bound, in _PATIENCE rounds of cuts
-_PATIENCE: Final = 5
-_RELAXATION_ROUNDS: Final = 10  # of cuts, where the relaxation alone is asked
-_HEURISTIC_EFFORT: Final = 0.05  # what HiGHS does by default
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,14 +66,16 @@ class WholeProgram:
                 )
             )
             return best.solution()
-        outcome = self._search(problem, budget, seed, best, _TOUCHING)
+        # The limits are strict, which no linear program can say. The first search lets plans touch
+        # them, so that its bound is true; a second one stays clear where the first plan does touch.
+        outcome = self._search(problem, budget, seed, best, TOUCHING)
         if outcome.is_infeasible:
             return best.solution()
         plan = _plan_of(problem, outcome)
         for offered in (plan, _repaired(problem, plan)):
             best.offer(offered)
         if not replay(problem, plan).is_valid and not budget.is_spent():
-            clear = self._search(problem, budget, seed, best, _CLEAR)
+            clear = self._search(problem, budget, seed, best, INSIDE)
             best.offer(_plan_of(problem, clear))
         if best.is_valid:
             best.lower(Bound(value=outcome.bound, proof="milp", log=outcome.log))
@@ -100,7 +93,7 @@ class WholeProgram:
 
         if self.formulation == "antichain":
             _cut(engine, problem, model, self.cut_rounds, watch)
-        return engine.search(_columns(best), best.gap, _HEURISTIC_EFFORT, watch)
+        return engine.search(_columns(best), best.gap, None, watch)
 
 
 def exhaust(search: Search) -> Iterator[None]:
@@ -121,9 +114,9 @@ def exhaust(search: Search) -> Iterator[None]:
 
 def relaxation_bound(problem: Problem, budget: Budget, seed: int) -> Bound:
     """Return what the linear relaxation of the whole program says that no plan exceeds."""
-    model = plan_program(problem, "antichain", _TOUCHING)
+    model = plan_program(problem, "antichain", TOUCHING)
     engine = Engine(model.program, budget, seed, is_chained=problem.use_resources)
-    _cut(engine, problem, model, _RELAXATION_ROUNDS, _unwatched)
+    _cut(engine, problem, model, TUNING.patience, _unwatched)
     return Bound(value=engine.bound, proof="milp", log=engine.log)
 
 
@@ -151,7 +144,8 @@ def _cut(engine: Engine, problem: Problem, model: PlanProgram, rounds: int, watc
             return
         watch(-np.inf, engine.bound)
         bounds.append(engine.bound)
-        if len(bounds) > _PATIENCE and bounds[-1 - _PATIENCE] - bounds[-1] < _STALLED * bounds[-1]:
+        trifle = TUNING.little**2 * bounds[-1]
+        if len(bounds) > TUNING.several and bounds[-1 - TUNING.several] - bounds[-1] < trifle:
             return
         num_added = 0
         for satellite, precedence in zip(problem.satellites, model.precedences, strict=True):
@@ -212,7 +206,7 @@ class _Reporter:
     def __call__(self, reward: float, bound: float) -> None:
         """Report the best objective so far and the bound, unless that was done just now."""
         now_s = time.monotonic()
-        if now_s - self._last_s < _REPORT_EVERY_S:
+        if now_s - self._last_s < PAUSE_S:
             return
         self._last_s = now_s
         is_known = np.isfinite(reward)
