@@ -55,11 +55,15 @@ class FreeStarts:
 
 
 def chain_multipliers(search: Search) -> Iterator[None]:
-    """Ascend on chains of tasks with free starts."""
+    """Ascend on chains of tasks with free starts, at a time until the bound is lower."""
+    best = search.best
+    known = best.distance
     for value, prices in ascend_on_chains(search.problem, search.budget.stop):
-        search.best.lower(Bound(value=value, proof="lagrangian", prices=prices))
-        search.best.report("prices")
-        yield
+        best.lower(Bound(value=value, proof="lagrangian", prices=prices))
+        best.report("prices")
+        if best.is_done or best.distance < known:
+            yield
+            known = best.distance
 
 
 def fixed_starts(search: Search) -> Iterator[None]:

@@ -124,6 +124,7 @@ STRATEGIES: Final = (
         name="windows and choices",
         supports=lambda p: has_steady_worth(p) and not is_fleet(p),
         slices=resources.windows_and_choices,
+        begin=Begin.STALLED,
         patience=lambda: TUNING.tries,
     ),
     Strategy(
@@ -135,7 +136,7 @@ STRATEGIES: Final = (
         name="multipliers",
         supports=lambda p: has_steady_worth(p) and not is_fleet(p),
         slices=resources.multipliers,
-        patience=lambda: TUNING.several,
+        patience=lambda: TUNING.tries,
     ),
     Strategy(
         name="programs with contacts fixed",
