@@ -10,6 +10,7 @@ import numpy as np
 from planner_core.problem import COLLECT, Pinned, Problem
 from planner_core.problem.plan import Columns, Plan
 from planner_core.problem.slew import TIME_TOLERANCE_S
+from planner_core.referee.pinned_plan import breaches
 from planner_core.referee.replay import replay
 from planner_core.referee.sight import turns_between
 from planner_core.worth import share_earned
@@ -26,13 +27,16 @@ def best_reward(problem: Problem) -> float:
 def best_plan(problem: Problem) -> Plan | None:
     """Return a valid plan of the highest reward, judged by the referee, if there is any.
 
-    Plans with a turn that takes too long are left out. The others are judged from the one that
-    could earn most downwards, until no other can earn more.
+    Plans with a turn that takes too long are left out, and such as break a pin. The others are
+    judged from the one that could earn most downwards, until no other can earn more.
     """
     most, alone = _Most(problem), _Alone(problem)
-    chains = _chains(problem, _may_follow(problem), (), 0)
+    kept = set(problem.kept_rows.tolist())
+    chains = _chains(problem, _not_ruled_out(problem), _may_follow(problem), ())
     # Of those that could earn the same the longest first: it has contacts for what it takes.
-    plans = sorted(((most.of(rows), len(rows), rows) for rows in chains), reverse=True)
+    plans = sorted(
+        ((most.of(rows), len(rows), rows) for rows in chains if kept.issubset(rows)), reverse=True
+    )
     best, reward = None, 0.0
     for at_most, _, rows in plans:
         if best is not None and at_most <= reward:
@@ -44,6 +48,12 @@ def best_plan(problem: Problem) -> Plan | None:
         if timeline.is_valid and (best is None or timeline.reward > reward):
             best, reward = plan, timeline.reward
     return best
+
+
+def has_plan(problem: Problem) -> bool:
+    """Return whether there is any valid plan."""
+    worthless = replace(problem, worth=np.zeros(len(problem.opportunities)), full_worth=None)
+    return best_plan(worthless) is not None
 
 
 class _Most:
@@ -113,6 +123,17 @@ class _Alone:
         return self._known[part]
 
 
+def _not_ruled_out(problem: Problem) -> list[int]:
+    """Return the tasks that no pin rules out, as the referee sees it."""
+    everything = Plan.of(problem, range(len(problem.opportunities)))
+    ruled_out = {
+        everything.actions[position].opportunity
+        for violation in breaches(problem, everything)
+        for position in violation.blamed
+    }
+    return [row for row in range(len(problem.opportunities)) if row not in ruled_out]
+
+
 def _may_follow(problem: Problem) -> set[tuple[int, int]]:
     """Return which two tasks a satellite has time to turn between, as the referee sees it."""
     table = problem.opportunities
@@ -131,12 +152,12 @@ def _may_follow(problem: Problem) -> set[tuple[int, int]]:
 
 
 def _chains(
-    problem: Problem, may_follow: set[tuple[int, int]], rows: Rows, first: int
+    problem: Problem, rows: list[int], may_follow: set[tuple[int, int]], taken: Rows
 ) -> Iterator[Rows]:
-    """Yield a plan and all that go on from it, each task right after one that it may follow."""
-    yield rows
+    """Yield a plan and all that go on from it by some rows, each after one that it may follow."""
+    yield taken
     satellite = problem.opportunities.satellite
-    for row in range(first, len(satellite)):
-        before = next((r for r in reversed(rows) if satellite[r] == satellite[row]), None)
+    for number, row in enumerate(rows):
+        before = next((r for r in reversed(taken) if satellite[r] == satellite[row]), None)
         if before is None or (before, row) in may_follow:
-            yield from _chains(problem, may_follow, (*rows, row), row + 1)
+            yield from _chains(problem, rows[number + 1 :], may_follow, (*taken, row))
