@@ -31,11 +31,9 @@ def best_plan(problem: Problem) -> Plan | None:
     judged from the one that could earn most downwards, until no other can earn more.
     """
     most, alone = _Most(problem), _Alone(problem)
-    kept = set(problem.kept_rows.tolist())
-    chains = _chains(problem, _not_ruled_out(problem), _may_follow(problem), ())
     # Of those that could earn the same the longest first: it has contacts for what it takes.
     plans = sorted(
-        ((most.of(rows), len(rows), rows) for rows in chains if kept.issubset(rows)), reverse=True
+        ((most.of(rows), len(rows), rows) for rows in possible_plans(problem)), reverse=True
     )
     best, reward = None, 0.0
     for at_most, _, rows in plans:
@@ -54,6 +52,14 @@ def has_plan(problem: Problem) -> bool:
     """Return whether there is any valid plan."""
     worthless = replace(problem, worth=np.zeros(len(problem.opportunities)), full_worth=None)
     return best_plan(worthless) is not None
+
+
+def possible_plans(problem: Problem) -> Iterator[Rows]:
+    """Yield the tasks of each plan in which every turn fits and every pin is kept."""
+    kept = set(problem.kept_rows.tolist())
+    for rows in _chains(problem, _not_ruled_out(problem), _may_follow(problem), ()):
+        if kept.issubset(rows):
+            yield rows
 
 
 class _Most:
