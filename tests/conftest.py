@@ -106,10 +106,23 @@ def pytest_collection() -> Generator[None, object, object]:
         return (yield)
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put the long modules first."""
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Put the long modules first, and beside a database server leave out what never asks it."""
     place = {module: number for number, module in enumerate(_LONG)}
     items.sort(key=lambda item: place.get(item.nodeid.partition("::")[0], len(place)))
+    if "SLEWLINE_TEST_SERVER_URL" in os.environ:
+        elsewhere = [item for item in items if not _asks_the_server(item)]
+        items[:] = [item for item in items if _asks_the_server(item)]
+        config.hook.pytest_deselected(items=elsewhere)
+
+
+def _asks_the_server(item: pytest.Item) -> bool:
+    """Return whether a test has a database on the server that is named, by a fixture or by itself.
+
+    All others are the same without it, and `make test` runs them.
+    """
+    assert isinstance(item, pytest.Function)
+    return "template_url" in item.fixturenames or hasattr(item.module, "SERVER_URL")
 
 
 @pytest.fixture(scope="session")

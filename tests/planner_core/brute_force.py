@@ -5,9 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
+import numpy as np
+
 from planner_core.problem import COLLECT, Pinned, Problem
-from planner_core.problem.plan import Plan
+from planner_core.problem.plan import Columns, Plan
+from planner_core.problem.slew import TIME_TOLERANCE_S
+from planner_core.referee.pinned_plan import breaches
 from planner_core.referee.replay import replay
+from planner_core.referee.sight import turns_between
+from planner_core.worth import share_earned
+
+Rows = tuple[int, ...]
 
 
 def best_reward(problem: Problem) -> float:
@@ -19,33 +27,20 @@ def best_reward(problem: Problem) -> float:
 def best_plan(problem: Problem) -> Plan | None:
     """Return a valid plan of the highest reward, judged by the referee, if there is any.
 
-    The referee first says which two tasks a satellite cannot do one right after the other.
-    Plans without such a pair are judged from the one that could earn most downwards, until no
-    other can earn more.
+    Plans with a turn that takes too long are left out, and such as break a pin. The others are
+    judged from the one that could earn most downwards, until no other can earn more.
     """
-    table = problem.opportunities
-    free = replace(problem, use_resources=False, pinned=Pinned())
-    may_follow = {
-        (a, b)
-        for a in range(len(table))
-        for b in range(a + 1, len(table))
-        if table.satellite[a] != table.satellite[b]
-        or replay(free, Plan.of(problem, (a, b)), in_detail=False).is_valid
-    }
-
-    def worth(rows: tuple[int, ...]) -> float:
-        best: dict[int, float] = {}
-        for row in rows:
-            if table.kind[row] == COLLECT:
-                target = int(table.place[row])
-                best[target] = max(best.get(target, 0.0), float(problem.worth[row]))
-        return sum(best.values())
-
-    plans = sorted(_chains(problem, may_follow, (), 0), key=worth, reverse=True)
+    most, alone = _Most(problem), _Alone(problem)
+    # Of those that could earn the same the longest first: it has contacts for what it takes.
+    plans = sorted(
+        ((most.of(rows), len(rows), rows) for rows in possible_plans(problem)), reverse=True
+    )
     best, reward = None, 0.0
-    for rows in plans:
-        if best is not None and worth(rows) <= reward:
+    for at_most, _, rows in plans:
+        if best is not None and at_most <= reward:
             break
+        if best is not None and alone.most(rows) + most.on_board <= reward:
+            continue
         plan = Plan.of(problem, rows)
         timeline = replay(problem, plan, in_detail=False)
         if timeline.is_valid and (best is None or timeline.reward > reward):
@@ -53,13 +48,122 @@ def best_plan(problem: Problem) -> Plan | None:
     return best
 
 
+def has_plan(problem: Problem) -> bool:
+    """Return whether there is any valid plan."""
+    worthless = replace(problem, worth=np.zeros(len(problem.opportunities)), full_worth=None)
+    return best_plan(worthless) is not None
+
+
+def possible_plans(problem: Problem) -> Iterator[Rows]:
+    """Yield the tasks of each plan in which every turn fits and every pin is kept."""
+    kept = set(problem.kept_rows.tolist())
+    for rows in _chains(problem, _not_ruled_out(problem), _may_follow(problem), ()):
+        if kept.issubset(rows):
+            yield rows
+
+
+class _Most:
+    """What a plan could earn at most: each image comes down as soon as a contact begins."""
+
+    def __init__(self, problem: Problem) -> None:
+        table = problem.opportunities
+        self._is_image: list[bool] = (table.kind == COLLECT).tolist()
+        self._place: list[int] = table.place.tolist()
+        self._satellite: list[int] = table.satellite.tolist()
+        # Of each image before each contact; last, of one that no contact follows.
+        age_s = np.maximum(table.start_s[None, :] - table.end_s[:, None], 0.0)
+        age_s = np.column_stack([age_s, np.full(len(table), np.inf)])
+        if problem.counts_delivery:
+            worth = problem.worth_on_ground[:, None] * share_earned(problem.objective, age_s)
+        else:
+            worth = np.broadcast_to(problem.worth[:, None], age_s.shape)
+        self._worth: list[list[float]] = worth.tolist()
+        self.on_board = sum(i.worth for i in problem.on_board if problem.counts_delivery)
+
+    def of(self, rows: Rows) -> float:
+        """Return the most that tasks could earn that follow each other in this order."""
+        best: dict[int, float] = {}
+        contact: dict[int, int] = {}
+        for row in reversed(rows):
+            if self._is_image[row]:
+                worth = self._worth[row][contact.get(self._satellite[row], -1)]
+                target = self._place[row]
+                best[target] = max(best.get(target, 0.0), worth)
+            else:
+                contact[self._satellite[row]] = row
+        return sum(best.values()) + self.on_board
+
+
+class _Alone:
+    """What plans could earn by what the referee says of each satellite's part alone.
+
+    Turns, battery and recorder are of one satellite, and many plans of a fleet have the same part.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self._free = replace(problem, pinned=Pinned())
+        self._known: dict[Rows, dict[int, float] | None] = {}
+
+    def most(self, rows: Rows) -> float:
+        """Return the most that a plan could earn, nothing where a part of it is not valid."""
+        satellite = self._free.opportunities.satellite
+        parts: dict[int, list[int]] = {}
+        for row in rows:
+            parts.setdefault(int(satellite[row]), []).append(row)
+        if len(parts) < 2:
+            return np.inf
+        best: dict[int, float] = {}
+        for part in parts.values():
+            earned = self._earned(tuple(part))
+            if earned is None:
+                return 0.0
+            for target, worth in earned.items():
+                best[target] = max(best.get(target, 0.0), worth)
+        return sum(best.values())
+
+    def _earned(self, part: Rows) -> dict[int, float] | None:
+        if part not in self._known:
+            timeline = replay(self._free, Plan.of(self._free, part), in_detail=False)
+            earned = {target: image.worth for target, image in timeline.collected.items()}
+            self._known[part] = earned if timeline.is_valid else None
+        return self._known[part]
+
+
+def _not_ruled_out(problem: Problem) -> list[int]:
+    """Return the tasks that no pin rules out, as the referee sees it."""
+    everything = Plan.of(problem, range(len(problem.opportunities)))
+    ruled_out = {
+        everything.actions[position].opportunity
+        for violation in breaches(problem, everything)
+        for position in violation.blamed
+    }
+    return [row for row in range(len(problem.opportunities)) if row not in ruled_out]
+
+
+def _may_follow(problem: Problem) -> set[tuple[int, int]]:
+    """Return which two tasks a satellite has time to turn between, as the referee sees it."""
+    table = problem.opportunities
+    pairs: set[tuple[int, int]] = set()
+    for index in range(len(problem.satellites)):
+        own = np.flatnonzero(table.satellite == index)
+        first, second = (own[i] for i in np.triu_indices(len(own), 1))
+        before, after = (
+            Columns(row=rows, start_s=table.start_s[rows], end_s=table.end_s[rows])
+            for rows in (first, second)
+        )
+        turned = np.array(turns_between(problem, index, before, after)).reshape(-1, 2)
+        fits = turned[:, 1] <= after.start_s - before.end_s + 2.0 * TIME_TOLERANCE_S
+        pairs.update(zip(first[fits].tolist(), second[fits].tolist(), strict=True))
+    return pairs
+
+
 def _chains(
-    problem: Problem, may_follow: set[tuple[int, int]], rows: tuple[int, ...], first: int
-) -> Iterator[tuple[int, ...]]:
-    """Yield a plan and all that go on from it, each task right after one that it may follow."""
-    yield rows
+    problem: Problem, rows: list[int], may_follow: set[tuple[int, int]], taken: Rows
+) -> Iterator[Rows]:
+    """Yield a plan and all that go on from it by some rows, each after one that it may follow."""
+    yield taken
     satellite = problem.opportunities.satellite
-    for row in range(first, len(satellite)):
-        before = next((r for r in reversed(rows) if satellite[r] == satellite[row]), None)
+    for number, row in enumerate(rows):
+        before = next((r for r in reversed(taken) if satellite[r] == satellite[row]), None)
         if before is None or (before, row) in may_follow:
-            yield from _chains(problem, may_follow, (*rows, row), row + 1)
+            yield from _chains(problem, rows[number + 1 :], may_follow, (*taken, row))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 from dataclasses import replace
 from functools import partial
-from itertools import combinations
 from typing import Literal, get_args
 
 import numpy as np
@@ -27,6 +26,7 @@ from planner_core.solvers.milp import Milp
 from planner_core.solvers.registry import SOLVERS
 from planner_core.solvers.rule import Rule
 from tests.examples import examples
+from tests.planner_core.brute_force import possible_plans
 from tests.planner_core.problems import TIGHT, random_problem, varied_problem
 
 AIMS: tuple[Preference, ...] = get_args(Preference)
@@ -115,12 +115,8 @@ def all_best(seed: int) -> tuple[Problem, Plan, tuple[View, ...]]:
     """Return a small problem, a plan that earns the most, and every plan that earns as much."""
     problem = alike_problem(seed, num_satellites=1, num_targets=4)
     plan = Milp().solve(problem, Budget(), 0).plan
-    reward, rows = replay(problem, plan).reward, range(len(problem.opportunities))
-    views = (
-        View.of(problem, Plan.of(problem, chosen))
-        for size in range(len(rows) + 1)
-        for chosen in combinations(rows, size)
-    )
+    reward = replay(problem, plan).reward
+    views = (View.of(problem, Plan.of(problem, rows)) for rows in possible_plans(problem))
     best = (view for view in views if view.timeline.is_valid and view.timeline.reward == reward)
     return problem, plan, tuple(best)
 

@@ -13,7 +13,7 @@ import pytest
 
 from tests.patience import PATIENCE_S
 from tests.service.factories import tle
-from tests.service.serving import serving_as_installed
+from tests.service.serving import serving, serving_as_installed
 
 ROOT = Path(__file__).resolve().parents[2]
 OWN_FILES = {
@@ -71,7 +71,9 @@ def _output(page: str, tmp_path: Path) -> str:
     (tmp_path / "service").symlink_to(ROOT / "service")
     for name, lines in OWN_FILES.items():
         (tmp_path / name).write_text("\n".join(lines) + "\n", encoding="utf-8")
-    with serving_as_installed(tmp_path, "serve", "--workers", "1") as (_, line):
+    # As a user would the README's walk begins.
+    begin = serving_as_installed if page == "README.md" else serving
+    with begin(tmp_path, "serve", "--workers", "1") as (_, line):
         ran = subprocess.run(
             ["bash", "-eu", "-c", _walk(page, line.split()[-1])],
             cwd=tmp_path,

@@ -19,7 +19,10 @@ from tests.plain_http import NO_TLS
 from tests.service.serving import serving_as_installed
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+# Both ask for the same: one is enough for every day.
+@pytest.mark.parametrize(
+    "number", [signal.SIGTERM, pytest.param(signal.SIGINT, marks=pytest.mark.full_size)]
+)
 def test_serve_says_once_when_it_is_ready_and_ends_cleanly(
     tmp_path: Path, number: signal.Signals
 ) -> None:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import os
 import socket
-import subprocess
-import sys
 import threading
 import time
 from types import TracebackType
@@ -15,6 +13,8 @@ import httpx
 
 from service.jobs.supervisor import environment_of
 from service.settings import Settings
+from tests.service import prepared
+from tests.service.prepared import Program
 
 _PAUSE_S = 0.2
 
@@ -27,7 +27,7 @@ class Api:
             probe.bind(("127.0.0.1", 0))
             self._port = probe.getsockname()[1]
         self._environment = os.environ | environment_of(settings)
-        self._process: subprocess.Popen[bytes] | None = None
+        self._process: Program | None = None
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._keep_running, daemon=True)
         address = f"http://127.0.0.1:{self._port}"
@@ -101,7 +101,7 @@ class Api:
         return answer
 
     def _keep_running(self) -> None:
-        command = [sys.executable, "-m", "service", "api", "--port", str(self._port)]
+        words = ["service", "api", "--port", str(self._port)]
         while not self._stopping.wait(_PAUSE_S):
             if self._process is None or self._process.poll() is not None:
-                self._process = subprocess.Popen(command, env=self._environment)
+                self._process = prepared.start(words, self._environment, stdout=1)
