@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget, Termination
@@ -60,6 +60,11 @@ def test_delivered_is_the_best_of_all_plans(
     num_satellites=st.integers(1, 2),
     has_quality=st.booleans(),
 )
+# The price of an antenna ran off until it fitted no 32 bits.
+@example(
+    seed=503436, dynamics="physical", collected_share=0.9, half_life_s=None, num_satellites=2,
+    has_quality=True,
+)  # fmt: skip
 def test_no_plan_beats_the_bound_whatever_delivery_counts(
     dynamics: Literal["physical", "paper"],
     seed: int,

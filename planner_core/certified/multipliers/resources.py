@@ -63,7 +63,9 @@ class PriceSearch:
         num_groups = len(self._groups)
         self._is_reachable = np.diff(problem.target_opportunities[1]) > 0
         self._is_moved = np.append(self._is_reachable, np.zeros(num_groups, dtype=np.bool_))
-        self._most = np.append(problem.best_worth, np.full(num_groups, np.inf))
+        # No contact brings more down than all targets are worth: a price above that says no more.
+        all_worth = float(problem.best_worth.sum())
+        self._most = np.append(problem.best_worth, np.full(num_groups, all_worth))
         own_scale = np.where(problem.best_worth > 0.0, problem.best_worth, 1.0)
         self._scale = np.append(own_scale, self._scale_of_antennas())
         self.antenna_prices = np.zeros(num_groups)

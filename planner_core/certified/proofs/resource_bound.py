@@ -32,7 +32,7 @@ def whole_worth(
 ) -> Ints:
     """Return what each opportunity is worth at these prices, in units, rounded up.
 
-    Contacts cost what their antennas do.
+    Contacts cost what their antennas do, or more than all images are worth: no path pays that.
     """
     table = problem.opportunities
     is_collect = table.kind == COLLECT
@@ -42,7 +42,8 @@ def whole_worth(
     units[is_collect] = np.maximum(np.ceil(worth / unit - ROUNDING), 0.0)
     if antenna_prices is not None:
         tolls = antenna_tolls(problem, antenna_prices)
-        units[~is_collect] = -np.floor(tolls[~is_collect] / unit + ROUNDING)
+        most = int(units.sum(dtype=np.int64)) + 1
+        units[~is_collect] = -np.minimum(np.floor(tolls[~is_collect] / unit + ROUNDING), most)
     return units
 
 
