@@ -91,6 +91,8 @@ class Search:
 
     Attributes
     ----------
+    like
+        The problem whose strategies are asked; the one that is planned by default.
     num_idle
         How many slices in a row have gained nothing.
     proof
@@ -101,6 +103,7 @@ class Search:
     seed: int
     strategies: Sequence[Strategy]
     effort: Effort = field(default_factory=Effort)
+    like: Problem | None = None
     num_idle: int = 0
     proof: Callable[[], Bound] | None = None
     _engines: dict[type, object] = field(default_factory=dict)
@@ -123,9 +126,17 @@ class Search:
         assert isinstance(found, kind)
         return found
 
-    def beside(self, best: Incumbent, seed: int, without: Slices | None = None) -> Search:
+    def beside(
+        self,
+        best: Incumbent,
+        seed: int,
+        *,
+        like: Problem | None = None,
+        without: Slices | None = None,
+    ) -> Search:
         """Return a search for another problem, with the same strategies but for one."""
-        return Search(best, seed, [one for one in self.strategies if one.slices is not without])
+        strategies = [one for one in self.strategies if one.slices is not without]
+        return Search(best, seed, strategies, like=like)
 
     def solved(self) -> Solution:
         """Search until plan and bound are close enough, or no strategy gets any further."""
@@ -162,7 +173,8 @@ def close_in(search: Search) -> None:
 
     None waits for more than a few slices of others.
     """
-    left = [one for one in search.strategies if one.supports(search.problem)]
+    like = search.problem if search.like is None else search.like
+    left = [one for one in search.strategies if one.supports(like)]
     turns: list[Turn] = []
     while left or turns:
         if search.best.is_done and not (left and left[0].begin is Begin.ALWAYS):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from typing import Final
 
 import pytest
 
@@ -12,7 +13,7 @@ from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.strategies.every import STRATEGIES
 from planner_core.certified.tuning import TUNING
-from planner_core.domain import Objective
+from planner_core.domain import Agility, Objective
 from planner_core.problem import Problem
 from planner_core.problem.delivery import with_objective
 from planner_core.problem.plan import Plan
@@ -139,16 +140,23 @@ def test_engines_are_shared() -> None:
     assert search.engine(Counter).began == (search.best, search.seed)
 
 
+MOVING: Final = Agility(slew_model="moving", acceleration_deg_s2=0.1)
+
+
 def _late(problem: Problem) -> Problem:
     return with_objective(problem, Objective(collected_share=0.0, half_life_s=3000.0))
 
 
-KINDS = {
+KINDS: Final = {
     "agility": random_problem(1, use_resources=False, num_collects=20),
     "choice": random_problem(1, use_resources=False, num_collects=20, num_offers=2),
     "fleet": random_problem(1, use_resources=False, num_collects=20, num_satellites=2),
     "limits": random_problem(1, num_collects=20, num_contacts=2),
     "fleet with limits": random_problem(1, num_collects=20, num_contacts=2, num_satellites=2),
+    "limits in motion": random_problem(1, num_collects=20, num_contacts=2, agility=MOVING),
+    "motion alone": random_problem(1, num_collects=20, use_resources=False, agility=MOVING),
+    "fleet in motion": random_problem(1, num_collects=20, num_contacts=2, num_satellites=2,
+                                      agility=MOVING),
     "aging": _late(random_problem(1, num_collects=20, num_contacts=2)),
     "aging fleet": _late(random_problem(1, num_collects=20, num_contacts=2, num_satellites=2)),
     "free starts": flat_problem(1, num_targets=8),

@@ -282,11 +282,16 @@ def _search_beside_by(
     beside = Search.beside
 
     def worked(
-        self: Search, best: Incumbent, seed: int, without: Slices | None = None
+        self: Search,
+        best: Incumbent,
+        seed: int,
+        *,
+        like: Problem | None = None,
+        without: Slices | None = None,
     ) -> Search | SimpleNamespace:
         if without is exhaust:
             return SimpleNamespace(solved=partial(work, best, seed))
-        return beside(self, best, seed, without)
+        return beside(self, best, seed, like=like, without=without)
 
     monkeypatch.setattr(Search, "beside", worked)
 

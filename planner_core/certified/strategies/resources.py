@@ -17,6 +17,7 @@ from planner_core.certified.driver import Search
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.proofs.resource_bound import quick_bound
 from planner_core.certified.strategies.resource_steps import ResourceSearch
+from planner_core.certified.strategies.supports import at_rest
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import Bools
 
@@ -45,7 +46,8 @@ def tasks_alone(search: Search) -> Bools:
     # reported.
     quiet = search.budget.part(TUNING.beginning, ignored)
     free = Incumbent(replace(search.problem, use_resources=False), quiet, best.gap)
-    solution = search.beside(free, search.seed).solved()
+    # What turns in motion forbid beside is for the search with limits to see.
+    solution = search.beside(free, search.seed, like=at_rest(free.problem)).solved()
     if solution.proven is not None:
         best.lower(solution.proven)
     best.report("without resources")

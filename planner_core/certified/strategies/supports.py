@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from planner_core.certified.tuning import TUNING
 from planner_core.precedence.relation import is_transitive
 from planner_core.problem import Problem
@@ -35,6 +37,17 @@ def has_free_starts(problem: Problem) -> bool:
 def has_limits(problem: Problem) -> bool:
     """Whether battery, recorder or motion bound plans, among the starts of opportunities."""
     return not has_free_starts(problem) and (problem.use_resources or problem.turns_in_motion)
+
+
+def at_rest(problem: Problem) -> Problem:
+    """Return the problem with satellites that turn between lines of sight at rest."""
+    return replace(
+        problem,
+        satellites=tuple(
+            replace(one, agility=replace(one.agility, slew_model="rest"))
+            for one in problem.satellites
+        ),
+    )
 
 
 def is_free(problem: Problem) -> bool:
