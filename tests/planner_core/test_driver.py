@@ -7,16 +7,18 @@ from typing import Final
 
 import pytest
 
-from planner_core.budget import Budget
+from planner_core.budget import Budget, Termination
 from planner_core.certified.driver import Begin, Effort, Search, Slices, Strategy
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.strategies.every import STRATEGIES
+from planner_core.certified.strategies.resources import tasks_alone
 from planner_core.certified.tuning import TUNING
 from planner_core.domain import Agility, Objective
 from planner_core.problem import Problem
 from planner_core.problem.delivery import with_objective
 from planner_core.problem.plan import Plan
+from planner_core.solvers.base import Solution
 from planner_core.solvers.rule import Rule
 from tests.planner_core.flat_earth import flat_problem
 from tests.planner_core.problems import random_problem
@@ -182,3 +184,18 @@ def test_every_strategy_of_the_list_has_a_problem_and_a_name_of_its_own() -> Non
     used = {one.name for one in STRATEGIES for kind in KINDS.values() if one.supports(kind)}
     assert used | {large} == {one.name for one in STRATEGIES}
     assert len({one.name for one in STRATEGIES}) == len(STRATEGIES)
+
+
+def test_agility_alone_is_asked_by_its_own_strategies(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By those for limits it would ask for agility alone again, without end."""
+    began: list[list[str]] = []
+
+    def solved(search: Search) -> Solution:
+        assert search.like is not None
+        began.append([one.name for one in search.strategies if one.supports(search.like)])
+        return Solution(plan=Plan(), termination=Termination.HORIZON_COMPLETE)
+
+    monkeypatch.setattr(Search, "solved", solved)
+    for kind in ("limits", "limits in motion"):
+        tasks_alone(Search(Incumbent(KINDS[kind], Budget(), 0.0), 0, STRATEGIES))
+    assert began == [["rule", "multipliers of paths", "windows", "cutting planes"]] * 2
