@@ -30,6 +30,7 @@ _ROOMS: Final[Mapping[str, Mapping[str, float]]] = {
     "strategies.resources": _ONE,
     "strategies.resource_steps": _ONE,
     "strategies.resource_fleet": _STATIONS,
+    "strategies.supports": {**_ONE, **_FLEET},
     "strategies.fleet": _FLEET,
     "strategies.continuous": _FREE,
     "strategies.commitments": {**_DELIVERED, **_STATIONS},
