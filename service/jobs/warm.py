@@ -31,6 +31,7 @@ from planner_core.certified.multipliers.energy import EnergyPaths, ascent_on_ene
 from planner_core.certified.multipliers.latency import LatencyAscent
 from planner_core.certified.proofs.queues import queue_value
 from planner_core.certified.strategies.agility import FreeSearch
+from planner_core.certified.strategies.fleet import FleetSearch
 from planner_core.domain import (
     Agility,
     GroundStation,
@@ -238,7 +239,10 @@ def _continuous_with_resources() -> None:
 
 
 def _fleet() -> None:
-    _plan(_two(_few()), Rule(), Certified())
+    fleet = _two(_few())
+    _plan(fleet, Rule(), Certified())
+    # So few targets are settled without a plan at the multipliers.
+    FleetSearch(Incumbent(_built(fleet), Budget(), 0.0), 0).windows(1)
 
 
 def _fleet_with_resources() -> None:
