@@ -138,7 +138,7 @@ _SMALL: Final = {"tight-150": 10.0, "tight-weights-300": 10.0, "physical-200": 1
 STRATEGIES: Final[Mapping[str, Change]] = {
     "the order by gains": Change(
         patches=_off("driver", "_chosen", _all_in_turn),
-        families=_SPACED | _FREE | _RESOURCES | _CLOUDS,
+        families=_SPACED | _FREE | _CLOUDS | {"paper-1000": 12.0},
     ),
     **{
         name: Change(patches=_without(name), families=families)
