@@ -2,7 +2,7 @@
 
 A strategy betters the plan or lowers the bound, a slice of work at a time. What a slice gains is
 by how much plan and bound have come nearer to each other. The next one goes to the strategy whose
-latest gained most, so that the work goes where it tells: to the bound where that is what is far
+latest gained most, so that the work goes where it pays: to the bound where that is what is far
 off, to the plan where that is. Slices take about as long as each other. They are not timed, so that
 the same seed gives the same plan (docs/decisions/0012-one-driver.md).
 """
@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from enum import Enum, auto
-from typing import Protocol, TypeAlias, TypeVar
+from typing import Protocol, TypeAlias, TypeVar, cast
 
 from planner_core.budget import Budget
 from planner_core.certified.incumbent import Incumbent
@@ -122,9 +122,7 @@ class Search:
         """Return the engine of this kind, the same one for all strategies."""
         if kind not in self._engines:
             self._engines[kind] = kind(self.best, self.seed)
-        found = self._engines[kind]
-        assert isinstance(found, kind)
-        return found
+        return cast(E, self._engines[kind])
 
     def beside(
         self,

@@ -39,8 +39,7 @@ class Certified:
         metadata={
             "minimum": 0,
             "maximum": 100_000,
-            "description": "How long to improve the plan before the proof: moves for each "
-            "opportunity.",
+            "description": "How long to improve the plan, at most: moves for each opportunity.",
         },
     )
 

@@ -71,7 +71,7 @@ def _output(page: str, tmp_path: Path) -> str:
     (tmp_path / "service").symlink_to(ROOT / "service")
     for name, lines in OWN_FILES.items():
         (tmp_path / name).write_text("\n".join(lines) + "\n", encoding="utf-8")
-    # As a user would the README's walk begins.
+    # The README's walk begins as a user would.
     begin = serving_as_installed if page == "README.md" else serving
     with begin(tmp_path, "serve", "--workers", "1") as (_, line):
         ran = subprocess.run(

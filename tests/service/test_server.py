@@ -19,7 +19,7 @@ from tests.plain_http import NO_TLS
 from tests.service.serving import serving_as_installed
 
 
-# Both ask for the same: one is enough for every day.
+# Both signals ask for the same: `.ci/run` sends the second one too.
 @pytest.mark.parametrize(
     "number", [signal.SIGTERM, pytest.param(signal.SIGINT, marks=pytest.mark.full_size)]
 )

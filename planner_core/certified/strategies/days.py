@@ -24,6 +24,7 @@ from planner_core.certified.strategies.half_life_steps import (
     prove_at_last,
 )
 from planner_core.certified.strategies.resource_steps import ResourceSearch
+from planner_core.certified.strategies.supports import is_fleet
 from planner_core.certified.strategies.whole_program import exhaust
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import Problem
@@ -72,7 +73,7 @@ def _without_half_life(
             breaks.end()
 
     # A small fleet goes on with sets of contacts, and does not wait for the whole program here.
-    share = 1.0 if engine.is_fleet else TUNING.first_share
+    share = 1.0 if is_fleet(engine.problem) else TUNING.first_share
     inner = Incumbent(undecayed, search.budget.part(share, look), search.best.gap)
     search.beside(inner, seed, without=exhaust).solved()
     return inner.plan

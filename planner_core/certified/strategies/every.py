@@ -20,14 +20,21 @@ from planner_core.certified.strategies import (
     whole_program,
 )
 from planner_core.certified.strategies.supports import (
+    has_choice_of_starts,
     has_free_starts,
+    has_free_starts_alone,
+    has_free_starts_with_resources,
+    has_one_start_each,
     has_steady_worth,
     is_aging,
     is_fleet,
     is_free_fleet,
     is_free_satellite,
+    is_large_free_fleet,
     is_shared,
+    is_shared_with_limits,
     is_small_free_fleet,
+    is_small_with_limits,
     is_within_reach,
 )
 from planner_core.certified.tuning import TUNING
@@ -56,24 +63,24 @@ STRATEGIES: Final = (
     # Without resources, one satellite.
     Strategy(
         name="multipliers of paths",
-        supports=lambda p: is_free_satellite(p) and not p.offers_choice,
+        supports=has_one_start_each,
         slices=agility.path_multipliers,
     ),
     Strategy(
         name="multipliers of passes",
-        supports=lambda p: is_free_satellite(p) and p.offers_choice,
+        supports=has_choice_of_starts,
         slices=agility.pass_multipliers,
         patience=lambda: TUNING.patience,
     ),
     Strategy(
         name="windows beside multipliers of passes",
-        supports=lambda p: is_free_satellite(p) and p.offers_choice,
+        supports=has_choice_of_starts,
         slices=agility.windows,
         patience=lambda: TUNING.patience,
     ),
     Strategy(
         name="windows",
-        supports=lambda p: is_free_satellite(p) and not p.offers_choice,
+        supports=has_one_start_each,
         slices=agility.windows,
         patience=lambda: TUNING.tries,
     ),
@@ -104,43 +111,43 @@ STRATEGIES: Final = (
     ),
     Strategy(
         name="windows of a large fleet",
-        supports=lambda p: is_free_fleet(p) and not is_small_free_fleet(p),
+        supports=is_large_free_fleet,
         slices=fleet.windows,
         begin=Begin.STALLED,
     ),
     # Battery and recorder.
     Strategy(
         name="plans and multipliers side by side",
-        supports=lambda p: has_steady_worth(p) and is_shared(p),
+        supports=is_shared_with_limits,
         slices=resource_fleet.side_by_side,
     ),
     Strategy(
         name="choices",
-        supports=lambda p: has_steady_worth(p) and not is_fleet(p),
+        supports=is_small_with_limits,
         slices=resources.choices,
         begin=Begin.STALLED,
     ),
     Strategy(
         name="windows and choices",
-        supports=lambda p: has_steady_worth(p) and not is_fleet(p),
+        supports=is_small_with_limits,
         slices=resources.windows_and_choices,
         begin=Begin.STALLED,
         patience=lambda: TUNING.tries,
     ),
     Strategy(
         name="whole relaxation",
-        supports=lambda p: has_steady_worth(p) and not is_fleet(p),
+        supports=is_small_with_limits,
         slices=resources.whole_relaxation,
     ),
     Strategy(
         name="multipliers",
-        supports=lambda p: has_steady_worth(p) and not is_fleet(p),
+        supports=is_small_with_limits,
         slices=resources.multipliers,
         patience=lambda: TUNING.tries,
     ),
     Strategy(
         name="programs with contacts fixed",
-        supports=lambda p: has_steady_worth(p) and not is_fleet(p),
+        supports=is_small_with_limits,
         slices=resources.programs,
         patience=lambda: TUNING.several,
     ),
@@ -159,18 +166,18 @@ STRATEGIES: Final = (
     # Free starts.
     Strategy(
         name="fixed starts",
-        supports=lambda p: has_free_starts(p) and p.use_resources,
+        supports=has_free_starts_with_resources,
         slices=continuous.fixed_starts,
     ),
     Strategy(
         name="insertion",
-        supports=lambda p: has_free_starts(p) and not p.use_resources,
+        supports=has_free_starts_alone,
         slices=continuous.insertion,
         begin=Begin.ALWAYS,
     ),
     Strategy(
         name="windows with free starts",
-        supports=lambda p: has_free_starts(p) and not p.use_resources,
+        supports=has_free_starts_alone,
         slices=continuous.windows,
     ),
     Strategy(
@@ -180,7 +187,7 @@ STRATEGIES: Final = (
     ),
     Strategy(
         name="windows with free starts and resources",
-        supports=lambda p: has_free_starts(p) and p.use_resources,
+        supports=has_free_starts_with_resources,
         slices=continuous.windows_with_resources,
     ),
     Strategy(

@@ -29,6 +29,7 @@ from planner_core.certified.strategies.half_life_steps import (
 )
 from planner_core.certified.strategies.resource_steps import ResourceSearch
 from planner_core.certified.strategies.resources import choices
+from planner_core.certified.strategies.supports import is_large
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import CONTACT, Floats, Problem
 from planner_core.problem.plan import Plan
@@ -48,7 +49,7 @@ def on_the_ground(search: Search) -> Iterator[None]:
     tried: set[tuple[int, ...]] = set()
     rng = np.random.default_rng(search.seed)
     num_idle = number = 0
-    if engine.is_large:
+    if is_large(engine.problem):
         _better_with_its_contacts(engine)
         yield
     lower(best, ascent, TUNING.rounds // 2)

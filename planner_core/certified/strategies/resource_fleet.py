@@ -16,6 +16,7 @@ from planner_core.certified.multipliers.energy import EnergyPaths, ascent_on_ene
 from planner_core.certified.multipliers.resources import PriceSearch
 from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.strategies.resource_steps import ResourceSearch
+from planner_core.certified.strategies.supports import is_fleet
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import Floats
 
@@ -34,7 +35,7 @@ def side_by_side(search: Search) -> Iterator[None]:
             _take_turns(engine, turns, pool, threads, pricing)
             yield
         programs = None
-        if engine.is_fleet and pricing.prices is not None:
+        if is_fleet(engine.problem) and pricing.prices is not None:
             programs = ProgramSearch(
                 search.problem, pool, pricing.prices, pricing.losses, search.budget, search.seed
             )
@@ -127,7 +128,7 @@ class _FleetPricing:
     def _steps(self) -> Iterator[int]:
         """Yield how long each turn takes, before it."""
         search, usage = self._search, self._paths.usage
-        beside_prices = TUNING.steps_beside if search.is_fleet else TUNING.tries
+        beside_prices = TUNING.steps_beside if is_fleet(search.problem) else TUNING.tries
         energy = ascent_on_energy(
             search.problem, self._paths, search.prices(), TUNING.epochs, search.seed
         )
@@ -154,7 +155,7 @@ class _FleetPricing:
         # as ten programs over the few tasks that most answers take.
         is_small = bool(np.count_nonzero(usage) <= TUNING.most_relaxed)
         is_relaxed = is_small and not search.problem.turns_to_the_sun
-        if search.is_fleet and is_relaxed and has_full_recorders:
+        if is_fleet(search.problem) and is_relaxed and has_full_recorders:
             for share in TUNING.price_shares[1:-1]:
                 self._ask_near(share * energy.multipliers)
             # Without cutting planes at first: that finds tasks.

@@ -23,7 +23,7 @@ from planner_core.certified.proofs.lagrangian import lagrangian_bound
 from planner_core.certified.proofs.latency import latency_value
 from planner_core.certified.sizes import MAX_PAIRS
 from planner_core.certified.strategies.commitments import best_commitment
-from planner_core.certified.strategies.supports import is_fleet, is_large
+from planner_core.certified.strategies.supports import is_large
 from planner_core.certified.strategies.whole_program import relaxation_bound
 from planner_core.certified.tuning import TUNING
 from planner_core.precedence.relation import num_near_pairs
@@ -44,16 +44,6 @@ class ResourceSearch:
         self._one = self.problem.typical_worth
         self._agility_decides = False
         self._brought_down: set[Plan] = set()  # what was tried with further contacts
-
-    @property
-    def is_fleet(self) -> bool:
-        """Whether several satellites share so much that the whole program is too large."""
-        return is_fleet(self.problem)
-
-    @property
-    def is_large(self) -> bool:
-        """Whether steps towards prices take long, and the whole program is out of reach."""
-        return is_large(self.problem)
 
     @cached_property
     def unit(self) -> float:
@@ -148,8 +138,8 @@ class ResourceSearch:
         There the exact programmes pay for rounding to whole units with every image, and it is
         nearly tight. Where all images of a target earn the same they say as much or more.
         """
-        is_large = len(self.problem.opportunities) > TUNING.most_columns
-        if is_large or not self.problem.has_better_images:
+        is_too_large = len(self.problem.opportunities) > TUNING.most_columns
+        if is_too_large or not self.problem.has_better_images:
             return
         if num_near_pairs(self.problem) > MAX_PAIRS:
             return
@@ -227,7 +217,7 @@ class ResourceSearch:
         ]
         new = [key for key in dict.fromkeys(sets) if key not in self._relaxed][: TUNING.tries]
         offered = np.ones(len(table), dtype=np.bool_)
-        if len(table) > TUNING.large:
+        if is_large(self.problem):
             offered = (prices.usage > 0.0) | (turns.usage > 0.0)
         offered |= self.mask(action.opportunity for action in self.best.plan.actions)
         for contacts in new:

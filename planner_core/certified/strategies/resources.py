@@ -77,10 +77,10 @@ def whole_relaxation(search: Search) -> Iterator[None]:
 def multipliers(search: Search) -> Iterator[None]:
     """Lower the bound by multipliers of targets."""
     engine = search.engine(ResourceSearch)
-    multipliers = engine.price_search
+    prices = engine.price_search
     yield
     while _is_promising(search):
-        engine.price(multipliers, TUNING.tries)
+        engine.price(prices, TUNING.tries)
         yield
 
 

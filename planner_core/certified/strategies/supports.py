@@ -34,6 +34,16 @@ def has_free_starts(problem: Problem) -> bool:
     return problem.pointing is not None
 
 
+def has_free_starts_alone(problem: Problem) -> bool:
+    """Whether they may, and neither battery nor recorder counts."""
+    return has_free_starts(problem) and not problem.use_resources
+
+
+def has_free_starts_with_resources(problem: Problem) -> bool:
+    """Whether they may, and battery and recorder count."""
+    return has_free_starts(problem) and problem.use_resources
+
+
 def has_limits(problem: Problem) -> bool:
     """Whether battery, recorder or motion bound plans, among the starts of opportunities."""
     return not has_free_starts(problem) and (problem.use_resources or problem.turns_in_motion)
@@ -65,6 +75,16 @@ def is_free_satellite(problem: Problem) -> bool:
     return is_free(problem) and not is_shared(problem)
 
 
+def has_choice_of_starts(problem: Problem) -> bool:
+    """Whether such a satellite may start at several times in an access."""
+    return is_free_satellite(problem) and problem.offers_choice
+
+
+def has_one_start_each(problem: Problem) -> bool:
+    """Whether such a satellite may start at one time in each access."""
+    return is_free_satellite(problem) and not problem.offers_choice
+
+
 def is_free_fleet(problem: Problem) -> bool:
     """Whether agility alone counts, and several satellites have something to do."""
     return is_free(problem) and is_shared(problem)
@@ -75,9 +95,24 @@ def is_small_free_fleet(problem: Problem) -> bool:
     return is_free_fleet(problem) and len(problem.opportunities) <= TUNING.small_fleet
 
 
+def is_large_free_fleet(problem: Problem) -> bool:
+    """Whether such a fleet is too large for that."""
+    return is_free_fleet(problem) and not is_small_free_fleet(problem)
+
+
 def has_steady_worth(problem: Problem) -> bool:
     """Whether limits bound plans, and images have one worth, whenever they come down."""
     return has_limits(problem) and not has_half_life(problem)
+
+
+def is_shared_with_limits(problem: Problem) -> bool:
+    """Whether that holds of several satellites."""
+    return has_steady_worth(problem) and is_shared(problem)
+
+
+def is_small_with_limits(problem: Problem) -> bool:
+    """Whether that holds of one satellite, or of several with little to choose from."""
+    return has_steady_worth(problem) and not is_fleet(problem)
 
 
 def is_aging(problem: Problem) -> bool:
