@@ -16,7 +16,9 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import IO, Any, Final, NoReturn
@@ -35,6 +37,8 @@ class Prepared:
         self.stdout = stdout
         self.returncode: int | None = None
         self._told = told
+        # How it ended is told once, whoever waits for it: chaos waits in two threads.
+        self._waiting = threading.Lock()
 
     def poll(self) -> int | None:
         """Return how it ended, or None while it runs."""
@@ -50,7 +54,8 @@ class Prepared:
     def send_signal(self, number: int) -> None:
         """Send a signal, unless it has ended."""
         if self.poll() is None:
-            os.kill(self.pid, number)
+            with suppress(ProcessLookupError):
+                os.kill(self.pid, number)
 
     def terminate(self) -> None:
         """Send SIGTERM."""
@@ -61,13 +66,17 @@ class Prepared:
         self.send_signal(signal.SIGKILL)
 
     def _status(self, timeout_s: float | None) -> int | None:
-        if self.returncode is None:
-            self._told.settimeout(timeout_s)
-            try:
+        if not self._waiting.acquire(timeout=-1.0 if timeout_s is None else timeout_s):
+            return self.returncode
+        try:
+            if self.returncode is None:
+                self._told.settimeout(timeout_s)
                 self.returncode = int(self._told.recv(32))
-            except (BlockingIOError, TimeoutError):
-                return None
-            self._told.close()
+                self._told.close()
+        except (BlockingIOError, TimeoutError):
+            pass
+        finally:
+            self._waiting.release()
         return self.returncode
 
 

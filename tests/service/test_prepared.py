@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import psutil
@@ -58,6 +59,13 @@ def test_it_is_waited_for_and_killed(tmp_path: Path) -> None:
         assert process.wait() == -signal.SIGKILL
         process.terminate()  # nobody is left to be told
         psutil.wait_procs([fork_server])
+
+
+def test_all_who_wait_for_it_are_told() -> None:
+    process = prepared.start(["service", "--version"], os.environ)
+    assert process.stdout is not None
+    with process.stdout, ThreadPoolExecutor(4) as pool:
+        assert [each.result() for each in [pool.submit(process.wait) for _ in range(4)]] == [0] * 4
 
 
 def test_settings_of_libraries_want_a_start_from_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
