@@ -10,6 +10,8 @@ import time
 from collections.abc import Callable
 from typing import Final
 
+import psutil
+
 PATIENCE_S: Final = 300.0
 
 
@@ -19,3 +21,8 @@ def wait_until(condition: Callable[[], object], what: object = "it never happene
     while not condition():
         assert time.monotonic() < deadline_s, what
         time.sleep(0.05)
+
+
+def wait_for_the_end_of(pid: int) -> None:
+    """Return when there is no such process; who has ended may not be collected at once."""
+    wait_until(lambda: not psutil.pid_exists(pid), f"process {pid} has not ended")

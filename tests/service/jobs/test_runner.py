@@ -7,7 +7,6 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-import psutil
 import pytest
 
 from planner_core.budget import Progress
@@ -16,6 +15,7 @@ from service.jobs import runner as runner_module
 from service.jobs.child import Answered, Ending, Refused, Stopped
 from service.jobs.plan_request import Parcel, PlanRequest
 from service.jobs.runner import Abandoned, Limits, Lost, Order, Runner
+from tests.patience import wait_for_the_end_of
 from tests.service.jobs.work import WORK
 
 
@@ -49,7 +49,7 @@ def no_process_is_left(log: Path) -> Iterator[None]:
     """However a run ends, its process is gone."""
     yield
     for line in log.read_text().splitlines():
-        assert not psutil.pid_exists(int(line.split()[-1]))
+        wait_for_the_end_of(int(line.split()[-1]))
 
 
 def run(

@@ -10,13 +10,12 @@ import time
 from contextlib import closing
 from pathlib import Path
 
-import psutil
 import sqlalchemy as sa
 
 from service.db.rows import OpportunitySetRow
 from service.jobs import lease
 from service.jobs.supervisor import Supervisor
-from tests.patience import PATIENCE_S, wait_until
+from tests.patience import PATIENCE_S, wait_for_the_end_of, wait_until
 from tests.service.jobs.conftest import Jobs, Workers
 from tests.service.jobs.work import WORK
 from tests.service.prepared import Program
@@ -70,14 +69,14 @@ def test_a_job_survives_its_worker_and_finishes_once(jobs: Jobs) -> None:
         assert (job.state, job.dispatch, job.run, job.lost_runs) == ("succeeded", 2, 2, 1)
         assert jobs.result(job_id) is not None
         assert len(jobs.starts()) == 2
-        assert not psutil.pid_exists(orphan)
+        wait_for_the_end_of(orphan)
         jobs.until(lambda: jobs.queue.claims() == [])
         (second,) = supervisor.pids()
         assert second != first
     finally:
         supervisor.stop()
     assert supervisor.pids() == []
-    assert not psutil.pid_exists(second)
+    wait_for_the_end_of(second)
 
 
 def test_workers_take_over_from_a_frozen_and_from_a_stopped_one(
@@ -101,7 +100,7 @@ def test_workers_take_over_from_a_frozen_and_from_a_stopped_one(
     solver = solver_pid(jobs, handed_back)
     owner.terminate()
     assert owner.wait(PATIENCE_S) == 0
-    assert not psutil.pid_exists(solver)
+    wait_for_the_end_of(solver)
     waiting = jobs.job(handed_back)
     assert (waiting.state, waiting.dispatch, waiting.lost_runs) == ("queued", 2, 0)
 

@@ -14,8 +14,10 @@ from planner_core.errors import Cancelled, InvalidScenario
 from service.answers.blocks import target_blocks
 from service.jobs.plan_request import PlanAnswer, PlanRequest
 from service.jobs.runner import Work
+from tests.patience import PATIENCE_S
 from tests.service.answers import blocks_of_timeline
 
+_FOREVER_S = 3 * PATIENCE_S
 _SPAN = {"start": "2026-03-01T00:00:00.000Z", "end": "2026-03-02T00:00:00.000Z"}
 EMPTY = {
     "schema_version": "1.0",
@@ -55,7 +57,7 @@ def run(request: PlanRequest, budget: Budget) -> PlanAnswer:
             return search(request, budget)
         case "deaf":
             budget.report(Progress(phase="solve", fraction=0.5))
-            time.sleep(300)
+            time.sleep(_FOREVER_S)
         case "endless":
             budget.report(Progress(phase="solve", fraction=0.5))
             while True:
@@ -88,7 +90,7 @@ def run(request: PlanRequest, budget: Budget) -> PlanAnswer:
             worker = fork_server.parent()
             assert worker is not None
             worker.kill()
-            time.sleep(300)
+            time.sleep(_FOREVER_S)
         case "kill_fork_server":
             starts = Path(request.params["log"]).read_text()
             if starts.count(request.job_id) >= int(request.params.get("survives", 9)):
@@ -96,7 +98,7 @@ def run(request: PlanRequest, budget: Budget) -> PlanAnswer:
             fork_server = psutil.Process().parent()
             assert fork_server is not None
             fork_server.kill()
-            time.sleep(300)
+            time.sleep(_FOREVER_S)
         case "refuse":
             raise InvalidScenario("no_such_orbit", "The orbit is not one.", pointer="/satellites")
         case "bug":

@@ -10,11 +10,11 @@ import os
 import threading
 import time
 
-import psutil
 import pytest
 from sqlalchemy.exc import SQLAlchemyError
 
 from service.jobs.supervisor import Supervisor
+from tests.patience import wait_for_the_end_of
 from tests.service.jobs.chaos import ledger
 from tests.service.jobs.chaos.api import Api
 from tests.service.jobs.chaos.load import GIANT, Load
@@ -61,7 +61,7 @@ def test_nothing_is_lost(jobs: Jobs, capsys: pytest.CaptureFixture[str]) -> None
             supervisor.stop()
     assert sum(mischief.done.values()) >= 5 * rounds
     for line in jobs.starts():
-        assert not psutil.pid_exists(int(line.split()[-1])), "a solver has outlived its worker"
+        wait_for_the_end_of(int(line.split()[-1]))  # no solver outlives its worker
 
 
 def wait_for_the_end(jobs: Jobs) -> None:
