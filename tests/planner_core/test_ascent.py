@@ -9,13 +9,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner_core.certified.multipliers.paths import ascent_on_paths
+from planner_core.certified.multipliers.ascent import Ascent, Latest, OneByOne, Steps
+from planner_core.certified.multipliers.paths import Paths, ascent_on_paths
 from planner_core.certified.proofs.bound import Bound, rounded_bound
 from planner_core.certified.proofs.documents import from_json, is_proven, to_json
 from planner_core.certified.proofs.lagrangian import lagrangian_bound, lagrangian_value
 from planner_core.domain import Agility
-from planner_core.precedence.network import network_of
-from planner_core.problem import Floats, Problem
+from planner_core.precedence.network import heaviest_paths, network_of
+from planner_core.problem import Floats, Ints, Problem
 from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import random_problem
@@ -70,6 +71,53 @@ def test_no_plan_of_a_fleet_beats_them(
     bound = Bound(value=rounded_bound(problem, value, 0.0), proof="lagrangian", prices=prices)
     assert is_proven(problem, from_json(to_json(bound)))
     assert lagrangian_bound(problem, 0.0).value >= best - 1e-9
+
+
+class PlainPaths(OneByOne):
+    """What ``Paths`` does, an answer at a time."""
+
+    def __init__(self, problem: Problem) -> None:
+        self._network = network_of(problem)
+        self._worth = problem.worth[self._network.row]
+        num_parts = len(self._network.first) - 1
+        self.parts = np.flatnonzero(np.diff(self._network.first)).astype(np.int32)
+        self._latest = Latest(num_parts)
+        self._ends = np.empty(num_parts, dtype=np.int32)
+
+    def answer(self, part: int, multipliers: Floats, count: Ints) -> None:
+        weight, previous, _ = self._longest(multipliers)
+        targets, at = [], self._ends[part]
+        while at >= 0:
+            if weight[at] > 0.0:
+                targets.append(self._network.place[at])
+            at = previous[at]
+        self._latest.replace(part, np.array(targets, dtype=np.int32), count)
+
+    def gain(self, multipliers: Floats) -> float:
+        return self._longest(multipliers)[2]
+
+    def _longest(self, multipliers: Floats) -> tuple[Floats, Ints, float]:
+        weight = np.maximum(self._worth - multipliers[self._network.place], 0.0)
+        value, previous = np.empty(len(weight)), np.empty(len(weight), dtype=np.int32)
+        gain = heaviest_paths(self._network, weight, value, previous, self._ends)
+        return weight, previous, gain
+
+
+@examples(40)
+@given(seed=SEEDS, num_satellites=st.integers(1, 4))
+def test_turns_in_a_kernel_are_those_of_answers_one_by_one(seed: int, num_satellites: int) -> None:
+    problem = crowded(seed, num_satellites)
+    steps = Steps(first=0.3, last=0.1, num_epochs=20)
+    begin = 0.5 * problem.best_worth
+    quick, plain = (
+        Ascent(oracle, problem.best_worth, begin, steps, seed)
+        for oracle in (Paths(problem, network_of(problem)), PlainPaths(problem))
+    )
+    for ascent in (quick, plain):
+        ascent.run(0.0, GO_ON)
+    assert quick.value == plain.value
+    assert quick.multipliers.tolist() == plain.multipliers.tolist()
+    assert quick.mean.tolist() == plain.mean.tolist()
 
 
 @pytest.mark.parametrize("num_satellites", [2, 4, pytest.param(8, marks=pytest.mark.full_size)])

@@ -14,14 +14,38 @@ parts for turns: their steps are longer, and follow the value.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from planner_core.bundles import bundle
 from planner_core.certified.tuning import TUNING
-from planner_core.jit import kernel
-from planner_core.problem import Bytes, Floats, Ints
+from planner_core.jit import inlined
+from planner_core.problem import Bytes, Floats, Ints, Longs
+
+
+@bundle
+class Turns(NamedTuple):
+    """In which order parts answer, and how far multipliers move in between.
+
+    Attributes
+    ----------
+    order
+        Parts, each once.
+    ends
+        After how many of them multipliers move, in ascending order; at last after all.
+    length
+        What a multiplier moves for each answer too many, as a share of what the target is worth.
+    most
+        The best worth of each target, and zero for contacts. Shape ``(num_targets + 1,)``.
+    """
+
+    order: Ints
+    ends: Longs
+    length: float
+    most: Floats
 
 
 class Oracle(Protocol):
@@ -35,17 +59,39 @@ class Oracle(Protocol):
     def parts(self) -> Ints:
         """The parts that have anything to do."""
 
-    def answer(self, parts: Ints, multipliers: Floats, count: Ints) -> None:
-        """Let some parts answer anew.
+    def answer_in_turn(self, turns: Turns, multipliers: Floats, count: Ints, stop: Bytes) -> None:
+        """Let parts answer anew, and multipliers move in between.
 
         Parameters
         ----------
+        multipliers
+            Those of the moment; changed in place.
         count
             How many of the latest answers take each target; changed in place.
         """
 
     def gain(self, multipliers: Floats) -> float:
         """Return the most that all parts can gain at these multipliers."""
+
+
+class OneByOne(ABC):
+    """An oracle whose answers take so long that nothing is lost by asking for each of them."""
+
+    @abstractmethod
+    def answer(self, part: int, multipliers: Floats, count: Ints) -> None:
+        """Let a part answer anew, and keep the count of the latest answers."""
+
+    def answer_in_turn(self, turns: Turns, multipliers: Floats, count: Ints, stop: Bytes) -> None:
+        """Let parts answer anew, and multipliers move in between."""
+        begin = 0
+        for end in turns.ends.tolist():
+            if stop[0]:
+                return
+            for part in turns.order[begin:end].tolist():
+                self.answer(part, multipliers, count)
+            begin = end
+            moved = multipliers + turns.length * turns.most * (count - 1)
+            np.clip(moved, 0.0, turns.most, out=multipliers)
 
 
 class Latest:
@@ -143,17 +189,14 @@ class Ascent:
             self.improve(self._steps.asked_every, stop)
 
     def _go_round(self, stop: Bytes) -> None:
-        steps, parts = self._steps, self._rng.permutation(self._oracle.parts)
-        num_moves = min(TUNING.moves_per_epoch, len(parts))
+        steps, order = self._steps, self._rng.permutation(self._oracle.parts)
+        num_moves = min(TUNING.moves_per_epoch, len(order))
         shorter = steps.last ** (self._epoch / max(1, steps.num_epochs))
         # Before all have answered nothing is known of what is taken twice.
         length = steps.first * shorter / max(1, num_moves) if self._epoch else 0.0
-        for move in range(num_moves):
-            if stop[0]:
-                return
-            some = parts[len(parts) * move // num_moves : len(parts) * (move + 1) // num_moves]
-            self._oracle.answer(some, self._now, self._count)
-            _move(self._now, self._most, self._count, length)
+        ends = len(order) * np.arange(1, num_moves + 1) // max(1, num_moves)
+        turns = Turns(order, ends, length, self._most)
+        self._oracle.answer_in_turn(turns, self._now, self._count, stop)
 
     def ask(self) -> None:
         """Note what the mean of the multipliers proves."""
@@ -162,8 +205,10 @@ class Ascent:
             self.value, self.multipliers = value, self._mean[:-1].copy()
 
 
-@kernel
-def _move(now: Floats, most: Floats, count: Ints, length: float) -> None:
+@inlined
+def move(multipliers: Floats, turns: Turns, count: Ints) -> None:
     """Move multipliers in place, each within 0 and the best worth of its target."""
-    for i in range(len(now)):
-        now[i] = min(max(now[i] + length * most[i] * (count[i] - 1), 0.0), most[i])
+    length, most = turns.length, turns.most
+    for i in range(len(multipliers)):
+        moved = multipliers[i] + length * most[i] * (count[i] - 1)
+        multipliers[i] = min(max(moved, 0.0), most[i])

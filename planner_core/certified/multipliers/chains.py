@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from planner_core.certified.multipliers.ascent import Ascent, Steps
+from planner_core.certified.multipliers.ascent import Ascent, Latest, OneByOne, Steps
 from planner_core.certified.proofs.continuous import (
     ContinuousDual,
     num_followers,
@@ -19,21 +19,18 @@ from planner_core.certified.tuning import TUNING
 from planner_core.problem import Bytes, Floats, Ints, Problem
 
 
-class Chains:
+class Chains(OneByOne):
     """The heaviest chain of each part of a day, at given multipliers."""
 
     def __init__(self, dual: ContinuousDual) -> None:
         self._dual = dual
         self.parts: Ints = np.arange(len(dual.parts), dtype=np.int32)
-        self._taken = [np.empty(0, dtype=np.int32) for _ in dual.parts]
+        self._latest = Latest(len(dual.parts))
 
-    def answer(self, parts: Ints, multipliers: Floats, count: Ints) -> None:
-        """Give some parts new chains."""
-        for number in parts.tolist():
-            _, taken = self._dual.chain(number, multipliers[:-1], is_exact=False)
-            np.subtract.at(count, self._taken[number], 1)
-            np.add.at(count, taken, 1)
-            self._taken[number] = taken
+    def answer(self, part: int, multipliers: Floats, count: Ints) -> None:
+        """Give a part a new chain."""
+        _, taken = self._dual.chain(part, multipliers[:-1], is_exact=False)
+        self._latest.replace(part, taken, count)
 
     def gain(self, multipliers: Floats) -> float:
         """Return what no chains of all parts exceed."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from planner_core.certified.dp.energy_labels import EnergyLevels, levels_of_estimate, most_by_energy
 from planner_core.certified.dp.resource_network import Network, network_of
-from planner_core.certified.multipliers.ascent import Ascent, Latest, Steps
+from planner_core.certified.multipliers.ascent import Ascent, Latest, OneByOne, Steps
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import COLLECT, Floats, Ints, Problem, SatelliteProblem
 from planner_core.worth import weights
@@ -38,7 +38,7 @@ class _Part(NamedTuple):
         )
 
 
-class EnergyPaths:
+class EnergyPaths(OneByOne):
     """The best path of each satellite that its battery allows, at given multipliers.
 
     Attributes
@@ -59,13 +59,12 @@ class EnergyPaths:
         self._latest = Latest(len(self._satellites))
         self.usage = np.zeros(len(problem.opportunities))
 
-    def answer(self, parts: Ints, multipliers: Floats, count: Ints) -> None:
-        """Let some satellites answer anew."""
-        for number in parts.tolist():
-            part = self._satellites[number]
-            _, path = self._best(part, multipliers)
-            self._latest.replace(number, part.target[path], count)
-            self.usage[part.rows[path]] += 1.0
+    def answer(self, part: int, multipliers: Floats, count: Ints) -> None:
+        """Let a satellite answer anew."""
+        satellite = self._satellites[part]
+        _, path = self._best(satellite, multipliers)
+        self._latest.replace(part, satellite.target[path], count)
+        self.usage[satellite.rows[path]] += 1.0
 
     def gain(self, multipliers: Floats) -> float:
         """Return the most that all satellites can gain."""

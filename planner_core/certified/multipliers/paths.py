@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner_core.certified.multipliers.ascent import Ascent, Steps
+from planner_core.certified.multipliers.ascent import Ascent, Steps, Turns, move
 from planner_core.certified.tuning import TUNING
 from planner_core.jit import kernel
 from planner_core.precedence.network import Network, heaviest_path, heaviest_paths
-from planner_core.problem import Bools, Floats, Ints, Problem
+from planner_core.problem import Bools, Bytes, Floats, Ints, Problem
 
 
 class Paths:
@@ -23,11 +23,11 @@ class Paths:
         self._ends = np.empty(len(network.first) - 1, dtype=np.int32)
         self._is_on_path = np.zeros(n, dtype=np.bool_)
 
-    def answer(self, parts: Ints, multipliers: Floats, count: Ints) -> None:
-        """Give some parts new paths."""
-        _answer(
-            self._network, parts, self._worth, multipliers, count, self._is_on_path,
-            self._weight, self._value, self._previous,
+    def answer_in_turn(self, turns: Turns, multipliers: Floats, count: Ints, stop: Bytes) -> None:
+        """Give parts new paths, and let multipliers move in between."""
+        _answer_in_turn(
+            self._network, turns, self._worth, multipliers, count, self._is_on_path,
+            self._weight, self._value, self._previous, stop,
         )  # fmt: skip
 
     def gain(self, multipliers: Floats) -> float:
@@ -47,9 +47,9 @@ def ascent_on_paths(problem: Problem, network: Network, num_epochs: int, seed: i
 
 
 @kernel
-def _answer(
+def _answer_in_turn(
     network: Network,
-    parts: Ints,
+    turns: Turns,
     worth: Floats,
     multipliers: Floats,
     count: Ints,
@@ -57,8 +57,9 @@ def _answer(
     weight: Floats,
     value: Floats,
     previous: Ints,
+    stop: Bytes,
 ) -> None:
-    """Give each of some parts a new path, all in place.
+    """Give each of some parts a new path, and move multipliers in between, all in place.
 
     Parameters
     ----------
@@ -67,16 +68,23 @@ def _answer(
     weight, value, previous
         Room to work in. Shape ``(n,)``.
     """
-    for part in parts:
-        for a in range(network.first[part], network.first[part + 1]):
-            weight[a] = max(0.0, worth[a] - multipliers[network.place[a]])
-            if is_on_path[a]:
-                is_on_path[a] = False
-                count[network.place[a]] -= 1
-        _, at = heaviest_path(network, part, weight, value, previous)
-        while at >= 0:
-            # What is worth nothing is only passed through.
-            if weight[at] > 0.0:
-                is_on_path[at] = True
-                count[network.place[at]] += 1
-            at = previous[at]
+    begin = 0
+    for k in range(len(turns.ends)):
+        if stop[0]:
+            return
+        for i in range(begin, turns.ends[k]):
+            part = turns.order[i]
+            for a in range(network.first[part], network.first[part + 1]):
+                weight[a] = max(0.0, worth[a] - multipliers[network.place[a]])
+                if is_on_path[a]:
+                    is_on_path[a] = False
+                    count[network.place[a]] -= 1
+            _, at = heaviest_path(network, part, weight, value, previous)
+            while at >= 0:
+                # What is worth nothing is only passed through.
+                if weight[at] > 0.0:
+                    is_on_path[at] = True
+                    count[network.place[at]] += 1
+                at = previous[at]
+        move(multipliers, turns, count)
+        begin = turns.ends[k]

@@ -16,7 +16,7 @@ from planner_core.certified.dp.contact_queues import most_by_queues
 from planner_core.certified.dp.queue_tables import Queues
 from planner_core.certified.dp.queue_terms import queues_of
 from planner_core.certified.dp.resource_network import network_of
-from planner_core.certified.multipliers.ascent import Ascent, Latest, Steps
+from planner_core.certified.multipliers.ascent import Ascent, Latest, OneByOne, Steps
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import COLLECT, Bools, Bytes, Floats, Ints, Problem, SatelliteProblem
 from planner_core.problem.restrict import taking
@@ -49,7 +49,7 @@ class _Part(NamedTuple):
         return cls(queues=queues, target=target.astype(np.int32))
 
 
-class QueuePaths:
+class QueuePaths(OneByOne):
     """The best path of each satellite that takes given contacts, at given multipliers."""
 
     def __init__(self, parts: Sequence[_Part], stop: Bytes) -> None:
@@ -57,12 +57,11 @@ class QueuePaths:
         self.parts: Ints = np.arange(len(parts), dtype=np.int32)
         self._latest = Latest(len(parts))
 
-    def answer(self, parts: Ints, multipliers: Floats, count: Ints) -> None:
-        """Let some satellites answer anew."""
-        for number in parts.tolist():
-            part = self._satellites[number]
-            _, path = self._best(part, multipliers)
-            self._latest.replace(number, part.target[path], count)
+    def answer(self, part: int, multipliers: Floats, count: Ints) -> None:
+        """Let a satellite answer anew."""
+        satellite = self._satellites[part]
+        _, path = self._best(satellite, multipliers)
+        self._latest.replace(part, satellite.target[path], count)
 
     def gain(self, multipliers: Floats) -> float:
         """Return the most that all satellites can gain."""
