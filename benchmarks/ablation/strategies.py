@@ -151,6 +151,7 @@ STRATEGIES: Final[Mapping[str, Change]] = {
             "a fleet's cutting planes": _FLEET,
             "choices": _RESOURCES | _DELIVERED,
             "windows and choices": _RESOURCES,
+            "choices from the best plan": _RESOURCES | _CLOUDS,
             "whole relaxation": _CLOUDS,
             "multipliers": _RESOURCES,
             "programs with contacts fixed": _RESOURCES,

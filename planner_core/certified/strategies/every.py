@@ -146,6 +146,12 @@ STRATEGIES: Final = (
         patience=lambda: TUNING.tries,
     ),
     Strategy(
+        name="choices from the best plan",
+        supports=is_small_with_limits,
+        slices=resources.choices_from_the_best,
+        patience=lambda: 1,
+    ),
+    Strategy(
         name="programs with contacts fixed",
         supports=is_small_with_limits,
         slices=resources.programs,

@@ -15,6 +15,7 @@ from dataclasses import replace
 from planner_core.budget import ignored
 from planner_core.certified.driver import Search
 from planner_core.certified.incumbent import Incumbent
+from planner_core.certified.lns.choices import ChoiceSearch
 from planner_core.certified.proofs.resource_bound import quick_bound
 from planner_core.certified.strategies.resource_steps import ResourceSearch
 from planner_core.certified.strategies.supports import at_rest
@@ -65,6 +66,26 @@ def windows_and_choices(search: Search) -> Iterator[None]:
             engine.turn_search.adopt(best.plan)
         engine.search(engine.turn_search, TUNING.rounds)
         known = best.reward
+        yield
+
+
+def choices_from_the_best(search: Search) -> Iterator[None]:
+    """Replan the whole day by choices of tasks from the best plan, while that leads on.
+
+    Windows and choices in turn leave such plans too soon: with 1,000 targets and `paper` four of
+    six draws are within half a percent after 1 to 2.3 CPU seconds so, in place of one; three of
+    four with 500 within two percent after 2 in place of 6.
+    """
+    engine, best = search.engine(ResourceSearch), search.best
+    choices = ChoiceSearch(search.problem, engine.unit, search.seed, search.budget.stop)
+    while _is_promising(search):
+        choices.adopt(best.plan)
+        num_idle = 0
+        while num_idle < TUNING.rounds and not best.is_done:
+            choices.move()
+            is_better = choices.reward > best.reward and engine.offer(choices.plan)
+            num_idle = 0 if is_better else num_idle + 1
+        best.report("plans")
         yield
 
 
