@@ -149,7 +149,6 @@ STRATEGIES: Final = (
         name="choices from the best plan",
         supports=is_small_with_limits,
         slices=resources.choices_from_the_best,
-        patience=lambda: 1,
     ),
     Strategy(
         name="programs with contacts fixed",
