@@ -23,12 +23,12 @@ import numpy as np
 from planner_core.bundles import bundle
 from planner_core.certified.tuning import TUNING
 from planner_core.jit import inlined
-from planner_core.problem import Bytes, Floats, Ints, Longs
+from planner_core.problem import Bools, Bytes, Floats, Ints, Longs
 
 
 @bundle
-class Turns(NamedTuple):
-    """In which order parts answer, and how far multipliers move in between.
+class Epoch(NamedTuple):
+    """In which order parts answer in an epoch, and how far multipliers move in between.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class Oracle(Protocol):
     def parts(self) -> Ints:
         """The parts that have anything to do."""
 
-    def answer_in_turn(self, turns: Turns, multipliers: Floats, count: Ints, stop: Bytes) -> None:
+    def run_epoch(self, epoch: Epoch, multipliers: Floats, count: Ints, stop: Bytes) -> None:
         """Let parts answer anew, and multipliers move in between.
 
         Parameters
@@ -81,17 +81,17 @@ class OneByOne(ABC):
     def answer(self, part: int, multipliers: Floats, count: Ints) -> None:
         """Let a part answer anew, and keep the count of the latest answers."""
 
-    def answer_in_turn(self, turns: Turns, multipliers: Floats, count: Ints, stop: Bytes) -> None:
+    def run_epoch(self, epoch: Epoch, multipliers: Floats, count: Ints, stop: Bytes) -> None:
         """Let parts answer anew, and multipliers move in between."""
         begin = 0
-        for end in turns.ends.tolist():
+        for end in epoch.ends.tolist():
             if stop[0]:
                 return
-            for part in turns.order[begin:end].tolist():
+            for part in epoch.order[begin:end].tolist():
                 self.answer(part, multipliers, count)
             begin = end
-            moved = multipliers + turns.length * turns.most * (count - 1)
-            np.clip(moved, 0.0, turns.most, out=multipliers)
+            moved = multipliers + epoch.length * epoch.most * (count - 1)
+            np.clip(moved, 0.0, epoch.most, out=multipliers)
 
 
 class Latest:
@@ -195,8 +195,8 @@ class Ascent:
         # Before all have answered nothing is known of what is taken twice.
         length = steps.first * shorter / max(1, num_moves) if self._epoch else 0.0
         ends = len(order) * np.arange(1, num_moves + 1) // max(1, num_moves)
-        turns = Turns(order, ends, length, self._most)
-        self._oracle.answer_in_turn(turns, self._now, self._count, stop)
+        epoch = Epoch(order, ends, length, self._most)
+        self._oracle.run_epoch(epoch, self._now, self._count, stop)
 
     def ask(self) -> None:
         """Note what the mean of the multipliers proves."""
@@ -206,9 +206,28 @@ class Ascent:
 
 
 @inlined
-def move(multipliers: Floats, turns: Turns, count: Ints) -> None:
+def weigh(
+    begin: int,
+    end: int,
+    place: Ints,
+    worth: Floats,
+    multipliers: Floats,
+    weight: Floats,
+    is_on_path: Bools,
+    count: Ints,
+) -> None:
+    """Weigh a part's nodes at the multipliers of the moment, and take its path off the count."""
+    for a in range(begin, end):
+        weight[a] = max(0.0, worth[a] - multipliers[place[a]])
+        if is_on_path[a]:
+            is_on_path[a] = False
+            count[place[a]] -= 1
+
+
+@inlined
+def move(multipliers: Floats, epoch: Epoch, count: Ints) -> None:
     """Move multipliers in place, each within 0 and the best worth of its target."""
-    length, most = turns.length, turns.most
+    length, most = epoch.length, epoch.most
     for i in range(len(multipliers)):
         moved = multipliers[i] + length * most[i] * (count[i] - 1)
         multipliers[i] = min(max(moved, 0.0), most[i])

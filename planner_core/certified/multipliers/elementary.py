@@ -12,7 +12,7 @@ from planner_core.certified.dp.elementary import (
     labels_for,
     memory_of,
 )
-from planner_core.certified.multipliers.ascent import Ascent, Steps, Turns, move
+from planner_core.certified.multipliers.ascent import Ascent, Epoch, Steps, move, weigh
 from planner_core.certified.tuning import TUNING
 from planner_core.jit import borrowing
 from planner_core.precedence.arcs import ArcNetwork, arc_network_of
@@ -33,10 +33,10 @@ class ElementaryPaths:
         self._is_on_path = np.zeros(n, dtype=np.bool_)
         self._count = np.zeros(len(problem.target_ids) + 1, dtype=np.int32)
 
-    def answer_in_turn(self, turns: Turns, multipliers: Floats, count: Ints, stop: Bytes) -> None:
+    def run_epoch(self, epoch: Epoch, multipliers: Floats, count: Ints, stop: Bytes) -> None:
         """Give parts new paths, and let multipliers move in between."""
-        _answer_in_turn(
-            self._network, self._memory, self._labels, turns, self._worth, multipliers,
+        _run_epoch(
+            self._network, self._memory, self._labels, epoch, self._worth, multipliers,
             self._weight, self._is_on_path, count, stop,
         )  # fmt: skip
 
@@ -67,11 +67,11 @@ def ascent_on_passes(problem: Problem, seed: int, num_epochs: int | None = None)
 
 
 @borrowing
-def _answer_in_turn(
+def _run_epoch(
     network: ArcNetwork,
     memory: Memory,
     labels: Labels,
-    turns: Turns,
+    epoch: Epoch,
     worth: Floats,
     multipliers: Floats,
     weight: Floats,
@@ -81,22 +81,20 @@ def _answer_in_turn(
 ) -> None:
     """Give each of some parts a new path, and move multipliers in between, all in place."""
     begin = 0
-    for k in range(len(turns.ends)):
+    for k in range(len(epoch.ends)):
         if stop[0]:
             return
-        for i in range(begin, turns.ends[k]):
-            part = turns.order[i]
-            for b in range(network.first[part], network.first[part + 1]):
-                place = network.place[b]
-                weight[b] = max(0.0, worth[b] - multipliers[place])
-                if is_on_path[b]:
-                    is_on_path[b] = False
-                    count[place] -= 1
+        for i in range(begin, epoch.ends[k]):
+            part = epoch.order[i]
+            weigh(
+                network.first[part], network.first[part + 1], network.place, worth, multipliers,
+                weight, is_on_path, count,
+            )  # fmt: skip
             _, at = label_part(network, memory, weight, labels, part)
             while at >= 0:
                 if labels.is_paid[at] and worth[at] >= multipliers[network.place[at]]:
                     is_on_path[at] = True
                     count[network.place[at]] += 1
                 at = labels.previous[at]
-        move(multipliers, turns, count)
-        begin = turns.ends[k]
+        move(multipliers, epoch, count)
+        begin = epoch.ends[k]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner_core.certified.multipliers.ascent import Ascent, Steps, Turns, move
+from planner_core.certified.multipliers.ascent import Ascent, Epoch, Steps, move, weigh
 from planner_core.certified.tuning import TUNING
 from planner_core.jit import kernel
 from planner_core.precedence.network import Network, heaviest_path, heaviest_paths
@@ -23,10 +23,10 @@ class Paths:
         self._ends = np.empty(len(network.first) - 1, dtype=np.int32)
         self._is_on_path = np.zeros(n, dtype=np.bool_)
 
-    def answer_in_turn(self, turns: Turns, multipliers: Floats, count: Ints, stop: Bytes) -> None:
+    def run_epoch(self, epoch: Epoch, multipliers: Floats, count: Ints, stop: Bytes) -> None:
         """Give parts new paths, and let multipliers move in between."""
-        _answer_in_turn(
-            self._network, turns, self._worth, multipliers, count, self._is_on_path,
+        _run_epoch(
+            self._network, epoch, self._worth, multipliers, count, self._is_on_path,
             self._weight, self._value, self._previous, stop,
         )  # fmt: skip
 
@@ -47,9 +47,9 @@ def ascent_on_paths(problem: Problem, network: Network, num_epochs: int, seed: i
 
 
 @kernel
-def _answer_in_turn(
+def _run_epoch(
     network: Network,
-    turns: Turns,
+    epoch: Epoch,
     worth: Floats,
     multipliers: Floats,
     count: Ints,
@@ -69,16 +69,15 @@ def _answer_in_turn(
         Room to work in. Shape ``(n,)``.
     """
     begin = 0
-    for k in range(len(turns.ends)):
+    for k in range(len(epoch.ends)):
         if stop[0]:
             return
-        for i in range(begin, turns.ends[k]):
-            part = turns.order[i]
-            for a in range(network.first[part], network.first[part + 1]):
-                weight[a] = max(0.0, worth[a] - multipliers[network.place[a]])
-                if is_on_path[a]:
-                    is_on_path[a] = False
-                    count[network.place[a]] -= 1
+        for i in range(begin, epoch.ends[k]):
+            part = epoch.order[i]
+            weigh(
+                network.first[part], network.first[part + 1], network.place, worth, multipliers,
+                weight, is_on_path, count,
+            )  # fmt: skip
             _, at = heaviest_path(network, part, weight, value, previous)
             while at >= 0:
                 # What is worth nothing is only passed through.
@@ -86,5 +85,5 @@ def _answer_in_turn(
                     is_on_path[at] = True
                     count[network.place[at]] += 1
                 at = previous[at]
-        move(multipliers, turns, count)
-        begin = turns.ends[k]
+        move(multipliers, epoch, count)
+        begin = epoch.ends[k]
