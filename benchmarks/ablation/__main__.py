@@ -1,8 +1,8 @@
 """Run the ablation as far as it is missing, and write its page.
 
 ``python -m benchmarks.ablation`` tries all strategies, ``--constants`` also half and double of the
-constants (hours), ``--only`` what holds one of some words in its name. Rows go into
-docs/ablation.csv, the page of them into docs/ablation.md.
+constants (hours), ``--only`` what holds one of some words in its name, ``--anew`` what is known of
+another revision too. Rows go into docs/ablation.csv, the page of them into docs/ablation.md.
 """
 
 from __future__ import annotations
@@ -26,10 +26,11 @@ def main() -> None:
     parser.add_argument("--into", type=Path, default=_ROWS, metavar="FILE")
     parser.add_argument("--constants", action="store_true", help="half and double of each as well")
     parser.add_argument("--only", nargs="+", default=[""], metavar="WORD")
+    parser.add_argument("--anew", action="store_true", help="also what other revisions have told")
     options = parser.parse_args()
     changes = {**STRATEGIES, **(constants() if options.constants else {})}
     chosen = [name for name in changes if any(word in name for word in options.only)]
-    run({name: changes[name] for name in chosen}, options.into)
+    run({name: changes[name] for name in chosen}, options.into, anew=options.anew)
     text = page(rows.read(options.into, Trial))
     options.into.with_suffix(".md").write_text(text, encoding="utf-8")
 

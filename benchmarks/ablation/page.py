@@ -11,7 +11,7 @@ from benchmarks.ablation.constants import FACTORS
 from benchmarks.ablation.strategies import NOTHING
 from benchmarks.ablation.trials import Trial
 from benchmarks.suite.compare import Line, line_of
-from benchmarks.suite.engine import LEVELS
+from benchmarks.suite.engine import LEVELS, Case
 
 POINTS: Final = 0.2  # of gap
 RATIO: Final = 1.1  # of time
@@ -67,14 +67,21 @@ class Finding:
 
 
 def findings(trials: Iterable[Trial]) -> list[Finding]:
-    """Return what each change has done to each family, in the order of the rows."""
-    by_change: dict[str, list[Trial]] = {}
+    """Return what each change has done to each family, in the order of the rows.
+
+    The latest row of a change and a case counts, beside the latest before it without a change.
+    """
+    plain: dict[Case, Trial] = {}
+    by_change: dict[str, dict[Case, tuple[Trial, Trial]]] = {}
     for trial in trials:
-        by_change.setdefault(trial.change, []).append(trial)
-    plain = {trial.case: trial for trial in by_change.pop(NOTHING, [])}
+        if trial.change == NOTHING:
+            plain[trial.case] = trial
+        elif trial.case in plain:
+            pair = plain[trial.case], trial
+            by_change.setdefault(trial.change, {})[trial.case] = pair
     found = []
-    for change, rows in by_change.items():
-        pairs = [(plain[row.case], row) for row in rows if row.case in plain]
+    for change, cases in by_change.items():
+        pairs = list(cases.values())
         for family in dict.fromkeys(row.family for _, row in pairs):
             own = [pair for pair in pairs if pair[1].family == family]
             found.append(Finding(change=change, line=line_of(own)))

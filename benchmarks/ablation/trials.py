@@ -23,13 +23,24 @@ class Trial(rows.Row):
     change: str = NOTHING
 
 
-def run(changes: Mapping[str, Change], path: Path) -> None:
-    """Run what is missing, and the same without a change, and write it down line by line."""
-    known = {(trial.change, trial.case) for trial in rows.read(path, Trial)}
+def run(changes: Mapping[str, Change], path: Path, *, anew: bool = False) -> None:
+    """Run what is missing, and the same without a change, and write it down line by line.
+
+    Parameters
+    ----------
+    anew
+        Whether what is known of another revision is missing.
+    """
+    revision, before = rows.revision(), rows.read(path, Trial)
+    plain = {one.case for one in before if not one.change and one.revision == revision}
+    told = [one for one in before if not anew or one.revision == revision]
+    known = {(one.change, one.case) for one in told}
     for case, names in _by_case(changes).items():
         missing = [name for name in names if (name, case) not in known]
         if not missing:
             continue
+        if case not in plain:
+            missing.insert(0, NOTHING)
         warm_up(case.family)
         problem = problem_of(scenario_of(FAMILIES[case.family], case.draw))
         for name in missing:
@@ -44,11 +55,11 @@ def run(changes: Mapping[str, Change], path: Path) -> None:
 
 
 def _by_case(changes: Mapping[str, Change]) -> dict[Case, list[str]]:
-    """Return which changes each case is run with, the solver as it is first."""
+    """Return which changes each case is run with."""
     found: dict[Case, list[str]] = {}
     for name, change in changes.items():
         for case in cases_of(change):
-            found.setdefault(case, [NOTHING]).append(name)
+            found.setdefault(case, []).append(name)
     return found
 
 

@@ -109,6 +109,23 @@ def test_each_case_is_run_once_as_it_is_and_once_with_each_change(tmp_path: Path
     assert rows.read(path, Trial) == done
 
 
+def test_what_another_revision_has_told_is_run_again_where_that_is_asked(
+    tmp_path: Path, few: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "ablation.csv"
+    first, second = (Change(tuning={"tries": n}, families={few: 9.0}, num_draws=1) for n in (7, 8))
+    monkeypatch.setattr(rows, "revision", lambda: "r1")
+    trials.run({"first": first}, path)
+    monkeypatch.setattr(rows, "revision", lambda: "r2")
+    trials.run({"first": first}, path)
+    trials.run({"first": first, "second": second}, path)
+    trials.run({"first": first, "second": second}, path, anew=True)
+    done = [(trial.change, trial.revision) for trial in rows.read(path, Trial)]
+    assert done == [
+        (NOTHING, "r1"), ("first", "r1"), (NOTHING, "r2"), ("second", "r2"), ("first", "r2"),
+    ]  # fmt: skip
+
+
 def test_a_process_that_dies_is_a_failure(few: str, monkeypatch: pytest.MonkeyPatch) -> None:
     def die(*_: object) -> Result:
         raise SystemExit(3)
@@ -116,6 +133,16 @@ def test_a_process_that_dies_is_a_failure(few: str, monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(trials, "solve", die)
     answer = trials.forked(None, Case(family=few, draw=0, seed=0, budget_s=1.0), None)  # type: ignore[arg-type]
     assert answer == "ended without an answer"
+
+
+def test_the_latest_counts_beside_the_latest_before_it() -> None:
+    first = replace(PLAIN, change="first", gap_percent=1.5)
+    faster = replace(PLAIN, gap_percent=0.5, revision="r2")
+    second = replace(faster, change="second")
+    (one, two) = findings([PLAIN, first, faster, second])
+    assert (one.line.points, two.line.points) == (0.5, 0.0)
+    (again, _) = findings([PLAIN, first, faster, second, replace(first, gap_percent=0.6)])
+    assert again.line.points == pytest.approx(0.1)
 
 
 def test_what_is_missed_is_found_and_written() -> None:
