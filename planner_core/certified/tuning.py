@@ -102,7 +102,8 @@ class Tuning:
     moves_at_a_time, moves_in_a_step
         Of the window search between two looks at the budget; and under resources.
     moves_per_task
-        Of the window search in a turn; ``little`` of them beside an ascent on passes.
+        Of the window search in a turn; ``little`` of them beside an ascent on passes. Of a step
+        under resources, at most.
     disturbance
         Largest share of a plan, or of prices, that a random move changes.
 

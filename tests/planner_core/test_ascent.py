@@ -105,7 +105,7 @@ class PlainPaths(OneByOne):
 
 @examples(40)
 @given(seed=SEEDS, num_satellites=st.integers(1, 4))
-def test_an_epoch_in_a_kernel_is_one_of_answers_one_by_one(seed: int, num_satellites: int) -> None:
+def test_epochs_in_a_kernel_are_those_of_answers_one_by_one(seed: int, num_satellites: int) -> None:
     problem = crowded(seed, num_satellites)
     steps = Steps(first=0.3, last=0.1, num_epochs=20)
     begin = 0.5 * problem.best_worth

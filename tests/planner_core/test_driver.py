@@ -179,6 +179,21 @@ def test_each_kind_of_problem_has_strategies_for_plans_and_for_bounds(kind: str)
     assert best.reward <= solution.proven.value <= problem.best_worth.sum() + 1e-6
 
 
+@pytest.mark.parametrize(
+    ("kind", "left_out"),
+    [(kind, one) for kind in KINDS for one in STRATEGIES if one.supports(KINDS[kind])],
+    ids=lambda value: value.name if isinstance(value, Strategy) else value,
+)
+def test_no_strategy_needs_another(kind: str, left_out: Strategy) -> None:
+    best = Incumbent(KINDS[kind], Budget(), 0.0, Plan(), Bound(value=1e9, proof="milp"),
+                     covers_starts=True)  # fmt: skip
+    others = [one for one in STRATEGIES if one is not left_out]
+    solution = Search(best, 0, others, Effort(moves_per_task=5.0)).solved()
+    assert best.is_valid
+    assert solution.proven is not None
+    assert best.reward <= solution.proven.value
+
+
 def test_every_strategy_of_the_list_has_a_problem_and_a_name_of_its_own() -> None:
     large = "windows of a large fleet"
     used = {one.name for one in STRATEGIES for kind in KINDS.values() if one.supports(kind)}

@@ -347,7 +347,7 @@ def test_the_fewest_changes_are_what_brute_force_finds(seed: int) -> None:
     event(f"shed: {int((is_base & is_image).sum()) - found.num_kept}")
 
 
-@pytest.mark.parametrize("seed", [31, 65, 75, 110, 140, 162, 176, 185, 196, 223, 317, 351])
+@pytest.mark.parametrize("seed", [31, 75, 110, 140, 162, 176, 185, 196, 223, 317, 351, 368])
 def test_where_the_plan_breaks_a_limit_no_plan_counts_more(seed: int) -> None:
     """What is earned and what is kept, by brute force; contacts count nothing when kept."""
     stability = replace(BETA, contact_weight=0.0)

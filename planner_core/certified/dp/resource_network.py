@@ -22,6 +22,7 @@ charge away: such arcs give it back, :math:`E' = \min(E +` ``give`` :math:`, ...
 from __future__ import annotations
 
 from typing import NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -92,6 +93,10 @@ class Network(NamedTuple):
     must_deliver: bool
 
 
+_made: WeakKeyDictionary[SatelliteProblem, dict[tuple[bool, str, float], Network]]
+_made = WeakKeyDictionary()
+
+
 def network_of(problem: Problem, satellite: SatelliteProblem) -> Network:
     """Return the network whose paths include every plan that the referee accepts."""
     return _network(problem, satellite, ROUNDING)
@@ -103,7 +108,24 @@ def strict_network_of(problem: Problem, satellite: SatelliteProblem) -> Network:
 
 
 def _network(problem: Problem, satellite: SatelliteProblem, slack: float) -> Network:
-    """Return a network; limits are passed by ``slack`` (negative: kept clear of)."""
+    """Return a network; limits are passed by ``slack`` (negative: kept clear of).
+
+    Searches ask for it again wherever worths or what is kept have changed: all else is made once.
+    """
+    made = _made.setdefault(satellite, {})
+    key = problem.use_resources, problem.dynamics, slack
+    if key not in made:
+        made[key] = _without_worth(problem, satellite, slack)
+    network = made[key]
+    return network._replace(
+        is_kept=np.isin(satellite.rows, problem.kept_rows),
+        delivered=_delivered(problem, satellite, network.data_floor, max(slack, 0.0)),
+        must_deliver=must_deliver(problem, satellite),
+    )
+
+
+def _without_worth(problem: Problem, satellite: SatelliteProblem, slack: float) -> Network:
+    """Return a network without what worths and pins decide."""
     track = resource_columns(problem, satellite)
     precedence = direct_precedence(satellite)
     charge_from = track.charge_per_s * track.charge_from_s
@@ -127,7 +149,7 @@ def _network(problem: Problem, satellite: SatelliteProblem, slack: float) -> Net
     return Network(
         place=satellite.place,
         is_contact=(satellite.kind == CONTACT).astype(np.uint8),
-        is_kept=np.isin(satellite.rows, problem.kept_rows),
+        is_kept=np.zeros(len(satellite), dtype=np.bool_),
         idle_from=idle_from,
         by_idle=np.argsort(idle_from, kind="stable").astype(np.int32),
         near_first=near_first,
@@ -145,11 +167,11 @@ def _network(problem: Problem, satellite: SatelliteProblem, slack: float) -> Net
         data_floor=-data_from,
         data_before=top - track.telemetry_per_s * track.data_peak_s,
         data_after=top - data_from,
-        delivered=_delivered(problem, satellite, -data_from, max(slack, 0.0)),
+        delivered=np.zeros(len(satellite)),
         energy_start=track.battery_start,
         data_start=track.recorder_start,
         data_end=top - track.telemetry_per_s * track.data_end_s,
-        must_deliver=must_deliver(problem, satellite),
+        must_deliver=False,
     )
 
 

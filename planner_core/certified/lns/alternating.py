@@ -53,6 +53,8 @@ class TurnSearch:
         self._num_first_steps = 1 if has_batches else TUNING.patience
         self._choices = ChoiceSearch(problem, unit, seed, budget.stop)
         self._seed, self._num_starts, self._idle_steps = seed, 0, TUNING.patience
+        self._windows = self._afresh()
+        self._windows.adopt(start)
         self.ended: list[Plan] = []
         self.usage = np.zeros(len(problem.opportunities))
 
@@ -71,14 +73,17 @@ class TurnSearch:
     def _begin(self) -> None:
         if self._num_starts:
             self.ended.append(self.plan)
-        # A seed of its own for each start of each search.
-        self._windows = ResourceWindows(self.problem, self._seed + MAX_STARTS * self._num_starts)
+            self._windows = self._afresh()
         self._windows.adopt(self._start)
         self._num_starts, self._idle_steps = self._num_starts + 1, 0
         # Whole days first: once most targets are taken, contacts hardly move.
         self._replan_days()
         self._replan_windows(self._num_first_steps)
         self._note()
+
+    def _afresh(self) -> ResourceWindows:
+        # A seed of its own for each start of each search.
+        return ResourceWindows(self.problem, self._seed + MAX_STARTS * self._num_starts)
 
     def adopt(self, plan: Plan) -> None:
         """Begin with another plan from now on."""

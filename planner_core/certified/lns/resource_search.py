@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from planner_core.budget import Budget
@@ -90,18 +92,15 @@ class ResourceWindows:
         self._note_contacts()
 
     def make_moves(self, num_moves: int, budget: Budget) -> None:
-        """Make about so many moves, unless the budget is spent before."""
+        """Make at most so many moves, fewer where tasks are few or the budget is spent before."""
         while self._grounds and num_moves > 0 and not budget.is_spent():
             ground = self._grounds[self._turn % len(self._grounds)]
             self._turn += 1
-            make_moves(
-                ground._replace(is_shut=self._shut(ground)), self._taken, self._room,
-                self._draws, min(num_moves, TUNING.moves_in_a_step), budget.stop,
-            )  # fmt: skip
+            self._make_moves_on(ground, min(num_moves, _in_a_step(ground)), budget)
             num_moves -= TUNING.moves_in_a_step
 
     def make_moves_on_each(self, num_moves: float, budget: Budget) -> None:
-        """Make so many moves on each satellite, unless the budget is spent before.
+        """Make so many moves on each satellite, with the same exceptions.
 
         Where that is less than one, one move on such a share of them, which take turns.
         """
@@ -112,10 +111,11 @@ class ResourceWindows:
         for ground in grounds:
             if budget.is_spent():
                 break
-            make_moves(
-                ground._replace(is_shut=self._shut(ground)), self._taken, self._room,
-                self._draws, each, budget.stop,
-            )  # fmt: skip
+            self._make_moves_on(ground, min(each, TUNING.patience * _in_a_step(ground)), budget)
+
+    def _make_moves_on(self, ground: Ground, num_moves: int, budget: Budget) -> None:
+        ground = ground._replace(is_shut=self._shut(ground))
+        make_moves(ground, self._taken, self._room, self._draws, num_moves, budget.stop)
 
     def _note_contacts(self) -> None:
         """Forget what contacts shut, where these are no longer those of the plan."""
@@ -162,3 +162,8 @@ def _kept_targets(problem: Problem) -> Bools:
     table, kept = problem.opportunities, problem.kept_rows
     is_kept[table.place[kept[table.kind[kept] == COLLECT]]] = True
     return is_kept
+
+
+def _in_a_step(ground: Ground) -> int:
+    """Return how many moves a satellite is worth at a time."""
+    return min(TUNING.moves_in_a_step, math.ceil(TUNING.moves_per_task * len(ground.rows)))

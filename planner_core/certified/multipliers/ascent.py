@@ -27,25 +27,46 @@ from planner_core.problem import Bools, Bytes, Floats, Ints, Longs
 
 
 @bundle
-class Epoch(NamedTuple):
-    """In which order parts answer in an epoch, and how far multipliers move in between.
+class Epochs(NamedTuple):
+    """In which order parts answer in some epochs, and how far multipliers move in between.
 
     Attributes
     ----------
-    order
-        Parts, each once.
+    orders
+        Parts, each once in an epoch. Shape ``(num_epochs, num_parts)``.
     ends
         After how many of them multipliers move, in ascending order; at last after all.
-    length
-        What a multiplier moves for each answer too many, as a share of what the target is worth.
+    lengths
+        What a multiplier moves in each epoch for each answer too many, as a share of what the
+        target is worth. Shape ``(num_epochs,)``.
     most
         The best worth of each target, and zero for contacts. Shape ``(num_targets + 1,)``.
+    newest_share
+        Of an epoch's multipliers in the mean.
     """
 
-    order: Ints
+    orders: Ints
     ends: Longs
-    length: float
+    lengths: Floats
     most: Floats
+    newest_share: float
+
+
+@bundle
+class Standing(NamedTuple):
+    """Where an ascent stands; kernels change it in place. Shape ``(num_targets + 1,)`` each.
+
+    Attributes
+    ----------
+    now, mean
+        The multipliers of the moment, and their mean of late.
+    taken
+        How many of the latest answers take each target.
+    """
+
+    now: Floats
+    mean: Floats
+    taken: Ints
 
 
 class Oracle(Protocol):
@@ -59,16 +80,8 @@ class Oracle(Protocol):
     def parts(self) -> Ints:
         """The parts that have anything to do."""
 
-    def run_epoch(self, epoch: Epoch, multipliers: Floats, count: Ints, stop: Bytes) -> None:
-        """Let parts answer anew, and multipliers move in between.
-
-        Parameters
-        ----------
-        multipliers
-            Those of the moment; changed in place.
-        count
-            How many of the latest answers take each target; changed in place.
-        """
+    def run(self, epochs: Epochs, standing: Standing, stop: Bytes) -> int:
+        """Let parts answer anew, and multipliers move in between; return how many epochs ended."""
 
     def gain(self, multipliers: Floats) -> float:
         """Return the most that all parts can gain at these multipliers."""
@@ -81,17 +94,21 @@ class OneByOne(ABC):
     def answer(self, part: int, multipliers: Floats, count: Ints) -> None:
         """Let a part answer anew, and keep the count of the latest answers."""
 
-    def run_epoch(self, epoch: Epoch, multipliers: Floats, count: Ints, stop: Bytes) -> None:
-        """Let parts answer anew, and multipliers move in between."""
-        begin = 0
-        for end in epoch.ends.tolist():
-            if stop[0]:
-                return
-            for part in epoch.order[begin:end].tolist():
-                self.answer(part, multipliers, count)
-            begin = end
-            moved = multipliers + epoch.length * epoch.most * (count - 1)
-            np.clip(moved, 0.0, epoch.most, out=multipliers)
+    def run(self, epochs: Epochs, standing: Standing, stop: Bytes) -> int:
+        """Let parts answer anew, and multipliers move in between; return how many epochs ended."""
+        now, mean, count = standing
+        ends, most = epochs.ends.tolist(), epochs.most
+        for number, order in enumerate(epochs.orders.tolist()):
+            step, begin = epochs.lengths[number] * most, 0
+            for end in ends:
+                if stop[0]:
+                    return number
+                for part in order[begin:end]:
+                    self.answer(part, now, count)
+                begin = end
+                np.clip(now + step * (count - 1), 0.0, most, out=now)
+            mean += epochs.newest_share * (now - mean)
+        return len(epochs.orders)
 
 
 class Latest:
@@ -153,9 +170,8 @@ class Ascent:
     ) -> None:
         self._oracle, self._steps = oracle, steps
         self._most = np.append(most, 0.0)
-        self._now = np.clip(np.append(begin, 0.0), 0.0, self._most)
-        self._mean = self._now.copy()
-        self._count = np.zeros(len(self._now), dtype=np.int32)
+        now = np.clip(np.append(begin, 0.0), 0.0, self._most)
+        self._standing = Standing(now, now.copy(), np.zeros(len(now), dtype=np.int32))
         self._rng = np.random.default_rng(seed)
         self._epoch = 0
         # Each target for its whole worth, and nothing for any task.
@@ -169,18 +185,18 @@ class Ascent:
     @property
     def mean(self) -> Floats:
         """The mean of the multipliers of late. Shape ``(num_targets,)``."""
-        mean: Floats = self._mean[:-1]
+        mean: Floats = self._standing.mean[:-1]
         return mean
 
     def improve(self, num_epochs: int, stop: Bytes) -> None:
         """Let all parts answer so many times, and prove a bound now and then."""
-        for _ in range(num_epochs):
-            self._go_round(stop)
+        every, last = self._steps.asked_every, self._epoch + num_epochs
+        while self._epoch < last:
+            num_next = min(last - self._epoch, every - self._epoch % every)
+            self._epoch += self._oracle.run(self._next(num_next), self._standing, stop)
             if stop[0]:
                 return
-            self._epoch += 1
-            self._mean += TUNING.newest_share * (self._now - self._mean)
-            if self._epoch % self._steps.asked_every == 0:
+            if self._epoch % every == 0:
                 self.ask()
 
     def run(self, level: float, stop: Bytes) -> None:
@@ -188,21 +204,27 @@ class Ascent:
         while not (self.is_settled or self.value <= level or stop[0]):
             self.improve(self._steps.asked_every, stop)
 
-    def _go_round(self, stop: Bytes) -> None:
-        steps, order = self._steps, self._rng.permutation(self._oracle.parts)
-        num_moves = min(TUNING.moves_per_epoch, len(order))
-        shorter = steps.last ** (self._epoch / max(1, steps.num_epochs))
+    def _next(self, num_epochs: int) -> Epochs:
+        steps, parts = self._steps, self._oracle.parts
+        num_moves = min(TUNING.moves_per_epoch, len(parts))
+        numbers = range(self._epoch, self._epoch + num_epochs)
+        shorter = [steps.last ** (number / max(1, steps.num_epochs)) for number in numbers]
         # Before all have answered nothing is known of what is taken twice.
-        length = steps.first * shorter / max(1, num_moves) if self._epoch else 0.0
-        ends = len(order) * np.arange(1, num_moves + 1) // max(1, num_moves)
-        epoch = Epoch(order, ends, length, self._most)
-        self._oracle.run_epoch(epoch, self._now, self._count, stop)
+        first = [steps.first if number else 0.0 for number in numbers]
+        return Epochs(
+            orders=np.array([self._rng.permutation(parts) for _ in numbers]),
+            ends=len(parts) * np.arange(1, num_moves + 1) // max(1, num_moves),
+            lengths=np.array(first) * np.array(shorter) / max(1, num_moves),
+            most=self._most,
+            newest_share=TUNING.newest_share,
+        )
 
     def ask(self) -> None:
         """Note what the mean of the multipliers proves."""
-        value = float(self._mean.sum()) + self._oracle.gain(self._mean)
+        mean = self._standing.mean
+        value = float(mean.sum()) + self._oracle.gain(mean)
         if value < self.value:
-            self.value, self.multipliers = value, self._mean[:-1].copy()
+            self.value, self.multipliers = value, mean[:-1].copy()
 
 
 @inlined
@@ -225,9 +247,15 @@ def weigh(
 
 
 @inlined
-def move(multipliers: Floats, epoch: Epoch, count: Ints) -> None:
+def move(standing: Standing, epochs: Epochs, number: int) -> None:
     """Move multipliers in place, each within 0 and the best worth of its target."""
-    length, most = epoch.length, epoch.most
-    for i in range(len(multipliers)):
-        moved = multipliers[i] + length * most[i] * (count[i] - 1)
-        multipliers[i] = min(max(moved, 0.0), most[i])
+    length, most, now, taken = epochs.lengths[number], epochs.most, standing.now, standing.taken
+    for i in range(len(now)):
+        now[i] = min(max(now[i] + length * most[i] * (taken[i] - 1), 0.0), most[i])
+
+
+@inlined
+def average(standing: Standing, epochs: Epochs) -> None:
+    """Take the multipliers at the end of an epoch into their mean."""
+    for i in range(len(standing.now)):
+        standing.mean[i] += epochs.newest_share * (standing.now[i] - standing.mean[i])

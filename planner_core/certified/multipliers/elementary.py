@@ -12,7 +12,15 @@ from planner_core.certified.dp.elementary import (
     labels_for,
     memory_of,
 )
-from planner_core.certified.multipliers.ascent import Ascent, Epoch, Steps, move, weigh
+from planner_core.certified.multipliers.ascent import (
+    Ascent,
+    Epochs,
+    Standing,
+    Steps,
+    average,
+    move,
+    weigh,
+)
 from planner_core.certified.tuning import TUNING
 from planner_core.jit import borrowing
 from planner_core.precedence.arcs import ArcNetwork, arc_network_of
@@ -33,11 +41,13 @@ class ElementaryPaths:
         self._is_on_path = np.zeros(n, dtype=np.bool_)
         self._count = np.zeros(len(problem.target_ids) + 1, dtype=np.int32)
 
-    def run_epoch(self, epoch: Epoch, multipliers: Floats, count: Ints, stop: Bytes) -> None:
+    def run(self, epochs: Epochs, standing: Standing, stop: Bytes) -> int:
         """Give parts new paths, and let multipliers move in between."""
-        _run_epoch(
-            self._network, self._memory, self._labels, epoch, self._worth, multipliers,
-            self._weight, self._is_on_path, count, stop,
+        return int(
+            _run(
+                self._network, self._memory, self._labels, epochs, standing, self._worth,
+                self._weight, self._is_on_path, stop,
+            )
         )  # fmt: skip
 
     def gain(self, multipliers: Floats) -> float:
@@ -67,34 +77,36 @@ def ascent_on_passes(problem: Problem, seed: int, num_epochs: int | None = None)
 
 
 @borrowing
-def _run_epoch(
+def _run(
     network: ArcNetwork,
     memory: Memory,
     labels: Labels,
-    epoch: Epoch,
+    epochs: Epochs,
+    standing: Standing,
     worth: Floats,
-    multipliers: Floats,
     weight: Floats,
     is_on_path: Bools,
-    count: Ints,
     stop: Bytes,
-) -> None:
-    """Give each of some parts a new path, and move multipliers in between, all in place."""
-    begin = 0
-    for k in range(len(epoch.ends)):
-        if stop[0]:
-            return
-        for i in range(begin, epoch.ends[k]):
-            part = epoch.order[i]
-            weigh(
-                network.first[part], network.first[part + 1], network.place, worth, multipliers,
-                weight, is_on_path, count,
-            )  # fmt: skip
-            _, at = label_part(network, memory, weight, labels, part)
-            while at >= 0:
-                if labels.is_paid[at] and worth[at] >= multipliers[network.place[at]]:
-                    is_on_path[at] = True
-                    count[network.place[at]] += 1
-                at = labels.previous[at]
-        move(multipliers, epoch, count)
-        begin = epoch.ends[k]
+) -> int:
+    """Give each part a new path in each epoch, and move multipliers in between, all in place."""
+    for number in range(len(epochs.orders)):
+        begin = 0
+        for end in epochs.ends:
+            if stop[0]:
+                return number
+            for i in range(begin, end):
+                part = epochs.orders[number, i]
+                weigh(
+                    network.first[part], network.first[part + 1], network.place, worth,
+                    standing.now, weight, is_on_path, standing.taken,
+                )  # fmt: skip
+                _, at = label_part(network, memory, weight, labels, part)
+                while at >= 0:
+                    if labels.is_paid[at] and worth[at] >= standing.now[network.place[at]]:
+                        is_on_path[at] = True
+                        standing.taken[network.place[at]] += 1
+                    at = labels.previous[at]
+            move(standing, epochs, number)
+            begin = end
+        average(standing, epochs)
+    return len(epochs.orders)

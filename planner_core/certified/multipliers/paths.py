@@ -4,7 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner_core.certified.multipliers.ascent import Ascent, Epoch, Steps, move, weigh
+from planner_core.certified.multipliers.ascent import (
+    Ascent,
+    Epochs,
+    Standing,
+    Steps,
+    average,
+    move,
+    weigh,
+)
 from planner_core.certified.tuning import TUNING
 from planner_core.jit import kernel
 from planner_core.precedence.network import Network, heaviest_path, heaviest_paths
@@ -23,11 +31,13 @@ class Paths:
         self._ends = np.empty(len(network.first) - 1, dtype=np.int32)
         self._is_on_path = np.zeros(n, dtype=np.bool_)
 
-    def run_epoch(self, epoch: Epoch, multipliers: Floats, count: Ints, stop: Bytes) -> None:
+    def run(self, epochs: Epochs, standing: Standing, stop: Bytes) -> int:
         """Give parts new paths, and let multipliers move in between."""
-        _run_epoch(
-            self._network, epoch, self._worth, multipliers, count, self._is_on_path,
-            self._weight, self._value, self._previous, stop,
+        return int(
+            _run(
+                self._network, epochs, standing, self._worth, self._is_on_path,
+                self._weight, self._value, self._previous, stop,
+            )
         )  # fmt: skip
 
     def gain(self, multipliers: Floats) -> float:
@@ -47,43 +57,45 @@ def ascent_on_paths(problem: Problem, network: Network, num_epochs: int, seed: i
 
 
 @kernel
-def _run_epoch(
+def _run(
     network: Network,
-    epoch: Epoch,
+    epochs: Epochs,
+    standing: Standing,
     worth: Floats,
-    multipliers: Floats,
-    count: Ints,
     is_on_path: Bools,
     weight: Floats,
     value: Floats,
     previous: Ints,
     stop: Bytes,
-) -> None:
-    """Give each of some parts a new path, and move multipliers in between, all in place.
+) -> int:
+    """Give each part a new path in each epoch, and move multipliers in between, all in place.
 
     Parameters
     ----------
-    count, is_on_path
-        How many of the current paths take each place, and which nodes those are.
+    is_on_path
+        Which nodes are on the current paths.
     weight, value, previous
         Room to work in. Shape ``(n,)``.
     """
-    begin = 0
-    for k in range(len(epoch.ends)):
-        if stop[0]:
-            return
-        for i in range(begin, epoch.ends[k]):
-            part = epoch.order[i]
-            weigh(
-                network.first[part], network.first[part + 1], network.place, worth, multipliers,
-                weight, is_on_path, count,
-            )  # fmt: skip
-            _, at = heaviest_path(network, part, weight, value, previous)
-            while at >= 0:
-                # What is worth nothing is only passed through.
-                if weight[at] > 0.0:
-                    is_on_path[at] = True
-                    count[network.place[at]] += 1
-                at = previous[at]
-        move(multipliers, epoch, count)
-        begin = epoch.ends[k]
+    for number in range(len(epochs.orders)):
+        begin = 0
+        for end in epochs.ends:
+            if stop[0]:
+                return number
+            for i in range(begin, end):
+                part = epochs.orders[number, i]
+                weigh(
+                    network.first[part], network.first[part + 1], network.place, worth,
+                    standing.now, weight, is_on_path, standing.taken,
+                )  # fmt: skip
+                _, at = heaviest_path(network, part, weight, value, previous)
+                while at >= 0:
+                    # What is worth nothing is only passed through.
+                    if weight[at] > 0.0:
+                        is_on_path[at] = True
+                        standing.taken[network.place[at]] += 1
+                    at = previous[at]
+            move(standing, epochs, number)
+            begin = end
+        average(standing, epochs)
+    return len(epochs.orders)

@@ -119,7 +119,7 @@ STRATEGIES: Final = (
     Strategy(
         name="plans and multipliers side by side",
         supports=is_shared_with_limits,
-        slices=resource_fleet.side_by_side,
+        slices=resource_fleet.plans_and_multipliers,
     ),
     Strategy(
         name="choices",

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from planner_core.certified.mip.solution_pool import PlanPool
 from planner_core.certified.multipliers.paths import ascent_on_paths
 from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.proofs.certificate import Multipliers
+from planner_core.certified.side_by_side import side_by_side
 from planner_core.certified.strategies.agility import FreeSearch, cut_and_prove
 from planner_core.certified.strategies.supports import is_small_free_fleet
 from planner_core.certified.tuning import TUNING
@@ -80,17 +81,15 @@ class FleetSearch:
         left = int(moves_per_task * num_accesses)
         # So long that a few without a better plan say something.
         in_a_slice = int(TUNING.moves_per_task * num_accesses / TUNING.patience) + 1
-        with ThreadPoolExecutor(self.budget.num_threads) as threads:
+        with side_by_side(self.budget.num_threads) as together:
             while left > 0 and not self.best.is_done:
                 end = max(left - in_a_slice, 0)
                 while left > end and self._is_wanted(pool, streams):
                     num_moves = min(left, TUNING.moves_at_a_time)
-                    going = [
-                        threads.submit(one.make_moves, num_moves, self.budget, offered)
-                        for one in streams
+                    moves = [
+                        partial(one.make_moves, num_moves, self.budget, offered) for one in streams
                     ]
-                    for move in going:
-                        move.result()
+                    together(*moves)
                     left -= num_moves
                     if num_streams > 1 and left // TUNING.moves_at_a_time % TUNING.several == 0:
                         self._merge(pool, streams)

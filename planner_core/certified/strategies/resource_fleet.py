@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 
 import numpy as np
 
@@ -15,13 +15,14 @@ from planner_core.certified.multipliers.ascent import Ascent, Steps
 from planner_core.certified.multipliers.energy import EnergyPaths, ascent_on_energy
 from planner_core.certified.multipliers.resources import PriceSearch
 from planner_core.certified.proofs.bound import Bound
+from planner_core.certified.side_by_side import Together, side_by_side
 from planner_core.certified.strategies.resource_steps import ResourceSearch
 from planner_core.certified.strategies.supports import is_fleet
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import Floats
 
 
-def side_by_side(search: Search) -> Iterator[None]:
+def plans_and_multipliers(search: Search) -> Iterator[None]:
     """Search for plans and multipliers side by side, and for plans again until that fails.
 
     What is left of a small fleet HiGHS soon settles.
@@ -29,10 +30,10 @@ def side_by_side(search: Search) -> Iterator[None]:
     engine, best = search.engine(ResourceSearch), search.best
     turns = engine.turns(engine.unit)
     pool = PlanPool(search.problem, search.budget, search.seed)
-    with ThreadPoolExecutor(search.budget.num_threads) as threads:
+    with side_by_side(search.budget.num_threads) as together:
         pricing = _FleetPricing(engine)
         while not (pricing.is_settled or best.is_done):
-            _take_turns(engine, turns, pool, threads, pricing)
+            _take_turns(engine, turns, pool, together, pricing)
             yield
         programs = None
         if is_fleet(engine.problem) and pricing.prices is not None:
@@ -43,7 +44,7 @@ def side_by_side(search: Search) -> Iterator[None]:
         while idle_turns < (TUNING.fleet_patience if programs else TUNING.tries):
             if best.is_done:
                 return
-            is_better = _take_turns(engine, turns, pool, threads, programs)
+            is_better = _take_turns(engine, turns, pool, together, programs)
             idle_turns = 0 if is_better else idle_turns + 1
             yield
 
@@ -52,7 +53,7 @@ def _take_turns(
     search: ResourceSearch,
     turns: TurnSearch,
     pool: PlanPool,
-    threads: ThreadPoolExecutor,
+    together: Together,
     other: _FleetPricing | ProgramSearch | None,
 ) -> bool:
     """Let the search for plans and another go on side by side; return whether a plan is better.
@@ -60,11 +61,10 @@ def _take_turns(
     That search learns from no other: it would lead nowhere new from their plans.
     """
     num_steps = TUNING.steps_beside if other is None else other.steps_beside
-    work = [threads.submit(turns.turn, num_steps)]
+    work = [partial(turns.turn, num_steps)]
     if other is not None:
-        work.append(threads.submit(_go_on, other, pool))
-    for turn in work:
-        turn.result()
+        work.append(partial(_go_on, other, pool))
+    together(*work)
     pool.learn(turns.ended, turns.plan)
     is_better = [search.offer(plan) for plan in (turns.plan, pool.plan)]
     search.best.report("plans")
