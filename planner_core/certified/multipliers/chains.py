@@ -44,20 +44,28 @@ def ascend_on_chains(problem: Problem, stop: Bytes) -> Iterator[tuple[float, Flo
     if num_followers(problem, width_s) > MAX_FOLLOWERS:
         return
     begin = TUNING.begin_of_chains * problem.best_worth
-    num_epochs = TUNING.epochs // TUNING.several
+    # An epoch of narrow cells takes as long as four of wide ones, which prove next to nothing.
     rough = Steps(
         first=TUNING.first_step,
         last=TUNING.last_step_of_few,
-        num_epochs=num_epochs,
-        asked_every=num_epochs + 1,  # its answers prove less than those of narrow cells
+        num_epochs=TUNING.many_epochs,
+        asked_every=TUNING.many_epochs + 1,
     )
-    fine = replace(rough, first=TUNING.first_step / 2.0, asked_every=TUNING.epochs_at_a_time)
+    fine = replace(
+        rough,
+        first=TUNING.first_step / 2.0,
+        num_epochs=TUNING.epochs // TUNING.several,
+        asked_every=TUNING.epochs_at_a_time,
+    )
     for cell_s, steps in ((max(rough_cell_s(), width_s), rough), (width_s, fine)):
         dual = None if stop[0] else ContinuousDual.of(problem, cell_s, stop)
         if dual is None:
             return
         most = np.where(dual.is_offered, problem.best_worth, 0.0)
         ascent = Ascent(Chains(dual), most, begin, steps, 0)
+        if steps is fine:
+            ascent.ask()
+        yield ascent.value, ascent.multipliers
         while not ascent.is_settled and not stop[0]:
             ascent.improve(1, stop)
             yield ascent.value, ascent.multipliers

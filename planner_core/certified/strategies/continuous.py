@@ -55,15 +55,12 @@ class FreeStarts:
 
 
 def chain_multipliers(search: Search) -> Iterator[None]:
-    """Ascend on chains of tasks with free starts, at a time until the bound is lower."""
+    """Ascend on chains of tasks with free starts."""
     best = search.best
-    known = best.distance
     for value, prices in ascend_on_chains(search.problem, search.budget.stop):
         best.lower(Bound(value=value, proof="lagrangian", prices=prices))
         best.report("prices")
-        if best.is_done or best.distance < known:
-            yield
-            known = best.distance
+        yield
 
 
 def fixed_starts(search: Search) -> Iterator[None]:

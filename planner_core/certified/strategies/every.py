@@ -184,6 +184,7 @@ STRATEGIES: Final = (
         name="windows with free starts",
         supports=has_free_starts_alone,
         slices=continuous.windows,
+        patience=lambda: TUNING.patience,
     ),
     Strategy(
         name="multipliers of chains",
