@@ -38,36 +38,41 @@ class Chains(OneByOne):
         return value - float(multipliers.sum())
 
 
-def ascend_on_chains(problem: Problem, stop: Bytes) -> Iterator[tuple[float, Floats]]:
-    """Yield after each epoch the best bound so far, and the multipliers that prove it."""
+def ascend_on_chains(problem: Problem, stop: Bytes) -> Iterator[tuple[float, Floats] | None]:
+    """Yield the best bound so far and its multipliers, or None after an epoch that proves none."""
     width_s = width_for(problem)
     if num_followers(problem, width_s) > MAX_FOLLOWERS:
         return
     begin = TUNING.begin_of_chains * problem.best_worth
-    # An epoch of narrow cells takes as long as four of wide ones, which prove next to nothing.
-    rough = Steps(
+    wide = Steps(
         first=TUNING.first_step,
         last=TUNING.last_step_of_few,
         num_epochs=TUNING.many_epochs,
-        asked_every=TUNING.many_epochs + 1,
+        asked_every=TUNING.rounds,
     )
-    fine = replace(
-        rough,
+    narrow = replace(
+        wide,
         first=TUNING.first_step / 2.0,
         num_epochs=TUNING.epochs // TUNING.several,
         asked_every=TUNING.epochs_at_a_time,
     )
-    for cell_s, steps in ((max(rough_cell_s(), width_s), rough), (width_s, fine)):
+    # An epoch of narrow cells takes as long as four of wide ones, which prove less.
+    stages = [(rough_cell_s(), wide), (width_s, narrow)]
+    if width_s >= rough_cell_s():
+        stages = [(width_s, wide)]
+    for cell_s, steps in stages:
         dual = None if stop[0] else ContinuousDual.of(problem, cell_s, stop)
         if dual is None:
             return
         most = np.where(dual.is_offered, problem.best_worth, 0.0)
         ascent = Ascent(Chains(dual), most, begin, steps, 0)
-        if steps is fine:
+        if steps is narrow:
             ascent.ask()
-        yield ascent.value, ascent.multipliers
-        while not ascent.is_settled and not stop[0]:
-            ascent.improve(1, stop)
             yield ascent.value, ascent.multipliers
+        for epoch in range(1, steps.num_epochs + 1):
+            ascent.improve(1, stop)
+            if stop[0]:
+                return
+            yield None if epoch % steps.asked_every else (ascent.value, ascent.multipliers)
         begin = ascent.mean
         del dual, ascent

@@ -35,9 +35,12 @@ def windows(search: Search) -> Iterator[None]:
     engine = search.engine(FreeStarts)
     num_tasks = max((len(s.spans.row) for s in engine.search.satellites), default=0)
     left = int(np.ceil(search.effort.moves_per_task * num_tasks / TUNING.moves_at_a_time))
-    for _ in range(left):
-        engine.search.move(TUNING.moves_at_a_time)
-        engine.offer("window search")
+    while left > 0:
+        # Multipliers of chains take seconds for a slice: what both gain is compared.
+        for _ in range(min(left, TUNING.several)):
+            engine.search.move(TUNING.moves_at_a_time)
+            engine.offer("window search")
+        left -= TUNING.several
         yield
 
 
@@ -55,12 +58,15 @@ class FreeStarts:
 
 
 def chain_multipliers(search: Search) -> Iterator[None]:
-    """Ascend on chains of tasks with free starts."""
+    """Ascend on chains of tasks with free starts, at a time until that has proven a bound."""
     best = search.best
-    for value, prices in ascend_on_chains(search.problem, search.budget.stop):
-        best.lower(Bound(value=value, proof="lagrangian", prices=prices))
-        best.report("prices")
-        yield
+    for proven in ascend_on_chains(search.problem, search.budget.stop):
+        if proven is not None:
+            value, prices = proven
+            best.lower(Bound(value=value, proof="lagrangian", prices=prices))
+            best.report("prices")
+        if proven is not None or best.is_done:
+            yield
 
 
 def fixed_starts(search: Search) -> Iterator[None]:

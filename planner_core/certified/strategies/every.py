@@ -184,7 +184,7 @@ STRATEGIES: Final = (
         name="windows with free starts",
         supports=has_free_starts_alone,
         slices=continuous.windows,
-        patience=lambda: TUNING.patience,
+        patience=lambda: TUNING.tries,
     ),
     Strategy(
         name="multipliers of chains",
