@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget, Termination
-from planner_core.certified.driver import Effort
+from planner_core.certified.driver import Effort, Search
+from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.continuous_search import ContinuousSearch
 from planner_core.certified.lns.insertion_with_resources import (
     filled_with_resources,
@@ -19,6 +21,7 @@ from planner_core.certified.lns.insertion_with_resources import (
 from planner_core.certified.proofs import documents as proofs
 from planner_core.certified.proofs.bound import accessible
 from planner_core.certified.proofs.continuous import ContinuousDual, continuous_value
+from planner_core.certified.strategies import continuous
 from planner_core.certified.strategies.continuous import with_own_starts
 from planner_core.certified.strategies.every import solved
 from planner_core.domain import Agility
@@ -28,6 +31,7 @@ from planner_core.problem import (
     COLLECT,
     CONTACT,
     Blocked,
+    Floats,
     Kept,
     Pinned,
     Problem,
@@ -158,6 +162,23 @@ def test_the_best_plan_on_a_grid_stays_below_the_bound(seed: int, num_satellites
     search.move(100)
     assert best.bound is not None
     assert search.reward >= replay(grid, best.plan).reward
+
+
+def test_multipliers_that_prove_nothing_better_let_others_have_their_turn(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    problem = flat_problem(1, num_targets=8)
+    told = [None, (100.0, problem.best_worth), None, None, (100.0, problem.best_worth)]
+
+    def ascend(*_: object) -> Iterator[tuple[float, Floats] | None]:
+        yield from told
+
+    monkeypatch.setattr(continuous, "ascend_on_chains", ascend)
+    best = Incumbent(problem, Budget(), 0.0, bound=accessible(problem), covers_starts=True)
+    assert best.bound.value < 100.0
+    assert len(list(continuous.chain_multipliers(Search(best, 0, ())))) == 2
+    best.budget.cancel()
+    assert len(list(continuous.chain_multipliers(Search(best, 0, ())))) == len(told)
 
 
 def test_bounds_can_be_checked_and_false_ones_are_refused() -> None:
