@@ -12,11 +12,8 @@ from functools import reduce
 from typing import Any, Final
 
 from planner_core.certified.driver import Turn
-from planner_core.certified.lns.search import WindowSearch
 from planner_core.certified.strategies import every
 from planner_core.certified.tuning import tune
-from planner_core.precedence.network import Network
-from planner_core.problem import Floats, Problem
 
 ENGINE: Final = "planner_core.certified"
 NOTHING: Final = ""
@@ -90,14 +87,6 @@ class _Idle:
         """Do nothing."""
 
 
-def _without_urgency(
-    problem: Problem, seed: int, network: Network, preference: Floats, urgency: Floats
-) -> WindowSearch:
-    """Return a window search whose moves begin anywhere."""
-    del urgency
-    return WindowSearch(problem, seed, network, preference)
-
-
 def _all_in_turn(turns: Sequence[Turn]) -> Turn:
     """Return who has waited longest, whatever the gains."""
     going = [turn for turn in turns if not turn.is_stalled] or turns
@@ -156,15 +145,11 @@ STRATEGIES: Final[Mapping[str, Change]] = {
             "multipliers": _RESOURCES,
             "programs with contacts fixed": _RESOURCES,
             "windows with free starts": _FREE,
-            "multipliers of chains": _FREE,
+            # Their first tables alone take six seconds.
+            "multipliers of chains": {"continuous-1000": 30.0},
             "exhaust": _RESOURCES | _SMALL,
         }.items()
     },
-    "urgency": Change(
-        patches=_off("strategies.fleet", "WindowSearch", _without_urgency),
-        families=_LARGE_FLEET,
-        num_draws=1,
-    ),
     "preference": Change(tuning={"preference": 0.0}, families=_LARGE_FLEET, num_draws=1),
     "relaxations of a fleet's contacts": Change(tuning={"most_relaxed": 0}, families=_STATIONS),
     "program search": Change(

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget
-from planner_core.certified.lns.search import improved
+from planner_core.certified.lns.search import WindowSearch, improved
 from planner_core.domain import Agility
 from planner_core.problem import Kept, Pinned
 from planner_core.problem.plan import Plan
@@ -77,11 +77,13 @@ def test_a_plan_is_never_given_up_for_targets_that_are_only_preferred() -> None:
     reward = replay(problem, start).reward
     for seed in range(10):
         preference = rng.uniform(0.5, 1.5, len(problem.target_ids))
-        plan = improved(problem, start, 20.0, Budget(), seed, preference)
-        timeline = replay(problem, plan)
+        search = WindowSearch(problem, seed, preference=preference)
+        search.adopt(start)
+        search.make_moves(800, Budget())
+        timeline = replay(problem, search.plan)
         assert not timeline.violations
         assert timeline.reward >= reward
-        assert 7 in {action.opportunity for action in plan.actions}
+        assert 7 in {action.opportunity for action in search.plan.actions}
 
 
 def test_a_cancelled_search_returns_the_plan_at_once() -> None:

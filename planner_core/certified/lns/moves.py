@@ -23,6 +23,7 @@ from planner_core.problem.slew import TIME_TOLERANCE_S
 
 _FEWEST_TASKS, _MOST_TASKS = TUNING.window_tasks
 _FOR_FREE_TARGET: Final = TUNING.aimed
+_TRIALS: Final = TUNING.patience
 _TIE: Final = TUNING.tie
 
 
@@ -39,11 +40,6 @@ class Ground(NamedTuple):
     preference
         By how much the search prefers a target to others of its worth, as a factor.
         Shape ``(num_targets + 1,)``.
-    urgency
-        How likely a move begins at a target that is not imaged, where one is drawn.
-        Shape ``(num_targets + 1,)``.
-    num_trials
-        How many draws there are for such a target.
     is_kept
         What every plan must take.
     is_locked
@@ -56,8 +52,6 @@ class Ground(NamedTuple):
     is_transitive: Bools
     worth: Floats
     preference: Floats
-    urgency: Floats
-    num_trials: int
     is_kept: Bools
     is_locked: Bools
     kept_worth: float
@@ -118,15 +112,13 @@ def make_moves(
 def _pivot(ground: Ground, taken: Taken, offered: Bools, draws: Uint64s) -> int:
     """Return a node at random, mostly one of a target that is not imaged."""
     n = len(ground.network.place)
-    num_trials = ground.num_trials if next_draw(draws) < _FOR_FREE_TARGET else 1
+    num_trials = _TRIALS if next_draw(draws) < _FOR_FREE_TARGET else 1
     pivot = 0
     for _ in range(num_trials):
         pivot = int(next_draw(draws) * n)
         target = ground.network.place[pivot]
         if offered[pivot] and taken.holder[target] == FREE and ground.worth[pivot] > 0.0:
-            urgency = ground.urgency[target]
-            if urgency >= 1.0 or next_draw(draws) < urgency:
-                break
+            break
     return pivot
 
 

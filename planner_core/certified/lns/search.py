@@ -39,9 +39,6 @@ class WindowSearch:
         By how much targets not yet imaged are preferred to others of the same reward, as a
         factor for each; a plan is never given up for one that earns less. Shape
         ``(num_targets,)``.
-    urgency
-        How much targets not yet imaged are worth trying for, from 0 to 1; all the same by
-        default. Shape ``(num_targets,)``.
     """
 
     def __init__(
@@ -50,12 +47,11 @@ class WindowSearch:
         seed: int,
         network: Network | None = None,
         preference: Floats | None = None,
-        urgency: Floats | None = None,
     ) -> None:
         self.problem = problem
         network = network or network_of(problem)
         self._row = network.row
-        self._ground = _ground_of(problem, network, preference, urgency)
+        self._ground = _ground_of(problem, network, preference)
         self._draws = draws_of(seed)
         self._room = room_for(len(problem.target_ids))
         self._every = np.ones(len(self._row), dtype=np.bool_)
@@ -114,18 +110,10 @@ def num_choices(problem: Problem) -> int:
 
 
 def improved(
-    problem: Problem,
-    plan: Plan,
-    moves_per_task: float,
-    budget: Budget,
-    seed: int,
-    preference: Floats | None = None,
+    problem: Problem, plan: Plan, moves_per_task: float, budget: Budget, seed: int
 ) -> Plan:
-    """Return a plan that earns no less, after moves in proportion to the accesses.
-
-    ``preference`` as for ``WindowSearch``.
-    """
-    search = WindowSearch(problem, seed, preference=preference)
+    """Return a plan that earns no less, after moves in proportion to the accesses."""
+    search = WindowSearch(problem, seed)
     search.adopt(plan)
     search.make_moves(int(moves_per_task * num_choices(problem)), budget)
     return search.plan
@@ -142,9 +130,7 @@ def polished(
     return replace(solution, plan=plan)
 
 
-def _ground_of(
-    problem: Problem, network: Network, preference: Floats | None, urgency: Floats | None
-) -> Ground:
+def _ground_of(problem: Problem, network: Network, preference: Floats | None) -> Ground:
     is_transitive = np.array([is_transitive_on(s) for s in problem.satellites], dtype=np.bool_)
     num_targets = len(problem.target_ids)
     worth = problem.worth[network.row]
@@ -156,8 +142,6 @@ def _ground_of(
         is_transitive=is_transitive[network.satellite],
         worth=worth,
         preference=np.ones(num_targets + 1) if preference is None else np.append(preference, 1.0),
-        urgency=np.ones(num_targets + 1) if urgency is None else np.append(urgency, 0.0),
-        num_trials=TUNING.patience if urgency is None else TUNING.trials,
         is_kept=is_kept,
         is_locked=is_locked,
         kept_worth=1.0 + float(problem.best_worth.sum()),

@@ -123,12 +123,13 @@ class FleetSearch:
 
     def windows(self, number: int) -> WindowSearch:
         """Return a window search from a start of its own, the first from the best plan."""
-        preference = urgency = None
+        preference = None
         if not is_small_free_fleet(self.problem):
-            urgency = np.minimum(self.prices / np.maximum(self.problem.best_worth, 1e-300), 1.0)
-            preference = 1.0 + TUNING.preference * (0.5 - urgency)
+            # Satellites hardly compete for targets with low multipliers: those are hard to have.
+            wanted = np.minimum(self.prices / np.maximum(self.problem.best_worth, 1e-300), 1.0)
+            preference = 1.0 + TUNING.preference * (0.5 - wanted)
         seed = self._seed + number
-        windows = WindowSearch(self.problem, seed, self._network, preference, urgency)
+        windows = WindowSearch(self.problem, seed, self._network, preference)
         windows.adopt(self.best.plan if number == 0 else self._priced_plan(seed))
         return windows
 
