@@ -45,7 +45,7 @@ def ascend_on_chains(problem: Problem, stop: Bytes) -> Iterator[tuple[float, Flo
         return
     begin = TUNING.begin_of_chains * problem.best_worth
     wide = Steps(
-        first=TUNING.first_step,
+        first=TUNING.first_step_of_paths,
         last=TUNING.last_step_of_few,
         num_epochs=TUNING.many_epochs,
         asked_every=TUNING.rounds,
