@@ -21,7 +21,7 @@ charge away: such arcs give it back, :math:`E' = \min(E +` ``give`` :math:`, ...
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -93,8 +93,9 @@ class Network(NamedTuple):
     must_deliver: bool
 
 
-_made: WeakKeyDictionary[SatelliteProblem, dict[tuple[bool, str, float], Network]]
-_made = WeakKeyDictionary()
+# Horizon and stations are the same in all problems of a satellite; these three are not.
+_Kind: TypeAlias = tuple[bool, str, float]
+_made: WeakKeyDictionary[SatelliteProblem, dict[_Kind, Network]] = WeakKeyDictionary()
 
 
 def network_of(problem: Problem, satellite: SatelliteProblem) -> Network:
@@ -113,10 +114,10 @@ def _network(problem: Problem, satellite: SatelliteProblem, slack: float) -> Net
     Searches ask for it again wherever worths or what is kept have changed: all else is made once.
     """
     made = _made.setdefault(satellite, {})
-    key = problem.use_resources, problem.dynamics, slack
-    if key not in made:
-        made[key] = _without_worth(problem, satellite, slack)
-    network = made[key]
+    kind = problem.use_resources, problem.dynamics, slack
+    if kind not in made:
+        made[kind] = _without_worth(problem, satellite, slack)
+    network = made[kind]
     return network._replace(
         is_kept=np.isin(satellite.rows, problem.kept_rows),
         delivered=_delivered(problem, satellite, network.data_floor, max(slack, 0.0)),
