@@ -34,8 +34,8 @@ class Tuning:
         starts under resources.
 
     first_step_of_paths, first_step
-        How far multipliers move in the first epoch of an ascent on longest paths and of any other,
-        in shares of what targets are worth.
+        How far multipliers move in the first epoch of an ascent on longest paths, or on chains in
+        wide cells of start times, and of any other, in shares of what targets are worth.
     last_step, last_step_of_few
         How far in the last one, as a share of that; and where epochs are few.
     begin, begin_of_chains

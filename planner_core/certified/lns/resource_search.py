@@ -165,5 +165,5 @@ def _kept_targets(problem: Problem) -> Bools:
 
 
 def _in_a_step(ground: Ground) -> int:
-    """Return how many moves a satellite is worth at a time."""
+    """Return how many moves a satellite has at a time: few where it has few tasks."""
     return min(TUNING.moves_in_a_step, math.ceil(TUNING.moves_per_task * len(ground.rows)))

@@ -23,7 +23,7 @@ import numpy as np
 from planner_core.bundles import bundle
 from planner_core.certified.tuning import TUNING
 from planner_core.jit import inlined
-from planner_core.problem import Bools, Bytes, Floats, Ints, Longs
+from planner_core.problem import Bools, Bytes, Floats, Ints
 
 
 @bundle
@@ -34,8 +34,8 @@ class Epochs(NamedTuple):
     ----------
     orders
         Parts, each once in an epoch. Shape ``(num_epochs, num_parts)``.
-    ends
-        After how many of them multipliers move, in ascending order; at last after all.
+    moves_after
+        Whether multipliers move after the first, second, ... of them. Shape ``(num_parts,)``.
     lengths
         What a multiplier moves in each epoch for each answer too many, as a share of what the
         target is worth. Shape ``(num_epochs,)``.
@@ -46,7 +46,7 @@ class Epochs(NamedTuple):
     """
 
     orders: Ints
-    ends: Longs
+    moves_after: Bools
     lengths: Floats
     most: Floats
     newest_share: float
@@ -97,16 +97,15 @@ class OneByOne(ABC):
     def run(self, epochs: Epochs, standing: Standing, stop: Bytes) -> int:
         """Let parts answer anew, and multipliers move in between; return how many epochs ended."""
         now, mean, count = standing
-        ends, most = epochs.ends.tolist(), epochs.most
+        moves_after = epochs.moves_after.tolist()
         for number, order in enumerate(epochs.orders.tolist()):
-            step, begin = epochs.lengths[number] * most, 0
-            for end in ends:
+            step = epochs.lengths[number] * epochs.most
+            for part, is_moved in zip(order, moves_after, strict=True):
                 if stop[0]:
                     return number
-                for part in order[begin:end]:
-                    self.answer(part, now, count)
-                begin = end
-                np.clip(now + step * (count - 1), 0.0, most, out=now)
+                self.answer(part, now, count)
+                if is_moved:
+                    np.clip(now + step * (count - 1), 0.0, epochs.most, out=now)
             mean += epochs.newest_share * (now - mean)
         return len(epochs.orders)
 
@@ -207,13 +206,15 @@ class Ascent:
     def _next(self, num_epochs: int) -> Epochs:
         steps, parts = self._steps, self._oracle.parts
         num_moves = min(TUNING.moves_per_epoch, len(parts))
+        moves_after = np.zeros(len(parts), dtype=np.bool_)
+        moves_after[len(parts) * np.arange(1, num_moves + 1) // max(1, num_moves) - 1] = True
         numbers = range(self._epoch, self._epoch + num_epochs)
         shorter = [steps.last ** (number / max(1, steps.num_epochs)) for number in numbers]
         # Before all have answered nothing is known of what is taken twice.
         first = [steps.first if number else 0.0 for number in numbers]
         return Epochs(
             orders=np.array([self._rng.permutation(parts) for _ in numbers]),
-            ends=len(parts) * np.arange(1, num_moves + 1) // max(1, num_moves),
+            moves_after=moves_after,
             lengths=np.array(first) * np.array(shorter) / max(1, num_moves),
             most=self._most,
             newest_share=TUNING.newest_share,
@@ -233,29 +234,28 @@ def weigh(
     end: int,
     place: Ints,
     worth: Floats,
-    multipliers: Floats,
+    standing: Standing,
     weight: Floats,
     is_on_path: Bools,
-    count: Ints,
 ) -> None:
     """Weigh a part's nodes at the multipliers of the moment, and take its path off the count."""
     for a in range(begin, end):
-        weight[a] = max(0.0, worth[a] - multipliers[place[a]])
+        weight[a] = max(0.0, worth[a] - standing.now[place[a]])
         if is_on_path[a]:
             is_on_path[a] = False
-            count[place[a]] -= 1
+            standing.taken[place[a]] -= 1
 
 
 @inlined
-def move(standing: Standing, epochs: Epochs, number: int) -> None:
-    """Move multipliers in place, each within 0 and the best worth of its target."""
+def move(standing: Standing, epochs: Epochs, number: int, i: int) -> None:
+    """Move multipliers where they do after the i-th answer, and take an epoch's last to the mean.
+
+    Each stays within 0 and the best worth of its target.
+    """
     length, most, now, taken = epochs.lengths[number], epochs.most, standing.now, standing.taken
-    for i in range(len(now)):
-        now[i] = min(max(now[i] + length * most[i] * (taken[i] - 1), 0.0), most[i])
-
-
-@inlined
-def average(standing: Standing, epochs: Epochs) -> None:
-    """Take the multipliers at the end of an epoch into their mean."""
-    for i in range(len(standing.now)):
-        standing.mean[i] += epochs.newest_share * (standing.now[i] - standing.mean[i])
+    if epochs.moves_after[i]:
+        for j in range(len(now)):
+            now[j] = min(max(now[j] + length * most[j] * (taken[j] - 1), 0.0), most[j])
+    if i + 1 == len(epochs.moves_after):
+        for j in range(len(now)):
+            standing.mean[j] += epochs.newest_share * (now[j] - standing.mean[j])

@@ -12,15 +12,7 @@ from planner_core.certified.dp.elementary import (
     labels_for,
     memory_of,
 )
-from planner_core.certified.multipliers.ascent import (
-    Ascent,
-    Epochs,
-    Standing,
-    Steps,
-    average,
-    move,
-    weigh,
-)
+from planner_core.certified.multipliers.ascent import Ascent, Epochs, Standing, Steps, move, weigh
 from planner_core.certified.tuning import TUNING
 from planner_core.jit import borrowing
 from planner_core.precedence.arcs import ArcNetwork, arc_network_of
@@ -90,23 +82,17 @@ def _run(
 ) -> int:
     """Give each part a new path in each epoch, and move multipliers in between, all in place."""
     for number in range(len(epochs.orders)):
-        begin = 0
-        for end in epochs.ends:
+        for i in range(len(epochs.moves_after)):
             if stop[0]:
                 return number
-            for i in range(begin, end):
-                part = epochs.orders[number, i]
-                weigh(
-                    network.first[part], network.first[part + 1], network.place, worth,
-                    standing.now, weight, is_on_path, standing.taken,
-                )  # fmt: skip
-                _, at = label_part(network, memory, weight, labels, part)
-                while at >= 0:
-                    if labels.is_paid[at] and worth[at] >= standing.now[network.place[at]]:
-                        is_on_path[at] = True
-                        standing.taken[network.place[at]] += 1
-                    at = labels.previous[at]
-            move(standing, epochs, number)
-            begin = end
-        average(standing, epochs)
+            part = epochs.orders[number, i]
+            begin, end = network.first[part], network.first[part + 1]
+            weigh(begin, end, network.place, worth, standing, weight, is_on_path)
+            _, at = label_part(network, memory, weight, labels, part)
+            while at >= 0:
+                if labels.is_paid[at] and worth[at] >= standing.now[network.place[at]]:
+                    is_on_path[at] = True
+                    standing.taken[network.place[at]] += 1
+                at = labels.previous[at]
+            move(standing, epochs, number, i)
     return len(epochs.orders)

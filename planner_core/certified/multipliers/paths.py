@@ -4,15 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner_core.certified.multipliers.ascent import (
-    Ascent,
-    Epochs,
-    Standing,
-    Steps,
-    average,
-    move,
-    weigh,
-)
+from planner_core.certified.multipliers.ascent import Ascent, Epochs, Standing, Steps, move, weigh
 from planner_core.certified.tuning import TUNING
 from planner_core.jit import kernel
 from planner_core.precedence.network import Network, heaviest_path, heaviest_paths
@@ -78,24 +70,18 @@ def _run(
         Room to work in. Shape ``(n,)``.
     """
     for number in range(len(epochs.orders)):
-        begin = 0
-        for end in epochs.ends:
+        for i in range(len(epochs.moves_after)):
             if stop[0]:
                 return number
-            for i in range(begin, end):
-                part = epochs.orders[number, i]
-                weigh(
-                    network.first[part], network.first[part + 1], network.place, worth,
-                    standing.now, weight, is_on_path, standing.taken,
-                )  # fmt: skip
-                _, at = heaviest_path(network, part, weight, value, previous)
-                while at >= 0:
-                    # What is worth nothing is only passed through.
-                    if weight[at] > 0.0:
-                        is_on_path[at] = True
-                        standing.taken[network.place[at]] += 1
-                    at = previous[at]
-            move(standing, epochs, number)
-            begin = end
-        average(standing, epochs)
+            part = epochs.orders[number, i]
+            begin, end = network.first[part], network.first[part + 1]
+            weigh(begin, end, network.place, worth, standing, weight, is_on_path)
+            _, at = heaviest_path(network, part, weight, value, previous)
+            while at >= 0:
+                # What is worth nothing is only passed through.
+                if weight[at] > 0.0:
+                    is_on_path[at] = True
+                    standing.taken[network.place[at]] += 1
+                at = previous[at]
+            move(standing, epochs, number, i)
     return len(epochs.orders)

@@ -36,7 +36,7 @@ def windows(search: Search) -> Iterator[None]:
     num_tasks = max((len(s.spans.row) for s in engine.search.satellites), default=0)
     left = int(np.ceil(search.effort.moves_per_task * num_tasks / TUNING.moves_at_a_time))
     while left > 0:
-        # Multipliers of chains take seconds for a slice: what both gain is compared.
+        # A slice of the multipliers takes seconds, and the driver compares what slices gain.
         for _ in range(min(left, TUNING.several)):
             engine.search.move(TUNING.moves_at_a_time)
             engine.offer("window search")
