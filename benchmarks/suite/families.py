@@ -38,6 +38,10 @@ def _halved_in(half_life_h: float) -> Objective:
     return Objective(collected_share=0.0, half_life_s=3600.0 * half_life_h)
 
 
+def _shared(collected_share: float) -> Objective:
+    return Objective(collected_share=collected_share)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Family:
     """Missions of one kind and size, planned in the same CPU seconds.
@@ -129,6 +133,22 @@ FAMILIES: Final[Mapping[str, Family]] = {
     "delivered-1000": Family(
         num_targets=1000, budget_s=10.0, quick_budget_s=5.0, dynamics="physical",
         objective=_DELIVERED,
+    ),
+    "share-200": Family(
+        num_targets=200, budget_s=10.0, quick_budget_s=5.0, dynamics="physical",
+        objective=_shared(0.9),
+    ),
+    "share-paper-500": Family(
+        num_targets=500, budget_s=20.0, quick_budget_s=10.0, dynamics="paper",
+        objective=_shared(0.5),
+    ),
+    "share-1000": Family(
+        num_targets=1000, budget_s=20.0, quick_budget_s=10.0, dynamics="physical",
+        objective=_shared(0.9),
+    ),
+    "share-fleet-4x2000": Family(
+        num_satellites=4, num_targets=2000, budget_s=40.0, quick_budget_s=None, dynamics="physical",
+        objective=_shared(0.9),
     ),
     "half-life-3h-1000": Family(
         num_targets=1000, budget_s=10.0, quick_budget_s=8.0, dynamics="physical",

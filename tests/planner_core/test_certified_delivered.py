@@ -13,10 +13,14 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget, Termination
+from planner_core.certified.incumbent import Incumbent
+from planner_core.certified.lns.choices import ChoiceSearch
 from planner_core.certified.proofs.resource_bound import quick_bound, resource_value
 from planner_core.certified.solver import Certified
-from planner_core.domain import Objective
-from planner_core.problem import COLLECT, Problem
+from planner_core.certified.strategies import commitments
+from planner_core.certified.tuning import TUNING
+from planner_core.domain import Agility, Objective
+from planner_core.problem import COLLECT, Bytes, Problem
 from planner_core.problem.delivery import with_objective
 from planner_core.problem.plan import Plan
 from planner_core.reasons import delivery
@@ -76,7 +80,84 @@ def test_no_plan_beats_the_bound_whatever_delivery_counts(
     problem = _small(seed, dynamics, num_satellites, has_quality=has_quality)
     objective = Objective(collected_share=collected_share, half_life_s=half_life_s)
     problem = with_objective(problem, objective)
-    encloses(problem, best_reward(problem))
+    is_best = encloses(problem, best_reward(problem))
+    assert is_best or half_life_s is not None
+
+
+@examples(250)
+@given(
+    seed=SEEDS,
+    dynamics=st.sampled_from(["physical", "paper"]),
+    collected_share=st.sampled_from([0.2, 0.5, 0.9]),
+    num_satellites=st.integers(1, 2),
+    has_quality=st.booleans(),
+    agility=st.sampled_from([Agility(), Agility(slew_rate_deg_s=0.15)]),
+)
+def test_highs_knows_what_stays_on_board(
+    dynamics: Literal["physical", "paper"],
+    seed: int,
+    collected_share: float,
+    num_satellites: int,
+    has_quality: bool,
+    agility: Agility,
+) -> None:
+    """Where turns take long a satellite may turn by way of an image of a target that it has."""
+    problem = random_problem(
+        seed,
+        dynamics=dynamics,
+        num_satellites=num_satellites,
+        has_quality=has_quality,
+        agility=agility,
+        max_turn_deg=60.0,
+        num_collects=7,
+        num_targets=4,
+    )
+    problem = with_objective(problem, Objective(collected_share=collected_share))
+    best = best_reward(problem)
+    solution = Milp().solve(problem, Budget(), 0)
+    assert replay(problem, solution.plan).reward == pytest.approx(best)
+    assert solution.bound == pytest.approx(best, abs=1e-4)
+
+
+def test_amounts_that_may_stay_on_board_bind_plans_and_the_least_of_the_best_is_chosen(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    made: list[ChoiceSearch] = []
+    amounts: list[float | None] = []
+
+    class Noted(ChoiceSearch):
+        def __init__(self, problem: Problem, unit: float, seed: int, stop: Bytes) -> None:
+            super().__init__(problem, unit, seed, stop)
+            made.append(self)
+            amounts.append(problem.left_on_board)
+
+    monkeypatch.setattr(commitments, "ChoiceSearch", Noted)
+    num_chosen = num_left_out = 0
+    for seed in range(20):
+        made.clear()
+        amounts.clear()
+        problem = random_problem(
+            seed, num_collects=60, num_targets=30, num_contacts=4, span_s=900.0, dynamics="paper"
+        )
+        problem = with_objective(problem, Objective(collected_share=0.5))
+        best = Incumbent(problem, Budget(), 0.0)
+        committed = commitments.best_commitment(best, 0.5, 0.95, seed)
+        assert amounts[0] is None
+        least, rewards = np.inf, []
+        for amount, search in zip(amounts, made, strict=True):
+            # An image fills 0.15 of the recorder.
+            assert amount is None or amount < 0.15 * least
+            timeline = replay(problem, search.plan)
+            images = timeline.collected.values()
+            least = min(least, sum(not image.is_downlinked for image in images))
+            rewards.append(timeline.reward)
+        last = len(rewards) - 1 - int(np.argmax(rewards[::-1]))
+        assert (committed and committed.problem.left_on_board) == amounts[last]
+        assert best.reward >= max(rewards)
+        num_chosen += committed is not None
+        num_left_out += len(amounts) < len(TUNING.images_on_board)
+    assert num_chosen
+    assert num_left_out
 
 
 @functools.cache

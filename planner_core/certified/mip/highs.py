@@ -86,9 +86,11 @@ class Engine:
 
     def add_rows(self, rows: Rows) -> None:
         """Add constraints; the next run starts from the last one's basis."""
-        self._highs.addRows(
+        status = self._highs.addRows(
             len(rows), rows.lower, rows.upper, len(rows.column), rows.first, rows.column, rows.value
         )
+        # It takes none of them where a row names a column twice.
+        assert status != highspy.HighsStatus.kError
 
     def relaxed(self) -> Floats | None:
         """Return the best fractional point, or None if the budget did not suffice."""

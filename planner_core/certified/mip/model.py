@@ -8,9 +8,11 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from planner_core.certified.dp.resource_network import must_deliver
 from planner_core.certified.mip.clique_cuts import antichain_cover, detours, excluding_pairs
 from planner_core.certified.mip.program import Program, Rows
 from planner_core.certified.mip.resources import ResourceTerms, add_resources, resource_terms
+from planner_core.certified.tolerances import SAME
 from planner_core.precedence.antennas import antenna_groups
 from planner_core.precedence.relation import (
     Precedence,
@@ -39,6 +41,9 @@ class PlanProgram:
     ----------
     problem
         The opportunities that a plan may take.
+    taken, down
+        The columns x, and those that say that an image comes down, which follow them; -1 where that
+        makes no difference. Shape ``(n,)``.
     orders
         For each satellite, which of its tasks can stand in one plan.
     paid
@@ -48,6 +53,7 @@ class PlanProgram:
     problem: Problem
     program: Program
     taken: Ints
+    down: Ints
     precedences: tuple[Precedence, ...]
     paid: Paid | None
 
@@ -70,9 +76,9 @@ class Paid(NamedTuple):
 
     Attributes
     ----------
-    target, worth
-        Of each group; a target without images has one of them too, worth nothing.
-        Shape ``(num_groups,)``.
+    target, worth, lost
+        Of each group, the last where its image stays on board; a target without images has one of
+        them too, worth nothing. Shape ``(num_groups,)``.
     rows, offsets
         Their images, group by group, and where each group begins.
         Shapes ``(num_images,)`` and ``(num_groups + 1,)``.
@@ -80,29 +86,37 @@ class Paid(NamedTuple):
 
     target: Ints
     worth: Floats
+    lost: Floats
     rows: Ints
     offsets: Longs
 
     @classmethod
-    def of(cls, problem: Problem) -> Paid:
+    def of(cls, problem: Problem, lost: Floats) -> Paid:
         """Return the groups of a problem, target after target."""
         rows, offsets = problem.target_opportunities
         empty = np.flatnonzero(np.diff(offsets) == 0)
         target = np.concatenate([problem.opportunities.place[rows], empty])
-        worth = np.concatenate([problem.worth[rows], np.zeros(len(empty))])
-        groups, group = np.unique(np.column_stack([target, worth]), axis=0, return_inverse=True)
+        own = np.column_stack([problem.worth[rows], lost[rows]])
+        own = np.vstack([own, np.zeros((len(empty), 2))])
+        groups, group = np.unique(np.column_stack([target, own]), axis=0, return_inverse=True)
         group = group.ravel()[: len(rows)]
         counts = np.bincount(group, minlength=len(groups))
         return cls(
             target=groups[:, 0].astype(np.int32),
             worth=groups[:, 1],
+            lost=groups[:, 2],
             rows=rows[np.argsort(group, kind="stable")],
             offsets=np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
         )
 
 
 def plan_program(
-    problem: Problem, formulation: Formulation, margin: float, rows: Ints | None = None
+    problem: Problem,
+    formulation: Formulation,
+    margin: float,
+    rows: Ints | None = None,
+    *,
+    sees_what_stays: bool = True,
 ) -> PlanProgram:
     """Return the program of the plans that take some of the tasks.
 
@@ -112,42 +126,70 @@ def plan_program(
         How far inside battery and recorder limits to stay.
     rows
         The opportunities that a plan may take, ascending; all by default.
+    sees_what_stays
+        Whether images that stay on board are worth less; otherwise all are worth the most they can.
     """
     terms = [
         resource_terms(problem, satellite) if problem.use_resources and len(satellite) else None
         for satellite in problem.satellites
     ]
+    lost = _lost_on_board(problem) if sees_what_stays else np.zeros(len(problem.opportunities))
     if rows is not None:
         # What a task costs depends on the tasks around it, taken or not.
         is_kept = np.zeros(len(problem.opportunities), dtype=np.bool_)
         is_kept[rows] = True
         kept = [np.flatnonzero(is_kept[s.rows]).astype(np.int32) for s in problem.satellites]
         terms = [own and own.of_part(part) for own, part in zip(terms, kept, strict=True)]
-        problem = restricted(problem, rows)
+        problem, lost = restricted(problem, rows), lost[rows]
     precedences = tuple(transitive_closure(satellite) for satellite in problem.satellites)
     program = Program()
-    taken, paid = _variables(program, problem, is_transitive(problem))
-    _constraints(program, problem, taken, precedences, terms, formulation, margin)
-    return PlanProgram(
-        problem=problem, program=program, taken=taken, precedences=precedences, paid=paid
+    taken, down, paid = _variables(program, problem, lost)
+    model = PlanProgram(
+        problem=problem,
+        program=program,
+        taken=taken,
+        down=down,
+        precedences=precedences,
+        paid=paid,
     )
+    _constraints(model, terms, formulation, margin)
+    return model
 
 
-def _variables(program: Program, problem: Problem, is_direct: bool) -> tuple[Ints, Paid | None]:
-    """Add x, 1 for what must be taken, and the objective: what the images are worth."""
-    table, worth = problem.opportunities, problem.worth
+def _variables(program: Program, problem: Problem, lost: Floats) -> tuple[Ints, Ints, Paid | None]:
+    """Add x, 1 for what must be taken, which images come down, and what images are worth."""
+    table, worth = problem.opportunities, problem.worth - lost
     kept = np.zeros(len(table), dtype=np.bool_)
     kept[problem.kept_rows] = True
-    if is_direct:
-        useful = (worth > 0.0) | ((table.kind == CONTACT) & problem.use_resources)
+    down, may_come = np.full(len(table), -1, dtype=np.int32), lost > 0.0
+    if is_transitive(problem):
+        useful = (problem.worth > 0.0) | ((table.kind == CONTACT) & problem.use_resources)
         useful |= kept
         taken = program.add_columns(
             worth, lower=kept.astype(np.float64), upper=useful.astype(np.float64)
         )
+        down[may_come] = program.add_columns(lost[may_come])
         _once_per_target(program, problem, taken)
-        return taken, None
+        return taken, down, None
     taken = program.add_columns(np.zeros(len(table)), lower=kept.astype(np.float64))
-    return taken, _paid_for_the_best(program, problem, taken)
+    down[may_come] = program.add_columns(np.zeros(int(may_come.sum())))
+    return taken, down, _paid_for_the_best(program, problem, taken, down, lost)
+
+
+def _lost_on_board(problem: Problem) -> Floats:
+    """Return what each image is worth less that stays on board. Shape ``(n,)``.
+
+    Nothing where plans hold only such as come down, and where none can.
+    """
+    lost = np.zeros(len(problem.opportunities))
+    if not problem.counts_delivery:
+        return lost
+    on_board = problem.objective.collected_share * problem.worth_on_ground
+    for satellite in problem.satellites:
+        if not must_deliver(problem, satellite):
+            lost[satellite.rows] = (problem.worth - on_board)[satellite.rows]
+    lost[lost <= SAME * problem.worth] = 0.0
+    return lost
 
 
 def _once_per_target(program: Program, problem: Problem, taken: Ints) -> None:
@@ -156,43 +198,55 @@ def _once_per_target(program: Program, problem: Problem, taken: Ints) -> None:
     program.add_rows(Rows.of(offsets, taken[rows], upper=1.0))
 
 
-def _paid_for_the_best(program: Program, problem: Problem, taken: Ints) -> Paid:
-    """Pay for one image of each target that is taken.
+def _paid_for_the_best(
+    program: Program, problem: Problem, taken: Ints, down: Ints, lost: Floats
+) -> Paid:
+    """Pay for one image of each target that is taken, and comes down.
 
     A slow satellite may turn by way of a target that it has collected already.
     """
-    paid = Paid.of(problem)
+    paid = Paid.of(problem, lost)
     offsets = paid.offsets
-    collected = program.add_columns(paid.worth, is_integer=False)
-    column = np.insert(taken[paid.rows], offsets[1:], collected)
-    value = np.insert(np.full(len(paid.rows), -1.0), offsets[1:], 1.0)
-    program.add_rows(Rows.of(offsets + np.arange(len(offsets)), column, value, upper=0.0))
+    collected = program.add_columns(paid.worth - paid.lost, is_integer=False)
+    program.add_rows(_no_more_than(collected, taken[paid.rows], offsets))
     first = np.flatnonzero(np.diff(paid.target, prepend=-1, append=-1))
     groups = [collected[a:b] for a, b in itertools.pairwise(first) if b - a > 1]
     program.add_rows(Rows.at_most(groups, [1.0] * len(groups)))
+    of_image = np.repeat(paid.lost, np.diff(offsets)) > 0.0
+    comes = np.flatnonzero(paid.lost > 0.0)
+    delivered = program.add_columns(paid.lost[comes], is_integer=False)
+    program.add_rows(Rows.aligned((delivered, 1.0), (collected[comes], -1.0), upper=0.0))
+    counts = np.concatenate([[0], np.cumsum(np.diff(offsets)[comes])])
+    program.add_rows(_no_more_than(delivered, down[paid.rows[of_image]], counts))
     return paid
 
 
+def _no_more_than(columns: Ints, others: Ints, offsets: Longs) -> Rows:
+    """Return rows that let each column be no more than a group of others comes to."""
+    column = np.insert(others, offsets[1:], columns)
+    value = np.insert(np.full(len(others), -1.0), offsets[1:], 1.0)
+    return Rows.of(offsets + np.arange(len(offsets)), column, value, upper=0.0)
+
+
 def _constraints(
-    program: Program,
-    problem: Problem,
-    taken: Ints,
-    precedences: tuple[Precedence, ...],
+    model: PlanProgram,
     terms: list[ResourceTerms | None],
     formulation: Formulation,
     margin: float,
 ) -> None:
+    program = model.program
     for satellite, precedence, own_terms in zip(
-        problem.satellites, precedences, terms, strict=True
+        model.problem.satellites, model.precedences, terms, strict=True
     ):
-        own = taken[satellite.rows]
+        own = model.taken[satellite.rows]
         if len(own) == 0:
             continue
         _agility(program, own, precedence, formulation)
         _detours(program, satellite, own, precedence)
         if own_terms is not None:
-            add_resources(program, satellite, own_terms, own, margin)
-    _stations(program, problem, taken)
+            down = model.down[satellite.rows]
+            add_resources(program, satellite, own_terms, own, down, margin)
+    _stations(program, model.problem, model.taken)
 
 
 def _agility(program: Program, own: Ints, precedence: Precedence, formulation: Formulation) -> None:

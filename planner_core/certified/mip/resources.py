@@ -12,6 +12,9 @@ telemetry of all seconds so far). Idling is then free, and a level changes at ta
 * ``G[k] >= G[k-1] + data_gain[k] * x[k]``, ``G[k] >= empty[k]`` where k is a contact;
 * and the limits, for the instants at which the booked level is the lowest (or highest) one.
 
+Images come down in the order in which they were taken. So one is on the ground at the end if the
+recorder then holds no more than what was recorded after it (``_add_shares``).
+
 A task that still runs when the next could begin has been booked whole, while some of its
 sunlight and telemetry is yet to come. Where it begins the limits allow for that.
 """
@@ -25,6 +28,7 @@ import numpy as np
 
 from planner_core.certified.dp.resource_network import must_deliver, network_of
 from planner_core.certified.mip.program import Program, Rows
+from planner_core.certified.tolerances import ON_BOARD
 from planner_core.mdp.idle_energy import IdleEnergy, idle_energy
 from planner_core.precedence.relation import comes_before, direct_precedence
 from planner_core.problem import (
@@ -95,6 +99,8 @@ class ResourceTerms:
         What is given back to pairs of tasks.
     delivered
         Highest level at the end with each task as the last image, where images must come down.
+    comes_down
+        The same for each image to be on the ground, where some may stay on board.
     """
 
     energy_cost: Floats
@@ -109,6 +115,7 @@ class ResourceTerms:
     recorder_top_first: float
     given: Given = NOTHING_GIVEN
     delivered: Floats | None = None
+    comes_down: Floats | None = None
 
     def of_part(self, rows: Ints) -> ResourceTerms:
         """Return the terms where only some of the tasks may be taken, in ascending order.
@@ -127,12 +134,9 @@ class ResourceTerms:
         )
 
     def _at(self, rows: Ints) -> ResourceTerms:
-        others = ("recorder_top_first", "given", "delivered")
-        names = [f.name for f in fields(self) if f.name not in others]
+        names = [f.name for f in fields(self) if isinstance(getattr(self, f.name), np.ndarray)]
         part = {name: getattr(self, name)[rows] for name in names}
-        delivered = None if self.delivered is None else self.delivered[rows]
-        given = self.given.of_part(rows, len(self.full))
-        return replace(self, given=given, delivered=delivered, **part)
+        return replace(self, given=self.given.of_part(rows, len(self.full)), **part)
 
 
 def resource_terms(problem: Problem, satellite: SatelliteProblem) -> ResourceTerms:
@@ -142,9 +146,11 @@ def resource_terms(problem: Problem, satellite: SatelliteProblem) -> ResourceTer
         if problem.dynamics == "physical"
         else event_terms(satellite)
     )
-    if not must_deliver(problem, satellite):
-        return terms
-    return replace(terms, delivered=network_of(problem, satellite).delivered)
+    if must_deliver(problem, satellite):
+        return replace(terms, delivered=network_of(problem, satellite).delivered)
+    if problem.counts_delivery:
+        return replace(terms, comes_down=network_of(problem, satellite).data_floor)
+    return terms
 
 
 def physical_terms(problem: Problem, satellite: SatelliteProblem) -> ResourceTerms:
@@ -260,6 +266,7 @@ def add_resources(
     satellite: SatelliteProblem,
     terms: ResourceTerms,
     taken: Ints,
+    down: Ints,
     margin: float,
 ) -> None:
     """Add one satellite's battery and recorder.
@@ -270,11 +277,17 @@ def add_resources(
         Of the tasks that may be taken.
     taken
         Their columns x. Shape ``(m,)``.
+    down
+        The columns that say that an image comes down; -1 where there is none. Shape ``(m,)``.
     margin
         How far inside the strict limits to stay; negative to let them be touched.
     """
     _add_battery(program, satellite, terms, taken, margin)
-    _add_recorder(program, satellite, terms, taken, margin)
+    level = _add_recorder(program, satellite, terms, taken, margin)
+    if terms.delivered is not None:
+        _add_delivery(program, satellite, terms.delivered, level, taken)
+    if terms.comes_down is not None:
+        _add_shares(program, terms, level, taken, down, margin)
 
 
 def _add_battery(
@@ -346,7 +359,8 @@ def _add_changes(
 
 def _add_recorder(
     program: Program, satellite: SatelliteProblem, terms: ResourceTerms, taken: Ints, margin: float
-) -> None:
+) -> Ints:
+    """Add the recorder; return the columns of its level after each task."""
     r = satellite.resources
     start = r.initial_recorder_fraction
     top = terms.recorder_top_first - margin
@@ -368,8 +382,7 @@ def _add_recorder(
             (level[high], 1.0), (taken[high], -rise[high]), lower=terms.recorder_floor[high]
         )
     )
-    if terms.delivered is not None:
-        _add_delivery(program, satellite, terms.delivered, level, taken)
+    return level
 
 
 def _add_delivery(
@@ -384,3 +397,31 @@ def _add_delivery(
     last = np.full(len(images), level[-1])
     less = highest - delivered[images]
     program.add_rows(Rows.aligned((last, 1.0), (taken[images], less), upper=highest))
+
+
+def _add_shares(
+    program: Program, terms: ResourceTerms, level: Ints, taken: Ints, down: Ints, margin: float
+) -> None:
+    """Let an image come down only if the recorder holds no more at the end than is younger.
+
+    What is recorded after each image is a column of its own, so that rows stay short.
+    """
+    images = np.flatnonzero(down >= 0)
+    if len(images) == 0:
+        return
+    program.add_rows(Rows.aligned((down[images], 1.0), (taken[images], -1.0), upper=0.0))
+    fills = np.flatnonzero((terms.data_gain > 0.0) | (down >= 0))
+    most = np.append(np.full(len(fills) - 1, np.inf), 0.0)
+    after = program.add_columns(np.zeros(len(fills)), upper=most, is_integer=False)
+    next_one, gain = taken[fills[1:]], -terms.data_gain[fills[1:]]
+    program.add_rows(
+        Rows.aligned((after[:-1], 1.0), (after[1:], -1.0), (next_one, gain), lower=0.0, upper=0.0)
+    )
+    assert terms.comes_down is not None
+    free = terms.comes_down[images] + (ON_BOARD if margin < 0.0 else -margin)
+    highest = max(float(terms.recorder_top[-1]), float(free.max()))
+    last = np.full(len(images), level[-1])
+    younger = after[np.searchsorted(fills, images)]
+    program.add_rows(
+        Rows.aligned((last, 1.0), (younger, -1.0), (down[images], highest - free), upper=highest)
+    )

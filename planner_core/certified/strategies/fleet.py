@@ -83,7 +83,7 @@ class FleetSearch:
         in_a_slice = int(TUNING.moves_per_task * num_accesses / TUNING.patience) + 1
         with side_by_side(self.budget.num_threads) as together:
             while left > 0 and not self.best.is_done:
-                end = max(left - in_a_slice, 0)
+                before, end = left, max(left - in_a_slice, 0)
                 while left > end and self._is_wanted(pool, streams):
                     num_moves = min(left, TUNING.moves_at_a_time)
                     moves = [
@@ -95,6 +95,8 @@ class FleetSearch:
                         self._merge(pool, streams)
                 for plan in (pool.plan, *(stream.plan for stream in streams)):
                     self.best.offer(plan)
+                if left == before:
+                    return
                 yield
 
     def _is_wanted(self, pool: PlanPool, streams: Sequence[WindowSearch]) -> bool:
