@@ -128,14 +128,14 @@ FAMILIES: Final[Mapping[str, Family]] = {
         has_random_rewards=True, has_tight_battery=True,
     ),
     "delivered-paper-500": Family(
-        num_targets=500, budget_s=20.0, quick_budget_s=10.0, dynamics="paper", objective=_DELIVERED
+        num_targets=500, budget_s=20.0, quick_budget_s=None, dynamics="paper", objective=_DELIVERED
     ),
     "delivered-1000": Family(
         num_targets=1000, budget_s=10.0, quick_budget_s=5.0, dynamics="physical",
         objective=_DELIVERED,
     ),
     "share-200": Family(
-        num_targets=200, budget_s=10.0, quick_budget_s=5.0, dynamics="physical",
+        num_targets=200, budget_s=10.0, quick_budget_s=None, dynamics="physical",
         objective=_shared(0.9),
     ),
     "share-paper-500": Family(
@@ -143,7 +143,7 @@ FAMILIES: Final[Mapping[str, Family]] = {
         objective=_shared(0.5),
     ),
     "share-1000": Family(
-        num_targets=1000, budget_s=20.0, quick_budget_s=10.0, dynamics="physical",
+        num_targets=1000, budget_s=20.0, quick_budget_s=None, dynamics="physical",
         objective=_shared(0.9),
     ),
     "share-fleet-4x2000": Family(

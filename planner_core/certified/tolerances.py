@@ -46,6 +46,15 @@ TOUCHING: Final = -1e-9
 """How far beyond the limits plans of a program may be, so that its bound holds for those that touch
 them."""
 
+UNLIKE: Final = 1e-7
+"""Relative: by how much every other worth of a program is raised, so that sums are no multiples.
+Where they are HiGHS rounds bounds to them, and allows for ``CHAINED`` alone in that: a relaxation
+at 138.9999999991 came to be 138.9, where a plan has 139. It ends sooner by it as well: twelve
+missions of 60 to 150 targets take 0.1 to 4 s, and 0.1 to 11 s without."""
+
+NEARLY: Final = 0.999
+"""Of a unit of worth: HiGHS need not tell plans apart that are nearer than that."""
+
 INSIDE: Final = 1e-7
 """How far a program stays within the limits, so that the referee accepts its plans."""
 

@@ -119,6 +119,17 @@ def test_highs_knows_what_stays_on_board(
     assert solution.bound == pytest.approx(best, abs=1e-4)
 
 
+def test_highs_rounds_no_bound_to_whole_sums() -> None:
+    """What it allows for then is less than relaxations with batteries are off by."""
+    problem = random_problem(3, num_collects=60, num_targets=30, num_contacts=4, span_s=3000.0)
+    problem = with_objective(problem, Objective(collected_share=0.9))
+    proven = Milp().solve(problem, Budget(), 0).proven
+    assert proven is not None
+    assert proven.log is not None
+    assert "Solving MIP model" in proven.log
+    assert "Objective function is integral" not in proven.log
+
+
 def test_amounts_that_may_stay_on_board_bind_plans_and_the_least_of_the_best_is_chosen(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

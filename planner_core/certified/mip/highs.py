@@ -12,7 +12,7 @@ import numpy as np
 from planner_core.budget import Budget
 from planner_core.certified.mip.program import Program, Rows
 from planner_core.certified.sizes import LOG_CHARACTERS, PAUSE_S, POLL_S
-from planner_core.certified.tolerances import CHAINED, SAME
+from planner_core.certified.tolerances import CHAINED, NEARLY, SAME
 from planner_core.problem import Floats
 
 # Sums of zeros and ones bear HiGHS's usual tolerance. In a long chain of levels each row may
@@ -121,6 +121,7 @@ class Engine:
         heuristic_effort: float | None,
         watch: Watch,
         max_nodes: int | None = None,
+        unit: float = 0.0,
     ) -> Outcome:
         """Return the best integer point.
 
@@ -137,6 +138,8 @@ class Engine:
         max_nodes
             How many parts of the search to look at; unlike a limit in seconds, the same
             everywhere.
+        unit
+            An amount of which what any point is worth is a multiple, about; 0 where there is none.
         """
         if self._is_abandoned:
             # HiGHS is still in its last relaxation, and must not be touched.
@@ -146,6 +149,8 @@ class Engine:
         kinds = np.full(len(integer), int(highspy.HighsVarType.kInteger), dtype=np.uint8)
         highs.changeColsIntegrality(len(integer), integer, kinds)
         highs.setOptionValue("mip_rel_gap", gap)
+        if unit > 0.0:
+            highs.setOptionValue("mip_abs_gap", NEARLY * unit)
         if heuristic_effort is not None:
             highs.setOptionValue("mip_heuristic_effort", heuristic_effort)
         if max_nodes is not None:

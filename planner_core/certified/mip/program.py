@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from planner_core.certified.tolerances import UNLIKE
 from planner_core.problem import Bools, Floats, Ints
 
 
@@ -105,6 +106,12 @@ class Program:
         self.is_integer.append(np.full(n, is_integer))
         self.num_columns += n
         return np.arange(self.num_columns - n, self.num_columns, dtype=np.int32)
+
+    def tell_apart(self) -> None:
+        """Raise every other worth by a hair: bounds stay bounds, and sums are no multiples."""
+        worth = np.concatenate(self.worth)
+        worth[::2] *= 1.0 + UNLIKE
+        self.worth = [worth]
 
     def add_rows(self, rows: Rows) -> None:
         """Add constraints; none is no harm."""

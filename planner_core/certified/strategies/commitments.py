@@ -16,6 +16,7 @@ import numpy as np
 
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.choices import ChoiceSearch
+from planner_core.certified.strategies.supports import is_shared
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import COLLECT, Bools, Problem, SatelliteProblem
 from planner_core.problem.plan import Plan
@@ -35,8 +36,8 @@ def best_commitment(best: Incumbent, unit: float, first_goal: float, seed: int) 
 
     Of two that lead as far it is the one that leaves less on board. A few moves tell more than
     first plans do: 500 targets and a share of 0.5 (`paper`, two draws) come to 281 and 282.5 after
-    12 CPU seconds, and to 273 and 282 by the first plans. Better plans on the way are offered to
-    ``best``.
+    12 CPU seconds, and to 273 and 282 by the first plans. Fleets lose a little by them. Better
+    plans on the way are offered to ``best``.
 
     Parameters
     ----------
@@ -48,6 +49,7 @@ def best_commitment(best: Incumbent, unit: float, first_goal: float, seed: int) 
         return None
     found, most, idle, stranded = None, -np.inf, 0, np.inf
     fill = _typical_fill(problem)
+    num_moves = 0 if is_shared(problem) else TUNING.several
     for num_images in _amounts(problem):
         if best.budget.is_spent() or idle == TUNING.tries:
             break
@@ -57,7 +59,7 @@ def best_commitment(best: Incumbent, unit: float, first_goal: float, seed: int) 
         choices = ChoiceSearch(part, unit, seed, best.budget.stop)
         choices.start(np.zeros(len(problem.opportunities), dtype=np.bool_), first_goal)
         best.offer(choices.plan)
-        for _ in range(TUNING.several):
+        for _ in range(num_moves):
             choices.move()
         best.offer(choices.plan)
         timeline = best.judge(choices.plan)
@@ -73,8 +75,7 @@ def best_commitment(best: Incumbent, unit: float, first_goal: float, seed: int) 
 def _amounts(problem: Problem) -> Iterator[int | None]:
     """Yield how many typical images may stay in each recorder, first of all any number."""
     yield None
-    is_fleet = sum(len(satellite) > 0 for satellite in problem.satellites) > 1
-    yield from TUNING.images_on_board[1::2] if is_fleet else TUNING.images_on_board
+    yield from TUNING.images_on_board[1::2] if is_shared(problem) else TUNING.images_on_board
 
 
 def _most_stranded(problem: Problem, timeline: Timeline) -> int:

@@ -85,6 +85,8 @@ class WholeProgram:
         self, problem: Problem, budget: Budget, seed: int, best: Incumbent, margin: float
     ) -> Outcome:
         model = plan_program(problem, self.formulation, margin)
+        if problem.use_resources:
+            model.program.tell_apart()
         engine = Engine(model.program, budget, seed, is_chained=problem.use_resources)
         report = _Reporter(budget)
 
@@ -93,7 +95,7 @@ class WholeProgram:
 
         if self.formulation == "antichain":
             _cut(engine, problem, model, self.cut_rounds, watch)
-        return engine.search(_columns(best, model), best.gap, None, watch)
+        return engine.search(_columns(best, model), best.gap, None, watch, unit=best.unit)
 
 
 def exhaust(search: Search) -> Iterator[None]:
