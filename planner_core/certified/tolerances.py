@@ -52,8 +52,9 @@ Where they are HiGHS rounds bounds to them, and allows for ``CHAINED`` alone in 
 at 138.9999999991 came to be 138.9, where a plan has 139. It ends sooner by it as well: twelve
 missions of 60 to 150 targets take 0.1 to 4 s, and 0.1 to 11 s without."""
 
-NEARLY: Final = 0.999
-"""Of a unit of worth: HiGHS need not tell plans apart that are nearer than that."""
+NEARLY: Final = 0.5
+"""Of a unit of worth: HiGHS need not tell plans apart that are nearer than that. What ``UNLIKE``
+adds stays below it where plans earn up to five million units, of which one is ``SAME``."""
 
 INSIDE: Final = 1e-7
 """How far a program stays within the limits, so that the referee accepts its plans."""
