@@ -54,7 +54,7 @@ def best_commitment(best: Incumbent, unit: float, first_goal: float, seed: int) 
         if best.budget.is_spent() or idle == TUNING.tries:
             break
         if num_images is not None and num_images >= stranded:
-            continue  # the plan without a limit leaves no more than that
+            continue  # a plan that is known leaves no more than that
         part = problem if num_images is None else replace(problem, left_on_board=num_images * fill)
         choices = ChoiceSearch(part, unit, seed, best.budget.stop)
         choices.start(np.zeros(len(problem.opportunities), dtype=np.bool_), first_goal)
@@ -63,7 +63,8 @@ def best_commitment(best: Incumbent, unit: float, first_goal: float, seed: int) 
             choices.move()
         best.offer(choices.plan)
         timeline = best.judge(choices.plan)
-        stranded = min(stranded, _most_stranded(problem, timeline))
+        if timeline.is_valid:
+            stranded = min(stranded, _most_stranded(problem, timeline))
         idle = 0 if timeline.reward > most else idle + 1
         if timeline.reward >= most:
             found = None if part is problem else Committed(problem=part, plan=choices.plan)
