@@ -47,14 +47,15 @@ TOUCHING: Final = -1e-9
 them."""
 
 UNLIKE: Final = 1e-7
-"""Relative: by how much every other worth of a program is raised, so that sums are no multiples.
-Where they are HiGHS rounds bounds to them, and allows for ``CHAINED`` alone in that: a relaxation
-at 138.9999999991 came to be 138.9, where a plan has 139. It ends sooner by it as well: twelve
-missions of 60 to 150 targets take 0.1 to 4 s, and 0.1 to 11 s without."""
+"""Relative: by how much the worths of a program are raised at most, each by another amount, so that
+sums are no multiples. Where they are HiGHS rounds bounds to them, and allows for ``CHAINED`` alone
+in that: a relaxation at 138.9999999991 came to be 138.9, where a plan has 139. It also finds its
+way sooner among plans that are not alike: 24 missions of 60 to 150 targets take 21 s in all,
+and 104 s without."""
 
 NEARLY: Final = 0.5
 """Of a unit of worth: HiGHS need not tell plans apart that are nearer than that. What ``UNLIKE``
-adds stays below it where plans earn up to five million units, of which one is ``SAME``."""
+adds is less, up to plans of five million units. From there on a unit is less than ``SAME``."""
 
 INSIDE: Final = 1e-7
 """How far a program stays within the limits, so that the referee accepts its plans."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -11,6 +13,7 @@ from planner_core.budget import Budget, Termination
 from planner_core.certified.driver import Effort
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.fleet_start import priced_start
+from planner_core.certified.lns.search import WindowSearch
 from planner_core.certified.mip.solution_pool import PlanPool
 from planner_core.certified.multipliers.paths import ascent_on_paths
 from planner_core.certified.proofs.documents import from_json, is_proven, to_json
@@ -106,6 +109,15 @@ def test_what_streams_are_worth_together_is_taken(monkeypatch: pytest.MonkeyPatc
         pass
     assert known[0] == 2  # a plan of each stream
     assert search.best.reward >= replay(problem, best).reward
+
+
+def test_windows_end_where_a_stream_claims_more_than_the_referee_gives(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(WindowSearch, "reward", 1e6)
+    search = FleetSearch(Incumbent(fleet(3), Budget(), 0.0), 0)
+    assert len(list(itertools.islice(search.search(20.0), 10))) < 10
+    assert not search.best.is_optimal
 
 
 def test_a_large_fleet_is_planned_in_one_stream() -> None:

@@ -387,3 +387,17 @@ def test_no_bound_is_told_below_the_optimum_of_a_program_without_a_start(seed: i
     reward = float(np.concatenate(program.worth) @ outcome.columns)
     assert outcome.bound == pytest.approx(reward)
     assert min(bounds) >= reward - 1e-6
+
+
+def test_worths_are_told_apart_and_none_is_lowered() -> None:
+    program = Program()
+    program.add_columns(np.array([0.0, 3.0, 0.0, 3.0]))
+    program.add_columns(np.array([3.0]))
+    program.tell_apart()
+    (worth,) = program.worth
+    assert worth[[0, 2]].tolist() == [0.0, 0.0]
+    raised = worth[[1, 3, 4]]
+    assert len(set(raised.tolist())) == 3
+    assert np.all(raised >= 3.0)
+    assert raised == pytest.approx(3.0, rel=1e-7, abs=0.0)
+    assert program.num_columns == len(worth)

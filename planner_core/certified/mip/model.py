@@ -11,7 +11,8 @@ import numpy as np
 from planner_core.certified.dp.resource_network import must_deliver
 from planner_core.certified.mip.clique_cuts import antichain_cover, detours, excluding_pairs
 from planner_core.certified.mip.program import Program, Rows
-from planner_core.certified.mip.resources import ResourceTerms, add_resources, resource_terms
+from planner_core.certified.mip.resource_terms import ResourceTerms, resource_terms
+from planner_core.certified.mip.resources import add_resources
 from planner_core.certified.tolerances import SAME
 from planner_core.precedence.antennas import antenna_groups
 from planner_core.precedence.relation import (
@@ -116,7 +117,7 @@ def plan_program(
     margin: float,
     rows: Ints | None = None,
     *,
-    sees_what_stays: bool = True,
+    counts_delivery: bool = True,
 ) -> PlanProgram:
     """Return the program of the plans that take some of the tasks.
 
@@ -126,14 +127,16 @@ def plan_program(
         How far inside battery and recorder limits to stay.
     rows
         The opportunities that a plan may take, ascending; all by default.
-    sees_what_stays
+    counts_delivery
         Whether images that stay on board are worth less; otherwise all are worth the most they can.
     """
     terms = [
         resource_terms(problem, satellite) if problem.use_resources and len(satellite) else None
         for satellite in problem.satellites
     ]
-    lost = _lost_on_board(problem) if sees_what_stays else np.zeros(len(problem.opportunities))
+    lost = _lost_on_board(problem)
+    if not counts_delivery:
+        lost[:] = 0.0
     if rows is not None:
         # What a task costs depends on the tasks around it, taken or not.
         is_kept = np.zeros(len(problem.opportunities), dtype=np.bool_)
@@ -181,14 +184,11 @@ def _lost_on_board(problem: Problem) -> Floats:
 
     Nothing where plans hold only such as come down, and where none can.
     """
-    lost = np.zeros(len(problem.opportunities))
-    if not problem.counts_delivery:
-        return lost
-    on_board = problem.objective.collected_share * problem.worth_on_ground
-    for satellite in problem.satellites:
-        if not must_deliver(problem, satellite):
-            lost[satellite.rows] = (problem.worth - on_board)[satellite.rows]
+    lost = problem.lost_on_board.copy()
     lost[lost <= SAME * problem.worth] = 0.0
+    for satellite in problem.satellites:
+        if must_deliver(problem, satellite):
+            lost[satellite.rows] = 0.0
     return lost
 
 

@@ -108,10 +108,9 @@ class Program:
         return np.arange(self.num_columns - n, self.num_columns, dtype=np.int32)
 
     def tell_apart(self) -> None:
-        """Raise every other worth by a hair: bounds stay bounds, and sums are no multiples."""
+        """Raise each worth by a hair of its own: bounds stay bounds, and sums are no multiples."""
         worth = np.concatenate(self.worth)
-        worth[::2] *= 1.0 + UNLIKE
-        self.worth = [worth]
+        self.worth = [worth * (1.0 + UNLIKE * np.random.default_rng(0).random(len(worth)))]
 
     def add_rows(self, rows: Rows) -> None:
         """Add constraints; none is no harm."""

@@ -82,8 +82,7 @@ class Shares:
         is_image = satellite.kind == COLLECT
         size = np.where(is_image, satellite.end_s - satellite.start_s, 0.0)
         size *= satellite.resources.collect_fill_per_s
-        on_board = objective.collected_share * problem.worth_on_ground[rows]
-        lost = np.where(is_image, problem.worth[rows] - on_board, 0.0)
+        lost = problem.lost_on_board[rows]
         counts = (lost > 0.0) & (size > 0.0)
         if not counts.any():
             return None

@@ -96,7 +96,7 @@ class FleetSearch:
                 for plan in (pool.plan, *(stream.plan for stream in streams)):
                     self.best.offer(plan)
                 if left == before:
-                    return
+                    return  # a stream's plan claims to be good enough, and the referee differs
                 yield
 
     def _is_wanted(self, pool: PlanPool, streams: Sequence[WindowSearch]) -> bool:
