@@ -119,6 +119,7 @@ _RESOURCES: Final = {
 }  # fmt: skip
 _CLOUDS: Final = {"clouds-1000": 12.0}
 _DELIVERED: Final = {"delivered-paper-500": 12.0}
+_AGE_ON_BOARD: Final = {"half-life-12h-share-1000": 10.0, "half-life-12h-share-paper-1000": 10.0}
 _FLEET: Final = {"fleet-4x2000": 12.0, "fleet-2x500": 10.0}
 _STATIONS: Final = {"fleet-stations-4x2000": 60.0}
 _LARGE_FLEET: Final = {"fleet-24x10000": 60.0}
@@ -144,6 +145,7 @@ STRATEGIES: Final[Mapping[str, Change]] = {
             "whole relaxation": _CLOUDS,
             "multipliers": _RESOURCES,
             "programs with contacts fixed": _RESOURCES,
+            "plans without the half-life": _AGE_ON_BOARD,
             "windows with free starts": _FREE,
             # Their first tables alone take six seconds.
             "multipliers of chains": {"continuous-1000": 30.0},

@@ -34,8 +34,8 @@ _WARM_UP_DRAW: Final = 99
 _WARM_UP_TARGETS: Final = 100
 
 
-def _halved_in(half_life_h: float) -> Objective:
-    return Objective(collected_share=0.0, half_life_s=3600.0 * half_life_h)
+def _halved_in(half_life_h: float, collected_share: float = 0.0) -> Objective:
+    return Objective(collected_share=collected_share, half_life_s=3600.0 * half_life_h)
 
 
 def _shared(collected_share: float) -> Objective:
@@ -157,6 +157,14 @@ FAMILIES: Final[Mapping[str, Family]] = {
     "half-life-12h-1000": Family(
         num_targets=1000, budget_s=10.0, quick_budget_s=10.0, dynamics="physical",
         objective=_halved_in(12.0),
+    ),
+    "half-life-12h-share-1000": Family(
+        num_targets=1000, budget_s=10.0, quick_budget_s=None, dynamics="physical",
+        objective=_halved_in(12.0, 0.9),
+    ),
+    "half-life-12h-share-paper-1000": Family(
+        num_targets=1000, budget_s=10.0, quick_budget_s=None, dynamics="paper",
+        objective=_halved_in(12.0, 0.9),
     ),
     "half-life-12h-fleet-4x2000": Family(
         num_satellites=4, num_targets=2000, budget_s=40.0, quick_budget_s=None, dynamics="physical",

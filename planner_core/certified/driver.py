@@ -131,9 +131,13 @@ class Search:
         *,
         like: Problem | None = None,
         without: Slices | None = None,
+        only: Sequence[Slices] | None = None,
     ) -> Search:
-        """Return a search for another problem, with the same strategies but for one."""
-        strategies = [one for one in self.strategies if one.slices is not without]
+        """Return a search for another problem, with all strategies but one, or with a few."""
+        wanted = [one.slices for one in self.strategies] if only is None else only
+        strategies = [
+            one for one in self.strategies if one.slices in wanted and one.slices is not without
+        ]
         return Search(best, seed, strategies, like=like)
 
     def solved(self) -> Solution:

@@ -13,12 +13,14 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget, Termination
+from planner_core.certified.driver import Search
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.choices import ChoiceSearch
 from planner_core.certified.proofs.resource_bound import quick_bound, resource_value
 from planner_core.certified.solver import Certified
 from planner_core.certified.strategies import commitments
-from planner_core.certified.tuning import TUNING
+from planner_core.certified.strategies.every import STRATEGIES
+from planner_core.certified.tuning import TUNING, tuned
 from planner_core.domain import Agility, Objective
 from planner_core.problem import COLLECT, Bytes, Problem
 from planner_core.problem.delivery import with_objective
@@ -169,6 +171,28 @@ def test_amounts_that_may_stay_on_board_bind_plans_and_the_least_of_the_best_is_
         num_left_out += len(amounts) < len(TUNING.images_on_board)
     assert num_chosen
     assert num_left_out
+
+
+def test_where_images_earn_most_when_they_are_taken_a_half_life_leaves_some_on_board() -> None:
+    """By the contacts that they take plans bring all of them down."""
+    name = "plans without the half-life"
+    others = [one for one in STRATEGIES if one.name != name]
+    assert len(others) == len(STRATEGIES) - 1
+    with tuned(large=20):
+        for seed in (10, 12):
+            problem = random_problem(
+                seed,
+                num_collects=60,
+                num_targets=30,
+                num_contacts=4,
+                span_s=3000.0,
+                dynamics="paper",
+            )
+            problem = with_objective(problem, Objective(collected_share=0.9, half_life_s=600.0))
+            less, more = Incumbent(problem, Budget(), 0.0), Incumbent(problem, Budget(), 0.0)
+            Search(less, 0, others).solved()
+            Search(more, 0, STRATEGIES).solved()
+            assert less.reward < more.reward <= more.bound.value
 
 
 @functools.cache

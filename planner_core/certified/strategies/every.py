@@ -27,6 +27,7 @@ from planner_core.certified.strategies.supports import (
     has_one_start_each,
     has_steady_worth,
     is_aging,
+    is_aging_on_board,
     is_fleet,
     is_free_fleet,
     is_free_satellite,
@@ -161,6 +162,11 @@ STRATEGIES: Final = (
         name="days planned anew",
         supports=lambda p: is_aging(p) and is_shared(p),
         slices=days.days,
+    ),
+    Strategy(
+        name="plans without the half-life",
+        supports=is_aging_on_board,
+        slices=days.first_without_half_life,
     ),
     Strategy(
         name="plans by their contacts",

@@ -120,6 +120,12 @@ def is_aging(problem: Problem) -> bool:
     return has_limits(problem) and has_half_life(problem)
 
 
+def is_aging_on_board(problem: Problem) -> bool:
+    """Whether many images of one satellite do, and earn the larger part when they are taken."""
+    is_one = is_aging(problem) and not is_shared(problem)
+    return is_one and is_large(problem) and problem.objective.collected_share > 0.5
+
+
 def is_within_reach(problem: Problem) -> bool:
     """Whether the whole program is worth a try at last."""
     if has_free_starts(problem):
