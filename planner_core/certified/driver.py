@@ -134,9 +134,10 @@ class Search:
         only: Sequence[Slices] | None = None,
     ) -> Search:
         """Return a search for another problem, with all strategies but one, or with a few."""
-        wanted = [one.slices for one in self.strategies] if only is None else only
         strategies = [
-            one for one in self.strategies if one.slices in wanted and one.slices is not without
+            one
+            for one in self.strategies
+            if one.slices is not without and (only is None or one.slices in only)
         ]
         return Search(best, seed, strategies, like=like)
 

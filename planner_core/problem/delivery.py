@@ -31,6 +31,20 @@ def with_objective(problem: Problem, objective: Objective) -> Problem:
     return replace(problem, objective=objective, worth=worth, full_worth=problem.worth)
 
 
+def without_half_life(problem: Problem) -> Problem:
+    """Return the problem whose images keep their worth however late they come down."""
+    plain = replace(problem, worth=problem.worth_on_ground, full_worth=None)
+    return with_objective(plain, replace(problem.objective, half_life_s=None))
+
+
+def lost_on_board(problem: Problem) -> Floats:
+    """Return what each image earns less than its worth if it stays on board. Shape ``(n,)``."""
+    if not problem.counts_delivery:
+        return np.zeros(len(problem.worth))
+    on_board = problem.objective.collected_share * problem.worth_on_ground
+    return np.maximum(problem.worth - on_board, 0.0)
+
+
 def least_age_s(problem: Problem) -> Floats:
     """Return the age at which each image is on the ground at the earliest, whatever else is done.
 

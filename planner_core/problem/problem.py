@@ -341,14 +341,6 @@ class Problem:
         """Return what each image earns alone that is on the ground at once. Shape ``(n,)``."""
         return self.worth if self.full_worth is None else self.full_worth
 
-    @cached_property
-    def lost_on_board(self) -> Floats:
-        """Return what each image earns less than ``worth`` if it stays on board. Shape ``(n,)``."""
-        if not self.counts_delivery:
-            return np.zeros(len(self.worth))
-        on_board = self.objective.collected_share * self.worth_on_ground
-        return np.maximum(self.worth - on_board, 0.0)
-
     def worth_of(self, rows: npt.NDArray[np.integer]) -> float:
         """Return what a plan earns at most that takes these opportunities and breaks nothing.
 

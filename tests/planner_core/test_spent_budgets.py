@@ -14,9 +14,10 @@ import pytest
 from planner_core.budget import Budget, Progress, Termination
 from planner_core.certified.solver import Certified
 from planner_core.certified.tuning import tuned
-from planner_core.domain import Agility
+from planner_core.domain import Agility, Objective
 from planner_core.precedence.relation import is_transitive
 from planner_core.problem import Problem
+from planner_core.problem.delivery import with_objective
 from planner_core.problem.pinned import Kept, Pinned
 from planner_core.referee.replay import replay
 from planner_core.solvers.rule import Rule
@@ -88,6 +89,10 @@ FAMILIES: Final[dict[str, Callable[[], Problem]]] = {
     ),
     "fleet with resources": _fleet_with_resources,
     "large fleet with resources": _fleet_with_resources,
+    "large share, and images that age": lambda: with_objective(
+        random_problem(0, num_collects=40, num_targets=20, num_contacts=4, has_rewards=True),
+        Objective(collected_share=0.9, half_life_s=600.0),
+    ),
     "continuous starts": lambda: flat_problem(
         1, num_targets=40, horizon_s=600.0
     ),

@@ -29,6 +29,7 @@ from planner_core.problem import (
     Problem,
     SatelliteProblem,
 )
+from planner_core.problem.delivery import lost_on_board
 from planner_core.problem.restrict import restricted
 
 Formulation = Literal["antichain", "pairwise"]
@@ -134,7 +135,7 @@ def plan_program(
         resource_terms(problem, satellite) if problem.use_resources and len(satellite) else None
         for satellite in problem.satellites
     ]
-    lost = _lost_on_board(problem)
+    lost = _binding_losses(problem)
     if not counts_delivery:
         lost[:] = 0.0
     if rows is not None:
@@ -179,12 +180,12 @@ def _variables(program: Program, problem: Problem, lost: Floats) -> tuple[Ints, 
     return taken, down, _paid_for_the_best(program, problem, taken, down, lost)
 
 
-def _lost_on_board(problem: Problem) -> Floats:
+def _binding_losses(problem: Problem) -> Floats:
     """Return what each image is worth less that stays on board. Shape ``(n,)``.
 
     Nothing where plans hold only such as come down, and where none can.
     """
-    lost = problem.lost_on_board.copy()
+    lost = lost_on_board(problem)
     lost[lost <= SAME * problem.worth] = 0.0
     for satellite in problem.satellites:
         if must_deliver(problem, satellite):

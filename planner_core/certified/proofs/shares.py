@@ -21,6 +21,7 @@ from planner_core.problem import (
     Problem,
     SatelliteProblem,
 )
+from planner_core.problem.delivery import lost_on_board
 from planner_core.problem.slew import TIME_TOLERANCE_S
 
 
@@ -82,7 +83,7 @@ class Shares:
         is_image = satellite.kind == COLLECT
         size = np.where(is_image, satellite.end_s - satellite.start_s, 0.0)
         size *= satellite.resources.collect_fill_per_s
-        lost = problem.lost_on_board[rows]
+        lost = lost_on_board(problem)[rows]
         counts = (lost > 0.0) & (size > 0.0)
         if not counts.any():
             return None

@@ -1,13 +1,11 @@
-"""Images that lose worth as they age, from plans as if they did not.
+"""A fleet whose images lose worth as they age: one satellite's day after another, planned anew.
 
-A fleet plans one satellite's day after another anew from such a plan, each beside the others'.
+Each is planned beside the others', from a plan that has all images brought down.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
-from typing import Final
 
 import numpy as np
 
@@ -17,7 +15,6 @@ from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.queue_plans import replanned_day
 from planner_core.certified.lns.settled_contacts import with_contacts
 from planner_core.certified.multipliers.latency import LatencyAscent
-from planner_core.certified.strategies import first_plan, resources
 from planner_core.certified.strategies.half_life_steps import (
     NamedContacts,
     bettered_by_windows,
@@ -30,14 +27,8 @@ from planner_core.certified.strategies.supports import is_fleet
 from planner_core.certified.strategies.whole_program import exhaust
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import Problem
-from planner_core.problem.delivery import with_objective
+from planner_core.problem.delivery import without_half_life
 from planner_core.problem.plan import Plan
-
-_FOR_PLANS: Final = (
-    first_plan.rule,
-    resources.windows_and_choices,
-    resources.choices_from_the_best,
-)
 
 
 def days(search: Search) -> Iterator[None]:
@@ -48,7 +39,7 @@ def days(search: Search) -> Iterator[None]:
     first, once, 267.3 and 197.9.
     """
     best, engine = search.best, search.engine(ResourceSearch)
-    undecayed = _undecayed(search.problem)
+    undecayed = without_half_life(search.problem)
     days, breaks = DayByDay(engine), _Breaks(search.budget)
     num_idle, ended = 0, list[Plan]()
     while num_idle < TUNING.patience and not best.is_done:
@@ -61,32 +52,6 @@ def days(search: Search) -> Iterator[None]:
             break  # so few tasks that every search ends with the same
         ended.append(plan)
     days.prove()
-
-
-def first_without_half_life(search: Search) -> Iterator[None]:
-    """Plan one satellite as if its images kept their worth, for a part of the time.
-
-    Plans by their contacts bring all images down. With a large share when they are taken it is
-    better to leave some on board: 1,000 targets, `paper`, a share of 0.9 and half-lives of 24 and
-    6 h earn 302.8 and 296.2 of 308.6 and 304.1 after 10 CPU seconds, in place of 284.5 and 262.7.
-    """
-    engine = search.engine(ResourceSearch)
-
-    def look(_: Progress) -> None:
-        engine.offer(inner.plan)
-        engine.best.report("plans")
-
-    part = search.budget.part(TUNING.beginning, look)
-    inner = Incumbent(_undecayed(search.problem), part, search.best.gap)
-    search.beside(inner, search.seed, only=_FOR_PLANS).solved()
-    engine.offer(inner.plan)
-    yield
-
-
-def _undecayed(problem: Problem) -> Problem:
-    """Return the problem whose images keep their worth."""
-    plain = replace(problem, worth=problem.worth_on_ground, full_worth=None)
-    return with_objective(plain, replace(problem.objective, half_life_s=None))
 
 
 def _without_half_life(

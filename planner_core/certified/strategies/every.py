@@ -166,7 +166,7 @@ STRATEGIES: Final = (
     Strategy(
         name="plans without the half-life",
         supports=is_aging_on_board,
-        slices=days.first_without_half_life,
+        slices=half_life.plans_without_half_life,
     ),
     Strategy(
         name="plans by their contacts",
