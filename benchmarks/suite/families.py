@@ -150,6 +150,10 @@ FAMILIES: Final[Mapping[str, Family]] = {
         num_satellites=4, num_targets=2000, budget_s=40.0, quick_budget_s=None, dynamics="physical",
         objective=_shared(0.9),
     ),
+    "share-fleet-paper-4x500": Family(
+        num_satellites=4, num_targets=500, budget_s=15.0, quick_budget_s=None, dynamics="paper",
+        objective=_shared(0.9),
+    ),
     "half-life-3h-1000": Family(
         num_targets=1000, budget_s=10.0, quick_budget_s=8.0, dynamics="physical",
         objective=_halved_in(3.0),

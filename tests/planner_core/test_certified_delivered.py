@@ -20,7 +20,8 @@ from planner_core.certified.proofs.resource_bound import quick_bound, resource_v
 from planner_core.certified.solver import Certified
 from planner_core.certified.strategies import commitments
 from planner_core.certified.strategies.every import STRATEGIES
-from planner_core.certified.tuning import TUNING, tuned
+from planner_core.certified.tolerances import ROUNDING
+from planner_core.certified.tuning import tuned
 from planner_core.domain import Agility, Objective
 from planner_core.problem import COLLECT, Bytes, Problem
 from planner_core.problem.delivery import with_objective
@@ -132,45 +133,69 @@ def test_highs_rounds_no_bound_to_whole_sums() -> None:
     assert "Objective function is integral" not in proven.log
 
 
-def test_amounts_that_may_stay_on_board_bind_plans_and_the_least_of_the_best_is_chosen(
-    monkeypatch: pytest.MonkeyPatch,
+@pytest.mark.parametrize("num_satellites", [1, 2])
+def test_plans_commit_to_the_least_on_board_that_the_best_of_several_keeps_to(
+    monkeypatch: pytest.MonkeyPatch, num_satellites: int
 ) -> None:
-    made: list[ChoiceSearch] = []
-    amounts: list[float | None] = []
+    made: list[tuple[float, ChoiceSearch]] = []
 
     class Noted(ChoiceSearch):
         def __init__(self, problem: Problem, unit: float, seed: int, stop: Bytes) -> None:
             super().__init__(problem, unit, seed, stop)
-            made.append(self)
-            amounts.append(problem.left_on_board)
+            amount = problem.left_on_board
+            made.append((np.inf if amount is None else amount, self))
 
     monkeypatch.setattr(commitments, "ChoiceSearch", Noted)
-    num_chosen = num_left_out = 0
+    image = 0.15  # of the recorder
+    tried = (2, 2, 1, 1, 0, 0)
+    numbers = tried if num_satellites == 1 else tried[1::2]
+    num_full = num_limited = num_free = 0
     for seed in range(20):
         made.clear()
-        amounts.clear()
         problem = random_problem(
-            seed, num_collects=60, num_targets=30, num_contacts=4, span_s=900.0, dynamics="paper"
+            seed,
+            num_collects=60,
+            num_targets=30,
+            num_contacts=4,
+            span_s=900.0,
+            dynamics="paper",
+            num_satellites=num_satellites,
         )
         problem = with_objective(problem, Objective(collected_share=0.5))
         best = Incumbent(problem, Budget(), 0.0)
-        committed = commitments.best_commitment(best, 0.5, 0.95, seed)
-        assert amounts[0] is None
-        least, rewards = np.inf, []
-        for amount, search in zip(amounts, made, strict=True):
-            # An image fills 0.15 of the recorder.
-            assert amount is None or amount < 0.15 * least
+        with tuned(images_on_board=tried):
+            committed = commitments.best_commitment(best, 0.5, 0.95, seed)
+        left, rewards = list[int](), list[float]()
+        for amount, search in made:
+            assert amount == np.inf or amount < image * min(left, default=np.inf)
             timeline = replay(problem, search.plan)
-            images = timeline.collected.values()
-            least = min(least, sum(not image.is_downlinked for image in images))
+            images = [i for i in timeline.collected.values() if not i.is_downlinked]
+            counts = [sum(i.satellite == index for i in images) for index in range(num_satellites)]
+            left.append(max(counts))
             rewards.append(timeline.reward)
+        if num_satellites == 1:
+            assert made[0][0] == np.inf
+        else:
+            # Any amount is tried where a plan comes up to the greatest.
+            assert made[0][0] == pytest.approx(image * numbers[0])
+            is_full = left[0] == numbers[0]
+            assert is_full == (np.inf in [amount for amount, _ in made])
+            num_full += is_full
         last = len(rewards) - 1 - int(np.argmax(rewards[::-1]))
-        assert (committed and committed.problem.left_on_board) == amounts[last]
+        amount = made[last][0]
+        least = min((image * n for n in numbers if n >= left[last]), default=np.inf)
+        least = min(least, amount)  # a rest of an image may stay
+        if committed is None:
+            assert least == np.inf
+            num_free += 1
+            continue
+        assert committed.problem.left_on_board == pytest.approx(least)
+        assert committed.plan == made[last][1].plan
         assert best.reward >= max(rewards)
-        num_chosen += committed is not None
-        num_left_out += len(amounts) < len(TUNING.images_on_board)
-    assert num_chosen
-    assert num_left_out
+        num_limited += least < amount - ROUNDING
+    assert num_limited
+    assert num_free
+    assert (num_satellites == 1) == (num_full == 0)
 
 
 def test_where_images_earn_most_when_they_are_taken_a_half_life_leaves_some_on_board() -> None:

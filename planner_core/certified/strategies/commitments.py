@@ -9,7 +9,6 @@ such problems tell which one to go on with. The referee weighs them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +16,7 @@ import numpy as np
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.choices import ChoiceSearch
 from planner_core.certified.strategies.supports import is_shared
+from planner_core.certified.tolerances import ROUNDING
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import COLLECT, Bools, Problem, SatelliteProblem
 from planner_core.problem.plan import Plan
@@ -39,6 +39,12 @@ def best_commitment(best: Incumbent, unit: float, first_goal: float, seed: int) 
     12 CPU seconds, and to 273 and 282 by the first plans. Fleets lose a little by them. Better
     plans on the way are offered to ``best``.
 
+    Where more may stay than the plan leaves, searches that go on from it leave more and more: they
+    count each image as if it came down. So it is the least amount that the plan keeps to, and a
+    fleet's first plan has one. Four satellites, 500 to 800 targets, shares of 0.5 and 0.9, 18
+    missions in ten CPU seconds: 1.36 % below their bounds on average, 1.65 % where any amount is
+    tried first and each amount is taken as it was tried.
+
     Parameters
     ----------
     unit, first_goal
@@ -47,44 +53,65 @@ def best_commitment(best: Incumbent, unit: float, first_goal: float, seed: int) 
     problem = best.problem
     if not problem.counts_delivery or problem.objective.is_delivered:
         return None
-    found, most, idle, stranded = None, -np.inf, 0, np.inf
     fill = _typical_fill(problem)
+    amounts = _amounts(problem, fill)
     num_moves = 0 if is_shared(problem) else TUNING.several
-    for num_images in _amounts(problem):
+    found, most, idle = None, -np.inf, 0
+    least_left, is_full = np.inf, True
+    for amount in amounts:
         if best.budget.is_spent() or idle == TUNING.tries:
             break
-        if num_images is not None and num_images >= stranded:
-            continue  # a plan that is known leaves no more than that
-        part = problem if num_images is None else replace(problem, left_on_board=num_images * fill)
-        choices = ChoiceSearch(part, unit, seed, best.budget.stop)
+        # More than a limit that is not reached, or than a known plan leaves, is of no use.
+        if not (is_full if amount == np.inf else amount < least_left - ROUNDING):
+            continue
+        choices = ChoiceSearch(_with_most(problem, amount), unit, seed, best.budget.stop)
         choices.start(np.zeros(len(problem.opportunities), dtype=np.bool_), first_goal)
         best.offer(choices.plan)
         for _ in range(num_moves):
             choices.move()
         best.offer(choices.plan)
         timeline = best.judge(choices.plan)
-        if timeline.is_valid:
-            stranded = min(stranded, _most_stranded(problem, timeline))
+        left = _most_left(problem, choices.plan, timeline) if timeline.is_valid else np.inf
+        least_left = min(least_left, left)
+        is_full = left > amount - fill + ROUNDING
         idle = 0 if timeline.reward > most else idle + 1
         if timeline.reward >= most:
+            least = min(one for one in amounts if one >= min(left - ROUNDING, amount))
+            part = _with_most(problem, least)
             found = None if part is problem else Committed(problem=part, plan=choices.plan)
             most = timeline.reward
         best.report("plans")
     return found
 
 
-def _amounts(problem: Problem) -> Iterator[int | None]:
-    """Yield how many typical images may stay in each recorder, first of all any number."""
-    yield None
-    yield from TUNING.images_on_board[1::2] if is_shared(problem) else TUNING.images_on_board
+def _amounts(problem: Problem, fill: float) -> tuple[float, ...]:
+    """Return how much may stay in each recorder, infinite for any, in the order of trials.
+
+    Parameters
+    ----------
+    fill
+        What an image takes of a recorder, about.
+    """
+    amounts = [number * fill for number in TUNING.images_on_board]
+    if not is_shared(problem):
+        return (np.inf, *amounts)
+    most, *less = amounts[1::2]
+    return (most, np.inf, *less)
 
 
-def _most_stranded(problem: Problem, timeline: Timeline) -> int:
-    """Return how many images stay in the recorder in which most do."""
-    counts = np.zeros(len(problem.satellites), dtype=np.int64)
+def _with_most(problem: Problem, amount: float) -> Problem:
+    return problem if amount == np.inf else replace(problem, left_on_board=amount)
+
+
+def _most_left(problem: Problem, plan: Plan, timeline: Timeline) -> float:
+    """Return what images fill of the recorder in which most of them stay."""
+    left = np.zeros(len(problem.satellites))
     for image in timeline.collected.values():
-        counts[image.satellite] += not image.is_downlinked
-    return int(counts.max())
+        if not image.is_downlinked:
+            action = plan.actions[image.position]
+            resources = problem.satellites[image.satellite].resources
+            left[image.satellite] += (action.end_s - action.start_s) * resources.collect_fill_per_s
+    return float(left.max())
 
 
 def _typical_fill(problem: Problem) -> float:
