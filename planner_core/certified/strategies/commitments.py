@@ -39,10 +39,10 @@ def best_commitment(best: Incumbent, unit: float, first_goal: float, seed: int) 
     12 CPU seconds, and to 273 and 282 by the first plans. Fleets lose a little by them. Better
     plans on the way are offered to ``best``.
 
-    Where more may stay than the plan leaves, searches that go on from it leave more and more: they
-    count each image as if it came down. So it is the least amount that the plan keeps to:
-    18 missions of four satellites, 500 to 800 targets, shares of 0.5 and 0.9, are 1.36 % below
-    their bounds on average after ten CPU seconds, and 1.65 % where any amount stays allowed.
+    Searches that go on from a plan count each image as if it came down. Where more may stay than
+    the plan leaves they leave more and more, so the limit is the least amount that it keeps to: 18
+    missions of four satellites, 500 to 800 targets, shares of 0.5 and 0.9, are 1.36 % below their
+    bounds on average after ten CPU seconds, and 1.65 % with the amount it was tried with.
 
     Parameters
     ----------
