@@ -25,6 +25,7 @@ _FLEET: Final = {"fleet-4x2000": 8.0}
 _STATIONS: Final = {"fleet-stations-4x2000": 30.0}
 _AGE: Final = {"half-life-12h-1000": 12.0}
 _DELIVERED: Final = {"delivered-paper-500": 12.0}
+_SUN: Final = {"share-sun-fleet-4x500": 15.0}
 _ROOMS: Final[Mapping[str, Mapping[str, float]]] = {
     "strategies.agility": {**_AGILITY, **_PASSES},
     "strategies.resources": _ONE,
@@ -33,10 +34,9 @@ _ROOMS: Final[Mapping[str, Mapping[str, float]]] = {
     "strategies.supports": {**_ONE, **_FLEET},
     "strategies.fleet": _FLEET,
     "strategies.continuous": _FREE,
-    "strategies.commitments": {**_DELIVERED, **_STATIONS},
     "strategies.half_life": _AGE,
     "strategies.half_life_steps": _AGE,
-    "lns.alternating": {**_ONE, **_STATIONS},
+    "lns.alternating": {**_ONE, **_STATIONS, **_SUN},
     "lns.choices": _ONE,
     "lns.continuous_search": _FREE,
     "lns.downlinks": _DELIVERED,

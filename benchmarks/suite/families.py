@@ -63,6 +63,8 @@ class Family:
         What an image is worth; all worth what they are when they are taken where it says nothing.
     has_forecast
         Whether it is worth that by the chance of a clear sky (``benchmarks.clouds``).
+    turns_to_sun
+        Whether satellites charge between turns to the sun alone.
     """
 
     num_targets: int
@@ -77,6 +79,7 @@ class Family:
     has_tight_battery: bool = False
     objective: Objective = _COLLECTED
     has_forecast: bool = False
+    turns_to_sun: bool = False
 
 
 FAMILIES: Final[Mapping[str, Family]] = {
@@ -154,6 +157,10 @@ FAMILIES: Final[Mapping[str, Family]] = {
         num_satellites=4, num_targets=500, budget_s=15.0, quick_budget_s=None, dynamics="paper",
         objective=_shared(0.9),
     ),
+    "share-sun-fleet-4x500": Family(
+        num_satellites=4, num_targets=500, budget_s=15.0, quick_budget_s=None,
+        dynamics="physical", objective=_shared(0.9), turns_to_sun=True,
+    ),
     "half-life-3h-1000": Family(
         num_targets=1000, budget_s=10.0, quick_budget_s=8.0, dynamics="physical",
         objective=_halved_in(3.0),
@@ -212,6 +219,8 @@ def scenario_of(family: Family, draw: int) -> Scenario:
         )
     if family.has_tight_battery:
         scenario = replace(scenario, satellites=tuple(map(_tight, scenario.satellites)))
+    if family.turns_to_sun:
+        scenario = replace(scenario, satellites=tuple(map(_turning, scenario.satellites)))
     if family.has_forecast:
         scenario = replace(scenario, forecast=forecast_of(scenario, Weather(draw)))
     return replace(
@@ -270,6 +279,10 @@ def towns(number: int, draw: int) -> tuple[Target, ...]:
         Target(id=f"t{i + 1}", lat_deg=lat, lon_deg=lon)
         for i, (lat, lon) in enumerate(zip(lat_deg.tolist(), lon_deg.tolist(), strict=True))
     )
+
+
+def _turning(satellite: Satellite) -> Satellite:
+    return replace(satellite, resources=replace(satellite.resources, sun_pointing="slew"))
 
 
 def _tight(satellite: Satellite) -> Satellite:

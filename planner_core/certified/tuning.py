@@ -124,6 +124,8 @@ class Tuning:
     large, small_fleet
         Opportunities above which steps with resources take long; up to which a fleet without them
         is planned in streams and ends with cutting planes.
+    dense
+        Opportunities of a satellite above which moves of its windows take long.
     most_columns, most_relaxed
         Tasks of a mixed-integer program, and of a relaxation without energy levels.
     steps_beside
@@ -134,8 +136,6 @@ class Tuning:
         Nodes of a HiGHS search that only seeks plans, and its share of work on heuristics.
     max_cuts
         Zero-half cuts of a round.
-    images_on_board
-        Typical images that may stay in a recorder at the end, tried in turn.
     """
 
     tries: int = 2
@@ -195,6 +195,7 @@ class Tuning:
     tasks_per_task: float = 1.2
     large: int = 3000
     small_fleet: int = 60_000
+    dense: int = 1000
     most_columns: int = 6000
     most_relaxed: int = 12_000
     steps_beside: int = 6
@@ -202,7 +203,6 @@ class Tuning:
     highs_nodes: int = 100
     highs_effort: float = 0.2
     max_cuts: int = 150
-    images_on_board: tuple[int, ...] = (40, 20, 10, 5, 2, 0)
 
 
 TUNING: Final = Tuning()

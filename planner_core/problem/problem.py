@@ -235,9 +235,8 @@ class Problem:
         The same for an image that is on the ground at once; None where that is ``worth``.
     objective
         What of its full worth an image earns when.
-    left_on_board
-        For searches for plans: how much data of images may stay in a recorder at the end, in
-        recorder capacities; None for any.
+    leaves_none_on_board
+        For searches for plans: whether all their images come down, whatever one on board earns.
     target_access
         Why a target has no opportunity, or ``ACCESS_FOUND``. Shape ``(num_targets,)``.
     station_antennas
@@ -271,7 +270,7 @@ class Problem:
     satellites: tuple[SatelliteProblem, ...]
     full_worth: Floats | None = None
     objective: Objective = field(default_factory=Objective)
-    left_on_board: float | None = None
+    leaves_none_on_board: bool = False
     pointing: Pointing | None = None
     pinned: Pinned = field(default_factory=Pinned)
     origin: Ints | None = None

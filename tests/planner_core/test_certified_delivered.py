@@ -13,17 +13,18 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget, Termination
+from planner_core.certified.dp import resource_network
 from planner_core.certified.driver import Search
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.choices import ChoiceSearch
+from planner_core.certified.lns.downlinks import brought_down
+from planner_core.certified.lns.resource_search import ResourceWindows
 from planner_core.certified.proofs.resource_bound import quick_bound, resource_value
 from planner_core.certified.solver import Certified
-from planner_core.certified.strategies import commitments
 from planner_core.certified.strategies.every import STRATEGIES
-from planner_core.certified.tolerances import ROUNDING
 from planner_core.certified.tuning import tuned
 from planner_core.domain import Agility, Objective
-from planner_core.problem import COLLECT, Bytes, Problem
+from planner_core.problem import COLLECT, Problem
 from planner_core.problem.delivery import with_objective
 from planner_core.problem.plan import Plan
 from planner_core.reasons import delivery
@@ -133,61 +134,77 @@ def test_highs_rounds_no_bound_to_whole_sums() -> None:
     assert "Objective function is integral" not in proven.log
 
 
-@pytest.mark.parametrize("num_satellites", [1, 2])
-def test_plans_commit_to_the_least_on_board_that_the_best_of_several_keeps_to(
-    monkeypatch: pytest.MonkeyPatch, num_satellites: int
+@pytest.mark.parametrize("search", [ResourceWindows, ChoiceSearch])
+@pytest.mark.parametrize("dynamics", ["physical", "paper"])
+def test_searches_count_what_stays_on_board(
+    dynamics: Literal["physical", "paper"], search: type[ResourceWindows] | type[ChoiceSearch]
 ) -> None:
-    made: list[tuple[float, ChoiceSearch]] = []
-
-    class Noted(ChoiceSearch):
-        def __init__(self, problem: Problem, unit: float, seed: int, stop: Bytes) -> None:
-            super().__init__(problem, unit, seed, stop)
-            amount = problem.left_on_board
-            made.append((np.inf if amount is None else amount, self))
-
-    monkeypatch.setattr(commitments, "ChoiceSearch", Noted)
-    image = 0.15  # of the recorder
-    tried = (2, 2, 1, 1, 0, 0)
-    numbers = tried if num_satellites == 1 else tried[1::2]
-    num_limited = num_free = 0
-    for seed in range(20):
-        made.clear()
+    """To the telemetry, and the part of an image that a contact's end leaves on board."""
+    lost, telemetry_per_s = 0.5, 1e-5
+    resources = replace(
+        TIGHT,
+        telemetry_per_s=telemetry_per_s,
+        battery_min_fraction=0.0,
+        initial_recorder_fraction=0.0,
+        collect_fill_per_s=0.002,
+    )
+    image = 30.0 * resources.collect_fill_per_s
+    num_left = num_down = 0
+    for seed in range(12):
         problem = random_problem(
             seed,
             num_collects=60,
             num_targets=30,
-            num_contacts=4,
-            span_s=900.0,
-            dynamics="paper",
-            num_satellites=num_satellites,
+            num_contacts=5,
+            num_satellites=1 + seed % 2,
+            resources=resources,
+            dynamics=dynamics,
         )
-        problem = with_objective(problem, Objective(collected_share=0.5))
-        best = Incumbent(problem, Budget(), 0.0)
-        with tuned(images_on_board=tried):
-            committed = commitments.best_commitment(best, 0.5, 0.95, seed)
-        left, rewards = list[int](), list[float]()
-        for amount, search in made:
-            assert amount == np.inf or amount < image * min(left, default=np.inf)
-            timeline = replay(problem, search.plan)
-            images = [i for i in timeline.collected.values() if not i.is_downlinked]
-            counts = [sum(i.satellite == index for i in images) for index in range(num_satellites)]
-            left.append(max(counts))
-            rewards.append(timeline.reward)
-        assert made[0][0] == np.inf
-        last = len(rewards) - 1 - int(np.argmax(rewards[::-1]))
-        amount = made[last][0]
-        least = min((image * n for n in numbers if n >= left[last]), default=np.inf)
-        least = min(least, amount)  # a rest of an image may stay
-        if committed is None:
-            assert least == np.inf
-            num_free += 1
-            continue
-        assert committed.problem.left_on_board == pytest.approx(least)
-        assert committed.plan == made[last][1].plan
-        assert best.reward >= max(rewards)
-        num_limited += least < amount - ROUNDING
-    assert num_limited
-    assert num_free
+        problem = with_objective(problem, Objective(collected_share=1.0 - lost))
+        plan, reward = _searched(problem, search, seed)
+        timeline = replay(problem, plan)
+        assert timeline.is_valid
+        images = timeline.collected.values()
+        num_left += sum(not one.is_downlinked for one in images)
+        num_down += sum(one.is_downlinked for one in images)
+        each = lost * (1.0 + telemetry_per_s * problem.horizon_s / image)
+        assert reward == pytest.approx(timeline.reward, abs=each * len(problem.satellites))
+    assert num_left
+    assert num_down
+
+
+def _searched(
+    problem: Problem, search: type[ResourceWindows] | type[ChoiceSearch], seed: int
+) -> tuple[Plan, float]:
+    """Return the plan that a search comes to, and what it counts it for."""
+    if search is ResourceWindows:
+        windows = ResourceWindows(problem, seed)
+        windows.make_moves(1000, Budget())
+        return windows.plan, windows.reward
+    choices = ChoiceSearch(problem, 0.5, seed, Budget().stop)
+    choices.start(np.zeros(len(problem.opportunities), dtype=np.bool_), 0.95)
+    for _ in range(10):
+        choices.move()
+    return choices.plan, choices.reward
+
+
+def test_windows_weigh_contacts_against_images(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By images alone a contact is in the way of some."""
+
+    def earned() -> float:
+        total = 0.0
+        for seed in range(10):
+            problem = random_problem(
+                seed, num_collects=90, num_targets=45, num_contacts=5, resources=ROOMY
+            )
+            problem = with_objective(problem, Objective(collected_share=0.5))
+            plan, _ = _searched(problem, ResourceWindows, seed)
+            total += replay(problem, brought_down(problem, plan, Budget())).reward
+        return total
+
+    weighed = earned()
+    monkeypatch.setattr(resource_network, "_left_cost", lambda problem, satellite: 0.0)
+    assert weighed > 1.05 * earned()
 
 
 def test_where_images_earn_most_when_they_are_taken_a_half_life_leaves_some_on_board() -> None:

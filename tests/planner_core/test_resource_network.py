@@ -24,7 +24,7 @@ def variants(problem: Problem) -> list[Problem]:
     return [
         problem,
         delivered,
-        replace(delivered, left_on_board=0.1),
+        replace(delivered, leaves_none_on_board=True),
         replace(delivered, pinned=Pinned(kept=kept)),
         replace(problem, worth=np.zeros(len(problem.opportunities))),
         replace(problem, use_resources=False),

@@ -41,12 +41,14 @@ from planner_core.precedence.relation import (
 from planner_core.problem import (
     COLLECT,
     CONTACT,
+    Bools,
     Floats,
     Ints,
     Longs,
     Problem,
     SatelliteProblem,
 )
+from planner_core.problem.delivery import lost_on_board
 from planner_core.problem.slew import TIME_TOLERANCE_S
 
 
@@ -63,7 +65,8 @@ class Network(NamedTuple):
     Where images count on the ground alone, no best plan takes one that stays on board: without it
     no other comes down later. With row ``i`` as the last image its data may end at ``delivered[i]``
     at most, which is telemetry younger than that image. ``must_deliver`` says so where dropping
-    an image makes no turn impossible.
+    an image makes no turn impossible. Where images on board earn a share, data that a recorder
+    holds at the end costs ``left_cost``, of worth for a full one.
     """
 
     place: Ints
@@ -91,6 +94,7 @@ class Network(NamedTuple):
     data_start: float
     data_end: float
     must_deliver: bool
+    left_cost: float
 
 
 # Horizon and stations are the same in all problems of a satellite; these three are not.
@@ -122,6 +126,7 @@ def _network(problem: Problem, satellite: SatelliteProblem, slack: float) -> Net
         is_kept=np.isin(satellite.rows, problem.kept_rows),
         delivered=_delivered(problem, satellite, network.data_floor, max(slack, 0.0)),
         must_deliver=must_deliver(problem, satellite),
+        left_cost=_left_cost(problem, satellite),
     )
 
 
@@ -173,6 +178,7 @@ def _without_worth(problem: Problem, satellite: SatelliteProblem, slack: float) 
         data_start=track.recorder_start,
         data_end=top - track.telemetry_per_s * track.data_end_s,
         must_deliver=False,
+        left_cost=0.0,
     )
 
 
@@ -181,22 +187,51 @@ def must_deliver(problem: Problem, satellite: SatelliteProblem) -> bool:
 
     That is how some best plan is where images count on the ground alone.
     """
-    is_asked = problem.objective.is_delivered or problem.left_on_board is not None
-    is_asked = is_asked and problem.counts_delivery
-    return is_asked and is_transitive_on(satellite)
+    is_asked = problem.objective.is_delivered or problem.leaves_none_on_board
+    return is_asked and problem.counts_delivery and is_transitive_on(satellite)
+
+
+def _left_cost(problem: Problem, satellite: SatelliteProblem) -> float:
+    """Return what images that fill a recorder lose if they stay on board, as the typical one does.
+
+    0 where that hangs on when they come down, or none may stay.
+    """
+    if problem.objective.half_life_s is not None or must_deliver(problem, satellite):
+        return 0.0
+    lost, size = lost_on_board(problem)[satellite.rows], image_size(satellite)
+    counts = (lost > 0.0) & (size > 0.0)
+    return float(np.median(lost[counts] / size[counts])) if counts.any() else 0.0
+
+
+def worth_before_left(problem: Problem) -> Floats:
+    """Return what images earn before ``left_cost`` is paid for those on board. Shape ``(n,)``.
+
+    No less than they earn either way: one that no contact follows is worth what it is on board.
+    """
+    worth, lost = problem.worth.copy(), lost_on_board(problem)
+    for satellite in problem.satellites:
+        cost = _left_cost(problem, satellite) * image_size(satellite)
+        earns = worth[satellite.rows] > 0.0
+        worth[satellite.rows] += np.where(earns, np.maximum(cost - lost[satellite.rows], 0.0), 0.0)
+    return worth
+
+
+def image_size(satellite: SatelliteProblem) -> Floats:
+    """Return what each task records, in recorder capacities; 0 for contacts."""
+    fill = (satellite.end_s - satellite.start_s) * satellite.resources.collect_fill_per_s
+    return np.where(satellite.kind == COLLECT, fill, 0.0)
 
 
 def _delivered(
     problem: Problem, satellite: SatelliteProblem, emptied: Floats, slack: float
 ) -> Floats:
     """Return the data at the end with each row as the last image; see ``Network``."""
-    fill = (satellite.end_s - satellite.start_s) * satellite.resources.collect_fill_per_s
+    fill = image_size(satellite)
     kept = problem.kept_local(satellite)
     kept = kept[satellite.kind[kept] == COLLECT]
     if slack == 0.0:
         # A plan brings down what it must take, too, where that is possible.
         kept = kept[problem.worth[satellite.rows[kept]] == 0.0]
-        emptied = emptied + (problem.left_on_board or 0.0)
     delivered = emptied + float(fill[kept].sum()) + 3.0 * slack
     delivered[kept] = ANY_LEVEL
     return delivered
@@ -253,6 +288,18 @@ def give_between(network: Network, i: int, k: int) -> float:
         if network.near_rows[at] == k:
             return float(network.near_give[at])
     return 0.0
+
+
+@kernel
+def cost_of_left(network: Network, taken: Bools) -> float:
+    """Return what data costs that is left after some rows, beyond what there is without any."""
+    if network.left_cost == 0.0:
+        return 0.0
+    data = network.data_start
+    for k in range(len(taken)):
+        if taken[k]:
+            data = max(network.data_floor[k], data + network.data_gain[k])
+    return float(network.left_cost * (max(data, 0.0) - max(network.data_start, 0.0)))
 
 
 def part_of(network: Network, rows: Ints) -> Network:

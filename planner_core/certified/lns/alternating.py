@@ -33,8 +33,6 @@ class TurnSearch:
 
     Attributes
     ----------
-    problem
-        What it plans: the same opportunities, perhaps under a commitment.
     ended
         What each start but the last has led to.
     usage
@@ -50,7 +48,11 @@ class TurnSearch:
         # four satellites 791 instead of 788 (docs/bounds.md); without such turns fleets lose by it.
         per_satellite = TUNING.patience if has_batches else 1
         self._num_choices = per_satellite * self._num_satellites
-        self._num_first_steps = 1 if has_batches else TUNING.patience
+        # Where tasks are not dense steps of windows take next to no time beside those: eight at a
+        # time earn up to 0.8 % more on missions of one to six satellites (docs/bounds.md).
+        is_dense = len(problem.opportunities) > self._num_satellites * TUNING.dense
+        self._num_first_steps = 1 if has_batches and is_dense else TUNING.patience
+        self._num_steps = TUNING.patience if has_batches and not is_dense else 1
         self._choices = ChoiceSearch(problem, unit, seed, budget.stop)
         self._seed, self._num_starts, self._idle_steps = seed, 0, TUNING.patience
         self._windows = self._afresh()
@@ -66,7 +68,7 @@ class TurnSearch:
                 continue
             before = self._windows.reward
             self._replan_days()
-            self._replan_windows(1)
+            self._replan_windows(self._num_steps)
             self._note()
             self._idle_steps = 0 if self._windows.reward > before else self._idle_steps + 1
 

@@ -15,17 +15,25 @@ import numpy as np
 from planner_core.certified.dp.completion_bounds import least_energy
 from planner_core.certified.dp.data_levels import DataLevels, data_levels, levels_of_part
 from planner_core.certified.dp.forward_labels import Goal, most_value, path_of
-from planner_core.certified.dp.resource_network import Network, part_of, strict_network_of
+from planner_core.certified.dp.resource_network import (
+    Network,
+    cost_of_left,
+    part_of,
+    strict_network_of,
+    worth_before_left,
+)
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import (
     COLLECT,
     Bools,
     Bytes,
+    Floats,
     Ints,
     Problem,
 )
 from planner_core.problem.plan import Plan
 from planner_core.solvers.sequential import blocked_rows
+from planner_core.worth import worth_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -38,8 +46,8 @@ class SatelliteChoices:
         Of each task; -1 for contacts. Shape ``(m,)``.
     weight
         Worth of each task in units. Shape ``(m,)``.
-    may_stay
-        Whether images may stay on board.
+    end_cost
+        What a recorder costs that ends at each level, in units. Shape ``(num_levels,)``.
     """
 
     rows: Ints
@@ -47,23 +55,31 @@ class SatelliteChoices:
     levels: DataLevels
     target: Ints
     weight: Ints
-    may_stay: bool
+    end_cost: Ints
 
     @classmethod
-    def of(cls, problem: Problem, index: int, unit: float) -> SatelliteChoices:
-        """Return the programme of a satellite that has opportunities."""
+    def of(cls, problem: Problem, index: int, worth: Floats, unit: float) -> SatelliteChoices:
+        """Return the programme of a satellite that has opportunities.
+
+        Parameters
+        ----------
+        worth
+            Of each opportunity, before what its data costs on board. Shape ``(n,)``.
+        """
         satellite = problem.satellites[index]
         network = strict_network_of(problem, satellite)
         target = np.where(satellite.kind == COLLECT, satellite.place, -1).astype(np.int32)
-        worth = problem.worth[satellite.rows]
+        levels = data_levels(network, 2, is_optimistic=False)
+        in_units = np.round(worth[satellite.rows] / unit)
+        cost = np.round(network.left_cost * np.maximum(levels.least, 0.0) / unit)
         return cls(
             rows=satellite.rows,
             network=network,
-            levels=data_levels(network, 2, is_optimistic=False),
+            levels=levels,
+            end_cost=cost.astype(np.int32),
             target=target,
-            may_stay=problem.left_on_board is not None and problem.left_on_board > 0.0,
             # Far above the bound, of which there are at most so many: such a task is in no plan.
-            weight=np.minimum(np.round(worth / unit), TUNING.max_units).astype(np.int32),
+            weight=np.minimum(in_units, TUNING.max_units).astype(np.int32),
         )
 
     def best(self, allowed: Bools, goal: int, stop: Bytes) -> tuple[int, Ints]:
@@ -71,7 +87,7 @@ class SatelliteChoices:
 
         Answers -1 and no tasks where there is none. Targets may be collected again and again.
         """
-        if self.network.must_deliver and not self.may_stay:
+        if self.network.must_deliver:
             allowed = allowed & ((self.target < 0) | self._comes_down(allowed))
         rows = np.flatnonzero(allowed | self.network.is_kept).astype(np.int32)
         nothing = rows[:0]
@@ -91,10 +107,19 @@ class SatelliteChoices:
         idle, after = idle[:, : top + 1].copy(), after[:, : top + 1].copy()
         credit = np.zeros(levels.num_levels, dtype=np.int32)
         wanted = Goal(max(goal, 0), idle, after, credit)
-        value, labels = most_value(network, levels, weight, credit, wanted, top, True, stop)
+        cost = self.end_cost
+        value, labels = most_value(network, levels, weight, cost, wanted, top, True, stop)
         if value < 0:
             return -1, nothing
-        return value, rows[path_of(network, levels, weight, credit, labels, value)]
+        return value, rows[path_of(network, levels, weight, cost, labels, value)]
+
+    def value_of(self, taken: Bools) -> int:
+        """Return the units that a plan of these tasks gains."""
+        levels, level = self.levels, self.levels.start
+        for row in np.flatnonzero(taken):
+            level = max(int(levels.floor[row]), level + int(levels.gain[row]), 0)
+        cost = self.end_cost[min(level, levels.num_levels - 1)]
+        return max(int(self.weight[taken].sum()) - int(cost), 0)
 
     def _comes_down(self, allowed: Bools) -> Bools:
         """Return the tasks that lie before an allowed contact."""
@@ -117,7 +142,7 @@ class ChoiceSearch:
     taken
         Whether the plan takes each opportunity. Shape ``(n,)``.
     reward
-        What its targets earn.
+        What its targets earn, less what data costs that stays on board.
     usage
         How many of the plans kept so far took each opportunity. Shape ``(n,)``.
     """
@@ -125,8 +150,9 @@ class ChoiceSearch:
     def __init__(self, problem: Problem, unit: float, seed: int, stop: Bytes) -> None:
         self._problem, self._stop = problem, stop
         self._rng = np.random.default_rng(seed)
+        self._worths = worth_before_left(problem)
         self._satellites = [
-            (index, SatelliteChoices.of(problem, index, unit))
+            (index, SatelliteChoices.of(problem, index, self._worths, unit))
             for index, satellite in enumerate(problem.satellites)
             if len(satellite)
         ]
@@ -206,7 +232,7 @@ class ChoiceSearch:
         allowed = kept | is_open | (own & (satellite.target >= 0))
         self._let_contacts(allowed, index, satellite)
         self._close(satellite, allowed, own)
-        goal = int(satellite.weight[own].sum())
+        goal = satellite.value_of(own)
         value, path = self._settled(satellite, allowed, goal)
         if value < 0:
             return
@@ -281,4 +307,7 @@ class ChoiceSearch:
         return self._mask(table.place[taken & (table.kind == COLLECT)])
 
     def _worth(self, taken: Bools) -> float:
-        return self._problem.worth_of(np.flatnonzero(taken))
+        table = self._problem.opportunities
+        images = np.flatnonzero(taken & (table.kind == COLLECT))
+        left = [cost_of_left(one.network, taken[one.rows]) for _, one in self._satellites]
+        return worth_of(table.place[images], self._worths[images]) - sum(left)

@@ -116,6 +116,26 @@ class Room(NamedTuple):
     move: Longs
 
 
+class After(NamedTuple):
+    """What comes after a window.
+
+    Attributes
+    ----------
+    need, bears
+        The least energy and the most data with which that fits.
+    floor, gain
+        Data that the window ends with becomes the larger of ``floor`` and itself with ``gain``.
+    left_cost
+        What data that is left at the end costs, of worth for a full recorder.
+    """
+
+    need: float
+    bears: float
+    floor: float
+    gain: float
+    left_cost: float
+
+
 def room_for(num_targets: int) -> Room:
     """Return working memory for a problem of so many targets."""
 
@@ -150,7 +170,7 @@ def room_for(num_targets: int) -> Room:
 @borrowing_inner
 def best_label(
     ground: Ground, room: Room, left: int, low: int, high: int, right: int,
-    energy: float, data: float, need: float, bears: float,
+    energy: float, data: float, after: After,
 ) -> int:  # fmt: skip
     """Find the path that gains most between two tasks; return its last label.
 
@@ -166,11 +186,11 @@ def best_label(
     best, best_energy, best_label = -np.inf, -np.inf, NOWHERE
     given = give_between(network, left, right) if right < m else 0.0
     if (
-        energy + given >= need
-        and data <= bears
+        energy + given >= after.need
+        and data <= after.bears
         and (left < 0 or right >= m or may_be_next(network, left, right))
     ):
-        best, best_energy, best_label = 0.0, energy, AT_START
+        best, best_energy, best_label = -left_cost_of(after, data), energy, AT_START
     for k in range(low, high):
         at = k - low
         if not starts_open and (left < 0 or network.idle_from[left] <= k):
@@ -224,14 +244,20 @@ def best_label(
         if count > 0 and (right >= m or may_be_next(network, k, right)):
             given = give_between(network, k, right) if right < m else 0.0
             for label in range(begin, begin + count):
-                if room.energy[label] + given < need or room.data[label] > bears:
+                if room.energy[label] + given < after.need or room.data[label] > after.bears:
                     continue
-                if room.value[label] > best or (
-                    room.value[label] == best and room.energy[label] > best_energy
-                ):
-                    best, best_energy = room.value[label], room.energy[label]
-                    best_label = label
+                value = room.value[label] - left_cost_of(after, room.data[label])
+                if value > best or (value == best and room.energy[label] > best_energy):
+                    best, best_energy, best_label = value, room.energy[label], label
     return best_label
+
+
+@inlined
+def left_cost_of(after: After, data: float) -> float:
+    """Return what the data costs that is left at the end, if a window ends with so much."""
+    if after.left_cost == 0.0:
+        return 0.0
+    return after.left_cost * max(after.floor, data + after.gain, 0.0)
 
 
 @inlined

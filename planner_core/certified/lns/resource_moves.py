@@ -13,7 +13,7 @@ import numpy as np
 
 from planner_core.certified.dp.resource_network import give_between
 from planner_core.certified.lns.moves import Taken
-from planner_core.certified.lns.resource_labels import Ground, Room, best_label
+from planner_core.certified.lns.resource_labels import After, Ground, Room, best_label, left_cost_of
 from planner_core.certified.signs import FREE, NEVER, NOWHERE
 from planner_core.certified.sizes import LABELS_PER_TASK, RESOURCE_WINDOW_NODES
 from planner_core.certified.tolerances import ROUNDING, SLIGHT, STAYS
@@ -35,6 +35,11 @@ def make_moves(
 ) -> None:
     """Make moves on one satellite's part of a plan, in place."""
     m = len(ground.rows)
+    left_cost = ground.network.left_cost
+    if left_cost > 0.0:
+        # At the price itself fewer plans are worth the same, and the search is sooner stuck
+        # (docs/bounds.md).
+        left_cost *= 2.0 * next_draw(draws)
     for _ in range(num_moves):
         if stop[0] or m == 0:
             break
@@ -45,16 +50,18 @@ def make_moves(
         while right < m and not taken.is_taken[ground.rows[right]]:
             right += 1
         energy, data, is_kept_to = _state_after(ground, taken, left)
-        need, bears = _wanted_before(ground, taken, right, _data_end(ground, taken, high))
+        after = _after(ground, taken, right, _data_end(ground, taken, high), left_cost)
         if low >= high or not is_kept_to:
             continue
         if ground.is_polish:
             _weigh_liking(ground, taken, room, low, high, draws)
         else:
             _weigh(ground, taken, room, low, high, draws)
-        last = best_label(ground, room, left, low, high, right, energy, data, need, bears)
+        last = best_label(ground, room, left, low, high, right, energy, data, after)
         if last != NOWHERE:
-            _replace(ground, taken, room, low, high, last)
+            saved = _cost_of(ground, taken, low, high, data, after)
+            saved -= left_cost_of(after, data if last < 0 else room.data[last])
+            _replace(ground, taken, room, low, high, last, saved)
 
 
 @borrowing_inner
@@ -135,27 +142,39 @@ def _data_end(ground: Ground, taken: Taken, high: int) -> float:
 
 
 @borrowing_inner
-def _wanted_before(
-    ground: Ground, taken: Taken, first: int, data_end: float
-) -> tuple[float, float]:
-    """Return the least energy and the most data with which the plan's tasks from one on fit."""
+def _after(ground: Ground, taken: Taken, first: int, data_end: float, left_cost: float) -> After:
+    """Return what the plan's tasks from one on want, and make of the data."""
     network = ground.network
-    need, bears = -np.inf, data_end
+    need, bears, floor, gain = -np.inf, data_end, -np.inf, 0.0
     k = len(ground.rows) - 1
-    after = -1
+    following = -1
     while k >= first:
         if taken.is_taken[ground.rows[k]]:
-            given = give_between(network, k, after) if after >= 0 else 0.0
+            given = give_between(network, k, following) if following >= 0 else 0.0
             need = max(need - given, network.energy_floor[k]) + network.energy_cost[k]
-            after = k
+            following = k
             if need > network.energy_cap[k]:
-                return np.inf, bears
+                return After(np.inf, bears, floor, gain, left_cost)
             bears = min(bears, network.data_after[k])
             if network.data_floor[k] > bears:
-                return np.inf, bears
+                return After(np.inf, bears, floor, gain, left_cost)
             bears = min(network.data_before[k], bears - network.data_gain[k])
+            floor = max(floor, network.data_floor[k] + gain)
+            gain += network.data_gain[k]
         k -= 1
-    return need, bears
+    return After(need, bears, floor, gain, left_cost)
+
+
+@borrowing_inner
+def _cost_of(ground: Ground, taken: Taken, low: int, high: int, data: float, after: After) -> float:
+    """Return what the data costs that stays at the end with the window's tasks as they are."""
+    network = ground.network
+    if after.left_cost == 0.0:
+        return 0.0
+    for k in range(low, high):
+        if taken.is_taken[ground.rows[k]]:
+            data = max(network.data_floor[k], data + network.data_gain[k])
+    return left_cost_of(after, data)
 
 
 @borrowing_inner
@@ -234,10 +253,18 @@ def _weigh_liking(
 
 
 @borrowing_inner
-def _replace(ground: Ground, taken: Taken, room: Room, low: int, high: int, last: int) -> None:
-    """Let a path take the place of what is in the window, unless the plan is worth less then."""
+def _replace(
+    ground: Ground, taken: Taken, room: Room, low: int, high: int, last: int, saved: float
+) -> None:
+    """Let a path take the place of what is in the window, unless the plan is worth less then.
+
+    Parameters
+    ----------
+    saved
+        What less data at the end is worth.
+    """
     place = ground.target
-    num_new, worth = 0, 0.0
+    num_new, worth = 0, saved
     liking, num_contacts = 0.0, 0
     label = last
     while label >= 0:

@@ -7,7 +7,11 @@ import math
 import numpy as np
 
 from planner_core.budget import Budget
-from planner_core.certified.dp.resource_network import strict_network_of
+from planner_core.certified.dp.resource_network import (
+    cost_of_left,
+    strict_network_of,
+    worth_before_left,
+)
 from planner_core.certified.lns.moves import Taken
 from planner_core.certified.lns.resource_labels import Ground, room_for
 from planner_core.certified.lns.resource_moves import make_moves
@@ -36,6 +40,7 @@ class ResourceWindows:
         self._room = room_for(num_targets)
         self._turn = 0
         is_locked = _locked_targets(problem)
+        self._worths = worth_before_left(problem)
         table = problem.opportunities
         self._contacts = np.flatnonzero(table.kind == CONTACT)
         self._shut_by, self._is_shut = self._contacts[:0], dict[int, Bools]()
@@ -49,7 +54,7 @@ class ResourceWindows:
                 target=np.where(satellite.kind == COLLECT, satellite.place, num_targets).astype(
                     np.int32
                 ),
-                worth=problem.worth,
+                worth=self._worths,
                 typical=problem.typical_worth,
                 is_locked=is_locked,
                 is_shut=np.zeros(len(satellite), dtype=np.bool_),
@@ -74,7 +79,13 @@ class ResourceWindows:
         # The referee sees each step: what a slow satellite needs on its way it will tell.
         kept = _kept_targets(self._problem)
         self._grounds = [
-            ground._replace(worth=worth, liking=liking, is_locked=kept, is_polish=True)
+            ground._replace(
+                network=ground.network._replace(left_cost=0.0),
+                worth=worth,
+                liking=liking,
+                is_locked=kept,
+                is_polish=True,
+            )
             for ground in self._grounds
         ]
 
@@ -86,7 +97,7 @@ class ResourceWindows:
         holder = np.full(len(self._problem.target_ids) + 1, FREE, dtype=np.int32)
         # The best image of a target counts, and the first of those.
         images = np.flatnonzero(is_taken & (table.kind == COLLECT))[::-1]
-        images = images[np.argsort(self._problem.worth[images], kind="stable")]
+        images = images[np.argsort(self._worths[images], kind="stable")]
         holder[table.place[images]] = images
         self._taken = Taken(is_taken=is_taken, holder=holder)
         self._note_contacts()
@@ -142,9 +153,10 @@ class ResourceWindows:
 
     @property
     def reward(self) -> float:
-        """What its targets earn."""
-        held = self._taken.holder[:-1]
-        return float(self._problem.worth[held[held != FREE]].sum())
+        """What its targets earn, less what data costs that stays on board."""
+        held, taken = self._taken.holder[:-1], self._taken.is_taken
+        left = [cost_of_left(one.network, taken[one.rows]) for one in self._grounds]
+        return float(self._worths[held[held != FREE]].sum()) - sum(left)
 
 
 def _locked_targets(problem: Problem) -> Bools:

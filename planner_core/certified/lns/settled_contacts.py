@@ -27,7 +27,7 @@ def with_contacts(
     return replace(
         taking(problem, contacts),
         worth=worth_with(problem, contacts, plan, verdict),
-        left_on_board=None if problem.objective.collected_share > 0.0 else 0.0,
+        leaves_none_on_board=problem.objective.collected_share == 0.0,
     )
 
 

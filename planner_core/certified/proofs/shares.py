@@ -8,13 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner_core.certified.dp.data_levels import DataLevels
-from planner_core.certified.dp.resource_network import Network
+from planner_core.certified.dp.resource_network import Network, image_size
 from planner_core.certified.signs import FROM_START
 from planner_core.certified.tolerances import ON_BOARD, ROUNDING
 from planner_core.certified.tuning import TUNING
 from planner_core.precedence.relation import is_transitive_on
 from planner_core.problem import (
-    COLLECT,
     Bools,
     Floats,
     Ints,
@@ -72,21 +71,12 @@ class Shares:
     @classmethod
     def of(cls, problem: Problem, satellite: SatelliteProblem, network: Network) -> Shares | None:
         """Return them where they matter; None where a task may be a detour for others."""
-        objective, rows = problem.objective, satellite.rows
-        if (
-            not problem.counts_delivery
-            or objective.half_life_s is not None
-            or network.must_deliver
-            or not is_transitive_on(satellite)
-        ):
+        if network.left_cost == 0.0 or not is_transitive_on(satellite):
             return None
-        is_image = satellite.kind == COLLECT
-        size = np.where(is_image, satellite.end_s - satellite.start_s, 0.0)
-        size *= satellite.resources.collect_fill_per_s
+        rows = satellite.rows
+        size = image_size(satellite)
         lost = lost_on_board(problem)[rows]
         counts = (lost > 0.0) & (size > 0.0)
-        if not counts.any():
-            return None
         starts = np.unique(satellite.start_s)
         since_s = starts[
             np.unique(
@@ -101,7 +91,7 @@ class Shares:
             lost=lost,
             size=size,
             is_kept=network.is_kept,
-            per_data=float(np.median(lost[counts] / size[counts])),
+            per_data=network.left_cost,
             held=network.data_start,
             typical=float(np.median(problem.worth_on_ground[rows][counts])),
             telemetry_per_s=satellite.resources.telemetry_per_s,

@@ -22,7 +22,6 @@ from planner_core.certified.proofs.bound import Bound, rounded_bound
 from planner_core.certified.proofs.lagrangian import lagrangian_bound
 from planner_core.certified.proofs.latency import latency_value
 from planner_core.certified.sizes import MAX_PAIRS
-from planner_core.certified.strategies.commitments import best_commitment
 from planner_core.certified.strategies.supports import is_large
 from planner_core.certified.strategies.whole_program import relaxation_bound
 from planner_core.certified.tuning import TUNING
@@ -90,21 +89,8 @@ class ResourceSearch:
         return self.turns(self.unit)
 
     def turns(self, unit: float) -> TurnSearch:
-        """Return a search for plans that begins at the best, or where a commitment leads.
-
-        Where agility alone decides, contacts find room beside what is imaged: plans of the
-        demonstration's mission after four CPU seconds earn 177.6, 172.5 and 167.4 (images on board
-        count 0.9, 0.5, 0.1), with commitments 176.9, 171.5 and 158.4, and the same after eight.
-        Where energy decides they are what plans lack: 263.9 in place of 222.4 of 266 (1,000
-        targets, images on board count 0.1).
-        """
-        committed = None
-        if not self._agility_decides:
-            committed = best_commitment(self.best, unit, TUNING.first_goal, self.seed)
-        problem, plan = (
-            (committed.problem, committed.plan) if committed else (self.problem, self.best.plan)
-        )
-        return TurnSearch(problem, plan, unit, self.budget, self.seed)
+        """Return a search for plans that begins at the best."""
+        return TurnSearch(self.problem, self.best.plan, unit, self.budget, self.seed)
 
     def search(self, turns: TurnSearch, num_steps: int) -> bool:
         """Search for plans from the best, while that leads on; return whether one is better."""

@@ -60,7 +60,7 @@ def windows_and_choices(search: Search) -> Iterator[None]:
     engine, best = search.engine(ResourceSearch), search.best
     known = best.reward
     while _is_promising(search):
-        if best.reward > known and engine.turn_search.problem is search.problem:
+        if best.reward > known:
             # Programs leave room for windows: under clouds 231.9 for 231.6, with rewards of 1 to
             # 10 2,505 for 2,499 of 2,534 after 20 CPU seconds.
             engine.turn_search.adopt(best.plan)
