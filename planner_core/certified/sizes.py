@@ -10,6 +10,9 @@ from typing import Final
 MAX_CELLS: Final = 36_000_000
 """Of one satellite's table over tasks and units of worth."""
 
+MAX_DATA_CELLS: Final = 9_000_000
+"""Of all satellites' tables over tasks and levels of data: a hundred epochs take some seconds."""
+
 MAX_STEPS: Final = 500_000_000
 """Of a satellite's near pairs times units of worth, in a bound that is to be quick: seconds."""
 

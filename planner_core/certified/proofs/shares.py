@@ -134,20 +134,27 @@ class Shares:
 
         With ``FROM_START`` as the instant that is so for all plans.
         """
-        worth = weight * unit
+        worth = weight.astype(np.float64) * unit
+        # Contacts cost what their antennas do.
+        most = np.where(weight < 0, worth, self.worth_at_most(worth, since))
+        return np.ceil(most / unit - ROUNDING).astype(np.int32)
+
+    def worth_at_most(self, worth: Floats, since: int) -> Floats:
+        """Return the same without units."""
         stays = np.maximum(worth - self.lost, 0.0) + self.per_data * self.size
         if since != FROM_START:
             may_stay = self.end_s > self.since_s[since] - TIME_TOLERANCE_S
             stays = np.where(may_stay, stays, 0.0)
         # Whoever takes an image for nothing can do without.
-        most = np.where((weight > 0) | self.is_kept, np.maximum(worth, stays), 0.0)
-        # Contacts cost what their antennas do.
-        return np.ceil(np.where(weight < 0, worth, most) / unit - ROUNDING).astype(np.int32)
+        return np.where((worth > 0.0) | self.is_kept, np.maximum(worth, stays), 0.0)
 
     def end_cost(self, levels: DataLevels, unit: float, since: int) -> Ints:
         """Return what a recorder costs that ends at each level, in units."""
+        return np.floor(self.cost_at_end(levels, since) / unit).astype(np.int32)
+
+    def cost_at_end(self, levels: DataLevels, since: int) -> Floats:
+        """Return the same without units."""
         without = -self.held
         if since != FROM_START:
             without = self.telemetry_per_s * (self.telemetry_since_s[since] - TIME_TOLERANCE_S)
-        left = np.maximum(levels.least + without - ON_BOARD, 0.0)
-        return np.floor(self.per_data * left / unit).astype(np.int32)
+        return self.per_data * np.maximum(levels.least + without - ON_BOARD, 0.0)

@@ -139,8 +139,9 @@ class _FleetPricing:
             search.ask_energy(energy)
         search.prove_by_energy(energy)
         yield beside_prices
-        value = min(search.best.bound.value, energy.value)
-        prices = PriceSearch(search.problem, value, energy.multipliers, search.budget.stop)
+        lowest, multipliers = search.ask_data(energy)
+        value = min(search.best.bound.value, lowest)
+        prices = PriceSearch(search.problem, value, multipliers, search.budget.stop)
         prices.learn(search.best.plan)
         known = search.best.bound
         search.price(prices, 1)

@@ -1,0 +1,92 @@
+"""Satellites limited by their recorders, as an oracle, where images on board earn a share.
+
+Batteries are left out, which makes an answer so quick that hundreds of epochs can be had. What the
+multipliers prove is for ``resource_bound`` to say.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from planner_core.certified.dp.data_labels import most_by_data
+from planner_core.certified.dp.data_levels import DataLevels, data_levels
+from planner_core.certified.dp.resource_network import Network, network_of
+from planner_core.certified.multipliers.ascent import Latest, OneByOne
+from planner_core.certified.proofs.shares import Shares
+from planner_core.certified.signs import FROM_START
+from planner_core.certified.sizes import MAX_DATA_CELLS
+from planner_core.certified.tuning import TUNING
+from planner_core.problem import COLLECT, Floats, Ints, Problem, SatelliteProblem
+
+
+class _Part(NamedTuple):
+    """One satellite's programme; ``target`` is one too far for contacts."""
+
+    rows: Ints
+    network: Network
+    levels: DataLevels
+    shares: Shares | None
+    end_cost: Floats
+    target: Ints
+
+    @classmethod
+    def of(cls, problem: Problem, satellite: SatelliteProblem) -> _Part:
+        network = network_of(problem, satellite)
+        levels = data_levels(network, TUNING.coarse, is_optimistic=True)
+        shares = Shares.of(problem, satellite, network)
+        end_cost = np.zeros(levels.num_levels)
+        if shares is not None:
+            end_cost = shares.cost_at_end(levels, FROM_START)
+        target = np.where(satellite.kind == COLLECT, satellite.place, len(problem.target_ids))
+        return cls(
+            rows=satellite.rows, network=network, levels=levels, shares=shares, end_cost=end_cost,
+            target=target.astype(np.int32),
+        )  # fmt: skip
+
+
+class DataPaths(OneByOne):
+    """The best path of each satellite that its recorder allows, at given multipliers.
+
+    Attributes
+    ----------
+    is_of_use
+        Whether images on board earn a share, and tables are small enough.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self._satellites = [_Part.of(problem, s) for s in problem.satellites if len(s)]
+        self.parts: Ints = np.arange(len(self._satellites), dtype=np.int32)
+        # Satellites answer one after another, in the same room.
+        shape = (
+            max((len(part.rows) for part in self._satellites), default=0),
+            max((part.levels.num_levels for part in self._satellites), default=0),
+        )
+        num_cells = sum(len(part.rows) * part.levels.num_levels for part in self._satellites)
+        has_shares = any(part.shares is not None for part in self._satellites)
+        self.is_of_use = has_shares and num_cells <= MAX_DATA_CELLS
+        room = shape if self.is_of_use else (0, 0)
+        self._own, self._source = np.empty(room), np.empty(room, dtype=np.int32)
+        self._worth = problem.worth
+        self._latest = Latest(len(self._satellites))
+
+    def answer(self, part: int, multipliers: Floats, count: Ints) -> None:
+        """Let a satellite answer anew."""
+        satellite = self._satellites[part]
+        _, path = self._best(satellite, multipliers)
+        self._latest.replace(part, satellite.target[path], count)
+
+    def gain(self, multipliers: Floats) -> float:
+        """Return the most that all satellites can gain."""
+        return sum(self._best(part, multipliers)[0] for part in self._satellites)
+
+    def _best(self, part: _Part, multipliers: Floats) -> tuple[float, Ints]:
+        """Return the most that a satellite can gain, and the tasks of a path that does."""
+        worth = self._worth[part.rows] - multipliers[part.target]
+        weight = np.maximum(worth, 0.0)
+        if part.shares is not None:
+            weight = part.shares.worth_at_most(worth, FROM_START)
+        return most_by_data(
+            part.network, part.levels, weight, part.end_cost, self._own, self._source
+        )
