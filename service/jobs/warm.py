@@ -27,6 +27,7 @@ from planner_core.budget import Budget
 from planner_core.build import build_problem
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.alternating import TurnSearch
+from planner_core.certified.multipliers.data import DataPaths
 from planner_core.certified.multipliers.energy import EnergyPaths, ascent_on_energy
 from planner_core.certified.multipliers.latency import LatencyAscent
 from planner_core.certified.proofs.queues import queue_value
@@ -256,6 +257,9 @@ def _shortage() -> None:
     TurnSearch(problem, plan, problem.typical_worth, Budget(), 0).turn(1)
     paths, nothing = EnergyPaths(problem), np.zeros(len(problem.target_ids))
     ascent_on_energy(problem, paths, nothing, 1, 0).improve(1, Budget().stop)
+    on_board = DataPaths.of(with_objective(problem, Objective(collected_share=0.9)))
+    assert on_board is not None
+    on_board.gain(np.append(nothing, 0.0))
     free = FreeSearch(Incumbent(replace(problem, use_resources=False), Budget(), 0.0), 0)
     free.price()
     for _ in free.cut(1):

@@ -88,8 +88,8 @@ def test_no_plan_beats_the_multipliers(
 ) -> None:
     problem = _problem(seed, dynamics, num_satellites, num_contacts=2, has_quality=has_quality)
     problem = with_objective(problem, Objective(collected_share=collected_share))
-    paths = DataPaths(problem)
-    if not paths.is_of_use:
+    paths = DataPaths.of(problem)
+    if paths is None:
         return
     steps = Steps(first=0.2, last=1e-3, num_epochs=30)
     begin = np.zeros(len(problem.target_ids))

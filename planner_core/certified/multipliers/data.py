@@ -47,29 +47,27 @@ class _Part(NamedTuple):
 
 
 class DataPaths(OneByOne):
-    """The best path of each satellite that its recorder allows, at given multipliers.
+    """The best path of each satellite that its recorder allows, at given multipliers."""
 
-    Attributes
-    ----------
-    is_of_use
-        Whether images on board earn a share, and tables are small enough.
-    """
-
-    def __init__(self, problem: Problem) -> None:
-        self._satellites = [_Part.of(problem, s) for s in problem.satellites if len(s)]
+    def __init__(self, worth: Floats, satellites: list[_Part]) -> None:
+        self._worth, self._satellites = worth, satellites
         self.parts: Ints = np.arange(len(self._satellites), dtype=np.int32)
         # Satellites answer one after another, in the same room.
         shape = (
             max((len(part.rows) for part in self._satellites), default=0),
             max((part.levels.num_levels for part in self._satellites), default=0),
         )
-        num_cells = sum(len(part.rows) * part.levels.num_levels for part in self._satellites)
-        has_shares = any(part.shares is not None for part in self._satellites)
-        self.is_of_use = has_shares and num_cells <= MAX_DATA_CELLS
-        room = shape if self.is_of_use else (0, 0)
-        self._own, self._source = np.empty(room), np.empty(room, dtype=np.int32)
-        self._worth = problem.worth
+        self._own, self._source = np.empty(shape), np.empty(shape, dtype=np.int32)
         self._latest = Latest(len(self._satellites))
+
+    @classmethod
+    def of(cls, problem: Problem) -> DataPaths | None:
+        """Return the oracle; None where no image on board earns a share, or tables are large."""
+        satellites = [_Part.of(problem, s) for s in problem.satellites if len(s)]
+        num_cells = sum(len(part.rows) * part.levels.num_levels for part in satellites)
+        if num_cells > MAX_DATA_CELLS or all(part.shares is None for part in satellites):
+            return None
+        return cls(problem.worth, satellites)
 
     def answer(self, part: int, multipliers: Floats, count: Ints) -> None:
         """Let a satellite answer anew."""

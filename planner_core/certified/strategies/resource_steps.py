@@ -190,8 +190,8 @@ class ResourceSearch:
         CPU seconds, and 130.5, 377.5 and 258.8 without.
         """
         known = energy.value, energy.multipliers
-        paths = DataPaths(self.problem)
-        if not paths.is_of_use:
+        paths = DataPaths.of(self.problem)
+        if paths is None:
             return known
         steps = Steps(first=TUNING.first_step, last=TUNING.last_step, num_epochs=TUNING.many_epochs)
         data = Ascent(paths, self.problem.best_worth, self.prices(), steps, self.seed)
