@@ -7,9 +7,9 @@ sooner than they do (an incremental subgradient method, Nedic and Bertsekas 2001
 that is put to all parts at once now and then, which is what proves a bound.
 
 What the parts are, and how one answers, is for an oracle to say: longest paths (``paths``), paths
-that remember targets (``elementary``), batteries (``energy``), chains with free starts
-(``chains``). The exact programmes of ``resources`` take seconds for an answer and have too few
-parts for turns: their steps are longer, and follow the value.
+that remember targets (``elementary``), batteries (``energy``), recorders (``data``), chains with
+free starts (``chains``). The exact programmes of ``resources`` take seconds for an answer and have
+too few parts for turns: their steps are longer, and follow the value.
 """
 
 from __future__ import annotations
