@@ -21,10 +21,12 @@ def variants(problem: Problem) -> list[Problem]:
     other: Dynamics = "paper" if problem.dynamics == "physical" else "physical"
     kept = tuple(Kept(row=row, pointer=f"/pins/keep/{row}") for row in (1, 3))
     delivered = with_objective(problem, Objective.delivered())
+    shared = with_objective(problem, Objective(collected_share=0.5))
     return [
         problem,
         delivered,
-        replace(delivered, leaves_none_on_board=True),
+        shared,
+        replace(shared, leaves_none_on_board=True),
         replace(delivered, pinned=Pinned(kept=kept)),
         replace(problem, worth=np.zeros(len(problem.opportunities))),
         replace(problem, use_resources=False),

@@ -291,7 +291,7 @@ def give_between(network: Network, i: int, k: int) -> float:
 
 
 @kernel
-def cost_of_left(network: Network, taken: Bools) -> float:
+def cost_on_board(network: Network, taken: Bools) -> float:
     """Return what data costs that is left after some rows, beyond what there is without any."""
     if network.left_cost == 0.0:
         return 0.0

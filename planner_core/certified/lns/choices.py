@@ -17,7 +17,7 @@ from planner_core.certified.dp.data_levels import DataLevels, data_levels, level
 from planner_core.certified.dp.forward_labels import Goal, most_value, path_of
 from planner_core.certified.dp.resource_network import (
     Network,
-    cost_of_left,
+    cost_on_board,
     part_of,
     strict_network_of,
     worth_before_left,
@@ -309,5 +309,5 @@ class ChoiceSearch:
     def _worth(self, taken: Bools) -> float:
         table = self._problem.opportunities
         images = np.flatnonzero(taken & (table.kind == COLLECT))
-        left = [cost_of_left(one.network, taken[one.rows]) for _, one in self._satellites]
+        left = [cost_on_board(one.network, taken[one.rows]) for _, one in self._satellites]
         return worth_of(table.place[images], self._worths[images]) - sum(left)

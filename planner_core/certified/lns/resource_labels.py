@@ -190,7 +190,7 @@ def best_label(
         and data <= after.bears
         and (left < 0 or right >= m or may_be_next(network, left, right))
     ):
-        best, best_energy, best_label = -left_cost_of(after, data), energy, AT_START
+        best, best_energy, best_label = -cost_at_end(after, data), energy, AT_START
     for k in range(low, high):
         at = k - low
         if not starts_open and (left < 0 or network.idle_from[left] <= k):
@@ -246,14 +246,14 @@ def best_label(
             for label in range(begin, begin + count):
                 if room.energy[label] + given < after.need or room.data[label] > after.bears:
                     continue
-                value = room.value[label] - left_cost_of(after, room.data[label])
+                value = room.value[label] - cost_at_end(after, room.data[label])
                 if value > best or (value == best and room.energy[label] > best_energy):
                     best, best_energy, best_label = value, room.energy[label], label
     return best_label
 
 
 @inlined
-def left_cost_of(after: After, data: float) -> float:
+def cost_at_end(after: After, data: float) -> float:
     """Return what the data costs that is left at the end, if a window ends with so much."""
     if after.left_cost == 0.0:
         return 0.0

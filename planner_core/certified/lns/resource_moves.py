@@ -13,7 +13,7 @@ import numpy as np
 
 from planner_core.certified.dp.resource_network import give_between
 from planner_core.certified.lns.moves import Taken
-from planner_core.certified.lns.resource_labels import After, Ground, Room, best_label, left_cost_of
+from planner_core.certified.lns.resource_labels import After, Ground, Room, best_label, cost_at_end
 from planner_core.certified.signs import FREE, NEVER, NOWHERE
 from planner_core.certified.sizes import LABELS_PER_TASK, RESOURCE_WINDOW_NODES
 from planner_core.certified.tolerances import ROUNDING, SLIGHT, STAYS
@@ -60,7 +60,7 @@ def make_moves(
         last = best_label(ground, room, left, low, high, right, energy, data, after)
         if last != NOWHERE:
             saved = _cost_of(ground, taken, low, high, data, after)
-            saved -= left_cost_of(after, data if last < 0 else room.data[last])
+            saved -= cost_at_end(after, data if last < 0 else room.data[last])
             _replace(ground, taken, room, low, high, last, saved)
 
 
@@ -174,7 +174,7 @@ def _cost_of(ground: Ground, taken: Taken, low: int, high: int, data: float, aft
     for k in range(low, high):
         if taken.is_taken[ground.rows[k]]:
             data = max(network.data_floor[k], data + network.data_gain[k])
-    return left_cost_of(after, data)
+    return cost_at_end(after, data)
 
 
 @borrowing_inner

@@ -8,7 +8,7 @@ import numpy as np
 
 from planner_core.budget import Budget
 from planner_core.certified.dp.resource_network import (
-    cost_of_left,
+    cost_on_board,
     strict_network_of,
     worth_before_left,
 )
@@ -155,7 +155,7 @@ class ResourceWindows:
     def reward(self) -> float:
         """What its targets earn, less what data costs that stays on board."""
         held, taken = self._taken.holder[:-1], self._taken.is_taken
-        left = [cost_of_left(one.network, taken[one.rows]) for one in self._grounds]
+        left = [cost_on_board(one.network, taken[one.rows]) for one in self._grounds]
         return float(self._worths[held[held != FREE]].sum()) - sum(left)
 
 

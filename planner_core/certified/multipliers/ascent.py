@@ -15,8 +15,9 @@ too few parts for turns: their steps are longer, and follow the value.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
@@ -121,6 +122,40 @@ class Latest:
         np.subtract.at(count, self._taken[part], 1)
         np.add.at(count, targets, 1)
         self._taken[part] = targets
+
+
+class Part(Protocol):
+    """One satellite's programme."""
+
+    @property
+    def target(self) -> Ints:
+        """The target of each task, one too far for contacts."""
+
+
+P = TypeVar("P", bound=Part)
+
+
+class BestPaths(OneByOne, Generic[P]):
+    """An oracle that answers with the best path of each satellite."""
+
+    def __init__(self, satellites: Sequence[P]) -> None:
+        self._satellites = satellites
+        self.parts: Ints = np.arange(len(satellites), dtype=np.int32)
+        self._latest = Latest(len(satellites))
+
+    @abstractmethod
+    def best(self, part: P, multipliers: Floats) -> tuple[float, Ints]:
+        """Return the most that a satellite can gain, and the tasks of a path that does."""
+
+    def answer(self, part: int, multipliers: Floats, count: Ints) -> None:
+        """Let a satellite answer anew."""
+        satellite = self._satellites[part]
+        _, path = self.best(satellite, multipliers)
+        self._latest.replace(part, satellite.target[path], count)
+
+    def gain(self, multipliers: Floats) -> float:
+        """Return the most that all satellites can gain."""
+        return sum(self.best(part, multipliers)[0] for part in self._satellites)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

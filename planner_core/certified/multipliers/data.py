@@ -13,7 +13,7 @@ import numpy as np
 from planner_core.certified.dp.data_labels import most_by_data
 from planner_core.certified.dp.data_levels import DataLevels, data_levels
 from planner_core.certified.dp.resource_network import Network, network_of
-from planner_core.certified.multipliers.ascent import Latest, OneByOne
+from planner_core.certified.multipliers.ascent import BestPaths
 from planner_core.certified.proofs.shares import Shares
 from planner_core.certified.signs import FROM_START
 from planner_core.certified.sizes import MAX_DATA_CELLS
@@ -46,19 +46,18 @@ class _Part(NamedTuple):
         )  # fmt: skip
 
 
-class DataPaths(OneByOne):
+class DataPaths(BestPaths[_Part]):
     """The best path of each satellite that its recorder allows, at given multipliers."""
 
     def __init__(self, worth: Floats, satellites: list[_Part]) -> None:
-        self._worth, self._satellites = worth, satellites
-        self.parts: Ints = np.arange(len(self._satellites), dtype=np.int32)
+        super().__init__(satellites)
+        self._worth = worth
         # Satellites answer one after another, in the same room.
         shape = (
-            max((len(part.rows) for part in self._satellites), default=0),
-            max((part.levels.num_levels for part in self._satellites), default=0),
+            max((len(part.rows) for part in satellites), default=0),
+            max((part.levels.num_levels for part in satellites), default=0),
         )
         self._own, self._source = np.empty(shape), np.empty(shape, dtype=np.int32)
-        self._latest = Latest(len(self._satellites))
 
     @classmethod
     def of(cls, problem: Problem) -> DataPaths | None:
@@ -69,17 +68,7 @@ class DataPaths(OneByOne):
             return None
         return cls(problem.worth, satellites)
 
-    def answer(self, part: int, multipliers: Floats, count: Ints) -> None:
-        """Let a satellite answer anew."""
-        satellite = self._satellites[part]
-        _, path = self._best(satellite, multipliers)
-        self._latest.replace(part, satellite.target[path], count)
-
-    def gain(self, multipliers: Floats) -> float:
-        """Return the most that all satellites can gain."""
-        return sum(self._best(part, multipliers)[0] for part in self._satellites)
-
-    def _best(self, part: _Part, multipliers: Floats) -> tuple[float, Ints]:
+    def best(self, part: _Part, multipliers: Floats) -> tuple[float, Ints]:
         """Return the most that a satellite can gain, and the tasks of a path that does."""
         worth = self._worth[part.rows] - multipliers[part.target]
         weight = np.maximum(worth, 0.0)

@@ -13,7 +13,7 @@ import numpy as np
 
 from planner_core.certified.dp.energy_labels import EnergyLevels, levels_of_estimate, most_by_energy
 from planner_core.certified.dp.resource_network import Network, network_of
-from planner_core.certified.multipliers.ascent import Ascent, Latest, OneByOne, Steps
+from planner_core.certified.multipliers.ascent import Ascent, BestPaths, Steps
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import COLLECT, Floats, Ints, Problem, SatelliteProblem
 from planner_core.worth import weights
@@ -38,7 +38,7 @@ class _Part(NamedTuple):
         )
 
 
-class EnergyPaths(OneByOne):
+class EnergyPaths(BestPaths[_Part]):
     """The best path of each satellite that its battery allows, at given multipliers.
 
     Attributes
@@ -48,29 +48,23 @@ class EnergyPaths(OneByOne):
     """
 
     def __init__(self, problem: Problem) -> None:
-        self._satellites = [_Part.of(problem, s) for s in problem.satellites if len(s)]
-        self.parts: Ints = np.arange(len(self._satellites), dtype=np.int32)
+        super().__init__([_Part.of(problem, s) for s in problem.satellites if len(s)])
         # Satellites answer one after another, in the same room.
         most_rows = max((len(part.target) for part in self._satellites), default=0)
         widest = max((part.levels.width for part in self._satellites), default=0)
         self._own = np.empty((most_rows, widest))
         self._num_own = np.zeros(most_rows, dtype=np.int64)
         self._worth = problem.worth
-        self._latest = Latest(len(self._satellites))
         self.usage = np.zeros(len(problem.opportunities))
 
     def answer(self, part: int, multipliers: Floats, count: Ints) -> None:
         """Let a satellite answer anew."""
         satellite = self._satellites[part]
-        _, path = self._best(satellite, multipliers)
+        _, path = self.best(satellite, multipliers)
         self._latest.replace(part, satellite.target[path], count)
         self.usage[satellite.rows[path]] += 1.0
 
-    def gain(self, multipliers: Floats) -> float:
-        """Return the most that all satellites can gain."""
-        return sum(self._best(part, multipliers)[0] for part in self._satellites)
-
-    def _best(self, part: _Part, multipliers: Floats) -> tuple[float, Ints]:
+    def best(self, part: _Part, multipliers: Floats) -> tuple[float, Ints]:
         """Return the most that a satellite can gain, and the tasks of a path that does."""
         worth, paid = self._worth[part.rows], multipliers[part.target]
         gain, path = most_by_energy(

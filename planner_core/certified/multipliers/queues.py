@@ -16,7 +16,7 @@ from planner_core.certified.dp.contact_queues import most_by_queues
 from planner_core.certified.dp.queue_tables import Queues
 from planner_core.certified.dp.queue_terms import queues_of
 from planner_core.certified.dp.resource_network import network_of
-from planner_core.certified.multipliers.ascent import Ascent, Latest, OneByOne, Steps
+from planner_core.certified.multipliers.ascent import Ascent, BestPaths, Steps
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import COLLECT, Bools, Bytes, Floats, Ints, Problem, SatelliteProblem
 from planner_core.problem.restrict import taking
@@ -49,25 +49,15 @@ class _Part(NamedTuple):
         return cls(queues=queues, target=target.astype(np.int32))
 
 
-class QueuePaths(OneByOne):
+class QueuePaths(BestPaths[_Part]):
     """The best path of each satellite that takes given contacts, at given multipliers."""
 
     def __init__(self, parts: Sequence[_Part], stop: Bytes) -> None:
-        self._satellites, self._stop = parts, stop
-        self.parts: Ints = np.arange(len(parts), dtype=np.int32)
-        self._latest = Latest(len(parts))
+        super().__init__(parts)
+        self._stop = stop
 
-    def answer(self, part: int, multipliers: Floats, count: Ints) -> None:
-        """Let a satellite answer anew."""
-        satellite = self._satellites[part]
-        _, path = self._best(satellite, multipliers)
-        self._latest.replace(part, satellite.target[path], count)
-
-    def gain(self, multipliers: Floats) -> float:
-        """Return the most that all satellites can gain."""
-        return sum(self._best(part, multipliers)[0] for part in self._satellites)
-
-    def _best(self, part: _Part, multipliers: Floats) -> tuple[float, Ints]:
+    def best(self, part: _Part, multipliers: Floats) -> tuple[float, Ints]:
+        """Return the most that a satellite can gain, and the tasks of a path that does."""
         return most_by_queues(part.queues._replace(price=multipliers[part.target]), self._stop)
 
 
