@@ -203,7 +203,7 @@ def test_windows_weigh_contacts_against_images(monkeypatch: pytest.MonkeyPatch) 
         return total
 
     weighed = earned()
-    monkeypatch.setattr(resource_network, "_left_cost", lambda problem, satellite: 0.0)
+    monkeypatch.setattr(resource_network, "left_cost", lambda problem, satellite: 0.0)
     assert weighed > 1.05 * earned()
 
 

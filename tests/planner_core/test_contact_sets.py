@@ -8,10 +8,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget
+from planner_core.certified.dp.resource_network import (
+    cost_on_board,
+    strict_network_of,
+    worth_before_left,
+)
+from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.mip.contact_sets import FixedContacts
 from planner_core.certified.proofs.resource_bound import resource_value
-from planner_core.domain import Agility, Dynamics
+from planner_core.certified.strategies.resource_steps import ResourceSearch
+from planner_core.certified.tuning import TUNING
+from planner_core.domain import Agility, Dynamics, Objective
 from planner_core.problem import CONTACT, Problem
+from planner_core.problem.delivery import with_objective
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
 from planner_core.solvers.registry import Milp
@@ -80,3 +89,63 @@ def test_contacts_that_exclude_each_other_leave_nothing() -> None:
     relaxation = FixedContacts(problem, every, contacts, Budget(), 0).relaxation()
     assert relaxation.value == -np.inf
     assert np.all(np.isinf(relaxation.losses))
+
+
+def _shared(
+    seed: int, dynamics: Dynamics, num_satellites: int, collected_share: float, num_collects: int
+) -> Problem:
+    problem = random_problem(
+        seed, dynamics=dynamics, num_satellites=num_satellites, num_collects=num_collects,
+        num_targets=num_collects // 2, num_contacts=3, has_quality=seed % 2 == 0,
+    )  # fmt: skip
+    return with_objective(problem, Objective(collected_share=collected_share))
+
+
+@examples(60)
+@given(
+    seed=SEEDS,
+    dynamics=st.sampled_from(["physical", "paper"]),
+    num_satellites=st.integers(1, 2),
+    collected_share=st.sampled_from([0.2, 0.9]),
+)
+def test_programs_count_what_stays_on_board_as_the_other_searches_do(
+    seed: int, dynamics: Dynamics, num_satellites: int, collected_share: float
+) -> None:
+    problem = _shared(seed, dynamics, num_satellites, collected_share, 14)
+    plan = Milp().solve(problem, Budget(), 0).plan
+    taken = np.zeros(len(problem.opportunities), dtype=np.bool_)
+    taken[[action.opportunity for action in plan.actions]] = True
+    rows = tuple(np.flatnonzero(taken).tolist())
+    none = np.zeros(len(taken), dtype=np.bool_)
+    counted = float(worth_before_left(problem)[taken].sum())
+    for satellite in problem.satellites:
+        if len(satellite):
+            network = strict_network_of(problem, satellite)
+            counted -= cost_on_board(network, taken[satellite.rows])
+    program = FixedContacts(problem, none, rows, Budget(), 0)
+    assert program.relaxed() == pytest.approx(counted, abs=1e-5)
+
+
+@pytest.mark.parametrize("dynamics", ["physical", "paper"])
+def test_the_contacts_of_the_best_plan_lead_to_others(dynamics: Dynamics) -> None:
+    """From the contacts of a good plan alone, and few of its images, all of it is found."""
+    num_better = 0
+    for seed in range(8):
+        problem = _shared(seed, dynamics, 1 + seed % 2, 0.5, 24)
+        good = Milp().solve(problem, Budget(), 0).plan
+        kind = problem.opportunities.kind
+        images = [a for a in good.actions if kind[a.opportunity] != CONTACT]
+        few = Plan(tuple(a for a in good.actions if a not in images[1:]))
+        best = Incumbent(problem, Budget(), 0.0)
+        if not best.offer(few):
+            continue
+        search = ResourceSearch(best, seed)
+        before = best.reward
+        while search.fix_own_contacts():
+            assert best.reward > before
+            before = best.reward
+        # With less room than that above the plan the next image is hard to find.
+        room = TUNING.room * problem.typical_worth
+        assert best.reward >= replay(problem, good).reward - room
+        num_better += best.reward > replay(problem, few).reward
+    assert num_better >= 4

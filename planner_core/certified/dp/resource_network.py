@@ -126,7 +126,7 @@ def _network(problem: Problem, satellite: SatelliteProblem, slack: float) -> Net
         is_kept=np.isin(satellite.rows, problem.kept_rows),
         delivered=_delivered(problem, satellite, network.data_floor, max(slack, 0.0)),
         must_deliver=must_deliver(problem, satellite),
-        left_cost=_left_cost(problem, satellite),
+        left_cost=left_cost(problem, satellite),
     )
 
 
@@ -191,7 +191,7 @@ def must_deliver(problem: Problem, satellite: SatelliteProblem) -> bool:
     return is_asked and problem.counts_delivery and is_transitive_on(satellite)
 
 
-def _left_cost(problem: Problem, satellite: SatelliteProblem) -> float:
+def left_cost(problem: Problem, satellite: SatelliteProblem) -> float:
     """Return what images that fill a recorder lose if they stay on board, as the typical one does.
 
     0 where that hangs on when they come down, or none may stay.
@@ -210,7 +210,7 @@ def worth_before_left(problem: Problem) -> Floats:
     """
     worth, lost = problem.worth.copy(), lost_on_board(problem)
     for satellite in problem.satellites:
-        cost = _left_cost(problem, satellite) * image_size(satellite)
+        cost = left_cost(problem, satellite) * image_size(satellite)
         earns = worth[satellite.rows] > 0.0
         worth[satellite.rows] += np.where(earns, np.maximum(cost - lost[satellite.rows], 0.0), 0.0)
     return worth

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
 
-from planner_core.certified.dp.resource_network import must_deliver
+from planner_core.certified.dp.resource_network import must_deliver, worth_before_left
 from planner_core.certified.mip.clique_cuts import antichain_cover, detours, excluding_pairs
 from planner_core.certified.mip.program import Program, Rows
 from planner_core.certified.mip.resource_terms import ResourceTerms, resource_terms
@@ -33,6 +33,9 @@ from planner_core.problem.delivery import lost_on_board
 from planner_core.problem.restrict import restricted
 
 Formulation = Literal["antichain", "pairwise"]
+OnBoard = Literal["worth less", "priced", "worth the same"]
+"""What images that stay on board do: each has a column that says so, or what a recorder holds at
+the end has one price, or they are worth the most they can."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -118,7 +121,7 @@ def plan_program(
     margin: float,
     rows: Ints | None = None,
     *,
-    counts_delivery: bool = True,
+    on_board: OnBoard = "worth less",
 ) -> PlanProgram:
     """Return the program of the plans that take some of the tasks.
 
@@ -128,16 +131,20 @@ def plan_program(
         How far inside battery and recorder limits to stay.
     rows
         The opportunities that a plan may take, ascending; all by default.
-    counts_delivery
-        Whether images that stay on board are worth less; otherwise all are worth the most they can.
+    on_board
+        What images do that stay on board.
     """
     terms = [
-        resource_terms(problem, satellite) if problem.use_resources and len(satellite) else None
+        resource_terms(problem, satellite, prices_left=on_board == "priced")
+        if problem.use_resources and len(satellite)
+        else None
         for satellite in problem.satellites
     ]
     lost = _binding_losses(problem)
-    if not counts_delivery:
+    if on_board != "worth less":
         lost[:] = 0.0
+    if on_board == "priced":
+        problem = replace(problem, worth=worth_before_left(problem))
     if rows is not None:
         # What a task costs depends on the tasks around it, taken or not.
         is_kept = np.zeros(len(problem.opportunities), dtype=np.bool_)

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from planner_core.certified.dp.resource_network import must_deliver, network_of
+from planner_core.certified.dp.resource_network import left_cost, must_deliver, network_of
 from planner_core.mdp.idle_energy import IdleEnergy, idle_energy
 from planner_core.precedence.relation import comes_before, direct_precedence
 from planner_core.problem import (
@@ -79,6 +79,8 @@ class ResourceTerms:
         Highest level at the end with each task as the last image, where images must come down.
     comes_down
         The same for each image to be on the ground, where some may stay on board.
+    left_cost
+        What a full recorder costs at the end, of worth.
     """
 
     energy_cost: Floats
@@ -94,6 +96,7 @@ class ResourceTerms:
     given: Given = NOTHING_GIVEN
     delivered: Floats | None = None
     comes_down: Floats | None = None
+    left_cost: float = 0.0
 
     def of_part(self, rows: Ints) -> ResourceTerms:
         """Return the terms where only some of the tasks may be taken, in ascending order.
@@ -117,8 +120,16 @@ class ResourceTerms:
         return replace(self, given=self.given.of_part(rows, len(self.full)), **part)
 
 
-def resource_terms(problem: Problem, satellite: SatelliteProblem) -> ResourceTerms:
-    """Return the terms of a satellite that has opportunities."""
+def resource_terms(
+    problem: Problem, satellite: SatelliteProblem, *, prices_left: bool
+) -> ResourceTerms:
+    """Return the terms of a satellite that has opportunities.
+
+    Parameters
+    ----------
+    prices_left
+        Whether what stays on board has a price, as in the other searches (``left_cost``).
+    """
     terms = (
         physical_terms(problem, satellite)
         if problem.dynamics == "physical"
@@ -126,6 +137,8 @@ def resource_terms(problem: Problem, satellite: SatelliteProblem) -> ResourceTer
     )
     if must_deliver(problem, satellite):
         return replace(terms, delivered=network_of(problem, satellite).delivered)
+    if prices_left:
+        return replace(terms, left_cost=left_cost(problem, satellite))
     if problem.counts_delivery:
         return replace(terms, comes_down=network_of(problem, satellite).data_floor)
     return terms

@@ -55,6 +55,8 @@ def add_resources(
     if terms.delivered is not None:
         _add_delivery(program, satellite, terms.delivered, level, taken)
     _add_shares(program, terms, level, taken, down, margin)
+    if terms.left_cost > 0.0:
+        _add_price(program, satellite, terms.left_cost, level)
 
 
 def _add_battery(
@@ -191,3 +193,12 @@ def _add_shares(
     program.add_rows(
         Rows.aligned((last, 1.0), (younger, -1.0), (down[images], highest - free), upper=highest)
     )
+
+
+def _add_price(
+    program: Program, satellite: SatelliteProblem, left_cost: float, level: Ints
+) -> None:
+    """Let what the recorder holds at the end, beyond what it did at the start, have its price."""
+    start = max(satellite.resources.initial_recorder_fraction, 0.0)
+    left = program.add_columns(np.array([-left_cost]), lower=-start, upper=np.inf, is_integer=False)
+    program.add_rows(Rows.aligned((left, 1.0), (level[-1:], -1.0), lower=-start))

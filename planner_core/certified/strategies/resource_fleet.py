@@ -28,15 +28,18 @@ def plans_and_multipliers(search: Search) -> Iterator[None]:
     What is left of a small fleet HiGHS soon settles.
     """
     engine, best = search.engine(ResourceSearch), search.best
-    turns = engine.turns(engine.unit)
+    turns, known = engine.turn_search, best.reward
     pool = PlanPool(search.problem, search.budget, search.seed)
     with side_by_side(search.budget.num_threads) as together:
         pricing = _FleetPricing(engine)
         while not (pricing.is_settled or best.is_done):
+            if best.reward > known:
+                turns.adopt(best.plan)
             _take_turns(engine, turns, pool, together, pricing)
+            known = best.reward
             yield
         programs = None
-        if is_fleet(engine.problem) and pricing.prices is not None:
+        if pricing.prices is not None:
             programs = ProgramSearch(
                 search.problem, pool, pricing.prices, pricing.losses, search.budget, search.seed
             )
@@ -44,8 +47,10 @@ def plans_and_multipliers(search: Search) -> Iterator[None]:
         while idle_turns < (TUNING.fleet_patience if programs else TUNING.tries):
             if best.is_done:
                 return
+            if best.reward > known:
+                turns.adopt(best.plan)
             is_better = _take_turns(engine, turns, pool, together, programs)
-            idle_turns = 0 if is_better else idle_turns + 1
+            idle_turns, known = 0 if is_better else idle_turns + 1, best.reward
             yield
 
 
@@ -137,12 +142,8 @@ class _FleetPricing:
             # What takes opportunities counts from here on: answers come near the best plans.
             usage[:] = 0.0
             search.ask_energy(energy)
-        search.prove_by_energy(energy)
         yield beside_prices
-        lowest, multipliers = search.ask_data(energy)
-        value = min(search.best.bound.value, lowest)
-        prices = PriceSearch(search.problem, value, multipliers, search.budget.stop)
-        prices.learn(search.best.plan)
+        prices, _ = search.begin_prices(energy)
         known = search.best.bound
         search.price(prices, 1)
         self.prices = prices

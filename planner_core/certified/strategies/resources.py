@@ -69,6 +69,14 @@ def windows_and_choices(search: Search) -> Iterator[None]:
         yield
 
 
+def own_contacts(search: Search) -> Iterator[None]:
+    """Look for better plans with the contacts of the best one, by a small program."""
+    engine = search.engine(ResourceSearch)
+    while _is_promising(search):
+        engine.fix_own_contacts()
+        yield
+
+
 def choices_from_the_best(search: Search) -> Iterator[None]:
     """Replan the whole day by choices of tasks from the best plan, until that leads no further.
 

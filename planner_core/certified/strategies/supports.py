@@ -110,9 +110,23 @@ def is_shared_with_limits(problem: Problem) -> bool:
     return has_steady_worth(problem) and is_shared(problem)
 
 
-def is_small_with_limits(problem: Problem) -> bool:
-    """Whether that holds of one satellite, or of several with little to choose from."""
-    return has_steady_worth(problem) and not is_fleet(problem)
+def fits_a_program(problem: Problem) -> bool:
+    """Whether a program of all tasks, contacts fixed, takes seconds.
+
+    With turns to the sun each pair of near tasks has a column.
+    """
+    most = TUNING.large if problem.turns_to_the_sun else TUNING.most_columns
+    return has_steady_worth(problem) and len(problem.opportunities) <= most
+
+
+def is_small_and_shared(problem: Problem) -> bool:
+    """Whether that holds of several satellites with little to choose from."""
+    return is_shared_with_limits(problem) and not is_large(problem)
+
+
+def is_alone_with_limits(problem: Problem) -> bool:
+    """Whether that holds of one satellite."""
+    return has_steady_worth(problem) and not is_shared(problem)
 
 
 def is_aging(problem: Problem) -> bool:
