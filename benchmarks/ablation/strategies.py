@@ -120,6 +120,8 @@ _RESOURCES: Final = {
 _CLOUDS: Final = {"clouds-1000": 12.0}
 _DELIVERED: Final = {"delivered-paper-500": 12.0}
 _AGE_ON_BOARD: Final = {"half-life-12h-share-1000": 10.0, "half-life-12h-share-paper-1000": 10.0}
+_OWN_CONTACTS: Final = {"weights-1000": 20.0, "clouds-1000": 15.0, "share-paper-500": 15.0}
+_SHARED: Final = {"share-fleet-paper-4x500": 12.0}
 _FLEET: Final = {"fleet-4x2000": 12.0, "fleet-2x500": 10.0}
 _STATIONS: Final = {"fleet-stations-4x2000": 60.0}
 _LARGE_FLEET: Final = {"fleet-24x10000": 60.0}
@@ -145,6 +147,8 @@ STRATEGIES: Final[Mapping[str, Change]] = {
             "whole relaxation": _CLOUDS,
             "multipliers": _RESOURCES,
             "programs with contacts fixed": _RESOURCES,
+            "programs with the plan's contacts": _OWN_CONTACTS,
+            "a fleet's programs with the plan's contacts": _SHARED,
             "plans without the half-life": _AGE_ON_BOARD,
             "windows with free starts": _FREE,
             # Their first tables alone take six seconds.

@@ -25,7 +25,7 @@ from planner_core.problem import Floats
 def plans_and_multipliers(search: Search) -> Iterator[None]:
     """Search for plans and multipliers side by side, and for plans again until that fails.
 
-    What is left of a small fleet HiGHS soon settles.
+    Where other strategies have found a better plan, the search for plans goes on from that.
     """
     engine, best = search.engine(ResourceSearch), search.best
     turns, known = engine.turn_search, best.reward

@@ -262,9 +262,7 @@ class ResourceSearch:
         num_rounds
             Of cutting planes.
         """
-        table = self.problem.opportunities
-        own = self.mask(action.opportunity for action in self.best.plan.actions)
-        contacts = tuple(np.flatnonzero(own & (table.kind == CONTACT)).tolist())
+        own, contacts = self._own
         program = FixedContacts(self.problem, offered | own, contacts, self.budget, self.seed)
         relaxation = program.relaxation(num_rounds)
         self._relaxed[contacts] = relaxation
@@ -280,12 +278,17 @@ class ResourceSearch:
         """
         if self.best.bound.value < self.best.better + TUNING.room * self._one:
             return False
-        table = self.problem.opportunities
-        own = self.mask(action.opportunity for action in self.best.plan.actions)
-        contacts = tuple(np.flatnonzero(own & (table.kind == CONTACT)).tolist())
+        own, contacts = self._own
         if contacts not in self._relaxed:
-            self.relax_plan(np.ones(len(table), dtype=np.bool_), 0)
+            self.relax_plan(np.ones_like(own), 0)
         return self.fix_contacts(is_last=False, is_rounded=True)
+
+    @property
+    def _own(self) -> tuple[Bools, tuple[int, ...]]:
+        """Which opportunities the best plan takes, and its contacts."""
+        own = self.mask(action.opportunity for action in self.best.plan.actions)
+        is_contact = self.problem.opportunities.kind == CONTACT
+        return own, tuple(np.flatnonzero(own & is_contact).tolist())
 
     @property
     def best_relaxation(self) -> Relaxation | None:
