@@ -43,8 +43,10 @@ def plans_and_multipliers(search: Search) -> Iterator[None]:
             programs = ProgramSearch(
                 search.problem, pool, pricing.prices, pricing.losses, search.budget, search.seed
             )
+        # A small fleet has other strategies, which go on when this one has ended.
+        patience = TUNING.fleet_patience if is_fleet(engine.problem) else TUNING.patience
         idle_turns = 0
-        while idle_turns < (TUNING.fleet_patience if programs else TUNING.tries):
+        while idle_turns < (patience if programs else TUNING.tries):
             if best.is_done:
                 return
             if best.reward > known:
