@@ -118,7 +118,7 @@ STRATEGIES: Final = (
         slices=fleet.windows,
         begin=Begin.STALLED,
     ),
-    # Battery and recorder.
+    # Battery and recorder: several satellites, then one, which has the same in another order.
     Strategy(
         name="plans and multipliers side by side",
         supports=is_shared_with_limits,

@@ -30,30 +30,24 @@ def plans_and_multipliers(search: Search) -> Iterator[None]:
     engine, best = search.engine(ResourceSearch), search.best
     turns, known = engine.turn_search, best.reward
     pool = PlanPool(search.problem, search.budget, search.seed)
+    # A small fleet has other strategies, which go on when this one has ended.
+    patience = TUNING.fleet_patience if is_fleet(engine.problem) else TUNING.patience
     with side_by_side(search.budget.num_threads) as together:
         pricing = _FleetPricing(engine)
-        while not (pricing.is_settled or best.is_done):
-            if best.reward > known:
-                turns.adopt(best.plan)
-            _take_turns(engine, turns, pool, together, pricing)
-            known = best.reward
-            yield
-        programs = None
-        if pricing.prices is not None:
-            programs = ProgramSearch(
-                search.problem, pool, pricing.prices, pricing.losses, search.budget, search.seed
-            )
-        # A small fleet has other strategies, which go on when this one has ended.
-        patience = TUNING.fleet_patience if is_fleet(engine.problem) else TUNING.patience
+        other: _FleetPricing | ProgramSearch = pricing
         idle_turns = 0
-        while idle_turns < (patience if programs else TUNING.tries):
-            if best.is_done:
-                return
+        while idle_turns < patience and not best.is_done:
             if best.reward > known:
                 turns.adopt(best.plan)
-            is_better = _take_turns(engine, turns, pool, together, programs)
-            idle_turns, known = 0 if is_better else idle_turns + 1, best.reward
+            is_better = _take_turns(engine, turns, pool, together, other)
+            known = best.reward
+            idle_turns = 0 if is_better or other is pricing else idle_turns + 1
             yield
+            if other is pricing and pricing.is_settled:
+                other = ProgramSearch(
+                    search.problem, pool, engine.price_search, pricing.losses, search.budget,
+                    search.seed,
+                )  # fmt: skip
 
 
 def _take_turns(
@@ -61,17 +55,13 @@ def _take_turns(
     turns: TurnSearch,
     pool: PlanPool,
     together: Together,
-    other: _FleetPricing | ProgramSearch | None,
+    other: _FleetPricing | ProgramSearch,
 ) -> bool:
     """Let the search for plans and another go on side by side; return whether a plan is better.
 
     That search learns from no other: it would lead nowhere new from their plans.
     """
-    num_steps = TUNING.steps_beside if other is None else other.steps_beside
-    work = [partial(turns.turn, num_steps)]
-    if other is not None:
-        work.append(partial(_go_on, other, pool))
-    together(*work)
+    together(partial(turns.turn, other.steps_beside), partial(_go_on, other, pool))
     pool.learn(turns.ended, turns.plan)
     is_better = [search.offer(plan) for plan in (turns.plan, pool.plan)]
     search.best.report("plans")
