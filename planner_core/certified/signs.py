@@ -35,7 +35,7 @@ ANYWHERE: Final = -2
 """In place of the contact that a path has taken last: any of them, or none."""
 
 UNREACHED_UNITS: Final = -(2**30)
-"""Instead of units that add up to fewer than ``sizes.MAX_QUEUE_UNITS``: below 0 with those too."""
+"""Instead of units that add up to fewer than ``sizes.MAX_UNITS``: below 0 with those too."""
 
 PLENTY_UNITS: Final = 2**30
 """Units that suffice for anything: more than any path gains."""

@@ -56,7 +56,7 @@ def idle_spans(problem: Problem, satellite: SatelliteProblem, actions: Columns) 
     # Of the start of the horizon and the tasks before, the first that ends last.
     end_s = np.append(0.0, actions.end_s)
     free_from_s = np.maximum.accumulate(end_s)
-    is_later = np.diff(free_from_s, prepend=-1.0) > 0.0
+    is_later = np.append(True, free_from_s[1:] > free_from_s[:-1])
     last = np.maximum.accumulate(np.where(is_later, np.arange(len(end_s)), 0))
     turn_to_s = np.append(_first_turn_s(satellite), out_s)[last]
     sun_from_s = free_from_s + turn_to_s

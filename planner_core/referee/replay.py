@@ -142,7 +142,9 @@ def _collected(
     targets, first, count = np.unique(place, return_index=True, return_counts=True)
     best = images[first]
     duplicates = []
-    is_known = np.isin(targets, [image.target for image in problem.on_board])
+    is_known = np.zeros(len(targets), dtype=np.bool_)
+    if problem.on_board:
+        is_known = np.isin(targets, [image.target for image in problem.on_board])
     by_first = np.argsort(first)
     for target in by_first[((count > 1) | is_known)[by_first]].tolist():
         positions = images[place == targets[target]].tolist()

@@ -29,6 +29,7 @@ from planner_core.solvers.registry import Certified, Rule
 from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import Task, make_problem, random_problem, with_rewards
+from tests.planner_core.verdicts import certified
 
 SEEDS = st.integers(0, 10**6)
 SLOW = Agility(slew_rate_deg_s=0.3)
@@ -98,7 +99,7 @@ def test_it_equals_brute_force(
         num_targets=num_targets, span_s=400.0, agility=agility, max_turn_deg=max_turn_deg,
     )  # fmt: skip
     problem = with_spread(problem, seed, spread)
-    solution = Certified().solve(problem, Budget(), 0)
+    solution = certified(problem, is_hasty=seed % 8 > 0)
     assert solution.termination is Termination.OPTIMAL
     assert_proven(problem, solution, best_reward(problem))
 
@@ -122,7 +123,7 @@ def test_with_a_choice_of_starts_it_equals_brute_force(
         max_turn_deg=max_turn_deg,
     )  # fmt: skip
     problem = with_spread(problem, seed, spread)
-    solution = Certified().solve(problem, Budget(), 0)
+    solution = certified(problem, is_hasty=seed % 8 > 0)
     assert solution.termination is Termination.OPTIMAL
     assert_proven(problem, solution, best_reward(problem))
 
@@ -145,7 +146,7 @@ def test_with_a_worth_of_each_collect_it_equals_brute_force(
         num_offers=num_offers, num_targets=4, span_s=300.0, agility=agility,
         max_turn_deg=max_turn_deg, has_rewards=has_rewards, has_quality=True,
     )  # fmt: skip
-    solution = Certified().solve(problem, Budget(), 0)
+    solution = certified(problem, is_hasty=seed % 8 > 0)
     assert solution.termination is Termination.OPTIMAL
     assert_proven(problem, solution, best_reward(problem))
 

@@ -56,7 +56,7 @@ def test_delivered_is_the_best_of_all_plans(
 ) -> None:
     problem = _small(seed, dynamics, num_satellites, has_quality=has_quality)
     problem = with_objective(problem, Objective.delivered())
-    encloses(problem, best_reward(problem))
+    encloses(problem, best_reward(problem), is_hasty=seed % 8 > 0)
 
 
 @examples(800)
@@ -73,6 +73,11 @@ def test_delivered_is_the_best_of_all_plans(
     seed=503436, dynamics="physical", collected_share=0.9, half_life_s=None, num_satellites=2,
     has_quality=True,
 )  # fmt: skip
+# Among worths of next to nothing HiGHS called an optimum what was none.
+@example(
+    seed=257531, dynamics="paper", collected_share=1e-30, half_life_s=214.0, num_satellites=1,
+    has_quality=False,
+)  # fmt: skip
 def test_no_plan_beats_the_bound_whatever_delivery_counts(
     dynamics: Literal["physical", "paper"],
     seed: int,
@@ -84,7 +89,7 @@ def test_no_plan_beats_the_bound_whatever_delivery_counts(
     problem = _small(seed, dynamics, num_satellites, has_quality=has_quality)
     objective = Objective(collected_share=collected_share, half_life_s=half_life_s)
     problem = with_objective(problem, objective)
-    is_best = encloses(problem, best_reward(problem))
+    is_best = encloses(problem, best_reward(problem), is_hasty=seed % 8 > 0)
     assert is_best or half_life_s is not None
 
 
@@ -372,7 +377,7 @@ def test_a_share_for_images_on_board_bounds_every_plan(
     price: float,
 ) -> None:
     """What `certified` makes of such prices is held by the property of all objectives."""
-    problem = _problem(seed, dynamics, num_satellites, num_contacts=3, has_quality=has_quality)
+    problem = _small(seed, dynamics, num_satellites, has_quality=has_quality)
     problem = with_objective(problem, Objective(collected_share=collected_share))
     best = best_reward(problem)
     for unit in (0.05, 0.25, 1.0):

@@ -12,8 +12,8 @@ from planner_core.certified.dp.resource_network import Network, part_of
 from planner_core.certified.sizes import (
     MAX_QUEUE_ENTRIES,
     MAX_QUEUE_STEPS,
-    MAX_QUEUE_UNITS,
     MAX_QUEUE_WORK,
+    MAX_UNITS,
     QUEUE_STEPS,
 )
 from planner_core.certified.tolerances import DOWN, DOWN_S
@@ -103,7 +103,7 @@ def queues_of(
         most=problem.worth[table_rows],
         price=np.where(is_image, np.append(price, 0.0)[place * is_image], 0.0),
         half_life_s=float(problem.objective.half_life_s or np.inf),
-        unit=max(float(problem.worth[table_rows].sum()), 1e-9) / MAX_QUEUE_UNITS,
+        unit=max(float(problem.worth[table_rows].sum()), 1e-9) / MAX_UNITS,
         num_tables=num_tables,
         takes_worthless=False,
     )

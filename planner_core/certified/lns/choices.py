@@ -22,6 +22,7 @@ from planner_core.certified.dp.resource_network import (
     strict_network_of,
     worth_before_left,
 )
+from planner_core.certified.sizes import MAX_UNITS
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import (
     COLLECT,
@@ -76,7 +77,7 @@ class SatelliteChoices:
             rows=satellite.rows,
             network=network,
             levels=levels,
-            end_cost=cost.astype(np.int32),
+            end_cost=np.minimum(cost, MAX_UNITS).astype(np.int32),
             target=target,
             # Far above the bound, of which there are at most so many: such a task is in no plan.
             weight=np.minimum(in_units, TUNING.max_units).astype(np.int32),

@@ -10,6 +10,7 @@ import numpy as np
 from planner_core.certified.dp.data_levels import DataLevels
 from planner_core.certified.dp.resource_network import Network, image_size
 from planner_core.certified.signs import FROM_START
+from planner_core.certified.sizes import MAX_UNITS
 from planner_core.certified.tolerances import ON_BOARD, ROUNDING
 from planner_core.certified.tuning import TUNING
 from planner_core.precedence.relation import is_transitive_on
@@ -150,7 +151,8 @@ class Shares:
 
     def end_cost(self, levels: DataLevels, unit: float, since: int) -> Ints:
         """Return what a recorder costs that ends at each level, in units."""
-        return np.floor(self.cost_at_end(levels, since) / unit).astype(np.int32)
+        cost = np.floor(self.cost_at_end(levels, since) / unit)
+        return np.minimum(cost, MAX_UNITS).astype(np.int32)
 
     def cost_at_end(self, levels: DataLevels, since: int) -> Floats:
         """Return the same without units."""
