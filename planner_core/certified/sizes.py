@@ -30,7 +30,7 @@ MAX_LAYERS: Final = 48
 """Groups of contacts between which images come down."""
 
 MAX_UNITS: Final = 2**29
-"""Of worth that a path through queues may gain, or any path pay at its end, in 32 bits."""
+"""Of worth that a path through queues may gain, or any path pay at its end: counted in 32 bits."""
 
 MAX_QUEUE_WORK: Final = 20_000_000_000
 """Entries that a programme of queues raises, which takes some 20 s."""

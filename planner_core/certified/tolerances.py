@@ -22,7 +22,7 @@ LEAST_BOUND: Final = 4e-9
 """Of a bound where nearly nothing can be earned."""
 
 NOTHING: Final = 1e-15
-"""Of the most that a target is worth: no step of an ascent is worth less, and HiGHS is told of no
+"""Of the most that a target is worth: no step of an ascent, and no column of a program, is worth
 less."""
 
 ON_BOARD: Final = 3e-9

@@ -99,7 +99,7 @@ def test_it_equals_brute_force(
         num_targets=num_targets, span_s=400.0, agility=agility, max_turn_deg=max_turn_deg,
     )  # fmt: skip
     problem = with_spread(problem, seed, spread)
-    solution = certified(problem, is_hasty=seed % 8 > 0)
+    solution = certified(problem, seed)
     assert solution.termination is Termination.OPTIMAL
     assert_proven(problem, solution, best_reward(problem))
 
@@ -123,7 +123,7 @@ def test_with_a_choice_of_starts_it_equals_brute_force(
         max_turn_deg=max_turn_deg,
     )  # fmt: skip
     problem = with_spread(problem, seed, spread)
-    solution = certified(problem, is_hasty=seed % 8 > 0)
+    solution = certified(problem, seed)
     assert solution.termination is Termination.OPTIMAL
     assert_proven(problem, solution, best_reward(problem))
 
@@ -146,7 +146,7 @@ def test_with_a_worth_of_each_collect_it_equals_brute_force(
         num_offers=num_offers, num_targets=4, span_s=300.0, agility=agility,
         max_turn_deg=max_turn_deg, has_rewards=has_rewards, has_quality=True,
     )  # fmt: skip
-    solution = certified(problem, is_hasty=seed % 8 > 0)
+    solution = certified(problem, seed)
     assert solution.termination is Termination.OPTIMAL
     assert_proven(problem, solution, best_reward(problem))
 
