@@ -99,6 +99,7 @@ def create_app(
         title="Slewline",
         version=planner_core.__version__,
         description=DESCRIPTION,
+        openapi_url=None,  # service.api.openapi has routes of its own
         docs_url=None,  # FastAPI's own pages load scripts from the internet
         redoc_url=None,
         lifespan=_lifespan,

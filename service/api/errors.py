@@ -10,6 +10,7 @@ from typing import Any
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
+from fastapi.routing import iter_route_contexts
 from sqlalchemy.exc import SQLAlchemyError
 from starlette.exceptions import HTTPException
 
@@ -130,15 +131,18 @@ def _on_http_exception(request: Request, error: HTTPException) -> JSONResponse:
         code = "_".join(HTTPStatus(error.status_code).phrase.lower().split())
         return problem(request, code, error.detail, headers=error.headers, status=error.status_code)
     headers = dict(error.headers or {})
-    if error.status_code == 405 and (methods := _documented_methods(request)):
+    if error.status_code == 405 and (methods := _methods(request)):
         headers["Allow"] = ", ".join(methods)
     return problem(request, code, _http_detail(request, error), headers=headers)
 
 
-def _documented_methods(request: Request) -> list[str]:
+def _methods(request: Request) -> list[str]:
     # Each method is a route of its own, and the framework names those of the first one alone.
     path = getattr(request.scope.get("route"), "path", None)
-    return sorted(method.upper() for method in request.app.openapi()["paths"].get(path, ()))
+    routes = iter_route_contexts(request.app.routes)
+    return sorted(
+        {method for route in routes if route.path == path for method in route.methods or ()}
+    )
 
 
 def _http_detail(request: Request, error: HTTPException) -> str:

@@ -6,11 +6,12 @@ import base64
 import hashlib
 import re
 from html import escape
+from threading import Lock
 from typing import Any
 
 from fastapi import APIRouter, FastAPI, Request
 from fastapi.openapi.utils import get_openapi
-from fastapi.responses import HTMLResponse
+from fastapi.responses import HTMLResponse, JSONResponse
 from pydantic import BaseModel
 
 from service.api.errors import problem_responses
@@ -62,19 +63,24 @@ _KEYS = {
 
 
 def install_openapi(app: FastAPI) -> None:
-    """Make ``app.openapi()`` return the document with every error response declared."""
+    """Make ``app.openapi()`` return the document with every error response declared.
+
+    It takes seconds to build, once: only what runs in a thread may ask for it.
+    """
+    building = Lock()
 
     def document() -> dict[str, Any]:
-        if app.openapi_schema is None:
-            app.openapi_schema = _with_problems(
-                get_openapi(
-                    title=app.title,
-                    version=app.version,
-                    description=app.description,
-                    routes=app.routes,
+        with building:
+            if app.openapi_schema is None:
+                app.openapi_schema = _with_problems(
+                    get_openapi(
+                        title=app.title,
+                        version=app.version,
+                        description=app.description,
+                        routes=app.routes,
+                    )
                 )
-            )
-        return app.openapi_schema
+            return app.openapi_schema
 
     # As FastAPI's documentation has it.
     app.openapi = document  # type: ignore[method-assign]
@@ -153,6 +159,12 @@ def _below(collection: str, paths: dict[str, Any]) -> list[tuple[str, str]]:
 
 def _text(description: str) -> dict[str, Any]:
     return {"description": description, "schema": {"type": "string"}}
+
+
+@router.get("/openapi.json", name="openapi")
+def openapi_json(request: Request) -> JSONResponse:
+    """Return the document. FastAPI's own route builds it where every request has to wait."""
+    return JSONResponse(request.app.openapi())
 
 
 @router.get("/docs", response_class=HTMLResponse)

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from threading import Event
+from typing import Any
 
 import httpx
 import pytest
+from fastapi.openapi.utils import get_openapi
 
 from planner_core.errors import InvalidElements
 from service.db.rows import WorkerRow
 from service.db.session import Database
 from service.settings import Settings
+from tests.patience import PATIENCE_S
 from tests.plain_http import NO_TLS
 from tests.service.conftest import Service, new_app, serve
 from tests.service.factories import EPOCH, ground_station, satellite, target, tle
@@ -31,6 +36,42 @@ def test_a_wrong_method_is_405_and_names_the_right_ones(client: httpx.Client) ->
     assert client.post("/v1/satellites/1/elements").headers["allow"] == "GET, PUT"
     assert client.put("/v1/satellites/import").headers["allow"] == "POST"
     assert client.post("/docs").headers["allow"] == "GET"
+
+
+def test_a_wrong_method_does_not_build_the_openapi_document(settings: Settings) -> None:
+    # It takes seconds, and every other request would wait for them.
+    app = new_app(settings)
+    with serve(app) as address, httpx.Client(base_url=address, verify=NO_TLS) as client:
+        assert client.patch("/v1/satellites").headers["allow"] == "GET, POST"
+        assert app.openapi_schema is None
+
+
+def test_others_are_served_while_the_openapi_document_is_built(
+    settings: Settings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun, may_end = Event(), Event()
+    built: list[int] = []
+
+    def slow(**kwargs: Any) -> dict[str, Any]:
+        built.append(1)
+        begun.set()
+        may_end.wait(PATIENCE_S)
+        return get_openapi(**kwargs)
+
+    monkeypatch.setattr("service.api.openapi.get_openapi", slow)
+    with (
+        serve(new_app(settings)) as address,
+        httpx.Client(base_url=address, verify=NO_TLS, timeout=60) as client,
+        ThreadPoolExecutor() as pool,
+    ):
+        try:
+            asked = [pool.submit(client.get, path) for path in ("/openapi.json", "/docs")]
+            assert begun.wait(PATIENCE_S)
+            assert client.get("/health/live").status_code == 200
+        finally:
+            may_end.set()
+        assert {answer.result().status_code for answer in asked} == {200}
+    assert len(built) == 1
 
 
 def test_a_mistyped_query_parameter_is_refused_rather_than_ignored(client: httpx.Client) -> None:

@@ -72,6 +72,7 @@ class Probed:
         command = [sys.executable, "-m", "schemathesis.cli", "--no-color"]
         command += ["--config-file", CONFIG.name, "run", DOCUMENT, "--url", self.url]
         command += ["--warnings", "off", "--output-sanitize", "false", "--continue-on-failure"]
+        command += ["--request-timeout", str(PATIENCE_S)]
         if EXAMPLES is None:
             command += ["--generation-deterministic", "--phases", phases]
         command += ["--max-examples", EXAMPLES or str(examples), *options]
