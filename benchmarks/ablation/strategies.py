@@ -120,6 +120,8 @@ _RESOURCES: Final = {
 _CLOUDS: Final = {"clouds-1000": 12.0}
 _DELIVERED: Final = {"delivered-paper-500": 12.0}
 _AGE_ON_BOARD: Final = {"half-life-12h-share-1000": 10.0, "half-life-12h-share-paper-1000": 10.0}
+_FEW_OF_AGE: Final = {"half-life-3h-100": 8.0}
+_FEW_OF_AGE_SHARED: Final = {"half-life-3h-fleet-4x80": 10.0}
 _OWN_CONTACTS: Final = {"weights-1000": 20.0, "clouds-1000": 15.0, "share-paper-500": 15.0}
 _SHARED: Final = {"share-fleet-paper-4x500": 12.0}
 _FLEET: Final = {"fleet-4x2000": 12.0, "fleet-2x500": 10.0}
@@ -150,6 +152,8 @@ STRATEGIES: Final[Mapping[str, Change]] = {
             "programs with the plan's contacts": _OWN_CONTACTS,
             "a fleet's programs with the plan's contacts": _SHARED,
             "plans without the half-life": _AGE_ON_BOARD,
+            "images by the contact that brings them down": _FEW_OF_AGE_SHARED,
+            "stretches by small programs": _FEW_OF_AGE,
             "windows with free starts": _FREE,
             # Their first tables alone take six seconds.
             "multipliers of chains": {"continuous-1000": 30.0},

@@ -165,6 +165,10 @@ FAMILIES: Final[Mapping[str, Family]] = {
         num_targets=1000, budget_s=10.0, quick_budget_s=8.0, dynamics="physical",
         objective=_halved_in(3.0),
     ),
+    "half-life-3h-100": Family(
+        num_targets=100, budget_s=8.0, quick_budget_s=None, dynamics="physical",
+        objective=_halved_in(3.0),
+    ),
     "half-life-12h-1000": Family(
         num_targets=1000, budget_s=10.0, quick_budget_s=10.0, dynamics="physical",
         objective=_halved_in(12.0),
@@ -176,6 +180,10 @@ FAMILIES: Final[Mapping[str, Family]] = {
     "half-life-12h-share-paper-1000": Family(
         num_targets=1000, budget_s=10.0, quick_budget_s=None, dynamics="paper",
         objective=_halved_in(12.0, 0.9),
+    ),
+    "half-life-3h-fleet-4x80": Family(
+        num_satellites=4, num_targets=80, budget_s=10.0, quick_budget_s=None, num_draws=3,
+        dynamics="physical", objective=_halved_in(3.0),
     ),
     "half-life-12h-fleet-4x2000": Family(
         num_satellites=4, num_targets=2000, budget_s=40.0, quick_budget_s=None, dynamics="physical",

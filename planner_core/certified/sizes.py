@@ -49,6 +49,10 @@ higher at half-lives of 3 and 12 h, with 5 the same."""
 FEW_CONTACTS: Final = 20
 """Of a satellite, among which a programme of queues finds the best in a second or less."""
 
+NEXT_CONTACTS: Final = 8
+"""After an image, that a program tells apart. With all of them programs take half as long again,
+with bounds as low."""
+
 MEMORY_BITS: Final = 128
 """Targets that a label may remember."""
 

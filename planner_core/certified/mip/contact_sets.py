@@ -26,7 +26,6 @@ from planner_core.problem import (
     CONTACT,
     Bools,
     Floats,
-    Ints,
     Problem,
 )
 from planner_core.problem.plan import Plan
@@ -53,10 +52,6 @@ class _Point(NamedTuple):
 
 
 class _Engine(Engine):
-    def hold(self, columns: Ints, values: Floats) -> None:
-        """Fix some columns anew."""
-        self._highs.changeColsBounds(len(columns), columns, values, values)
-
     def require(self, amount: float) -> None:
         """Look only for points worth this much, until there is one."""
         for option in ("objective_bound", "objective_target"):

@@ -13,7 +13,7 @@ from planner_core.budget import Budget
 from planner_core.certified.mip.program import Program, Rows
 from planner_core.certified.sizes import LOG_CHARACTERS, PAUSE_S, POLL_S
 from planner_core.certified.tolerances import CHAINED, NEARLY, NOTHING, SAME
-from planner_core.problem import Floats
+from planner_core.problem import Floats, Ints
 
 # Sums of zeros and ones bear HiGHS's usual tolerance. In a long chain of levels each row may
 # be off by as much, so there it must be far below one task.
@@ -92,6 +92,10 @@ class Engine:
         )
         # It takes none of them where a row names a column twice.
         assert status != highspy.HighsStatus.kError
+
+    def hold(self, columns: Ints, values: Floats) -> None:
+        """Fix some columns anew."""
+        self._highs.changeColsBounds(len(columns), columns, values, values)
 
     def relaxed(self) -> Floats | None:
         """Return the best fractional point, or None if the budget did not suffice."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from planner_core.certified.dp.resource_network import must_deliver, worth_before_left
 from planner_core.certified.mip.clique_cuts import antichain_cover, detours, excluding_pairs
+from planner_core.certified.mip.deliveries import add_deliveries
 from planner_core.certified.mip.program import Program, Rows
 from planner_core.certified.mip.resource_terms import ResourceTerms, resource_terms
 from planner_core.certified.mip.resources import add_resources
@@ -154,7 +155,8 @@ def plan_program(
         problem, lost = restricted(problem, rows), lost[rows]
     precedences = tuple(transitive_closure(satellite) for satellite in problem.satellites)
     program = Program()
-    taken, down, paid = _variables(program, problem, lost)
+    ages = on_board == "worth less" and problem.objective.half_life_s is not None
+    taken, down, paid = _variables(program, problem, lost, ages=ages and problem.counts_delivery)
     model = PlanProgram(
         problem=problem,
         program=program,
@@ -167,9 +169,12 @@ def plan_program(
     return model
 
 
-def _variables(program: Program, problem: Problem, lost: Floats) -> tuple[Ints, Ints, Paid | None]:
+def _variables(
+    program: Program, problem: Problem, lost: Floats, *, ages: bool
+) -> tuple[Ints, Ints, Paid | None]:
     """Add x, 1 for what must be taken, which images come down, and what images are worth."""
-    table, worth = problem.opportunities, problem.worth - lost
+    table, on_board = problem.opportunities, problem.worth - lost_on_board(problem)
+    worth = problem.worth - lost
     kept = np.zeros(len(table), dtype=np.bool_)
     kept[problem.kept_rows] = True
     down, may_come = np.full(len(table), -1, dtype=np.int32), lost > 0.0
@@ -177,10 +182,14 @@ def _variables(program: Program, problem: Problem, lost: Floats) -> tuple[Ints, 
         useful = (problem.worth > 0.0) | ((table.kind == CONTACT) & problem.use_resources)
         useful |= kept
         taken = program.add_columns(
-            worth, lower=kept.astype(np.float64), upper=useful.astype(np.float64)
+            on_board if ages else worth,
+            lower=kept.astype(np.float64),
+            upper=useful.astype(np.float64),
         )
-        down[may_come] = program.add_columns(lost[may_come])
+        down[may_come] = program.add_columns(np.zeros(may_come.sum()) if ages else lost[may_come])
         _once_per_target(program, problem, taken)
+        if ages:
+            add_deliveries(program, problem, taken, np.where(may_come, down, taken), on_board)
         return taken, down, None
     taken = program.add_columns(np.zeros(len(table)), lower=kept.astype(np.float64))
     down[may_come] = program.add_columns(np.zeros(int(may_come.sum())))

@@ -28,6 +28,7 @@ from planner_core.certified.strategies.supports import (
     has_one_start_each,
     has_steady_worth,
     is_aging,
+    is_aging_in_programs,
     is_aging_on_board,
     is_alone_with_limits,
     is_fleet,
@@ -35,6 +36,7 @@ from planner_core.certified.strategies.supports import (
     is_free_satellite,
     is_large_free_fleet,
     is_shared,
+    is_shared_and_aging_in_programs,
     is_shared_with_limits,
     is_small_and_shared,
     is_small_free_fleet,
@@ -187,6 +189,11 @@ STRATEGIES: Final = (
     ),
     # Images that lose worth as they age.
     Strategy(
+        name="images by the contact that brings them down",
+        supports=is_shared_and_aging_in_programs,
+        slices=whole_program.images_by_contact,
+    ),
+    Strategy(
         name="days planned anew",
         supports=lambda p: is_aging(p) and is_shared(p),
         slices=days.days,
@@ -200,6 +207,12 @@ STRATEGIES: Final = (
         name="plans by their contacts",
         supports=lambda p: is_aging(p) and not is_fleet(p),
         slices=half_life.on_the_ground,
+        begin=Begin.STALLED,
+    ),
+    Strategy(
+        name="stretches by small programs",
+        supports=is_aging_in_programs,
+        slices=half_life.stretches,
         begin=Begin.STALLED,
     ),
     # Free starts.

