@@ -35,8 +35,9 @@ from planner_core.problem.restrict import restricted
 
 Formulation = Literal["antichain", "pairwise"]
 OnBoard = Literal["worth less", "priced", "worth the same"]
-"""What images that stay on board do: each has a column that says so, or what a recorder holds at
-the end has one price, or they are worth the most they can."""
+"""What images that stay on board do: each has a column that says so, and others for when it comes
+down if it ages; or what a recorder holds at the end has one price; or they are worth the most they
+can."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
