@@ -39,7 +39,7 @@ def test_a_wrong_method_is_405_and_names_the_right_ones(client: httpx.Client) ->
 
 
 def test_a_wrong_method_does_not_build_the_openapi_document(settings: Settings) -> None:
-    # It takes seconds, and every other request would wait for them.
+    # It takes seconds.
     app = new_app(settings)
     with serve(app) as address, httpx.Client(base_url=address, verify=NO_TLS) as client:
         assert client.patch("/v1/satellites").headers["allow"] == "GET, POST"
