@@ -142,7 +142,7 @@ def is_aging_on_board(problem: Problem) -> bool:
 
 def is_aging_in_programs(problem: Problem) -> bool:
     """Whether they do, and programs know by which contact each comes down."""
-    return is_aging(problem) and is_transitive(problem) and not is_large(problem)
+    return is_aging(problem) and not is_large(problem) and is_transitive(problem)
 
 
 def is_shared_and_aging_in_programs(problem: Problem) -> bool:
