@@ -153,7 +153,7 @@ STRATEGIES: Final[Mapping[str, Change]] = {
             "a fleet's programs with the plan's contacts": _SHARED,
             "plans without the half-life": _AGE_ON_BOARD,
             "images by the contact that brings them down": _FEW_OF_AGE_SHARED,
-            "stretches by small programs": _FEW_OF_AGE,
+            "windows by small programs": _FEW_OF_AGE,
             "windows with free starts": _FREE,
             # Their first tables alone take six seconds.
             "multipliers of chains": {"continuous-1000": 30.0},

@@ -11,6 +11,7 @@ import numpy as np
 
 from planner_core.certified.mip.program import Program, Rows
 from planner_core.certified.sizes import NEXT_CONTACTS
+from planner_core.certified.tolerances import DOWN
 from planner_core.problem import (
     COLLECT,
     CONTACT,
@@ -20,6 +21,7 @@ from planner_core.problem import (
     Problem,
     SatelliteProblem,
 )
+from planner_core.problem.slew import TIME_TOLERANCE_S
 from planner_core.worth import share_earned
 
 
@@ -55,40 +57,25 @@ def _add_satellite(
     image, place, is_named = _next_contacts(table.end_s[images], table.start_s[contacts])
     if len(image) == 0:
         return
-    order = contacts[place]
-    ready_s = table.start_s[order] + problem.downlinks.stations.setup_s[table.place[order]]
-    age_s = ready_s - table.end_s[images[image]]
-    of_image = images[image]
+    of_image, contact = images[image], contacts[place]
+    ready_s = table.start_s[contact] + problem.downlinks.stations.setup_s[table.place[contact]]
+    age_s = ready_s - table.end_s[of_image]
     earned = problem.worth_on_ground[of_image] * share_earned(problem.objective, age_s)
     gain = np.minimum(earned, problem.worth[of_image]) - on_board[of_image]
     down = program.add_columns(np.maximum(gain, 0.0), is_integer=False)
-    _add_limits(program, down, np.ones(len(down)), image, may_come[images], np.ones(len(images)))
+    once = np.ones(len(down))
+    program.add_rows(Rows.limited(down, once, of_image, may_come, np.ones(len(table))))
     size = (table.end_s - table.start_s)[of_image] * satellite.resources.collect_fill_per_s
-    volume = satellite.volume[problem.local_row[contacts]]
-    named, at = down[is_named], place[is_named]
-    _add_limits(program, named, size[is_named], at, taken[contacts], volume)
-    program.add_rows(Rows.aligned((named, 1.0), (taken[contacts[at]], -1.0), upper=0.0))
+    volume = np.zeros(len(table))
+    volume[contacts] = satellite.volume[problem.local_row[contacts]] + DOWN
+    named, by = down[is_named], contact[is_named]
+    program.add_rows(Rows.limited(named, size[is_named], by, taken, volume))
+    program.add_rows(Rows.aligned((named, 1.0), (taken[by], -1.0), upper=0.0))
 
 
 def _next_contacts(end_s: Floats, start_s: Floats) -> tuple[Ints, Ints, Bools]:
     """Return pairs of images and contacts after them, and whether one stands for itself alone."""
-    place = np.searchsorted(start_s, end_s)[:, None] + np.arange(NEXT_CONTACTS + 1)
+    first = np.searchsorted(start_s, end_s - TIME_TOLERANCE_S)
+    place = first[:, None] + np.arange(NEXT_CONTACTS + 1)
     image, nth = np.nonzero(place < len(start_s))
     return image.astype(np.int32), place[image, nth].astype(np.int32), nth < NEXT_CONTACTS
-
-
-def _add_limits(
-    program: Program, columns: Ints, values: Floats, group: Ints, limit: Ints, most: Floats
-) -> None:
-    """Let columns of a group come to no more than ``most`` times the group's ``limit``."""
-    order = np.argsort(group, kind="stable")
-    groups, counts = np.unique(group, return_counts=True)
-    ends = np.cumsum(counts)
-    program.add_rows(
-        Rows.of(
-            np.concatenate([[0], np.cumsum(counts + 1)]).astype(np.int64),
-            np.insert(columns[order], ends, limit[groups]),
-            np.insert(values[order], ends, -most[groups]),
-            upper=0.0,
-        )
-    )

@@ -156,8 +156,9 @@ def plan_program(
         problem, lost = restricted(problem, rows), lost[rows]
     precedences = tuple(transitive_closure(satellite) for satellite in problem.satellites)
     program = Program()
-    ages = on_board == "worth less" and problem.objective.half_life_s is not None
-    taken, down, paid = _variables(program, problem, lost, ages=ages and problem.counts_delivery)
+    has_half_life = problem.counts_delivery and problem.objective.half_life_s is not None
+    ages = has_half_life and on_board == "worth less"
+    taken, down, paid = _variables(program, problem, lost, ages=ages)
     model = PlanProgram(
         problem=problem,
         program=program,
@@ -174,23 +175,22 @@ def _variables(
     program: Program, problem: Problem, lost: Floats, *, ages: bool
 ) -> tuple[Ints, Ints, Paid | None]:
     """Add x, 1 for what must be taken, which images come down, and what images are worth."""
-    table, on_board = problem.opportunities, problem.worth - lost_on_board(problem)
-    worth = problem.worth - lost
+    table, worth = problem.opportunities, problem.worth - lost
     kept = np.zeros(len(table), dtype=np.bool_)
     kept[problem.kept_rows] = True
     down, may_come = np.full(len(table), -1, dtype=np.int32), lost > 0.0
     if is_transitive(problem):
         useful = (problem.worth > 0.0) | ((table.kind == CONTACT) & problem.use_resources)
         useful |= kept
+        if ages:  # what an image earns beyond its worth on board hangs on its contact
+            worth, lost = problem.worth - lost_on_board(problem), np.zeros(len(table))
         taken = program.add_columns(
-            on_board if ages else worth,
-            lower=kept.astype(np.float64),
-            upper=useful.astype(np.float64),
+            worth, lower=kept.astype(np.float64), upper=useful.astype(np.float64)
         )
-        down[may_come] = program.add_columns(np.zeros(may_come.sum()) if ages else lost[may_come])
+        down[may_come] = program.add_columns(lost[may_come])
         _once_per_target(program, problem, taken)
         if ages:
-            add_deliveries(program, problem, taken, np.where(may_come, down, taken), on_board)
+            add_deliveries(program, problem, taken, np.where(may_come, down, taken), worth)
         return taken, down, None
     taken = program.add_columns(np.zeros(len(table)), lower=kept.astype(np.float64))
     down[may_come] = program.add_columns(np.zeros(int(may_come.sum())))

@@ -75,6 +75,27 @@ class Rows:
         column = np.concatenate([np.empty(0, dtype=np.int32), *members])
         return cls.of(offsets.astype(np.int64), column, upper=np.array(limits, dtype=np.float64))
 
+    @classmethod
+    def limited(cls, columns: Ints, values: Floats, group: Ints, limit: Ints, most: Floats) -> Rows:
+        """Return rows that let each group of columns come to at most a multiple of a column.
+
+        Parameters
+        ----------
+        group
+            Of each column. Shape ``(num_columns,)``.
+        limit, most
+            The column that limits each group, and how many times. Shape ``(num_groups,)``.
+        """
+        order = np.argsort(group, kind="stable")
+        groups, counts = np.unique(group, return_counts=True)
+        ends = np.cumsum(counts)
+        return cls.of(
+            np.concatenate([[0], np.cumsum(counts + 1)]).astype(np.int64),
+            np.insert(columns[order], ends, limit[groups]),
+            np.insert(values[order], ends, -most[groups]),
+            upper=0.0,
+        )
+
     def __len__(self) -> int:
         return len(self.first)
 

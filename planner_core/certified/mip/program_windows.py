@@ -1,7 +1,7 @@
-"""Stretches of a plan planned anew, contacts with images, by small mixed-integer programs.
+"""Windows of a plan planned anew, contacts with images, by small mixed-integer programs.
 
 Searches that move images leave contacts where they are, and those that move contacts settle what
-images earn before. Where images age both hang on each other. In a stretch of some hundred
+images earn before. Where images age both hang on each other. In a window of some hundred
 opportunities of all satellites, what is outside as it is, HiGHS decides about them together.
 """
 
@@ -19,7 +19,7 @@ from planner_core.problem.plan import Plan
 
 
 class ProgramWindows:
-    """Plans that differ from others in one stretch, drawn at random."""
+    """Plans that differ from others in one window, drawn at random."""
 
     def __init__(self, problem: Problem, budget: Budget, seed: int) -> None:
         self._problem, self._budget, self._seed = problem, budget, seed
@@ -27,8 +27,8 @@ class ProgramWindows:
         self._by_start = np.argsort(problem.opportunities.start_s, kind="stable")
 
     def move(self, plan: Plan, num_tasks: int) -> Plan:
-        """Return the plan with a stretch of so many opportunities planned anew."""
-        problem, open_ = self._problem, self._stretch(num_tasks)
+        """Return the plan with a window of so many opportunities planned anew."""
+        problem, open_ = self._problem, self._window(num_tasks)
         own = np.zeros_like(open_)
         own[[action.opportunity for action in plan.actions]] = True
         rows = np.flatnonzero(own | open_).astype(np.int32)
@@ -44,8 +44,8 @@ class ProgramWindows:
             return plan
         return Plan.of(problem, rows[outcome.columns[: len(rows)] > 0.5])
 
-    def _stretch(self, num_tasks: int) -> Bools:
-        """Return which opportunities lie within a stretch of time. Shape ``(n,)``."""
+    def _window(self, num_tasks: int) -> Bools:
+        """Return which opportunities lie within a window. Shape ``(n,)``."""
         table, order = self._problem.opportunities, self._by_start
         first = int(self._rng.integers(-num_tasks // 2, len(order) - num_tasks // 2))
         last = min(first + num_tasks, len(order)) - 1

@@ -113,17 +113,7 @@ def _add_changes(
         )
     )
     for side in (given.first, given.second):
-        order = np.argsort(side, kind="stable")
-        tasks, counts = np.unique(side, return_counts=True)
-        ends = np.cumsum(counts)
-        program.add_rows(
-            Rows.of(
-                np.concatenate([[0], np.cumsum(counts + 1)]).astype(np.int64),
-                np.insert(back[order], ends, taken[tasks]),
-                np.insert(np.ones(len(side)), ends, -1.0),
-                upper=0.0,
-            )
-        )
+        program.add_rows(Rows.limited(back, np.ones(len(back)), side, taken, np.ones(m)))
 
 
 def _add_recorder(

@@ -210,9 +210,9 @@ STRATEGIES: Final = (
         begin=Begin.STALLED,
     ),
     Strategy(
-        name="stretches by small programs",
+        name="windows by small programs",
         supports=is_aging_in_programs,
-        slices=half_life.stretches,
+        slices=half_life.program_windows,
         begin=Begin.STALLED,
     ),
     # Free starts.

@@ -74,12 +74,12 @@ def plans_without_half_life(search: Search) -> Iterator[None]:
     yield
 
 
-def stretches(search: Search) -> Iterator[None]:
-    """Plan stretches of the day anew by small programs, and longer ones where none is better.
+def program_windows(search: Search) -> Iterator[None]:
+    """Plan windows of the day anew by small programs, and longer ones where none is better.
 
     One satellite over 60 to 120 targets ended within five CPU seconds up to 3.5 % below its bound.
-    At a half-life of 12 h it earns 55.84, 91.44 and 108.83 now after eight, and earned 53.97, 90.21
-    and 105.87, of at most 55.85, 92.26 and 109.32.
+    At a half-life of 12 h it earns 55.84, 91.44 and 108.82 now after eight, and earned 53.97, 90.21
+    and 105.87, of at most 55.89, 92.26 and 109.32.
     """
     best, engine = search.best, search.engine(ResourceSearch)
     windows = ProgramWindows(best.problem, best.budget, search.seed)
