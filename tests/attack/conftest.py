@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import os
 import resource
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
@@ -16,6 +14,7 @@ import psutil
 import pytest
 
 from tests.plain_http import NO_TLS
+from tests.service import prepared
 from tests.service.access.conftest import Door, MakeDoor, door, make_door
 from tests.service.jobs.conftest import SERVER_URL, Jobs, client, jobs, template_url, workers
 from tests.service.webhooks.conftest import courier, post
@@ -46,7 +45,7 @@ class Program:
     """The program as it is installed: an API that asks for keys, and all that it starts."""
 
     door: Door
-    process: subprocess.Popen[str]
+    process: prepared.Program
 
     @property
     def heavy(self) -> psutil.Process:
@@ -63,17 +62,11 @@ StartProgram = Callable[..., AbstractContextManager[Program]]
 def running_program(jobs: Jobs, num_files: int = 0, **settings: object) -> Iterator[Program]:
     """Run the program on the database of jobs, with some settings changed."""
     url = jobs.settings.database_url
-    command = [sys.executable, "-m", "service", "api", "--port", "0", "--database-url", url]
+    words = ["service", "api", "--port", "0", "--database-url", url]
     given = {"require_keys": True} | settings
     variables = {f"SLEWLINE_{name}".upper(): str(value) for name, value in given.items()}
     with (jobs.folder / "api.log").open("ab") as log:
-        process = subprocess.Popen(
-            command,
-            env=os.environ | variables,
-            stdout=subprocess.PIPE,
-            stderr=log,
-            text=True,
-        )
+        process = prepared.start(words, os.environ | variables, stderr=log.fileno())
     if num_files:
         resource.prlimit(process.pid, resource.RLIMIT_NOFILE, (num_files, num_files))
     assert process.stdout is not None

@@ -2,33 +2,27 @@
 
 from __future__ import annotations
 
-import resource
 from collections.abc import Callable
 from multiprocessing import get_context
 from typing import Final
 
-import psutil
 import pytest
 
+from tests.fuzz.limited import Sizes, hoard, parse_one
 from tests.fuzz.nasty import NASTIES
 from tests.fuzz.odd_values import ODD_FILES
 from tests.fuzz.parsers import PARSERS
-
-Sizes = tuple[int, int]
 
 SIZES: Final = [
     (200_000, 50_000_000),
     pytest.param((2_000_000, 250_000_000), marks=pytest.mark.full_size),
 ]
-"""Of a file, and of the memory that it may take: a good hundred bytes for each of the file.
-
-JSON takes about thirty at most.
-"""
+"""A good hundred bytes of memory for each of the file; JSON takes about thirty at most."""
 DEADLINE_S: Final = 120.0
 """Far beyond the second or two that the slowest take: for what would take hours."""
 
 CONTEXT = get_context("forkserver")
-CONTEXT.set_forkserver_preload(["tests.fuzz.parsers"])
+CONTEXT.set_forkserver_preload([parse_one.__module__])
 
 
 @pytest.mark.parametrize("sizes", SIZES, ids=lambda sizes: f"{sizes[0] // 1000} kB")
@@ -51,26 +45,6 @@ def status_of(work: Callable[[int, Sizes], None], argument: int, sizes: Sizes) -
         process.kill()
         process.join()
     return process.exitcode
-
-
-def parse_one(number: int, sizes: Sizes) -> None:
-    """Give one of the nasty files to each parser of its kinds."""
-    file = NASTIES[number]
-    data = file.make(sizes[0])
-    limit_memory(sizes)
-    for name, parse in PARSERS.items():
-        if name.partition(" ")[2] in file.kinds:
-            parse(data)
-
-
-def hoard(times: int, sizes: Sizes) -> None:
-    limit_memory(sizes)
-    bytearray(times * sizes[1])
-
-
-def limit_memory(sizes: Sizes) -> None:
-    most = psutil.Process().memory_info().vms + sizes[1]
-    resource.setrlimit(resource.RLIMIT_AS, (most, most))
 
 
 @pytest.mark.parametrize("parser", PARSERS)

@@ -13,6 +13,7 @@ from planner_core.problem.slew import TIME_TOLERANCE_S
 from planner_core.referee.pinned_plan import breaches
 from planner_core.referee.replay import replay
 from planner_core.referee.sight import turns_between
+from planner_core.referee.timeline import Timeline
 from planner_core.worth import share_earned
 
 Rows = tuple[int, ...]
@@ -30,7 +31,7 @@ def best_plan(problem: Problem) -> Plan | None:
     Plans with a turn that takes too long are left out, and such as break a pin. The others are
     judged from the one that could earn most downwards, until no other can earn more.
     """
-    most, alone = _Most(problem), _Alone(problem)
+    most, alone, refused = _Most(problem), _Alone(problem), _Refused(problem)
     # Of those that could earn the same the longest first: it has contacts for what it takes.
     plans = sorted(
         ((most.of(rows), len(rows), rows) for rows in possible_plans(problem)), reverse=True
@@ -39,10 +40,13 @@ def best_plan(problem: Problem) -> Plan | None:
     for at_most, _, rows in plans:
         if best is not None and at_most <= reward:
             break
+        if refused.has(rows):
+            continue
         if best is not None and alone.most(rows) + most.on_board <= reward:
             continue
         plan = Plan.of(problem, rows)
         timeline = replay(problem, plan, in_detail=False)
+        refused.learn(rows, timeline)
         if timeline.is_valid and (best is None or timeline.reward > reward):
             best, reward = plan, timeline.reward
     return best
@@ -94,6 +98,46 @@ class _Most:
         return sum(best.values()) + self.on_board
 
 
+class _Refused:
+    """With what a satellite may not begin, since battery or recorder go beyond a limit there.
+
+    What they hold after a task follows from this task and those before it. So with the first task
+    that is to blame a plan is lost, whatever follows.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self._pinned = problem.pinned
+        self._start_s: list[float] = problem.opportunities.start_s.tolist()
+        self._satellite: list[int] = problem.opportunities.satellite.tolist()
+        self._beginnings: set[Rows] = set()
+
+    def has(self, rows: Rows) -> bool:
+        """Return whether a satellite begins as it may not."""
+        own: dict[int, Rows] = {}
+        if self._beginnings:
+            for row in rows:
+                satellite = self._satellite[row]
+                own[satellite] = (*own.get(satellite, ()), row)
+                if own[satellite] in self._beginnings:
+                    return True
+        return False
+
+    def learn(self, rows: Rows, timeline: Timeline) -> None:
+        """Note what the referee says of a plan."""
+        for violation in timeline.violations:
+            if violation.code not in ("battery", "recorder") or violation.inherited:
+                continue
+            # What is frozen is only to blame beside something else.
+            blamed = [p for p in violation.blamed if not self._is_frozen(rows[p])]
+            if blamed:
+                begun = rows[: min(blamed) + 1]
+                satellite = violation.satellite
+                self._beginnings.add(tuple(r for r in begun if self._satellite[r] == satellite))
+
+    def _is_frozen(self, row: int) -> bool:
+        return self._pinned.is_frozen(self._start_s[row])
+
+
 class _Alone:
     """What plans could earn by what the referee says of each satellite's part alone.
 
@@ -102,14 +146,14 @@ class _Alone:
 
     def __init__(self, problem: Problem) -> None:
         self._free = replace(problem, pinned=Pinned())
+        self._satellite: list[int] = problem.opportunities.satellite.tolist()
         self._known: dict[Rows, dict[int, float] | None] = {}
 
     def most(self, rows: Rows) -> float:
         """Return the most that a plan could earn, nothing where a part of it is not valid."""
-        satellite = self._free.opportunities.satellite
         parts: dict[int, list[int]] = {}
         for row in rows:
-            parts.setdefault(int(satellite[row]), []).append(row)
+            parts.setdefault(self._satellite[row], []).append(row)
         if len(parts) < 2:
             return np.inf
         best: dict[int, float] = {}

@@ -70,11 +70,12 @@ def _first_app() -> FastAPI:
 def new_app(settings: Settings, queue: JobQueue | None = None) -> FastAPI:
     """Return the application with settings of its own, on routes that another one has prepared.
 
-    FastAPI prepares the routes of each application at its first call, for 0.3 s. They know
-    nothing of settings.
+    FastAPI prepares the routes of each application at its first call, for 0.3 s, and its OpenAPI
+    document for two. They know nothing of settings.
     """
     app = create_app(settings, queue)
     app.router.routes[:] = _first_app().router.routes
+    app.openapi = _first_app().openapi  # type: ignore[method-assign]
     return app
 
 

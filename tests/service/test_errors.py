@@ -16,6 +16,7 @@ from fastapi.openapi.utils import get_openapi
 from planner_core.errors import InvalidElements
 from service.db.rows import WorkerRow
 from service.db.session import Database
+from service.main import create_app
 from service.settings import Settings
 from tests.patience import PATIENCE_S
 from tests.plain_http import NO_TLS
@@ -40,7 +41,7 @@ def test_a_wrong_method_is_405_and_names_the_right_ones(client: httpx.Client) ->
 
 def test_a_wrong_method_does_not_build_the_openapi_document(settings: Settings) -> None:
     # It takes seconds.
-    app = new_app(settings)
+    app = create_app(settings)
     with serve(app) as address, httpx.Client(base_url=address, verify=NO_TLS) as client:
         assert client.patch("/v1/satellites").headers["allow"] == "GET, POST"
         assert app.openapi_schema is None
@@ -60,7 +61,7 @@ def test_others_are_served_while_the_openapi_document_is_built(
 
     monkeypatch.setattr("service.api.openapi.get_openapi", slow)
     with (
-        serve(new_app(settings)) as address,
+        serve(create_app(settings)) as address,
         httpx.Client(base_url=address, verify=NO_TLS, timeout=60) as client,
         ThreadPoolExecutor() as pool,
     ):

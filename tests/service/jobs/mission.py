@@ -14,7 +14,7 @@ import httpx
 
 from tests.missions import Document, drawn_targets, paper_mission
 from tests.patience import PATIENCE_S
-from tests.service.contract import Contract
+from tests.service.conftest import contract
 from tests.service.serving import serving
 
 HALF_A_DAY = {"start": "2019-01-01T00:00:00Z", "end": "2019-01-01T12:00:00Z"}
@@ -79,6 +79,5 @@ def running(folder: Path) -> Iterator[Mission]:
         serving(folder, "serve", "--workers", "1") as (_, line),
         httpx.Client(base_url=line.split()[-1], timeout=60, trust_env=False) as http,
     ):
-        contract = Contract(http.get("/openapi.json").json())
-        http.event_hooks = {"response": [contract.check]}
+        http.event_hooks = {"response": [contract().check]}
         yield Mission(http=http)
