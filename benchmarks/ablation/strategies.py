@@ -119,7 +119,10 @@ _RESOURCES: Final = {
 }  # fmt: skip
 _CLOUDS: Final = {"clouds-1000": 12.0}
 _DELIVERED: Final = {"delivered-paper-500": 12.0}
-_AGE_ON_BOARD: Final = {"half-life-12h-share-1000": 10.0, "half-life-12h-share-paper-1000": 10.0}
+_AGE_ON_BOARD: Final = {
+    "half-life-12h-share-1000": 10.0, "half-life-12h-share-paper-1000": 10.0,
+    "half-life-3h-share-paper-300": 8.0,
+}  # fmt: skip
 _FEW_OF_AGE: Final = {"half-life-3h-100": 8.0}
 _FEW_OF_AGE_SHARED: Final = {"half-life-3h-fleet-4x80": 10.0}
 _OWN_CONTACTS: Final = {"weights-1000": 20.0, "clouds-1000": 15.0, "share-paper-500": 15.0}

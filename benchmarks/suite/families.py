@@ -161,6 +161,10 @@ FAMILIES: Final[Mapping[str, Family]] = {
         num_satellites=4, num_targets=500, budget_s=15.0, quick_budget_s=None,
         dynamics="physical", objective=_shared(0.9), turns_to_sun=True,
     ),
+    "share-sun-250": Family(
+        num_targets=250, budget_s=15.0, quick_budget_s=None, dynamics="physical",
+        objective=_shared(0.9), turns_to_sun=True,
+    ),
     "half-life-3h-1000": Family(
         num_targets=1000, budget_s=10.0, quick_budget_s=8.0, dynamics="physical",
         objective=_halved_in(3.0),
@@ -180,6 +184,10 @@ FAMILIES: Final[Mapping[str, Family]] = {
     "half-life-12h-share-paper-1000": Family(
         num_targets=1000, budget_s=10.0, quick_budget_s=None, dynamics="paper",
         objective=_halved_in(12.0, 0.9),
+    ),
+    "half-life-3h-share-paper-300": Family(
+        num_targets=300, budget_s=8.0, quick_budget_s=None, dynamics="paper",
+        objective=_halved_in(3.0, 0.9),
     ),
     "half-life-3h-fleet-4x80": Family(
         num_satellites=4, num_targets=80, budget_s=10.0, quick_budget_s=None, num_draws=3,

@@ -78,6 +78,9 @@ ROUTE_BUCKETS: Final = 4096
 ROUTE_TASKS: Final = 64
 """Of a window with free starts."""
 
+LARGE_PROGRAM: Final = 5000
+"""Columns, beyond which an interior point method finds an optimum of the relaxation sooner."""
+
 CLIQUE_STEPS: Final = 2000
 """Of the search for one clique cut, which any good one ends."""
 

@@ -14,6 +14,7 @@ from planner_core.certified.dp.resource_network import (
     worth_before_left,
 )
 from planner_core.certified.incumbent import Incumbent
+from planner_core.certified.mip import highs
 from planner_core.certified.mip.contact_sets import FixedContacts
 from planner_core.certified.proofs.resource_bound import resource_value
 from planner_core.certified.strategies.resource_steps import ResourceSearch
@@ -25,7 +26,7 @@ from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
 from planner_core.solvers.registry import Milp
 from tests.examples import examples
-from tests.planner_core.problems import random_problem
+from tests.planner_core.problems import random_problem, sunny_problem
 
 SEEDS = st.integers(0, 10**6)
 
@@ -63,6 +64,23 @@ def test_the_best_plan_is_found_from_its_contacts(
     assert timeline.is_valid
     assert timeline.reward == pytest.approx(reward)
     assert _contacts(problem, plan) == _contacts(problem, best)
+
+
+@pytest.mark.parametrize("is_sunny", [False, True])
+@pytest.mark.parametrize("seed", range(5))
+def test_an_interior_point_leads_to_as_good_a_corner(
+    seed: int, is_sunny: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if is_sunny:
+        problem = sunny_problem(seed, num_collects=30, is_moving=False)
+    else:
+        problem = random_problem(seed, num_collects=30, num_targets=20, has_rewards=True)
+    every = np.ones(len(problem.opportunities), dtype=np.bool_)
+    by_simplex = FixedContacts(problem, every, (), Budget(), 0).relaxed()
+    monkeypatch.setattr(highs, "LARGE_PROGRAM", 0)
+    from_inside = FixedContacts(problem, every, (), Budget(), 0).relaxed()
+    assert from_inside == pytest.approx(by_simplex, rel=1e-6)
+    assert from_inside > 0.0
 
 
 @examples(20)

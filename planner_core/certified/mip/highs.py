@@ -11,7 +11,7 @@ import numpy as np
 
 from planner_core.budget import Budget
 from planner_core.certified.mip.program import Program, Rows
-from planner_core.certified.sizes import LOG_CHARACTERS, PAUSE_S, POLL_S
+from planner_core.certified.sizes import LARGE_PROGRAM, LOG_CHARACTERS, PAUSE_S, POLL_S
 from planner_core.certified.tolerances import CHAINED, NEARLY, NOTHING, SAME
 from planner_core.problem import Floats, Ints
 
@@ -73,7 +73,7 @@ class Engine:
         }
         for option, value in options.items():
             highs.setOptionValue(option, value)
-        n = program.num_columns
+        self._num_columns = n = program.num_columns
         self._is_integer = np.concatenate(program.is_integer)
         highs.addVars(n, np.concatenate(program.lower), np.concatenate(program.upper))
         worth, self._left_out = _noticeable(program)
@@ -98,9 +98,17 @@ class Engine:
         self._highs.changeColsBounds(len(columns), columns, values, values)
 
     def relaxed(self) -> Floats | None:
-        """Return the best fractional point, or None if the budget did not suffice."""
+        """Return the best fractional point, or None if the budget did not suffice.
+
+        Large programs begin by the interior point method, and go on from the corner next to where
+        it ends: with turns to the sun 0.6 and 0.8 s where the simplex method alone takes 7.3 and
+        3.1 (6,000 columns). With 3,000 it takes half as long, or twice.
+        """
+        is_large = self._num_columns > LARGE_PROGRAM and not self._highs.getBasis().valid
+        self._highs.setOptionValue("solver", "ipm" if is_large else "choose")
         if not self._run():
             return None
+        self._highs.setOptionValue("solver", "choose")
         if self._highs.getModelStatus() != highspy.HighsModelStatus.kOptimal:
             return None
         info = self._highs.getInfo()

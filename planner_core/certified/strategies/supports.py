@@ -137,7 +137,8 @@ def is_aging(problem: Problem) -> bool:
 def is_aging_on_board(problem: Problem) -> bool:
     """Whether many images of one satellite do, and earn the larger part when they are taken."""
     is_one = is_aging(problem) and not is_shared(problem)
-    return is_one and is_large(problem) and problem.objective.collected_share > 0.5
+    is_many = len(problem.opportunities) > TUNING.open_tasks
+    return is_one and is_many and problem.objective.collected_share > 0.5
 
 
 def is_aging_in_programs(problem: Problem) -> bool:
