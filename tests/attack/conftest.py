@@ -42,7 +42,7 @@ collect_ignore = ["test_full_disk.py"] if SERVER_URL else []
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Program:
-    """The program as it is installed: an API that asks for keys, and all that it starts."""
+    """An API that asks for keys, and all that it starts."""
 
     door: Door
     process: prepared.Program
