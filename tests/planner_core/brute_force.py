@@ -99,15 +99,13 @@ class _Most:
 
 
 class _Refused:
-    """With what a satellite may not begin, since battery or recorder go beyond a limit there.
+    """Tasks with which no satellite may begin, since its battery or recorder breaks a limit there.
 
-    What they hold after a task follows from this task and those before it. So with the first task
-    that is to blame a plan is lost, whatever follows.
+    A level after a task follows from that task and those before it. So a plan is lost with the
+    first task that is to blame, whatever follows.
     """
 
     def __init__(self, problem: Problem) -> None:
-        self._pinned = problem.pinned
-        self._start_s: list[float] = problem.opportunities.start_s.tolist()
         self._satellite: list[int] = problem.opportunities.satellite.tolist()
         self._beginnings: set[Rows] = set()
 
@@ -125,17 +123,10 @@ class _Refused:
     def learn(self, rows: Rows, timeline: Timeline) -> None:
         """Note what the referee says of a plan."""
         for violation in timeline.violations:
-            if violation.code not in ("battery", "recorder") or violation.inherited:
-                continue
-            # What is frozen is only to blame beside something else.
-            blamed = [p for p in violation.blamed if not self._is_frozen(rows[p])]
-            if blamed:
-                begun = rows[: min(blamed) + 1]
+            if violation.code in ("battery", "recorder") and violation.blamed:
+                begun = rows[: min(violation.blamed) + 1]
                 satellite = violation.satellite
                 self._beginnings.add(tuple(r for r in begun if self._satellite[r] == satellite))
-
-    def _is_frozen(self, row: int) -> bool:
-        return self._pinned.is_frozen(self._start_s[row])
 
 
 class _Alone:

@@ -25,7 +25,7 @@ from planner_core.replanning.question import Question
 from planner_core.replanning.relief import replanned, within_limits
 from planner_core.solvers.registry import SOLVERS, Certified, Rule
 from tests.examples import examples
-from tests.planner_core.brute_force import possible_plans
+from tests.planner_core.brute_force import best_reward, possible_plans
 from tests.planner_core.problems import TIGHT, Task, make_problem, random_problem
 from tests.planner_core.verdicts import certified
 
@@ -195,6 +195,8 @@ def test_bounds_hold_for_all_that_may_be_flown_and_plans_are_among_it(
     if problem is None:
         return
     plans = list(_plans(problem))
+    valid = max((timeline.reward for _, timeline in plans if timeline.is_valid), default=0.0)
+    assert best_reward(problem) == pytest.approx(valid, abs=1e-9)
     flown = [timeline for _, timeline in plans if timeline.validity != "violations"]
     searched = within_limits(problem)
     solution = certified(searched, seed)

@@ -75,7 +75,7 @@ def new_app(settings: Settings, queue: JobQueue | None = None) -> FastAPI:
     """
     app = create_app(settings, queue)
     app.router.routes[:] = _first_app().router.routes
-    app.openapi = _first_app().openapi  # type: ignore[method-assign]
+    app.openapi = _first_app().openapi  # type: ignore[method-assign]  # as FastAPI would have it
     return app
 
 

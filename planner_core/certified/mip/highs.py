@@ -108,6 +108,7 @@ class Engine:
         self._highs.setOptionValue("solver", "ipm" if is_large else "choose")
         if not self._run():
             return None
+        # With a named solver HiGHS would leave out that columns are whole.
         self._highs.setOptionValue("solver", "choose")
         if self._highs.getModelStatus() != highspy.HighsModelStatus.kOptimal:
             return None
