@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +16,9 @@ import numpy.typing as npt
 from planner_core.errors import Cancelled
 
 Bytes = npt.NDArray[np.uint8]
+
+_LOOK_S: Final = 0.05
+"""Between two looks at the clock on behalf of kernels."""
 
 
 class Termination(StrEnum):
@@ -113,6 +118,28 @@ class Budget:
         """Stop kernels because the time is over (they cannot read a clock themselves)."""
         self._deadline = time.monotonic()
         self.stop[0] = 1
+
+    @contextmanager
+    def enforced(self) -> Iterator[None]:
+        """Expire once the time is over, so that it ends kernels as well."""
+        is_left = threading.Event()
+
+        def watch() -> None:
+            while not is_left.wait(_LOOK_S):
+                if self.is_spent() and not self.is_cancelled:
+                    self.expire()
+                    return
+
+        watching = threading.Thread(target=watch, daemon=True)
+        has_end = self._deadline is not None
+        if has_end:
+            watching.start()
+        try:
+            yield
+        finally:
+            is_left.set()
+            if has_end:
+                watching.join()
 
     @property
     def is_cancelled(self) -> bool:

@@ -26,6 +26,7 @@ def usual_mistakes(scenario: Scenario) -> tuple[str, ...]:
     found = (
         _at_sea(scenario),
         _at_night(scenario),
+        _never_ages(scenario),
         _no_station(scenario),
         _too_large(scenario),
         _too_hungry(scenario),
@@ -128,6 +129,16 @@ def _minds_the_sun(satellite: Satellite) -> bool:
         satellite.sensor.sun_elevation_min_deg is not None
         or satellite.resources.recorder_capacity_mbit is None
         or any(word in sensor_type for word in _RADAR)
+    )
+
+
+def _never_ages(scenario: Scenario) -> str | None:
+    objective = scenario.objective
+    if objective.half_life_s is None or objective.collected_share < 1.0:
+        return None
+    return (
+        "The objective's half_life_s changes nothing: with a collected_share of 1, as it is where "
+        "none is given beside it, images earn all of their worth when they are taken."
     )
 
 

@@ -109,12 +109,13 @@ def plan_scenario(
     problem = build_problem(scenario, opportunities, preparation)
     clock.append(time.perf_counter())
     budget.report(Progress(phase="solve", fraction=0.0))
-    relieved, solution, effects = _search(scenario, problem, solver, budget, seed, before)
+    with budget.enforced():
+        relieved, solution, effects = _search(scenario, problem, solver, budget, seed, before)
     clock.append(time.perf_counter())
     budget.report(Progress(phase="verify", fraction=0.0))
     timeline = replay(problem, solution.plan)
     # A replan has asked the multipliers of the plan before, or has begun with a quick bound.
-    has_asked = scenario.replan is not None and solution.proven is not None
+    has_asked = solution.proven is not None and (scenario.replan is not None or solver.bounds)
     bound = _best_bound(
         relieved, solution, timeline, budget, known_bound, wants_quick=not has_asked
     )
@@ -206,11 +207,7 @@ def _best_bound(
     known = known and known.without_on_board()
     claimed = (bound for bound in (known, solution.proven) if bound is not None)
     sound = [bound for bound in claimed if not _is_beaten(bound, timeline, reward)]
-    # Prices that a search has settled on are better than those of a moment.
-    is_settled = not problem.use_resources and any(
-        bound is solution.proven and bound.proof == "lagrangian" for bound in sound
-    )
-    is_loose = not is_settled and not any(is_optimal(reward, bound.value, 0.0) for bound in sound)
+    is_loose = not any(is_optimal(reward, bound.value, 0.0) for bound in sound)
     if known not in sound and is_loose and (wants_quick or not sound):
         quick = _quick_bound(problem, reward, budget)
         sound = [b for b in (*sound, quick) if not _is_beaten(b, timeline, reward)]

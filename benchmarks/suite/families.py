@@ -15,6 +15,7 @@ from benchmarks.missions import paper_scenario
 from planner_core.domain import (
     Agility,
     Dynamics,
+    GroundStation,
     Horizon,
     Objective,
     OrbitElements,
@@ -65,6 +66,8 @@ class Family:
         Whether it is worth that by the chance of a clear sky (``benchmarks.clouds``).
     turns_to_sun
         Whether satellites charge between turns to the sun alone.
+    num_stations
+        How many stations are drawn over the land; the paper's two where it says nothing.
     """
 
     num_targets: int
@@ -80,6 +83,7 @@ class Family:
     objective: Objective = _COLLECTED
     has_forecast: bool = False
     turns_to_sun: bool = False
+    num_stations: int | None = None
 
 
 FAMILIES: Final[Mapping[str, Family]] = {
@@ -193,6 +197,10 @@ FAMILIES: Final[Mapping[str, Family]] = {
         num_satellites=4, num_targets=80, budget_s=10.0, quick_budget_s=None, num_draws=3,
         dynamics="physical", objective=_halved_in(3.0),
     ),
+    "half-life-6h-network-4x400": Family(
+        num_satellites=4, num_targets=400, budget_s=20.0, quick_budget_s=None,
+        dynamics="physical", objective=_halved_in(6.0, 0.5), num_stations=30,
+    ),
     "half-life-12h-fleet-4x2000": Family(
         num_satellites=4, num_targets=2000, budget_s=40.0, quick_budget_s=None, dynamics="physical",
         objective=_halved_in(12.0),
@@ -237,6 +245,8 @@ def scenario_of(family: Family, draw: int) -> Scenario:
         scenario = replace(scenario, satellites=tuple(map(_tight, scenario.satellites)))
     if family.turns_to_sun:
         scenario = replace(scenario, satellites=tuple(map(_turning, scenario.satellites)))
+    if family.num_stations is not None:
+        scenario = replace(scenario, ground_stations=_network(family.num_stations, draw))
     if family.has_forecast:
         scenario = replace(scenario, forecast=forecast_of(scenario, Weather(draw)))
     return replace(
@@ -294,6 +304,14 @@ def towns(number: int, draw: int) -> tuple[Target, ...]:
     return tuple(
         Target(id=f"t{i + 1}", lat_deg=lat, lon_deg=lon)
         for i, (lat, lon) in enumerate(zip(lat_deg.tolist(), lon_deg.tolist(), strict=True))
+    )
+
+
+def _network(number: int, draw: int) -> tuple[GroundStation, ...]:
+    scenes = paper_scenario(number, draw, use_resources=False).targets
+    return tuple(
+        GroundStation(id=f"g{i + 1}", name=scene.id, lat_deg=scene.lat_deg, lon_deg=scene.lon_deg)
+        for i, scene in enumerate(scenes)
     )
 
 

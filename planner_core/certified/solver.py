@@ -24,6 +24,7 @@ class Certified:
     )
     paper: ClassVar[str] = "Not in the paper"
     exact: ClassVar[bool] = True
+    bounds: ClassVar[bool] = True
     honours: ClassVar[frozenset[Constraint]] = frozenset(Constraint) - {Constraint.DUPLICATE}
 
     gap: float = field(

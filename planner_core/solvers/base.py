@@ -76,6 +76,9 @@ class Solver(Protocol):
         operate satellites; where the paper describes it.
     exact
         Whether it proves its plan optimal when it runs to the end.
+    bounds
+        Whether it looks for a bound itself from the first moment on, so that a quick one tells
+        nothing new after it.
     honours
         The rules that its plans never break, whatever the problem.
     """
@@ -85,6 +88,7 @@ class Solver(Protocol):
     about: ClassVar[str]
     paper: ClassVar[str]
     exact: ClassVar[bool]
+    bounds: ClassVar[bool]
     honours: ClassVar[frozenset[Constraint]]
 
     @property

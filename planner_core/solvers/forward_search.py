@@ -200,6 +200,7 @@ class ForwardSearch:
     about: ClassVar[str] = "Looks a few actions ahead at each step and takes the best first one."
     paper: ClassVar[str] = "Algorithm 1, section Solution Methods"
     exact: ClassVar[bool] = False
+    bounds: ClassVar[bool] = False
     honours: ClassVar[frozenset[Constraint]] = frozenset(Constraint) - {Constraint.DUPLICATE}
 
     depth: int = field(

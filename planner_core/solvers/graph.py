@@ -37,6 +37,7 @@ class Graph:
     )
     paper: ClassVar[str] = "Algorithm 3, section Graph Search"
     exact: ClassVar[bool] = False
+    bounds: ClassVar[bool] = False
     honours: ClassVar[frozenset[Constraint]] = frozenset({Constraint.SLEW, Constraint.STATION})
 
     path: Literal["history", "longest"] = field(

@@ -59,6 +59,7 @@ class Mcts:
     )
     paper: ClassVar[str] = "Algorithm 2, section Solution Methods"
     exact: ClassVar[bool] = False
+    bounds: ClassVar[bool] = False
     honours: ClassVar[frozenset[Constraint]] = frozenset(Constraint) - {Constraint.DUPLICATE}
 
     num_simulations: int = field(

@@ -31,6 +31,7 @@ class Milp:
     )
     paper: ClassVar[str] = "Section Mixed-Integer Linear Programming"
     exact: ClassVar[bool] = True
+    bounds: ClassVar[bool] = False
     honours: ClassVar[frozenset[Constraint]] = frozenset(Constraint) - {Constraint.DUPLICATE}
 
     formulation: Formulation = field(

@@ -30,6 +30,7 @@ class Rule:
     )
     paper: ClassVar[str] = "Algorithm 4, section Rule-Based Planning"
     exact: ClassVar[bool] = False
+    bounds: ClassVar[bool] = False
     honours: ClassVar[frozenset[Constraint]] = frozenset(Constraint) - {Constraint.DUPLICATE}
 
     unimaged_only: bool = field(

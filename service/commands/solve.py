@@ -6,9 +6,9 @@ import argparse
 import json
 import signal
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor, wait
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any, Final, Self
+from typing import Any, Self
 
 from planner_core.budget import Budget
 from planner_core.solvers.registry import solver_class
@@ -19,8 +19,6 @@ from service.jobs.plan_job import run_plan_job
 from service.jobs.plan_request import PlanAnswer, PlanRequest
 from service.jobs.solver_params import params_of, parse_params
 from service.scenarios.canonical import canonical, sha256_of
-
-_LOOK_EVERY_S: Final = 0.05
 
 
 def solve(options: argparse.Namespace) -> int:
@@ -72,9 +70,4 @@ def answer_of(request: PlanRequest, budget: Budget) -> PlanAnswer:
     # In a thread: inside a kernel the main one could not take a signal.
     signal.signal(signal.SIGINT, lambda *_: budget.cancel())
     with ThreadPoolExecutor(max_workers=1) as pool:
-        job = pool.submit(run_plan_job, request, budget)
-        while not job.done():
-            wait([job], timeout=_LOOK_EVERY_S)
-            if budget.is_spent() and not budget.is_cancelled:
-                budget.expire()
-        return job.result()
+        return pool.submit(run_plan_job, request, budget).result()

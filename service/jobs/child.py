@@ -1,6 +1,6 @@
 """The solver's process: what happens between fork and exit.
 
-It talks to its worker over one pipe: ``CANCEL`` and ``EXPIRE`` come in, progress, the blocks of
+It talks to its worker over one pipe: ``CANCEL`` comes in, progress, the blocks of
 an answer and at last one ending go out. When the worker's end closes, the process is gone at once.
 """
 
@@ -14,7 +14,6 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from enum import Enum, auto
 from multiprocessing.connection import Connection
 from typing import Any, Final, cast
 
@@ -27,14 +26,10 @@ log = logging.getLogger(__name__)
 
 REPORT_EVERY_S: Final = 0.1
 
+CANCEL: Final = "cancel"
+"""All that the worker may say."""
+
 WorkFunction = Callable[[PlanRequest, Budget], PlanAnswer]
-
-
-class Command(Enum):
-    """What the worker may say."""
-
-    CANCEL = auto()
-    EXPIRE = auto()
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,7 +152,5 @@ def _obey(connection: Connection[Any, Any], budget: Budget) -> None:
         except (EOFError, OSError):
             # Nobody waits for an answer. Threads and kernels would delay a polite exit.
             os._exit(1)
-        if command is Command.CANCEL:
+        if command == CANCEL:
             budget.cancel()
-        elif command is Command.EXPIRE:
-            budget.expire()

@@ -1,4 +1,4 @@
-"""How long a solver process may go on after it was told that its time is over."""
+"""How long a solver process may go on once its time is over."""
 
 from __future__ import annotations
 

@@ -21,8 +21,8 @@ from planner_core.budget import Progress
 from service.answers.blocks import Block
 from service.jobs import child
 from service.jobs.child import (
+    CANCEL,
     Answered,
-    Command,
     Ending,
     OpportunitiesFollow,
     Refused,
@@ -167,7 +167,7 @@ class _Run:
     _progress: Progress | None = None
     _blocks: list[Block] = field(default_factory=list)
     _opportunity_block: bytes | None = None
-    _is_told: bool = False
+    _has_grace: bool = False
     _grace: Grace | None = None
     _next_tick_s: float = 0.0
     _expire_at_s: float = math.inf
@@ -219,12 +219,12 @@ class _Run:
         if progress.phase != self._phase:
             self._phase = progress.phase
             self.on_phase(progress.phase)
-            if self._is_told:
+            if self._has_grace:
                 self._grant_grace()
 
     def _grant_grace(self) -> None:
         """Have what is left of this phase end in time; the next one has a grace of its own."""
-        self._is_told = True
+        self._has_grace = True
         if self._cancelled and self._phase != "verify":
             self._kill_at_s = min(self._kill_at_s, time.monotonic() + CANCEL_GRACE_S)
             return
@@ -250,9 +250,8 @@ class _Run:
             return Refused("memory_limit", detail)
         now_s = time.monotonic()
         if now_s >= self._expire_at_s:
-            # A budget ends a search by itself; a kernel that cannot read a clock needs telling.
+            # The budget ends the search.
             self._expire_at_s = math.inf
-            self._say(Command.EXPIRE)
             self._grant_grace()
         # A process that has ended is not killed: its last words are still to be read.
         if now_s >= self._kill_at_s or (self._grace is not None and self._grace.is_over()):
@@ -277,14 +276,14 @@ class _Run:
         if order is Order.CANCEL and not self._cancelled:
             self._cancelled = True
             self._grant_grace()
-            self._say(Command.CANCEL)
+            self._cancel()
         return None
 
-    def _say(self, command: Command) -> None:
+    def _cancel(self) -> None:
         try:
-            self.pipe.send(command)
+            self.pipe.send(CANCEL)
         except OSError:
-            log.debug("the solver's process ended before it was told %s", command.name)
+            log.debug("the solver's process ended before it was cancelled")
 
 
 def _nothing() -> None:

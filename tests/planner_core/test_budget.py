@@ -2,19 +2,31 @@
 
 from __future__ import annotations
 
+import threading
+from dataclasses import replace
+
 import pytest
 
+from planner_core import run
 from planner_core.budget import Budget, Progress, Termination
 from planner_core.certified.driver import Search
 from planner_core.certified.incumbent import Incumbent
+from planner_core.certified.proofs.bound import Bound
+from planner_core.certified.proofs.resource_bound import quick_bound
 from planner_core.certified.solver import Certified
 from planner_core.certified.strategies.every import STRATEGIES
 from planner_core.certified.strategies.resources import tasks_alone
 from planner_core.certified.strategies.whole_program import WholeProgram
+from planner_core.domain import Quality
 from planner_core.problem import Problem
+from planner_core.problem.plan import Plan
+from planner_core.run import plan_scenario
 from planner_core.solvers.base import Solution
+from planner_core.solvers.rule import Rule
+from tests.patience import wait_until
 from tests.planner_core.flat_earth import flat_problem
 from tests.planner_core.problems import random_problem
+from tests.planner_core.test_worth import scenario
 
 
 def test_a_part_works_on_as_many_threads_and_stops_with_the_whole() -> None:
@@ -139,3 +151,50 @@ def test_a_job_that_is_cancelled_in_its_last_part_says_so(monkeypatch: pytest.Mo
     assert budget.is_cancelled
     assert ended == [Termination.CANCELLED]
     assert solution.termination is Termination.CANCELLED
+
+
+def test_an_enforced_budget_stops_kernels_once_its_time_is_over() -> None:
+    budget = Budget(0.0)
+    assert budget.stop[0] == 0
+    with budget.enforced():
+        wait_until(lambda: budget.stop[0] == 1)
+    assert budget.termination() is Termination.TIME_LIMIT
+
+
+@pytest.mark.parametrize("time_s", [None, 3600.0])
+def test_an_enforced_budget_whose_time_is_not_over_goes_on(time_s: float | None) -> None:
+    budget = Budget(time_s)
+    num_threads = threading.active_count()
+    with budget.enforced():
+        assert threading.active_count() == num_threads + (time_s is not None)
+    assert threading.active_count() == num_threads
+    assert not budget.is_spent()
+
+
+def test_a_plan_is_ready_when_its_time_is_over_whatever_kernel_runs() -> None:
+    """A kernel reads no clock."""
+
+    class Deaf(Rule):
+        def solve(self, problem: Problem, budget: Budget, seed: int) -> Solution:
+            wait_until(lambda: budget.stop[0] == 1)
+            return Solution(plan=Plan(), termination=budget.termination())
+
+    judged = plan_scenario(scenario(Quality()), Deaf(), 0, Budget(0.1))
+    assert judged.solution.termination is Termination.TIME_LIMIT
+
+
+def test_a_quick_bound_is_asked_for_where_the_solver_has_none(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked = list[str]()
+
+    def quick(problem: Problem, reward: float) -> Bound:
+        asked.append(solver.name)
+        return quick_bound(problem, reward)
+
+    monkeypatch.setattr(run, "quick_bound", quick)
+    asks = replace(scenario(Quality()), use_resources=True)
+    for solver in (Rule(), Certified()):
+        judged = plan_scenario(asks, solver, 0, Budget(0.0))
+        assert judged.bound is not None
+    assert asked == ["rule"]

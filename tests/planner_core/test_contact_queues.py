@@ -15,7 +15,11 @@ from hypothesis import strategies as st
 from planner_core.certified.dp.contact_queues import most_by_queues
 from planner_core.certified.dp.queue_terms import queues_of
 from planner_core.certified.dp.resource_network import strict_network_of
-from planner_core.certified.lns.queue_plans import plan_with_queues, replanned_day
+from planner_core.certified.lns.queue_plans import (
+    plan_with_queues,
+    replanned_day,
+    some_contacts,
+)
 from planner_core.certified.multipliers.queues import priced_by_queues
 from planner_core.certified.proofs import queues
 from planner_core.certified.proofs.bound import Bound, rounded_bound
@@ -302,3 +306,16 @@ def test_a_day_planned_anew_leaves_what_other_satellites_do() -> None:
         assert timeline.is_valid
         assert timeline.reward > replay(problem, plan).reward
         plan = new
+
+
+@pytest.mark.parametrize(
+    ("num_contacts", "num_tried"), [(6, 6), (20, 20), (30, 20), (60, 30), (200, 40)]
+)
+def test_of_many_contacts_a_day_tries_some(num_contacts: int, num_tried: int) -> None:
+    problem = random_problem(1, num_collects=3, num_contacts=num_contacts, span_s=40_000.0)
+    satellite, rng = problem.satellites[0], np.random.default_rng(0)
+    tried = [some_contacts(satellite, len(problem.opportunities), rng) for _ in range(2)]
+    for rows in tried:
+        assert np.count_nonzero(rows) == num_tried
+        assert set(problem.opportunities.kind[rows]) == {CONTACT}
+    assert np.array_equal(tried[0], tried[1]) == (num_tried == num_contacts)

@@ -28,7 +28,10 @@ from planner_core.certified.proofs.latency import latency_value
 from planner_core.certified.proofs.resource_bound import quick_bound
 from planner_core.certified.signs import NEVER
 from planner_core.certified.solver import Certified
+from planner_core.certified.strategies import days
 from planner_core.certified.strategies.days import DayByDay
+from planner_core.certified.strategies.every import STRATEGIES
+from planner_core.certified.strategies.resource_steps import ResourceSearch
 from planner_core.certified.strategies.whole_program import exhaust
 from planner_core.certified.tuning import tuned
 from planner_core.domain import Objective
@@ -329,6 +332,26 @@ def test_a_fleet_s_search_that_ends_with_the_same_plan_again_is_not_begun_afresh
     hurried = with_objective(problem, Objective(collected_share=0.0, half_life_s=4000.0))
     Certified().solve(hurried, Reports(100), 0)
     assert ended == [0, 1]
+
+
+def test_a_fleet_s_days_begin_with_the_best_plan(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It may be the plan that was offered, with more contacts."""
+    problem = random_problem(2, num_collects=40, num_contacts=4, num_satellites=2)
+    hurried = with_objective(problem, Objective(collected_share=0.0, half_life_s=4000.0))
+    good = Certified().solve(hurried, expiring(bounds_told(2)), 0).plan
+    worse = Plan(good.actions[:-2])
+    assert replay(hurried, worse).reward < replay(hurried, good).reward
+    begun = list[Plan]()
+
+    def noted(_: Problem, plan: Plan, *args: object) -> None:
+        begun.append(plan)
+
+    monkeypatch.setattr(days, "replanned_day", noted)
+    best = Incumbent(hurried, Budget(), 0.0, plan=good)
+    engine = Search(best, 0, STRATEGIES).engine(ResourceSearch)
+    DayByDay(engine).better(worse)
+    assert begun
+    assert replay(hurried, begun[0]).reward >= replay(hurried, good).reward
 
 
 @pytest.mark.parametrize("fill_per_s", [0.0, ROOMY.collect_fill_per_s])

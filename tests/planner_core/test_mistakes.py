@@ -9,7 +9,7 @@ import pytest
 
 from planner_core.access.scenario_opportunities import compute_opportunities
 from planner_core.budget import Budget
-from planner_core.domain import GroundStation, Quality, Resources, Scenario
+from planner_core.domain import GroundStation, Objective, Quality, Resources, Scenario
 from planner_core.mistakes import mistakes_of_accesses, usual_mistakes
 from planner_core.problem import CONTACT
 from tests.planner_core.test_worth import scenario
@@ -90,6 +90,15 @@ def test_an_image_must_fit_a_recorder() -> None:
     (warning,) = but_long(replace(asked, targets=tuple(targets)))
     assert repr(targets[0].id) in warning
     assert "and 1 more" in warning
+
+
+@pytest.mark.parametrize("collected_share", [0.5, 1.0])
+@pytest.mark.parametrize("half_life_s", [None, 3600.0])
+def test_a_half_life_of_nothing_is_told(collected_share: float, half_life_s: float | None) -> None:
+    objective = Objective(collected_share=collected_share, half_life_s=half_life_s)
+    told = usual_mistakes(replace(optical(), objective=objective))
+    is_told = any("half_life_s changes nothing" in one for one in told)
+    assert is_told == (collected_share == 1.0 and half_life_s is not None)
 
 
 def test_more_data_than_all_contacts_take_is_told() -> None:

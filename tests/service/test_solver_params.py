@@ -27,6 +27,7 @@ class Example:
     about: ClassVar[str] = ""
     paper: ClassVar[str] = ""
     exact: ClassVar[bool] = False
+    bounds: ClassVar[bool] = False
     honours: ClassVar[frozenset[Constraint]] = frozenset()
 
     depth: int = field(default=3, metadata={"minimum": 1, "maximum": 20, "description": "Steps."})
