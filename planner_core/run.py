@@ -32,7 +32,7 @@ from planner_core.solvers.base import Solution, Solver
 
 log = logging.getLogger(__name__)
 
-_SEARCH: Final = 0.8  # of the time: the rest is for what is preferred beside worth
+_SEARCH: Final = 0.8  # of the time: the rest brings images down and does what is preferred
 _ROUNDING: Final = 1e-6  # relative; rewards to which bounds are stated
 
 
@@ -167,7 +167,9 @@ def _search(
     # A replan changes as little as it must; nothing else may ask for more changes.
     aims = scenario.objective.prefer if scenario.replan is None else ()
     if scenario.replan is None:
-        search = budget.part(_SEARCH) if aims else budget
+        # Solvers of the paper leave it to what follows to bring images down.
+        is_followed = bool(aims) or (problem.counts_delivery and not solver.bounds)
+        search = budget.part(_SEARCH) if is_followed else budget
         found = solver.solve(relieved, search, seed)
         solution = flyable(own, relieved, found)
     else:

@@ -17,7 +17,7 @@ from planner_core.certified.solver import Certified
 from planner_core.certified.strategies.every import STRATEGIES
 from planner_core.certified.strategies.resources import tasks_alone
 from planner_core.certified.strategies.whole_program import WholeProgram
-from planner_core.domain import Quality
+from planner_core.domain import Objective, Quality
 from planner_core.problem import Problem
 from planner_core.problem.plan import Plan
 from planner_core.run import plan_scenario
@@ -198,3 +198,29 @@ def test_a_quick_bound_is_asked_for_where_the_solver_has_none(
         judged = plan_scenario(asks, solver, 0, Budget(0.0))
         assert judged.bound is not None
     assert asked == ["rule"]
+
+
+@pytest.mark.parametrize(
+    ("bounds", "objective", "share"),
+    [
+        (False, Objective(collected_share=0.5), 0.8),
+        (True, Objective(collected_share=0.5), 1.0),
+        (False, Objective.collected(), 1.0),
+        (True, Objective(collected_share=0.5, prefer=("early",)), 0.8),
+    ],
+)
+def test_a_solver_leaves_time_for_what_follows_it(
+    bounds: bool, objective: Objective, share: float
+) -> None:
+    """Preferences, and contacts for the images of one that does not look for bounds."""
+    left_s = list[float]()
+
+    class Watched(Rule):
+        def solve(self, problem: Problem, budget: Budget, seed: int) -> Solution:
+            left_s.append(budget.remaining_s() or 0.0)
+            return super().solve(problem, budget, seed)
+
+    Watched.bounds = bounds
+    asks = replace(scenario(Quality()), use_resources=True, objective=objective)
+    plan_scenario(asks, Watched(), 0, Budget(100_000.0))
+    assert left_s == [pytest.approx(100_000.0 * share, rel=0.05)]

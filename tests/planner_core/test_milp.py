@@ -14,12 +14,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget, Progress, Termination
-from planner_core.certified.mip.highs import Engine
+from planner_core.certified.mip.highs import Engine, Outcome
 from planner_core.certified.mip.model import plan_program
 from planner_core.certified.mip.program import Program, Rows
 from planner_core.certified.proofs.documents import is_proven
-from planner_core.certified.strategies.whole_program import relaxation_bound
-from planner_core.domain import Agility, Dynamics
+from planner_core.certified.strategies import whole_program
+from planner_core.certified.strategies.whole_program import WholeProgram, relaxation_bound
+from planner_core.domain import Agility, Dynamics, Objective
 from planner_core.precedence.relation import is_transitive
 from planner_core.problem import (
     COLLECT,
@@ -27,12 +28,16 @@ from planner_core.problem import (
     Problem,
     Sunlight,
 )
+from planner_core.problem.delivery import with_objective
 from planner_core.referee.replay import replay
 from planner_core.solvers.registry import Milp
+from planner_core.solvers.rule import Rule
 from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.budgets import bounds_told, expiring
 from tests.planner_core.problems import TIGHT, Task, make_problem, random_problem, varied_problem
+from tests.planner_core.test_delivery import ROOMY, contact
+from tests.planner_core.test_delivery import collect as images
 
 SEEDS = st.integers(0, 10**6)
 DYNAMICS = st.sampled_from(["physical", "paper"])
@@ -286,6 +291,20 @@ def test_incumbents_and_bounds_are_reported_while_it_searches() -> None:
     assert all(reward <= bound + 1e-4 for reward, bound in live)
     assert solution.bound is not None
     assert solution.termination is Termination.TIME_LIMIT
+
+
+def test_it_begins_with_plans_whose_images_come_down(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The rule asks for a contact once its recorder is rather full."""
+    nothing = Outcome(columns=None, bound=np.inf, is_infeasible=True, log="")
+    monkeypatch.setattr(WholeProgram, "_search", lambda *_: nothing)
+    problem = make_problem(
+        [images(0, 100.0), images(1, 150.0), contact(330.0, 390.0)], num_targets=2, resources=ROOMY
+    )
+    problem = with_objective(problem, Objective.delivered())
+    rule = Rule().solve(problem, Budget(), 0).plan
+    assert replay(problem, rule).reward == 0.0
+    monkeypatch.setattr(whole_program, "_starts", lambda *_: [rule])
+    assert replay(problem, Milp().solve(problem, Budget(), 0).plan).reward == 2.0
 
 
 def test_a_wanted_gap_is_enough() -> None:

@@ -14,6 +14,7 @@ import numpy as np
 from planner_core.budget import Budget, Progress, ignored
 from planner_core.certified.driver import Search
 from planner_core.certified.incumbent import Incumbent
+from planner_core.certified.lns.downlinks import brought_down
 from planner_core.certified.lns.search import improved
 from planner_core.certified.mip.clique_cuts import violated_antichains
 from planner_core.certified.mip.highs import Engine, Outcome, Watch
@@ -51,7 +52,7 @@ class WholeProgram:
         """Return the best plan; the same one for the same seed where the budget suffices."""
         best = Incumbent(problem, budget, gap, bound=Bound(value=np.inf, proof="milp"))
         for plan in _starts(problem, budget):
-            best.offer(plan)
+            best.offer(brought_down(problem, plan, budget))
         if not problem.use_resources and not problem.turns_in_motion:
             best.offer(improved(problem, best.plan, self.moves_per_task, budget, seed))
         if len(problem.opportunities) == 0 or budget.is_spent():
