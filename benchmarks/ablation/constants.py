@@ -25,7 +25,7 @@ _FLEET: Final = {"fleet-4x2000": 8.0}
 _STATIONS: Final = {"fleet-stations-4x2000": 30.0}
 _AGE: Final = {"half-life-12h-1000": 12.0}
 _DELIVERED: Final = {"delivered-paper-500": 12.0}
-_SUN: Final = {"share-sun-fleet-4x500": 15.0}
+_SUN: Final = {"share-sun-fleet-4x500": 15.0, "sun-fleet-4x2000": 20.0}
 _ROOMS: Final[Mapping[str, Mapping[str, float]]] = {
     "strategies.agility": {**_AGILITY, **_PASSES},
     "strategies.resources": _ONE,

@@ -165,6 +165,14 @@ FAMILIES: Final[Mapping[str, Family]] = {
         num_satellites=4, num_targets=500, budget_s=15.0, quick_budget_s=None,
         dynamics="physical", objective=_shared(0.9), turns_to_sun=True,
     ),
+    "share-sun-network-8x1000": Family(
+        num_satellites=8, num_targets=1000, budget_s=20.0, quick_budget_s=None,
+        dynamics="physical", objective=_shared(0.9), turns_to_sun=True, num_stations=30,
+    ),
+    "sun-fleet-4x2000": Family(
+        num_satellites=4, num_targets=2000, budget_s=20.0, quick_budget_s=None,
+        dynamics="physical", turns_to_sun=True,
+    ),
     "share-sun-250": Family(
         num_targets=250, budget_s=15.0, quick_budget_s=None, dynamics="physical",
         objective=_shared(0.9), turns_to_sun=True,

@@ -125,7 +125,7 @@ class Tuning:
         Opportunities above which steps with resources take long; up to which a fleet without them
         is planned in streams and ends with cutting planes.
     dense
-        Opportunities of a satellite above which moves of its windows take long.
+        Images of a satellite that turns to the sun above which whole days move them, not windows.
     most_columns, most_relaxed
         Tasks of a mixed-integer program, and of a relaxation without energy levels.
     steps_beside
@@ -195,7 +195,7 @@ class Tuning:
     tasks_per_task: float = 1.2
     large: int = 3000
     small_fleet: int = 60_000
-    dense: int = 1000
+    dense: int = 2000
     most_columns: int = 6000
     most_relaxed: int = 12_000
     steps_beside: int = 6

@@ -66,7 +66,8 @@ class ObjectiveIn(Body):
         None,
         gt=0.0,
         description="The rest halves with every such time between the end of the collect and its "
-        "last bit on the ground; null for no decay.",
+        "last bit on the ground; null for no decay. With a `collected_share` of 1 nothing is left "
+        "to halve.",
     )
     prefer: list[Preference] = Field(
         [],
