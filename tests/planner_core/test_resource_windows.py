@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import Literal
@@ -14,17 +15,18 @@ from hypothesis import strategies as st
 from planner_core.budget import Budget, Progress
 from planner_core.certified.lns import resource_search
 from planner_core.certified.lns.alternating import TurnSearch
+from planner_core.certified.lns.choices import ChoiceSearch
 from planner_core.certified.lns.resource_search import ResourceWindows
 from planner_core.certified.proofs.documents import from_json, is_proven, to_json
-from planner_core.certified.tuning import tuned
+from planner_core.certified.tuning import TUNING, tuned
 from planner_core.domain import Agility
-from planner_core.problem import Kept, Pinned
+from planner_core.problem import Kept, Pinned, Problem
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
 from planner_core.solvers.registry import Certified, Rule
 from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
-from tests.planner_core.problems import TIGHT, random_problem, varied_problem
+from tests.planner_core.problems import TIGHT, random_problem, sunny_problem, varied_problem
 
 SEEDS = st.integers(0, 10**6)
 STARVED = replace(TIGHT, battery_min_fraction=0.5, initial_battery_fraction=0.62)
@@ -159,3 +161,32 @@ def test_less_than_a_move_on_each_satellite_is_one_on_some_in_turn(
     for num_moves in (4.7, 0.7, 0.7, 0.4, 0.01):
         windows.make_moves_on_each(num_moves, Budget())
     assert moved == [(0, 4), (1, 4), (2, 4), (0, 1), (1, 1), (2, 1), (0, 1), (1, 1), (2, 1)]
+
+
+@pytest.mark.parametrize(
+    ("drawn", "is_dense", "num_satellites", "num_days", "num_steps"),
+    [
+        (random_problem, False, 2, 2, 1),
+        (sunny_problem, False, 2, 4, 4),
+        (sunny_problem, False, 5, 5, 4),
+        (sunny_problem, True, 2, 16, 1),
+    ],
+)
+def test_windows_have_more_steps_where_images_come_in_batches_that_are_not_dense(
+    monkeypatch: pytest.MonkeyPatch,
+    drawn: Callable[..., Problem],
+    is_dense: bool,
+    num_satellites: int,
+    num_days: int,
+    num_steps: int,
+) -> None:
+    problem = drawn(1, num_collects=40, num_contacts=4, num_satellites=num_satellites)
+    days, moves = list[int](), list[int]()
+    with tuned(dense=1 if is_dense else 1000):
+        search = TurnSearch(problem, Plan(), 1.0, Budget(), 0)
+    search.turn(1)
+    monkeypatch.setattr(ChoiceSearch, "move", lambda _: days.append(1))
+    monkeypatch.setattr(ResourceWindows, "make_moves", lambda _, number, __: moves.append(number))
+    search.turn(1)
+    assert len(days) == num_days
+    assert moves == [num_steps * TUNING.moves_in_a_step * num_satellites]
