@@ -121,25 +121,25 @@ class Budget:
 
     @contextmanager
     def enforced(self) -> Iterator[None]:
-        """Expire once the time is over, so that it ends kernels as well."""
-        is_left = threading.Event()
+        """Expire once the time of the whole is over, so that kernels end as well."""
+        if self._deadline is None:
+            yield
+            return
+        has_ended = threading.Event()
 
         def watch() -> None:
-            while not is_left.wait(_LOOK_S):
+            while not has_ended.wait(_LOOK_S):
                 if self.is_spent() and not self.is_cancelled:
                     self.expire()
                     return
 
-        watching = threading.Thread(target=watch, daemon=True)
-        has_end = self._deadline is not None
-        if has_end:
-            watching.start()
+        watching = threading.Thread(target=watch, name="budget", daemon=True)
+        watching.start()
         try:
             yield
         finally:
-            is_left.set()
-            if has_end:
-                watching.join()
+            has_ended.set()
+            watching.join()
 
     @property
     def is_cancelled(self) -> bool:

@@ -115,10 +115,11 @@ def plan_scenario(
     budget.report(Progress(phase="verify", fraction=0.0))
     timeline = replay(problem, solution.plan)
     # A replan has asked the multipliers of the plan before, or has begun with a quick bound.
-    has_asked = solution.proven is not None and (scenario.replan is not None or solver.bounds)
+    has_asked = scenario.replan is not None or solver.bounds or _is_settled(problem, solution)
     bound = _best_bound(
-        relieved, solution, timeline, budget, known_bound, wants_quick=not has_asked
-    )
+        relieved, solution, timeline, budget, known_bound,
+        wants_quick=solution.proven is None or not has_asked,
+    )  # fmt: skip
     on_board = most_on_board(problem)
     if on_board > 0.0:
         bound = bound and _of_all(bound.with_on_board(on_board), timeline)
@@ -188,6 +189,12 @@ def _search(
         polish = polished(problem, solution.plan, aims, budget, seed)
         solution, effects = replace(solution, plan=polish.plan), polish.effects
     return relieved, solution, effects
+
+
+def _is_settled(problem: Problem, solution: Solution) -> bool:
+    """Return whether multipliers that a search has settled on prove more than those of a moment."""
+    is_lagrangian = solution.proven is not None and solution.proven.proof == "lagrangian"
+    return is_lagrangian and not problem.use_resources
 
 
 def _best_bound(

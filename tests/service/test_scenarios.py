@@ -284,6 +284,14 @@ def test_old_elements_are_a_warning(client: httpx.Client) -> None:
     assert post(client, PATH, question(client))["warnings"] == []
 
 
+def test_a_half_life_without_a_share_that_ages_is_a_warning(client: httpx.Client) -> None:
+    asked = question(client, objective={"half_life_s": 3600})
+    (warning,) = post(client, PATH, asked)["warnings"]
+    assert "half_life_s changes nothing" in warning
+    asked["objective"]["collected_share"] = 0.5
+    assert post(client, PATH, asked)["warnings"] == []
+
+
 def test_elements_of_more_than_thirty_days_are_refused_unless_allowed(client: httpx.Client) -> None:
     asked = question(client)
     stale = satellite(name="STALE", tle=tle(epoch=EPOCH - timedelta(days=40)))
