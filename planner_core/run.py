@@ -101,10 +101,7 @@ def plan_scenario(
     """
     clock = [time.perf_counter()]
     preparation = budget.until_cancelled()
-    opportunities = computed
-    if opportunities is None and before is not None:
-        opportunities = before.opportunities_of(scenario, preparation)
-    opportunities = opportunities or compute_opportunities(scenario, preparation)
+    opportunities = computed or _opportunities(scenario, before, preparation)
     clock.append(time.perf_counter())
     problem = build_problem(scenario, opportunities, preparation)
     clock.append(time.perf_counter())
@@ -152,6 +149,14 @@ def plan_scenario(
         runtime_s=Runtime(access=access, compile=compile_, solve=solve, verify=verify),
         effects=effects,
     )
+
+
+def _opportunities(
+    scenario: Scenario, before: PlanBefore | None, budget: Budget
+) -> ScenarioOpportunities:
+    """Return the opportunities of the plan before, where they still hold, or compute them."""
+    kept = before.opportunities_of(scenario, budget) if before is not None else None
+    return kept or compute_opportunities(scenario, budget)
 
 
 def _search(
