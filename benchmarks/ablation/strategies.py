@@ -11,9 +11,11 @@ from dataclasses import dataclass, field
 from functools import reduce
 from typing import Any, Final
 
+from planner_core.budget import Budget
 from planner_core.certified.driver import Turn
+from planner_core.certified.lns.resource_search import ResourceWindows
 from planner_core.certified.strategies import every
-from planner_core.certified.tuning import tune
+from planner_core.certified.tuning import TUNING, tune
 
 ENGINE: Final = "planner_core.certified"
 NOTHING: Final = ""
@@ -93,6 +95,11 @@ def _all_in_turn(turns: Sequence[Turn]) -> Turn:
     return max(going, key=lambda turn: turn.num_waits)
 
 
+def _without_noise(search: ResourceWindows, num_moves: float, budget: Budget) -> None:
+    """Make as many moves as with noise."""
+    search.make_moves_on_each(TUNING.rounds * num_moves, budget)
+
+
 def _off(module: str, name: str, value: Callable[..., Any]) -> tuple[Patch, ...]:
     return (Patch(module=f"{ENGINE}.{module}", name=name, value=value),)
 
@@ -129,6 +136,10 @@ _OWN_CONTACTS: Final = {"weights-1000": 20.0, "clouds-1000": 15.0, "share-paper-
 _SHARED: Final = {"share-fleet-paper-4x500": 12.0}
 _FLEET: Final = {"fleet-4x2000": 12.0, "fleet-2x500": 10.0}
 _STATIONS: Final = {"fleet-stations-4x2000": 60.0}
+_UNEVEN: Final = {
+    "quality-sun-network-8x1000": 20.0, "weights-fleet-4x2000": 20.0,
+    "weights-share-sun-fleet-4x500": 15.0,
+}  # fmt: skip
 _LARGE_FLEET: Final = {"fleet-24x10000": 60.0}
 _SMALL: Final = {"tight-150": 10.0, "tight-weights-300": 10.0, "physical-200": 10.0}
 
@@ -165,6 +176,10 @@ STRATEGIES: Final[Mapping[str, Change]] = {
     },
     "preference": Change(tuning={"preference": 0.0}, families=_LARGE_FLEET, num_draws=1),
     "relaxations of a fleet's contacts": Change(tuning={"most_relaxed": 0}, families=_STATIONS),
+    "noise in a fleet's windows": Change(
+        patches=_off("lns.resource_search", "ResourceWindows.anneal", _without_noise),
+        families=_UNEVEN,
+    ),
     "program search": Change(
         patches=_off("strategies.resource_fleet", "ProgramSearch", _Idle), families=_STATIONS
     ),

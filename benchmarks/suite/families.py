@@ -19,6 +19,7 @@ from planner_core.domain import (
     Horizon,
     Objective,
     OrbitElements,
+    Quality,
     Resources,
     Satellite,
     Scenario,
@@ -31,6 +32,7 @@ _TOWN_SPREAD_DEG: Final = 3.0
 _HIGHEST_TOWN_LAT_DEG: Final = 60.0
 _COLLECTED: Final = Objective.collected()
 _DELIVERED: Final = Objective.delivered()
+_OFF_NADIR: Final = Quality(off_nadir_deg=((0.0, 1.0), (30.0, 0.9), (50.0, 0.5)))
 _WARM_UP_DRAW: Final = 99
 _WARM_UP_TARGETS: Final = 100
 
@@ -64,6 +66,8 @@ class Family:
         What an image is worth; all worth what they are when they are taken where it says nothing.
     has_forecast
         Whether it is worth that by the chance of a clear sky (``benchmarks.clouds``).
+    has_quality
+        Whether images off nadir are worth less.
     turns_to_sun
         Whether satellites charge between turns to the sun alone.
     num_stations
@@ -82,6 +86,7 @@ class Family:
     has_tight_battery: bool = False
     objective: Objective = _COLLECTED
     has_forecast: bool = False
+    has_quality: bool = False
     turns_to_sun: bool = False
     num_stations: int | None = None
 
@@ -169,6 +174,24 @@ FAMILIES: Final[Mapping[str, Family]] = {
         num_satellites=8, num_targets=1000, budget_s=20.0, quick_budget_s=None,
         dynamics="physical", objective=_shared(0.9), turns_to_sun=True, num_stations=30,
     ),
+    "quality-sun-network-4x300": Family(
+        num_satellites=4, num_targets=300, budget_s=15.0, quick_budget_s=None,
+        dynamics="physical", objective=_shared(0.9), has_quality=True, turns_to_sun=True,
+        num_stations=30,
+    ),
+    "quality-sun-network-8x1000": Family(
+        num_satellites=8, num_targets=1000, budget_s=20.0, quick_budget_s=None,
+        dynamics="physical", objective=_shared(0.9), has_quality=True, turns_to_sun=True,
+        num_stations=30,
+    ),
+    "weights-fleet-4x2000": Family(
+        num_satellites=4, num_targets=2000, budget_s=20.0, quick_budget_s=None,
+        dynamics="physical", has_random_rewards=True,
+    ),
+    "weights-share-sun-fleet-4x500": Family(
+        num_satellites=4, num_targets=500, budget_s=15.0, quick_budget_s=None,
+        dynamics="physical", objective=_shared(0.9), has_random_rewards=True, turns_to_sun=True,
+    ),
     "sun-fleet-4x2000": Family(
         num_satellites=4, num_targets=2000, budget_s=20.0, quick_budget_s=None,
         dynamics="physical", turns_to_sun=True,
@@ -255,6 +278,8 @@ def scenario_of(family: Family, draw: int) -> Scenario:
         scenario = replace(scenario, satellites=tuple(map(_turning, scenario.satellites)))
     if family.num_stations is not None:
         scenario = replace(scenario, ground_stations=_network(family.num_stations, draw))
+    if family.has_quality:
+        scenario = replace(scenario, quality=_OFF_NADIR)
     if family.has_forecast:
         scenario = replace(scenario, forecast=forecast_of(scenario, Weather(draw)))
     return replace(

@@ -28,7 +28,7 @@ class Tuning:
     patience
         How often in a row a search may lead to nothing better before it is done in another way.
     rounds
-        Steps of a search that is asked for more than a moment's work.
+        Steps of a search that is asked for more than a moment's work; levels of noise.
     fleet_patience
         Turns of a fleet's searches without a better plan, before the solver ends; windows with free
         starts under resources.
@@ -58,7 +58,7 @@ class Tuning:
     far_above
         Share of a bound: a plan or another bound that far away says little of the best plan.
     little
-        Share of a bound, a gap, a goal or a step: what a move of it is at least.
+        Share of a bound, a gap, a goal, a step or noise: what a move of it is at least.
     worth_a_step
         Share of a bound that a quick oracle must gain, for an exact one to be asked at all.
     levels_per_collect

@@ -39,7 +39,7 @@ Dynamics = Literal["physical", "paper"]
 @given(
     seed=SEEDS, dynamics=st.sampled_from(["physical", "paper"]),
     num_satellites=st.integers(1, 3), has_rewards=st.booleans(),
-    num_offers=st.sampled_from([1, 3]), num_kept=st.integers(0, 2),
+    has_quality=st.booleans(), num_offers=st.sampled_from([1, 3]), num_kept=st.integers(0, 2),
 )  # fmt: skip
 def test_plans_stay_valid_and_never_get_worse(
     slew_rate_deg_s: float,
@@ -47,13 +47,14 @@ def test_plans_stay_valid_and_never_get_worse(
     dynamics: Dynamics,
     num_satellites: int,
     has_rewards: bool,
+    has_quality: bool,
     num_offers: int,
     num_kept: int,
 ) -> None:
     problem = random_problem(
         seed, num_collects=30, num_targets=15, num_contacts=6, num_satellites=num_satellites,
-        dynamics=dynamics, has_rewards=has_rewards, max_turn_deg=25.0, num_offers=num_offers,
-        agility=Agility(slew_rate_deg_s=slew_rate_deg_s),
+        dynamics=dynamics, has_rewards=has_rewards, has_quality=has_quality, max_turn_deg=25.0,
+        num_offers=num_offers, agility=Agility(slew_rate_deg_s=slew_rate_deg_s),
     )  # fmt: skip
     first = Rule().solve(problem, Budget(), 0).plan
     must = [action.opportunity for action in first.actions[:num_kept]]
@@ -65,14 +66,18 @@ def test_plans_stay_valid_and_never_get_worse(
     assert search.plan == first
     search.make_moves(400, Budget())
     timeline = replay(problem, search.plan)
+    search.anneal(20, Budget())
+    annealed = replay(problem, search.plan)
     if start.is_valid:
         assert not timeline.violations
-        assert timeline.reward >= start.reward
-        assert search.reward == pytest.approx(timeline.reward)
+        assert not annealed.violations
+        assert annealed.reward >= timeline.reward - 1e-9 >= start.reward - 2e-9
+        assert search.reward == pytest.approx(annealed.reward)
         assert set(must) <= {action.opportunity for action in search.plan.actions}
     again = ResourceWindows(problem, seed)
     again.adopt(first)
     again.make_moves(400, Budget())
+    again.anneal(20, Budget())
     assert again.plan == search.plan
 
 
@@ -107,6 +112,25 @@ def test_windows_better_a_plan_that_the_rule_leaves() -> None:
     assert gained / 5 > 1.1
 
 
+def test_noise_leads_further_where_images_differ_in_worth() -> None:
+    plain, noisy = 0.0, 0.0
+    for seed in range(5):
+        problem = random_problem(
+            seed, num_collects=300, num_targets=120, num_contacts=12, num_satellites=3,
+            span_s=5000.0, has_quality=True,
+        )  # fmt: skip
+        problem = replace(problem, horizon_s=5100.0)
+        start = Rule().solve(problem, Budget(), 0).plan
+        one, other = ResourceWindows(problem, 0), ResourceWindows(problem, 0)
+        one.adopt(start)
+        other.adopt(start)
+        other.anneal(200, Budget())
+        for _ in range(TUNING.rounds):  # as many moves
+            one.make_moves_on_each(200, Budget())
+        plain, noisy = plain + one.reward, noisy + other.reward
+    assert noisy > 1.005 * plain
+
+
 def test_a_search_that_is_stopped_keeps_its_plan() -> None:
     problem = random_problem(3, num_collects=60, num_targets=30, num_contacts=6)
     budget = Budget()
@@ -115,6 +139,24 @@ def test_a_search_that_is_stopped_keeps_its_plan() -> None:
     plan = Rule().solve(problem, Budget(), 0).plan
     search.adopt(plan)
     search.make_moves(1000, budget)
+    search.anneal(1000, budget)
+    assert search.plan == plan
+
+
+def test_a_search_that_is_stopped_amid_noise_keeps_the_better_plan() -> None:
+    problem = random_problem(
+        3, num_collects=200, num_targets=80, num_contacts=12, num_satellites=2, has_quality=True
+    )
+    search = ResourceWindows(problem, 0)
+    search.adopt(Rule().solve(problem, Budget(), 0).plan)
+    search.anneal(200, Budget())
+    plan, looks = search.plan, iter(range(100))
+
+    class EndsAmidNoise(Budget):
+        def is_spent(self) -> bool:
+            return next(looks) >= 2
+
+    search.anneal(200, EndsAmidNoise())
     assert search.plan == plan
 
 

@@ -55,6 +55,9 @@ class Ground(NamedTuple):
         the plan and its contacts as they are; nothing else asks for it. Shape ``(n,)``.
     is_polish
         Whether it is one.
+    noise
+        Share of an image's worth that a move draws on top of it at random, at most, and that it
+        may lose.
     """
 
     network: Network
@@ -69,6 +72,7 @@ class Ground(NamedTuple):
     is_shut: Bools
     liking: Floats
     is_polish: bool
+    noise: float
 
 
 @bundle

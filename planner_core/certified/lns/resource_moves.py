@@ -181,11 +181,12 @@ def _cost_of(ground: Ground, taken: Taken, low: int, high: int, data: float, aft
 def _weigh(ground: Ground, taken: Taken, room: Room, low: int, high: int, draws: Uint64s) -> None:
     """Say what each task of a window adds to a path, and which targets come up repeatedly.
 
-    Ties are broken at random, so that the search wanders over plans of equal worth.
+    Ties are broken at random, so that the search wanders over plans of equal worth; with more
+    noise over such as are worth less.
     """
     move = room.move[0] + 1
     room.move[0] = move
-    with_others = next_draw(draws) < 0.5
+    with_others, noise = next_draw(draws) < 0.5, _TIE + ground.noise
     for k in range(low, high):
         at = k - low
         target = ground.target[k]
@@ -204,10 +205,10 @@ def _weigh(ground: Ground, taken: Taken, room: Room, low: int, high: int, draws:
             is_here = low <= ground.local[held] < high
         worth = ground.worth[ground.rows[k]]
         if held == FREE or is_here:
-            room.gain[at] = worth * (1.0 + _TIE * next_draw(draws)) if worth > 0.0 else NEVER
+            room.gain[at] = worth * (1.0 + noise * next_draw(draws)) if worth > 0.0 else NEVER
         elif with_others and not ground.is_locked[target]:
             better = worth - ground.worth[held]
-            room.gain[at] = better + worth * _TIE * next_draw(draws)
+            room.gain[at] = better + worth * noise * next_draw(draws)
         else:
             room.gain[at] = NEVER
         if ground.network.is_kept[k]:
@@ -258,6 +259,8 @@ def _replace(
 ) -> None:
     """Let a path take the place of what is in the window, unless the plan is worth less then.
 
+    By no more than the noise, that is.
+
     Parameters
     ----------
     saved
@@ -293,7 +296,7 @@ def _replace(
                 liking -= ground.liking[ground.rows[k]]
             else:
                 num_contacts -= 1
-    if worth < -ROUNDING:
+    if worth < -ROUNDING - ground.noise * ground.typical:
         return
     if ground.is_polish and (worth > ROUNDING or liking <= ROUNDING or num_contacts != 0):
         return

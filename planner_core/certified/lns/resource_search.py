@@ -60,6 +60,7 @@ class ResourceWindows:
                 is_shut=np.zeros(len(satellite), dtype=np.bool_),
                 liking=np.zeros(len(table)),
                 is_polish=False,
+                noise=0.0,
             )
             for index, satellite in enumerate(problem.satellites)
             if len(satellite)
@@ -123,6 +124,22 @@ class ResourceWindows:
             if budget.is_spent():
                 break
             self._make_moves_on(ground, min(each, TUNING.patience * _in_a_step(ground)), budget)
+
+    def anneal(self, num_moves: float, budget: Budget) -> None:
+        """Make so many moves on each satellite at each level of noise; the better plan stays.
+
+        The noising method (Charon and Hudry 1993): worths are drawn up to twice as high, then less
+        and less, and a move may lose as much. Where images differ in worth few moves lead to plans
+        that are worth the same, and a search that never loses is soon stuck: five real satellites
+        over 500 cities, images worth less off nadir, stood at 315 of at most 327 from the third
+        second to the thirtieth.
+        """
+        known, plan = self.reward, self.plan
+        for noise in (*np.geomspace(1.0, TUNING.little, TUNING.rounds - 1).tolist(), 0.0):
+            self._grounds = [ground._replace(noise=noise) for ground in self._grounds]
+            self.make_moves_on_each(num_moves, budget)
+        if self.reward < known:
+            self.adopt(plan)
 
     def _make_moves_on(self, ground: Ground, num_moves: int, budget: Budget) -> None:
         ground = ground._replace(is_shut=self._shut(ground))
