@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+import sys
 from collections.abc import Generator
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from xdist.scheduler import LoadScopeScheduling
 
 from service.process.imports import importing
 from tests.examples import load_profile
+from tests.service import prepared
 
 _ROOT = Path(__file__).resolve().parents[1]
 
@@ -22,6 +24,10 @@ load_profile()
 # Applications, servers and problems stay for a whole module: to look among them for garbage as
 # often as Python does takes a tenth of the time of the service's tests.
 gc.set_threshold(20_000, 20, 20)
+
+# As in a worker, for this process's children: matrices are small, and threads that wait for the
+# next one spin.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # What shares a service is done by one process.
 _TOGETHER = {
@@ -90,6 +96,12 @@ class _ByModule(LoadScopeScheduling):  # type: ignore[misc]  # it has no types
         if module in _APART:
             return nodeid.partition("[")[0]
         return _TOGETHER.get(module, module)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Have one process from which all that run tests fork programs."""
+    if sys.platform == "linux" and config.getoption("numprocesses", None):
+        prepared.share()
 
 
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:

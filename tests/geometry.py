@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
+from functools import cache, lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +18,7 @@ from sgp4.api import WGS72, Satrec
 from sgp4.conveniences import sat_epoch_datetime
 from skyfield.api import EarthSatellite, load, wgs84
 from skyfield.framelib import itrs
+from skyfield.timelib import Time, Timescale
 
 from planner_core.domain import (
     Horizon,
@@ -105,27 +107,38 @@ def satellite(
     )
 
 
+@cache
+def _timescale() -> Timescale:
+    scale = load.timescale(builtin=True)
+    pole = shipped()
+    terrestrial = pole.mjd + 2_400_000.5 + (pole.tai_utc_s + 32.184) / 86400.0
+    scale.polar_motion_table = (
+        terrestrial,
+        np.degrees(pole.xp_rad) * 3600.0,
+        np.degrees(pole.yp_rad) * 3600.0,
+    )
+    return scale
+
+
+@lru_cache(maxsize=4)
+def _times(start: datetime, after_s: bytes) -> Time:
+    """Return instants, which remember how the Earth stands then: that takes most of the time."""
+    return _timescale().utc(
+        start.year, start.month, start.day, start.hour, start.minute,
+        start.second + np.frombuffer(after_s),
+    )  # fmt: skip
+
+
 class SkyfieldPath:
     """A satellite's Earth-fixed states by Skyfield, with its own UT1 and our table's pole."""
 
     def __init__(self, elements: OrbitElements, horizon: Horizon):
-        self._scale = load.timescale(builtin=True)
-        pole = shipped()
-        terrestrial = pole.mjd + 2_400_000.5 + (pole.tai_utc_s + 32.184) / 86400.0
-        self._scale.polar_motion_table = (
-            terrestrial,
-            np.degrees(pole.xp_rad) * 3600.0,
-            np.degrees(pole.yp_rad) * 3600.0,
-        )
-        self._satellite = EarthSatellite.from_satrec(satrec(elements), self._scale)
+        self._satellite = EarthSatellite.from_satrec(satrec(elements), _timescale())
         self._start = horizon.start
 
     def position_m(self, t_s: Floats) -> Floats:
         """Return positions in the ITRS. Shape ``(n, 3)``."""
-        start = self._start
-        times = self._scale.utc(
-            start.year, start.month, start.day, start.hour, start.minute, start.second + t_s
-        )
+        times = _times(self._start, np.asarray(t_s, dtype=np.float64).tobytes())
         found = self._satellite.at(times).frame_xyz(itrs).m
         return np.ascontiguousarray(np.asarray(found, dtype=np.float64).T)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import count
 
 from planner_core.budget import Budget, Progress
 
@@ -29,6 +30,12 @@ def bounds_told(number: int) -> Callable[[Progress], bool]:
         return len(told) >= number
 
     return look_at
+
+
+def reports(number: int) -> Callable[[Progress], bool]:
+    """Return what says when so many reports have come."""
+    told = count(1)
+    return lambda _: next(told) >= number
 
 
 class Reports(Budget):

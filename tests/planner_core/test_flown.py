@@ -36,6 +36,7 @@ from planner_core.referee.timeline import Timeline
 from planner_core.run import plan_scenario
 from planner_core.solvers.registry import Certified, Rule
 from tests.geometry import hours, orbit, satellite
+from tests.planner_core.budgets import expiring, reports
 
 BEGIN = hours(1).start
 END = BEGIN + timedelta(hours=5)
@@ -327,7 +328,7 @@ def test_a_replan_from_a_state_keeps_the_frozen_part_to_the_bit() -> None:
     for start in instants(whole)[:4]:
         freeze = start + timedelta(minutes=25)
         scenario = continued(whole, start, freeze)
-        judged = plan_scenario(scenario, Certified(), 0, Budget(5.0))
+        judged = plan_scenario(scenario, Certified(), 0, expiring(reports(5)))
         assert judged.timeline.is_valid
         flown = words(scenario, judged.problem, judged.solution.plan)
         expected = [

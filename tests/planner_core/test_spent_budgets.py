@@ -94,7 +94,7 @@ FAMILIES: Final[dict[str, Callable[[], Problem]]] = {
         Objective(collected_share=0.9, half_life_s=600.0),
     ),
     "continuous starts": lambda: flat_problem(
-        1, num_targets=40, horizon_s=600.0
+        1, num_targets=20, horizon_s=600.0
     ),
     "continuous starts with resources": lambda: flat_problem(
         2, num_targets=10, num_contacts=2, use_resources=True, spacing_s=60.0

@@ -12,6 +12,7 @@ import atexit
 import json
 import os
 import runpy
+import selectors
 import signal
 import socket
 import subprocess
@@ -22,11 +23,14 @@ from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import IO, Any, Final, NoReturn
+from uuid import uuid4
 
 from service.process.imports import importing
+from service.process.parent import die_with_parent
 
 _ROOT: Final = Path(__file__).parents[2]
 _MOST_BYTES: Final = 1 << 17
+_NAME: Final = "SLEWLINE_TEST_PREPARED"
 
 
 class Prepared:
@@ -128,51 +132,82 @@ def _differs_in_own_settings_alone(env: Mapping[str, str]) -> bool:
     return all(name.startswith(("SLEWLINE_", "PYTEST_")) for name in names)
 
 
+def share() -> None:
+    """Start the process that programs are forked from, for this one and all that it starts."""
+    os.environ[_NAME] = _begin()
+
+
 @cache
 def _server() -> tuple[socket.socket, dict[str, str]]:
-    """Start the process that programs are forked from, and return its environment too.
+    """Return a way to the process that programs are forked from, and its environment."""
+    environment = dict(os.environ)
+    server = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    server.connect("\0" + (environment.get(_NAME) or _begin()))
+    atexit.register(server.close)
+    return server, environment
+
+
+def _begin() -> str:
+    """Start the process that programs are forked from; return the name at which it listens.
 
     It ends with this process.
     """
-    environment = dict(os.environ)
-    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    with theirs:
+    name = f"slewline-{uuid4().hex}"
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listener:
+        listener.bind("\0" + name)
+        listener.listen()
         # A test may have gone to another folder before it asks for the first program.
         process = subprocess.Popen(
-            [sys.executable, "-m", __name__], stdin=theirs.fileno(), cwd=_ROOT
+            [sys.executable, "-m", __name__], stdin=listener.fileno(), cwd=_ROOT
         )
 
     def end() -> None:
-        ours.close()
+        process.terminate()
         process.wait()
 
     atexit.register(end)
-    return ours, environment
+    return name
 
 
 # In the process that programs are forked from -------------------------------------------------
 
 
 def main() -> None:
-    """Import the service, and start what is asked for until nobody can ask any more."""
+    """Import the service, and start what is asked for."""
+    die_with_parent(signal.SIGTERM)
     with importing():
         import service.commands.cli
         import service.commands.serving
         import service.jobs.worker
         import service.server  # noqa: F401
-    requests = socket.socket(fileno=os.dup(0))
     # Who minds a program is collected by nobody; Ctrl-C is for the programs.
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    selector = selectors.DefaultSelector()
+    listener = socket.socket(fileno=os.dup(0))
+    selector.register(listener, selectors.EVENT_READ)
     while True:
-        data, descriptors, _, _ = socket.recv_fds(requests, _MOST_BYTES, 3)
-        if not data:
-            return
-        if os.fork() == 0:
-            requests.close()
-            _mind(json.loads(data), *descriptors)
-        for descriptor in descriptors:
-            os.close(descriptor)
+        for key, _ in selector.select():
+            if key.fileobj is listener:
+                selector.register(listener.accept()[0], selectors.EVENT_READ)
+            else:
+                _serve(key.fileobj, selector)
+
+
+def _serve(client: Any, selector: selectors.BaseSelector) -> None:
+    """Start what a process asks for, or forget the process if it has ended."""
+    data, descriptors, _, _ = socket.recv_fds(client, _MOST_BYTES, 3)
+    if not data:
+        selector.unregister(client)
+        client.close()
+        return
+    if os.fork() == 0:
+        for key in selector.get_map().values():
+            os.close(key.fd)
+        selector.close()
+        _mind(json.loads(data), *descriptors)
+    for descriptor in descriptors:
+        os.close(descriptor)
 
 
 def _mind(asked: dict[str, Any], told: int, stdout: int, stderr: int) -> NoReturn:
