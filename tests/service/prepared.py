@@ -26,7 +26,6 @@ from typing import IO, Any, Final, NoReturn
 from uuid import uuid4
 
 from service.process.imports import importing
-from service.process.parent import die_with_parent
 
 _ROOT: Final = Path(__file__).parents[2]
 _MOST_BYTES: Final = 1 << 17
@@ -158,12 +157,15 @@ def _begin() -> str:
         listener.listen()
         # A test may have gone to another folder before it asks for the first program.
         process = subprocess.Popen(
-            [sys.executable, "-m", __name__], stdin=listener.fileno(), cwd=_ROOT
+            [sys.executable, "-m", __name__, str(listener.fileno())],
+            stdin=subprocess.PIPE,
+            pass_fds=[listener.fileno()],
+            cwd=_ROOT,
         )
 
     def end() -> None:
         process.terminate()
-        process.wait()
+        process.communicate()
 
     atexit.register(end)
     return name
@@ -173,8 +175,10 @@ def _begin() -> str:
 
 
 def main() -> None:
-    """Import the service, and start what is asked for."""
-    die_with_parent(signal.SIGTERM)
+    """Import the service, and start what is asked for, until the end of the standard input.
+
+    That ends with who began this process, be it by SIGKILL.
+    """
     with importing():
         import service.commands.cli
         import service.commands.serving
@@ -184,10 +188,14 @@ def main() -> None:
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     selector = selectors.DefaultSelector()
-    listener = socket.socket(fileno=os.dup(0))
-    selector.register(listener, selectors.EVENT_READ)
+    listener = socket.socket(fileno=int(sys.argv[1]))
+    listener.set_inheritable(False)
+    for each in (sys.stdin, listener):
+        selector.register(each, selectors.EVENT_READ)
     while True:
         for key, _ in selector.select():
+            if key.fileobj is sys.stdin:
+                return
             if key.fileobj is listener:
                 selector.register(listener.accept()[0], selectors.EVENT_READ)
             else:
