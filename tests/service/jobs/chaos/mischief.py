@@ -151,7 +151,10 @@ class Mischief:
 
 @contextlib.contextmanager
 def _unless_it_ends(pid: int) -> Iterator[None]:
-    with contextlib.suppress(ProcessLookupError), no_room_for(pid):
+    """Leave a process no room; it may have ended before, or end meanwhile."""
+    with contextlib.suppress(ProcessLookupError), ExitStack() as stack:
+        with contextlib.suppress(ProcessLookupError):
+            stack.enter_context(no_room_for(pid))
         yield
 
 
