@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from pathlib import Path
 
 import psutil
@@ -66,6 +67,20 @@ def test_all_who_wait_for_it_are_told() -> None:
     assert process.stdout is not None
     with process.stdout, ThreadPoolExecutor(4) as pool:
         assert [each.result() for each in [pool.submit(process.wait) for _ in range(4)]] == [0] * 4
+
+
+def test_it_outlives_the_thread_that_began_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(prepared._NAME, raising=False)
+    monkeypatch.setattr(prepared, "_server", cache(prepared._server.__wrapped__))
+
+    def status() -> int:
+        process = prepared.start(["service", "--version"], os.environ, stdout=1)
+        assert isinstance(process, Prepared)
+        return process.wait()
+
+    with ThreadPoolExecutor(1) as pool:
+        assert pool.submit(status).result() == 0
+    assert status() == 0
 
 
 def test_settings_of_libraries_want_a_start_from_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
