@@ -2,7 +2,8 @@
 
 Such a program is a process of its own that runs what ``python -m`` would run, with its own
 arguments, environment and streams; it can be signalled, killed and waited for. Only imports are
-shared, and done before any thread begins. What is started with other settings than those of
+shared, and done before any thread begins. Workers that it starts, and what these fork their jobs
+from, are forks too (``spare``). What is started with other settings than those of
 Slewline is started as a user would, since libraries may read theirs while they are imported.
 """
 
@@ -11,7 +12,6 @@ from __future__ import annotations
 import atexit
 import json
 import os
-import runpy
 import selectors
 import signal
 import socket
@@ -26,9 +26,9 @@ from typing import IO, Any, Final, NoReturn
 from uuid import uuid4
 
 from service.process.imports import importing
+from tests.service import spare
 
 _ROOT: Final = Path(__file__).parents[2]
-_MOST_BYTES: Final = 1 << 17
 _NAME: Final = "SLEWLINE_TEST_PREPARED"
 
 
@@ -187,35 +187,78 @@ def main() -> None:
     # Who minds a program is collected by nobody; Ctrl-C is for the programs.
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    selector = selectors.DefaultSelector()
     listener = socket.socket(fileno=int(sys.argv[1]))
     listener.set_inheritable(False)
-    for each in (sys.stdin, listener):
-        selector.register(each, selectors.EVENT_READ)
-    while True:
-        for key, _ in selector.select():
-            if key.fileobj is sys.stdin:
-                return
-            if key.fileobj is listener:
-                selector.register(listener.accept()[0], selectors.EVENT_READ)
-            else:
-                _serve(key.fileobj, selector)
+    _Forks(sys.stdin, listener).serve()
 
 
-def _serve(client: Any, selector: selectors.BaseSelector) -> None:
-    """Start what a process asks for, or forget the process if it has ended."""
-    data, descriptors, _, _ = socket.recv_fds(client, _MOST_BYTES, 3)
-    if not data:
-        selector.unregister(client)
-        client.close()
-        return
-    if os.fork() == 0:
-        for key in selector.get_map().values():
+class _Forks:
+    """Starts what is asked for in this process, until the end of the first of some files.
+
+    The others are a listener, or one who asks.
+    """
+
+    def __init__(self, end: Any, *others: socket.socket) -> None:
+        self._end = end
+        self._selector = selectors.DefaultSelector()
+        for each in (end, *others):
+            self._selector.register(each, selectors.EVENT_READ)
+        self._twin: socket.socket | None = None
+
+    def serve(self) -> None:
+        while True:
+            for key, _ in self._selector.select():
+                file: Any = key.fileobj
+                if not isinstance(file, socket.socket):
+                    return
+                if file.getsockopt(socket.SOL_SOCKET, socket.SO_ACCEPTCONN):
+                    self._selector.register(file.accept()[0], selectors.EVENT_READ)
+                elif not self._start(file):
+                    if file is self._end:
+                        return
+                    self._selector.unregister(file)
+                    file.close()
+
+    def _start(self, client: socket.socket) -> bool:
+        """Start what a process asks for; return whether it still was there to ask."""
+        data, descriptors, _, _ = socket.recv_fds(client, spare.MOST_BYTES, 3)
+        if not data:
+            return False
+        asked = json.loads(data)
+        if self._end is sys.stdin and spare.num_workers(asked["words"]):
+            socket.send_fds(self._with_kernels(descriptors), [data], descriptors)
+        elif os.fork() == 0:
+            self._close()
+            _mind(asked, *descriptors)
+        for descriptor in descriptors:
+            os.close(descriptor)
+        return True
+
+    def _with_kernels(self, not_for_it: Sequence[int]) -> socket.socket:
+        """Return a way to a fork that has all kernels too, for those whose workers load them.
+
+        Each would take half a second. Other programs shall not hold what they never need.
+        """
+        if self._twin is None:
+            self._twin, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+            if os.fork() == 0:
+                self._close()
+                for descriptor in not_for_it:
+                    os.close(descriptor)
+                import service.jobs.preload  # noqa: F401
+
+                _Forks(theirs).serve()
+                os._exit(0)
+            theirs.close()
+        return self._twin
+
+    def _close(self) -> None:
+        """Close in a fork all that only this process needs."""
+        for key in self._selector.get_map().values():
             os.close(key.fd)
-        selector.close()
-        _mind(json.loads(data), *descriptors)
-    for descriptor in descriptors:
-        os.close(descriptor)
+        self._selector.close()
+        if self._twin is not None:
+            self._twin.close()
 
 
 def _mind(asked: dict[str, Any], told: int, stdout: int, stderr: int) -> NoReturn:
@@ -235,18 +278,12 @@ def _mind(asked: dict[str, Any], told: int, stdout: int, stderr: int) -> NoRetur
 
 def _become(asked: dict[str, Any], stdout: int, stderr: int) -> NoReturn:
     """Run the program in this process, as ``python -m`` does."""
-    signal.signal(signal.SIGINT, signal.default_int_handler)
     nothing = os.open(os.devnull, os.O_RDONLY)
     for descriptor, number in ((nothing, 0), (stdout, 1), (stderr, 2)):
         os.dup2(descriptor, number)
         if descriptor > 2:
             os.close(descriptor)
-    os.environ.clear()
-    os.environ.update(asked["env"])
-    os.chdir(asked["folder"])
-    module, *sys.argv[1:] = asked["words"]
-    runpy.run_module(module, run_name="__main__", alter_sys=True)
-    sys.exit()
+    spare.run(asked["words"], asked["env"], asked["folder"])
 
 
 if __name__ == "__main__":

@@ -14,8 +14,10 @@ import psutil
 import pytest
 
 import planner_core
+from tests.patience import PATIENCE_S
 from tests.service import prepared
 from tests.service.prepared import Prepared
+from tests.service.serving import serving
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="elsewhere nothing is forked")
 
@@ -60,6 +62,32 @@ def test_it_is_waited_for_and_killed(tmp_path: Path) -> None:
         assert process.wait() == -signal.SIGKILL
         process.terminate()  # nobody is left to be told
         psutil.wait_procs([fork_server])
+
+
+def test_its_workers_and_what_jobs_are_forked_from_are_forks_too(tmp_path: Path) -> None:
+    with serving(tmp_path, "serve", "--workers", "2") as (process, line):
+        assert line.startswith("Slewline is ready at ")
+        children = psutil.Process(process.pid).children()
+        workers = [child for child in children if child.name() != "slewline-fork"]
+        assert len(workers) == 2
+        for worker in workers:
+            fork_servers = [each for each in worker.children() if "-c" not in each.cmdline()]
+            assert len(fork_servers) == 1  # beside what tracks resources
+            for each in (worker, *fork_servers):
+                assert prepared.__name__ in each.cmdline()
+        started = psutil.Process(process.pid).children(recursive=True)
+        process.terminate()
+        assert process.stdout is not None
+        assert (process.stdout.read(), process.wait()) == ("", 0)
+        assert psutil.wait_procs(started, timeout=PATIENCE_S)[1] == []
+
+
+def test_what_it_has_in_reserve_ends_with_it() -> None:
+    process = prepared.start(["service.jobs", "--help"], os.environ)
+    assert process.stdout is not None
+    with process.stdout as output:
+        assert "--supervisor" in output.read()  # and no other process has its other end
+    assert process.wait() == 0
 
 
 def test_all_who_wait_for_it_are_told() -> None:
