@@ -13,8 +13,13 @@ from pathlib import Path
 
 import pytest
 
+from planner_core.kernel_folder import kernel_folder
+
 ROOT = Path(__file__).resolve().parents[3]
 _KERNEL_FOLDER = "from planner_core.kernel_folder import kernel_folder; print(kernel_folder())"
+
+_LEFT = "planner_core.certified.dp.start_labels"
+"""A module whose kernels neither the demonstration nor a kernel of another module needs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,22 +90,49 @@ def demonstrated(user: User) -> Demonstrated:
     return Demonstrated(user, said, said_again)
 
 
+def warmed_up(demonstrated: Path) -> list[Path]:
+    """Return the folders of this checkout's kernels that are just as the warm-up left them.
+
+    Tests may have had others compiled, or for more arguments: these prove nothing of the warm-up.
+    Where the demonstration has not compiled them all the whole is of no use, since what is compiled
+    already asks for nothing that it calls.
+    """
+    ready = kernel_folder() / "all.ready"
+    ended_at = ready.stat().st_mtime_ns if ready.exists() else 0
+
+    def is_as_it_was(folder: Path) -> bool:
+        try:
+            times = [path.stat().st_mtime_ns for path in folder.iterdir()]
+        except FileNotFoundError:  # somebody writes there
+            return False
+        num_kernels, num_compiled = (len(list(folder.glob(f"*.{end}"))) for end in ("nbi", "nbc"))
+        return num_kernels == num_compiled and max(times, default=0) <= ended_at
+
+    folders = list(kernel_folder().glob("planner_core.*"))
+    taken = [each for each in folders if is_as_it_was(each)]
+    left = [path for each in folders if each not in taken for path in each.glob("*.nbi")]
+    is_whole = all((demonstrated / path.parent.name / path.name).exists() for path in left)
+    return taken if is_whole else []
+
+
 @pytest.fixture(scope="session")
 def prefix(demonstrated: Demonstrated) -> Iterator[Path]:
     """The program as the image has it, in a folder that all may read.
 
-    What the demonstration has compiled its build finds there, and compiles the rest: all that a
-    demonstration needs is part of the whole warm-up, and would take a minute once more.
+    What the demonstration has compiled its build finds there, and what else the warm-up of this
+    checkout has, but for a module: to compile all of it would take two minutes once more.
     """
     folder = Path(tempfile.mkdtemp())
     folder.chmod(0o755)
     prefix, user = folder / "slewline", demonstrated.user
-    compiled = user.kernels.relative_to(user.folder / "venv")
+    kernels = user.kernels
+    compiled = prefix / kernels.relative_to(user.folder / "venv")
     environment = os.environ | {"PYTHON": sys.executable}
+    given = [each for each in warmed_up(kernels) if each.name != _LEFT]
     commands: list[list[str | Path]] = [
         [ROOT / "docker" / "install", "libraries", prefix],
-        ["mkdir", "-p", (prefix / compiled).parent],
-        ["cp", "-R", user.kernels, prefix / compiled],
+        ["mkdir", "-p", compiled],
+        ["cp", "-R", *given, f"{kernels}/.", compiled],
         [ROOT / "docker" / "install", "program", prefix],
     ]
     try:
