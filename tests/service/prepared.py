@@ -12,6 +12,7 @@ from __future__ import annotations
 import atexit
 import json
 import os
+import select
 import selectors
 import signal
 import socket
@@ -92,6 +93,7 @@ def start(
     *,
     stdout: int = subprocess.PIPE,
     stderr: int = 2,
+    start_new_session: bool = False,
 ) -> Program:
     """Run ``python -m`` with these words.
 
@@ -101,24 +103,36 @@ def start(
         The whole environment.
     stdout, stderr
         Descriptors; the first may be ``subprocess.PIPE``.
+    start_new_session
+        As for ``subprocess.Popen``.
     """
     if sys.platform != "linux" or not _differs_in_own_settings_alone(env):
         command = [sys.executable, "-m", *words]
-        return subprocess.Popen(command, env=env, stdout=stdout, stderr=stderr, text=True)
+        return subprocess.Popen(
+            command,
+            env=env,
+            stdout=stdout,
+            stderr=stderr,
+            text=True,
+            start_new_session=start_new_session,
+        )
+    asked = {
+        "words": list(words),
+        "env": dict(env),
+        "folder": os.getcwd(),
+        "has_session": start_new_session,
+    }
     if stdout != subprocess.PIPE:
-        return _forked(words, env, (stdout, stderr), None)
+        return _forked(asked, (stdout, stderr), None)
     read, write = os.pipe()
     try:
-        return _forked(words, env, (write, stderr), os.fdopen(read))
+        return _forked(asked, (write, stderr), os.fdopen(read))
     finally:
         os.close(write)
 
 
-def _forked(
-    words: Sequence[str], env: Mapping[str, str], streams: tuple[int, int], stdout: IO[str] | None
-) -> Prepared:
+def _forked(asked: dict[str, Any], streams: tuple[int, int], stdout: IO[str] | None) -> Prepared:
     told, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    asked = {"words": list(words), "env": dict(env), "folder": os.getcwd()}
     server, _ = _server()
     with theirs:
         socket.send_fds(server, [json.dumps(asked).encode()], [theirs.fileno(), *streams])
@@ -225,7 +239,7 @@ class _Forks:
         if not data:
             return False
         asked = json.loads(data)
-        if self._end is sys.stdin and spare.num_workers(asked["words"]):
+        if self._end is sys.stdin and spare.has_plans(asked["words"]):
             socket.send_fds(self._with_kernels(descriptors), [data], descriptors)
         elif os.fork() == 0:
             self._close()
@@ -262,8 +276,14 @@ class _Forks:
 
 
 def _mind(asked: dict[str, Any], told: int, stdout: int, stderr: int) -> NoReturn:
-    """Start a program, tell its process id, and how it ended."""
+    """Start a program, tell its process id, and how it ended; end before it with who asked.
+
+    A worker ends with the process that it is told has started it: that is this one.
+    """
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+    words: list[str] = asked["words"]
+    if "--supervisor" in words:
+        words[words.index("--supervisor") + 1] = str(os.getpid())
     pid = os.fork()
     if pid == 0:
         os.close(told)
@@ -271,8 +291,11 @@ def _mind(asked: dict[str, Any], told: int, stdout: int, stderr: int) -> NoRetur
     os.close(stdout)
     os.close(stderr)
     os.write(told, str(pid).encode())
-    _, status = os.waitpid(pid, 0)
-    os.write(told, str(os.waitstatus_to_exitcode(status)).encode())
+    program = os.pidfd_open(pid)
+    if program in select.select([program, told], [], [])[0]:
+        _, status = os.waitpid(pid, 0)
+        with suppress(BrokenPipeError):
+            os.write(told, str(os.waitstatus_to_exitcode(status)).encode())
     os._exit(0)
 
 
@@ -283,6 +306,8 @@ def _become(asked: dict[str, Any], stdout: int, stderr: int) -> NoReturn:
         os.dup2(descriptor, number)
         if descriptor > 2:
             os.close(descriptor)
+    if asked["has_session"]:
+        os.setsid()
     spare.run(asked["words"], asked["env"], asked["folder"])
 
 

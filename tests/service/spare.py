@@ -25,6 +25,8 @@ from contextlib import suppress
 from types import ModuleType
 from typing import Any, Final, NoReturn
 
+from service.jobs.runner import Work
+
 MOST_BYTES: Final = 1 << 17
 _MOST_DESCRIPTORS: Final = 16
 _FORK_SERVER: Final = "from multiprocessing.forkserver import main;"
@@ -49,13 +51,18 @@ def run(words: Sequence[str], env: Mapping[str, str], folder: str) -> NoReturn:
         sys.modules["__main__"] = main = ModuleType("__main__")
         exec(words[1], vars(main))
     else:
-        _keep(num_workers(words) or int(words[0] == "service.jobs"))
+        _keep(_num_workers(words) or int(words[0] == "service.jobs"))
         module, *sys.argv[1:] = words
         runpy.run_module(module, run_name="__main__", alter_sys=True)
     sys.exit()
 
 
-def num_workers(words: Sequence[str]) -> int:
+def has_plans(words: Sequence[str]) -> bool:
+    """Return whether a program, or one that it starts, loads all kernels to plan with them."""
+    return Work().preload in words or _num_workers(words) > 0
+
+
+def _num_workers(words: Sequence[str]) -> int:
     """Return how many workers a program is told to start beside it."""
     return int(words[words.index("--workers") + 1]) if "--workers" in words else 0
 

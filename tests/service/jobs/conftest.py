@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import os
 import shutil
+import subprocess
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import MappingProxyType
+from types import MappingProxyType, SimpleNamespace
 from typing import Any
 
 import httpx
@@ -21,6 +22,7 @@ from service.db.ids import new_id
 from service.db.migrate import upgrade
 from service.db.rows import JobRow, ScenarioRow, WorkerRow
 from service.db.session import Database
+from service.jobs import supervisor
 from service.jobs.queue import DbosQueue, migrate_queue
 from service.jobs.supervisor import environment_of
 from service.settings import Settings
@@ -217,6 +219,18 @@ def client(jobs: Jobs) -> Iterator[httpx.Client]:
     app = new_app(jobs.settings, jobs.queue)
     with serve(app) as address, checked_client(address) as client:
         yield client
+
+
+@pytest.fixture(autouse=True)
+def supervised(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have supervisors in this process start their workers as forks too."""
+
+    def start(command: list[str], **options: Any) -> Program:
+        _python, _m, *words = command
+        return prepared.start(words, **options)
+
+    popen = SimpleNamespace(Popen=start, TimeoutExpired=subprocess.TimeoutExpired)
+    monkeypatch.setattr(supervisor, "subprocess", popen)
 
 
 @pytest.fixture
