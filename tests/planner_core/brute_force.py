@@ -61,8 +61,8 @@ def has_plan(problem: Problem) -> bool:
 def possible_plans(problem: Problem) -> Iterator[Rows]:
     """Yield the tasks of each plan in which every turn fits and every pin is kept."""
     kept = set(problem.kept_rows.tolist())
-    for rows in _chains(problem, _not_ruled_out(problem), _may_follow(problem), ()):
-        if kept.issubset(rows):
+    for rows in _chains(problem, _not_ruled_out(problem), _may_follow(problem)):
+        if not kept or kept.issubset(rows):
             yield rows
 
 
@@ -192,13 +192,18 @@ def _may_follow(problem: Problem) -> set[tuple[int, int]]:
     return pairs
 
 
-def _chains(
-    problem: Problem, rows: list[int], may_follow: set[tuple[int, int]], taken: Rows
-) -> Iterator[Rows]:
-    """Yield a plan and all that go on from it by some rows, each after one that it may follow."""
-    yield taken
-    satellite = problem.opportunities.satellite
-    for number, row in enumerate(rows):
-        before = next((r for r in reversed(taken) if satellite[r] == satellite[row]), None)
-        if before is None or (before, row) in may_follow:
-            yield from _chains(problem, rows[number + 1 :], may_follow, (*taken, row))
+def _chains(problem: Problem, rows: list[int], may_follow: set[tuple[int, int]]) -> list[Rows]:
+    """Return all plans of some rows in which each row comes after one that it may follow."""
+    satellite: list[int] = problem.opportunities.satellite.tolist()
+    # Each with the last task of each satellite, if there is any.
+    nothing: tuple[int | None, ...] = (None,) * len(problem.satellites)
+    plans: list[tuple[Rows, tuple[int | None, ...]]] = [((), nothing)]
+    for row in rows:
+        own = satellite[row]
+        before = {None, *(first for first, second in may_follow if second == row)}
+        plans += [
+            ((*taken, row), (*last[:own], row, *last[own + 1 :]))
+            for taken, last in plans
+            if last[own] in before
+        ]
+    return [taken for taken, _ in plans]

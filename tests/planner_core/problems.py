@@ -203,9 +203,10 @@ def random_problem(
             turn_deg=float(rng.uniform(-max_turn_deg, max_turn_deg)) if max_turn_deg else 0.0,
             access=access,
         )
+        tasks.append(task)
         tasks.extend(
             replace(task, start_s=start_s + 9.0 * k, end_s=start_s + 9.0 * k + 30.0)
-            for k in range(num_offers)
+            for k in range(1, num_offers)
         )
     for _ in range(num_contacts if use_resources else 0):
         start_s = round(float(rng.uniform(0, 850)), 3)
