@@ -22,13 +22,13 @@ import subprocess
 import sys
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from itertools import pairwise
 from types import ModuleType
 from typing import Any, Final, NoReturn
 
-from service.jobs.runner import Work
-
 MOST_BYTES: Final = 1 << 17
 _MOST_DESCRIPTORS: Final = 16
+_MOST_SPARES: Final = 8
 _FORK_SERVER: Final = "from multiprocessing.forkserver import main;"
 
 
@@ -59,12 +59,16 @@ def run(words: Sequence[str], env: Mapping[str, str], folder: str) -> NoReturn:
 
 def has_plans(words: Sequence[str]) -> bool:
     """Return whether a program, or one that it starts, loads all kernels to plan with them."""
+    # Whoever only asks for programs, as each process of tests does, need not import this.
+    from service.jobs.runner import Work
+
     return Work().preload in words or _num_workers(words) > 0
 
 
 def _num_workers(words: Sequence[str]) -> int:
-    """Return how many workers a program is told to start beside it."""
-    return int(words[words.index("--workers") + 1]) if "--workers" in words else 0
+    """Return how many workers a program is told to start beside it; nothing of a fault."""
+    text = dict(pairwise(words)).get("--workers", "0")
+    return min(int(text), _MOST_SPARES) if text.isdecimal() else 0
 
 
 def _keep(number: int) -> None:

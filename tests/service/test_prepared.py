@@ -82,6 +82,16 @@ def test_its_workers_and_what_jobs_are_forked_from_are_forks_too(tmp_path: Path)
         assert psutil.wait_procs(started, timeout=PATIENCE_S)[1] == []
 
 
+def test_words_that_make_no_sense_are_for_the_program_alone(tmp_path: Path) -> None:
+    for options in (["--workers", "many"], ["--workers"]):
+        with (tmp_path / "said").open("wb") as said:
+            words = ["service", "serve", *options]
+            refused = prepared.start(words, os.environ, stdout=said.fileno(), stderr=said.fileno())
+        assert isinstance(refused, Prepared)
+        assert refused.wait() == 2
+        assert "--workers" in (tmp_path / "said").read_text()
+
+
 def test_what_it_has_in_reserve_ends_with_it() -> None:
     process = prepared.start(["service.jobs", "--help"], os.environ)
     assert process.stdout is not None
