@@ -19,12 +19,13 @@ from fastapi import FastAPI
 
 from service.db.migrate import upgrade
 from service.db.session import Database
-from service.jobs.queue import JobQueue
-from service.main import create_app
 from service.scenarios.opportunities import OpportunityReader
 from service.settings import Settings
 from tests.plain_http import NO_TLS
+from tests.service.application import first_app, new_app
 from tests.service.contract import Contract
+
+__all__ = ["Service", "checked_client", "contract", "new_app", "serve"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,26 +64,9 @@ def serve(app: FastAPI) -> Iterator[str]:
 
 
 @functools.cache
-def _first_app() -> FastAPI:
-    return create_app(Settings(database_url="sqlite:///unused.db"))
-
-
-def new_app(settings: Settings, queue: JobQueue | None = None) -> FastAPI:
-    """Return the application with settings of its own, on routes that another one has prepared.
-
-    FastAPI prepares the routes of each application at its first call, for 0.3 s, and its OpenAPI
-    document for two. They know nothing of settings.
-    """
-    app = create_app(settings, queue)
-    app.router.routes[:] = _first_app().router.routes
-    app.openapi = _first_app().openapi  # type: ignore[method-assign]  # as FastAPI would have it
-    return app
-
-
-@functools.cache
 def contract() -> Contract:
     """Return what the OpenAPI document promises; it is the same whatever the settings."""
-    return Contract(_first_app().openapi())
+    return Contract(first_app().openapi())
 
 
 def checked_client(address: str) -> httpx.Client:

@@ -196,8 +196,15 @@ def main() -> None:
     with importing():
         import service.commands.cli
         import service.commands.serving
+        import service.heavy
         import service.jobs.worker
-        import service.server  # noqa: F401
+        import service.server
+        from tests.service import application
+
+        application.prepare_routes()
+    # Each would prepare its routes once more, and its process for heavy work too.
+    for module in (service.server, service.heavy):
+        setattr(module, "create_app", application.new_app)  # noqa: B010 - no module declares it
     # Who minds a program is collected by nobody; Ctrl-C is for the programs.
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
