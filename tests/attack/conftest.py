@@ -13,6 +13,7 @@ import httpx
 import psutil
 import pytest
 
+from tests.patience import wait_until
 from tests.plain_http import NO_TLS
 from tests.service import prepared
 from tests.service.access.conftest import Door, MakeDoor, door, make_door
@@ -51,6 +52,8 @@ class Program:
     def heavy(self) -> psutil.Process:
         """The process that does what is heavy."""
         (fork_server,) = psutil.Process(self.process.pid).children()
+        # It begins beside the API, which may be ready before it.
+        wait_until(lambda: len(fork_server.children()) == 1)
         (process,) = fork_server.children()
         return process
 
