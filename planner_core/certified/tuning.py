@@ -192,7 +192,7 @@ class Tuning:
     tight: float = 0.05
     open_tasks: int = 1000
     more: float = 1.5
-    tasks_per_task: float = 1.2
+    tasks_per_task: float = 2.0
     large: int = 3000
     small_fleet: int = 60_000
     dense: int = 2000

@@ -20,7 +20,7 @@ from planner_core.certified.proofs.latency import latency_value
 from planner_core.certified.proofs.resource_bound import resource_value, whole_worth
 from planner_core.certified.proofs.satellite_relaxation import relaxations
 from planner_core.certified.solver import Certified
-from planner_core.certified.strategies.resource_fleet import _FleetPricing
+from planner_core.certified.strategies.resource_fleet import FleetPricing
 from planner_core.certified.strategies.resource_steps import ResourceSearch
 from planner_core.certified.tuning import tuned
 from planner_core.domain import Dynamics, Objective, Resources
@@ -160,7 +160,7 @@ def test_prices_of_antennas_that_prove_nothing_are_given_up() -> None:
         problem = _crowded_fleet(seed)
         search = ResourceSearch(Incumbent(problem, Budget(), 0.0), seed)
         with tuned(worth_a_step=1.0):
-            pricing = _FleetPricing(search)
+            pricing = FleetPricing(search)
             while pricing.prices is None:
                 pricing.turn()
             first = search.best.bound.value

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ from planner_core.certified.proofs.resource_bound import whole_worth
 from planner_core.certified.proofs.satellite_relaxation import relaxations
 from planner_core.certified.tuning import tuned
 from planner_core.domain import Dynamics
-from planner_core.problem import CONTACT, Problem
+from planner_core.problem import CONTACT, Floats, Problem
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
 from planner_core.solvers.registry import Rule
@@ -32,6 +33,12 @@ SEEDS = st.integers(0, 10**6)
 DYNAMICS = st.sampled_from(["physical", "paper"])
 STARVED = replace(TIGHT, battery_min_fraction=0.5, initial_battery_fraction=0.62)
 _problem = partial(varied_problem, scarce=STARVED)
+
+
+class Known(NamedTuple):
+    """Costs that stay as they are."""
+
+    losses: Floats
 
 
 def search_of(
@@ -46,7 +53,7 @@ def search_of(
     pool = PlanPool(problem, budget, seed)
     pool.add(start)
     losses = np.where(paths.usage > 0.0, 0.0, np.inf)
-    return ProgramSearch(problem, pool, prices, losses, budget, seed), pool
+    return ProgramSearch(problem, pool, prices, Known(losses), budget, seed), pool
 
 
 @examples(40)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import chain
+from typing import Protocol
 
 import numpy as np
 
@@ -31,6 +32,14 @@ from planner_core.problem import (
 from planner_core.solvers.sequential import blocked_rows
 
 
+class Costs(Protocol):
+    """What else is known of opportunities."""
+
+    @property
+    def losses(self) -> Floats:
+        """What taking each costs, about; infinite where no good plan does. Shape ``(n,)``."""
+
+
 class ProgramSearch:
     """Turns that seek plans for a pool.
 
@@ -40,9 +49,8 @@ class ProgramSearch:
         Where plans come from, and go.
     prices
         The satellites' programmes, and the best prices.
-    losses
-        What taking each opportunity costs, about; infinite where no good plan does.
-        Shape ``(n,)``.
+    costs
+        Says what taking each opportunity costs, as far as that is known by then.
 
     Attributes
     ----------
@@ -55,7 +63,7 @@ class ProgramSearch:
         problem: Problem,
         pool: PlanPool,
         prices: PriceSearch,
-        losses: Floats,
+        costs: Costs,
         budget: Budget,
         seed: int,
     ) -> None:
@@ -63,25 +71,25 @@ class ProgramSearch:
         self._pool = pool
         self._multipliers = prices
         self._satellites = prices.satellites
-        self._losses = losses
+        self._costs = costs
         self._offered_per_task = TUNING.tasks_per_task
         self._rng = np.random.default_rng(seed)
         self._work = self._steps()
         self.steps_beside = next(self._work, 1)
 
     def turn(self) -> None:
-        """Draw sets of contacts, see what some are worth, or solve a program with one."""
+        """Solve a program with the most hopeful contacts that are known, or that are drawn."""
         self.steps_beside = next(self._work, 1)
 
     def _steps(self) -> Iterator[int]:
         """Yield how long each turn will take, before it."""
+        yield TUNING.steps_beside
         while not self._budget.is_spent():
             group = self._group()
             # What satellites beside do stays the same, though the plan may change meanwhile.
             beside = self._tasks_beside(group)
             program = self._program(group, beside)
             before = self._pool.reward
-            yield TUNING.steps_beside
             sets = [self._contacts(group, rows) for rows in self._known()]
             yield from self._improve_best(program, beside, sets)
             if self._pool.reward == before:
@@ -92,6 +100,7 @@ class ProgramSearch:
                 yield from self._improve_best(program, beside, sets)
             if self._pool.reward == before:
                 self._offered_per_task = min(TUNING.more * self._offered_per_task, TUNING.several)
+                yield TUNING.steps_beside
 
     def _improve_best(
         self, program: FixedContacts, beside: Rows, sets: Sequence[Rows]
@@ -111,11 +120,11 @@ class ProgramSearch:
         value = program.relaxed()
         num_tries = 0
         while value >= self._pool.better and num_tries < TUNING.tries:
-            yield TUNING.steps_beside
             before = self._pool.reward
             self._pool.add(program.plan(self._pool.better, is_rounded=True))
             num_tries = 0 if self._pool.reward > before else num_tries + 1
             program.turn_aside(self._rng)
+            yield TUNING.steps_beside
 
     def _group(self) -> Bools:
         """Return which satellites the next program is for. Shape ``(num_satellites,)``."""
@@ -131,7 +140,7 @@ class ProgramSearch:
 
     def _promising(self) -> Bools:
         """Return tasks of which good plans are made: so many for each of the best plan."""
-        losses = self._losses
+        losses = self._costs.losses
         num_offered = int(self._offered_per_task * len(self._pool.plan.actions))
         cut_off = np.sort(losses[np.isfinite(losses)])[:num_offered].max(initial=0.0)
         promising: Bools = losses <= cut_off

@@ -128,6 +128,12 @@ STRATEGIES: Final = (
         patience=lambda: TUNING.tries,
     ),
     Strategy(
+        name="plans and programs side by side",
+        supports=is_shared_with_limits,
+        slices=resource_fleet.plans_and_programs,
+        patience=lambda: TUNING.tries,
+    ),
+    Strategy(
         name="a fleet's programs with the plan's contacts",
         supports=lambda p: fits_a_program(p) and is_shared(p),
         slices=resources.own_contacts,

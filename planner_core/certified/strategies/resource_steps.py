@@ -290,12 +290,6 @@ class ResourceSearch:
         is_contact = self.problem.opportunities.kind == CONTACT
         return own, tuple(np.flatnonzero(own & is_contact).tolist())
 
-    @property
-    def best_relaxation(self) -> Relaxation | None:
-        """The most hopeful set of contacts, if any was relaxed."""
-        known = [r for r in self._relaxed.values() if np.isfinite(r.value)]
-        return max(known, key=lambda relaxation: relaxation.value, default=None)
-
     def fix_contacts(self, *, is_last: bool, is_rounded: bool = False) -> bool:
         """Search for a better plan with the most promising contacts; return whether it is.
 
