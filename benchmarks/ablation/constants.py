@@ -46,7 +46,7 @@ _ROOMS: Final[Mapping[str, Mapping[str, float]]] = {
     "lns.resource_search": {**_ONE, **_STATIONS},
     "lns.search": {**_AGILITY, **_FLEET},
     "mip.contact_sets": _ONE,
-    "mip.program_search": _STATIONS,
+    "mip.program_search": {**_STATIONS, "weights-fleet-4x2000": 20.0},
     "mip.restricted_master": _AGILITY,
     "mip.solution_pool": {**_FLEET, **_STATIONS},
     "multipliers.ascent": {**_FLEET, **_PASSES},

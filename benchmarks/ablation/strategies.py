@@ -181,7 +181,8 @@ STRATEGIES: Final[Mapping[str, Change]] = {
         families=_UNEVEN,
     ),
     "program search": Change(
-        patches=_off("strategies.resource_fleet", "ProgramSearch", _Idle), families=_STATIONS
+        patches=_off("strategies.resource_fleet", "ProgramSearch", _Idle),
+        families=_STATIONS | {"weights-fleet-4x2000": 20.0},
     ),
 }
 """What is left out, or, where the name says so, done in another way."""

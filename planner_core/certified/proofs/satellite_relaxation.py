@@ -85,14 +85,13 @@ class SatelliteRelaxation:
         while num_units * num_images * len(self.satellite) > MAX_CELLS:
             num_units //= 2
         weight = np.where(self.satellite.kind == COLLECT, num_units, 0).astype(np.int32)
-        best, least = self, np.inf
+        best, least, near = self, np.inf, num_units * num_images
         for units in range(num_units):
             trial = replace(self, data_price=units / num_units)
-            price = trial._price_in(weight)
-            needs = _Needs.of(self.network, self.levels, weight, price, num_units * num_images)
+            needs = _Needs.of(self.network, self.levels, weight, trial._price_in(weight), near)
             if needs.top >= least:
                 break
-            best, least = trial, needs.top
+            best, least, near = trial, needs.top, needs.top
         return best
 
     def without(self, is_shut: Bools) -> SatelliteRelaxation:
@@ -330,7 +329,8 @@ class _Needs(NamedTuple):
             most = int(np.flatnonzero(idle[0] <= network.energy_start)[-1])
             if most < limit:
                 break
-            limit = 4 * limit if near is None else int(1.1 * limit)
+            # Totals out of reach take memory, and no time.
+            limit = 4 * limit if near is None else int(1.5 * limit)
         return cls(idle=idle, after=after, credit=credit, top=most + at_start)
 
 

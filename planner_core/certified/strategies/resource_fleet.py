@@ -42,6 +42,8 @@ def plans_and_programs(search: Search) -> Iterator[None]:
     while pricing.prices is None and not (pricing.is_settled or search.best.is_done):
         plans.go_on(engine, pricing)
         yield
+    if search.best.is_done:
+        return
     programs = ProgramSearch(
         search.problem, plans.pool, engine.price_search, pricing, search.budget, search.seed
     )
