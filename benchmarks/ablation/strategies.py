@@ -175,7 +175,9 @@ STRATEGIES: Final[Mapping[str, Change]] = {
         }.items()
     },
     "preference": Change(tuning={"preference": 0.0}, families=_LARGE_FLEET, num_draws=1),
-    "relaxations of a fleet's contacts": Change(tuning={"most_relaxed": 0}, families=_STATIONS),
+    "relaxations of a fleet's contacts": Change(
+        tuning={"most_relaxed": 0}, families=_STATIONS | {"share-fleet-4x2000": 40.0}
+    ),
     "noise in a fleet's windows": Change(
         patches=_off("lns.resource_search", "ResourceWindows.anneal", _without_noise),
         families=_UNEVEN,
