@@ -114,7 +114,8 @@ class Tuning:
         Of a typical target: with less room than ``room`` above the plan the next image is hard to
         find, and is looked for when multipliers get no lower (with half a target, 500 targets and
         turns to the sun: 26 CPU s for nothing, 1.25 % after 20 s instead of 0.42); two values
-        within ``tight`` are the same.
+        within ``tight`` are the same. As a share of what batteries alone allow: with more than
+        ``tight`` above the plan a fleet's recorders are full (docs/bounds.md).
     open_tasks
         Of a program with fixed contacts, and of one replanned day, at first.
     more

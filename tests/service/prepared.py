@@ -283,9 +283,10 @@ class _Forks:
 
 
 def _mind(asked: dict[str, Any], told: int, stdout: int, stderr: int) -> NoReturn:
-    """Start a program, tell its process id, and how it ended; end before it with who asked.
+    """Start a program, tell its process id, and how it ended.
 
-    A worker ends with the process that it is told has started it: that is this one.
+    Where the process that asked for it ends first, so does this one. A worker is told that this
+    one has started it, so it ends as well.
     """
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     words: list[str] = asked["words"]

@@ -111,7 +111,10 @@ def _words(command: Sequence[str]) -> list[str]:
 
 
 def _wake(spare: socket.socket, words: list[str], *options: Any) -> None:
-    """Have a spare become a program, with these of the options of ``fork_exec``."""
+    """Have a spare become a program, with these of the options of ``fork_exec``.
+
+    They stand in the order of CPython 3.11 and later.
+    """
     kept, folder, env, stdin, _, _, stdout, _, stderr, _, untold, _, has_session = options
     ends = zip(range(3), (stdin, stdout, stderr), strict=True)
     descriptors = {number: number if end == -1 else end for number, end in ends}

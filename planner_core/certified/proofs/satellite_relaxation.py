@@ -91,6 +91,7 @@ class SatelliteRelaxation:
             needs = _Needs.of(self.network, self.levels, weight, trial._price_in(weight), near)
             if needs.top >= least:
                 break
+            # A higher price allows less, or is the last: its tables need be no larger.
             best, least, near = trial, needs.top, needs.top
         return best
 
@@ -329,7 +330,7 @@ class _Needs(NamedTuple):
             most = int(np.flatnonzero(idle[0] <= network.energy_start)[-1])
             if most < limit:
                 break
-            # Totals out of reach take memory, and no time.
+            # Totals that no energy suffices for take memory, and next to no time.
             limit = 4 * limit if near is None else int(1.5 * limit)
         return cls(idle=idle, after=after, credit=credit, top=most + at_start)
 

@@ -23,7 +23,7 @@ from planner_core.problem import Floats
 
 
 def plans_and_multipliers(search: Search) -> Iterator[None]:
-    """Search for plans and multipliers side by side, until these settle."""
+    """Search for plans and multipliers side by side, until the multipliers have settled."""
     engine, plans = search.engine(ResourceSearch), search.engine(FleetPlans)
     pricing = plans.pricing(engine)
     while not (pricing.is_settled or search.best.is_done):
@@ -32,10 +32,10 @@ def plans_and_multipliers(search: Search) -> Iterator[None]:
 
 
 def plans_and_programs(search: Search) -> Iterator[None]:
-    """Search for plans, in steps and by programs side by side, until that fails.
+    """Search for plans, in steps and by programs side by side, until neither finds a better one.
 
-    From the first exact answer on. Before it programs better plans as much, and the bound, which
-    is far off, comes last: with rewards of 1 to 10 four satellites are at 6.4 % after 20 s.
+    Programs begin once multipliers have an exact answer. Earlier they better plans as much, but
+    the bound comes last: with rewards of 1 to 10 four satellites are at 6.4 % after 20 s.
     """
     engine, plans = search.engine(ResourceSearch), search.engine(FleetPlans)
     pricing = plans.pricing(engine)
@@ -127,7 +127,7 @@ class FleetPricing:
 
     @property
     def losses(self) -> Floats:
-        """What taking each opportunity costs, about; infinite where no good plan does."""
+        """What taking each costs, about; infinite where no good plan does. Shape ``(n,)``."""
         usage = self._paths.usage
         if self.prices is not None and self.knows_antennas:
             usage = self.prices.usage
@@ -155,8 +155,8 @@ class FleetPricing:
         yield beside_prices
         prices, _ = search.begin_prices(energy)
         known = search.best.bound
-        # So far above a plan batteries say little: recorders are full, and the plan's multipliers
-        # prove more.
+        # Where batteries alone allow so much more than a plan earns, recorders are full:
+        # multipliers that know of them prove more.
         is_far = search.best.reward < (1.0 - TUNING.tight) * energy.value
         if is_far:
             yield from self._go_by_plan(energy, prices)
