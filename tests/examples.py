@@ -9,12 +9,15 @@ from __future__ import annotations
 
 import math
 import os
+from typing import Final
 
 from hypothesis import HealthCheck, settings
 
+_ALL: Final = 100
+
 # How long an example takes says more of the machine than of the code.
 settings.register_profile(
-    "explore", max_examples=100, deadline=None, suppress_health_check=[HealthCheck.too_slow]
+    "explore", max_examples=_ALL, deadline=None, suppress_health_check=[HealthCheck.too_slow]
 )
 settings.register_profile("thorough", settings.get_profile("explore"), max_examples=1000)
 settings.register_profile("full", settings.get_profile("explore"), derandomize=True)
@@ -26,6 +29,11 @@ def load_profile() -> None:
     settings.load_profile(os.environ.get("SLEWLINE_TEST_PROFILE", "quick"))
 
 
+def is_full() -> bool:
+    """Return whether all is tried that tests ask for, not a fifth of it."""
+    return settings().max_examples >= _ALL
+
+
 def examples(number: int) -> settings:
     """Return the settings of a test that tries so many examples in a full run."""
-    return settings(max_examples=math.ceil(number * settings().max_examples / 100))
+    return settings(max_examples=math.ceil(number * settings().max_examples / _ALL))

@@ -49,7 +49,7 @@ _small = partial(_problem, num_collects=6, num_contacts=3)
 
 
 @pytest.mark.parametrize("dynamics", ["physical", "paper"])
-@examples(500)
+@examples(300)
 @given(seed=SEEDS, num_satellites=st.integers(1, 2), has_quality=st.booleans())
 def test_delivered_is_the_best_of_all_plans(
     dynamics: Literal["physical", "paper"], seed: int, num_satellites: int, has_quality: bool
@@ -59,7 +59,7 @@ def test_delivered_is_the_best_of_all_plans(
     encloses(problem, best_reward(problem), seed)
 
 
-@examples(800)
+@examples(300)
 @given(
     seed=SEEDS,
     dynamics=st.sampled_from(["physical", "paper"]),

@@ -48,7 +48,7 @@ def _program_bound(problem: Problem) -> float:
     return engine.search(None, 0.0, None, lambda _reward, _bound: None).bound
 
 
-@examples(400)
+@examples(250)
 @given(
     seed=st.integers(0, 10**6),
     dynamics=DYNAMICS,

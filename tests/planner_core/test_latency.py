@@ -122,7 +122,7 @@ def prices_of(problem: Problem, rng: np.random.Generator) -> tuple[Floats, Float
 
 
 @pytest.mark.parametrize("dynamics", ["physical", "paper"])
-@examples(500)
+@examples(300)
 @given(
     seed=SEEDS,
     collected_share=st.sampled_from([0.0, 0.3, 0.9]),

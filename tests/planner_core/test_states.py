@@ -103,8 +103,9 @@ def test_a_battery_stops_where_it_is_full_or_empty(
     lit = Sunlight(enter_s=edges[::2], exit_s=edges[1::2])
     resources = replace(IDLE, sunpoint_charge_per_s=charge_per_s, idle_drain_per_s=idle_per_s)
     stepped = battery
-    for second in range(9000):
-        is_lit = bool(np.any((lit.enter_s <= second) & (second < lit.exit_s)))
+    second = np.arange(9000)[:, None]
+    in_each = (lit.enter_s <= second) & (second < lit.exit_s)
+    for is_lit in in_each.sum(axis=1).tolist():
         stepped = min(1.0, max(0.0, stepped + charge_per_s * is_lit - idle_per_s))
     assert battery_after(resources, battery, lit, 9000.0) == pytest.approx(stepped, abs=1e-9)
 

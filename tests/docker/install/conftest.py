@@ -13,13 +13,18 @@ from pathlib import Path
 
 import pytest
 
-from planner_core.kernel_folder import kernel_folder
-
 ROOT = Path(__file__).resolve().parents[3]
 _KERNEL_FOLDER = "from planner_core.kernel_folder import kernel_folder; print(kernel_folder())"
 
-_LEFT = "planner_core.certified.dp.start_labels"
-"""A module whose kernels neither the demonstration nor a kernel of another module needs."""
+COMPILED = os.environ.get("SLEWLINE_TEST_KERNELS")
+"""Where kernels are as the warm-up of this checkout left them, before any test had more compiled:
+in ``demonstration`` those of its first part, in ``all`` those of the whole. Without it each
+installation compiles all of its own, which takes minutes."""
+
+_LEFT_TO_USER = "planner_core.referee.delivery"
+_LEFT_TO_IMAGE = "planner_core.certified.dp.start_labels"
+"""Modules whose kernels no kernel of another module needs; the first one's the demonstration does.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +53,7 @@ class User:
 
 @dataclass(frozen=True, slots=True)
 class Demonstrated:
-    """What ``slewline demo`` says in an environment where nothing was compiled, and then again."""
+    """What ``slewline demo`` says in a new environment, and then again."""
 
     user: User
     said: str
@@ -78,41 +83,29 @@ def dist(tmp_path_factory: pytest.TempPathFactory) -> Distribution:
 def user(dist: Distribution, tmp_path_factory: pytest.TempPathFactory) -> User:
     user = User(tmp_path_factory.mktemp("user"))
     run(sys.executable, "-m", "venv", user.folder / "venv", cwd=user.folder)
-    user.run(
-        "python", "-m", "pip", "-qq", "--disable-pip-version-check", "install", str(dist.wheel)
-    )
+    pip = ("python", "-m", "pip", "-qq", "--disable-pip-version-check", "install", "--no-compile")
+    user.run(*pip, str(dist.wheel))
     return user
+
+
+def compiled(part: str, left: str) -> list[Path]:
+    """Return the folders of this checkout's kernels, but that of one module; without them none."""
+    folders = sorted(Path(COMPILED, part).glob("planner_core.*")) if COMPILED else []
+    taken = [folder for folder in folders if folder.name != left]
+    assert len(taken) == max(len(folders) - 1, 0)
+    return taken
 
 
 @pytest.fixture(scope="session")
 def demonstrated(user: User) -> Demonstrated:
+    """What the warm-up of this checkout has compiled the first run finds there, but for a module.
+
+    To compile all of it would take more than a minute of processor time once more.
+    """
+    for folder in compiled("demonstration", _LEFT_TO_USER):
+        shutil.copytree(folder, user.kernels / folder.name)
     said, said_again = (user.run("slewline", "demo") for _ in range(2))
     return Demonstrated(user, said, said_again)
-
-
-def warmed_up(demonstrated: Path) -> list[Path]:
-    """Return the folders of this checkout's kernels that are just as the warm-up left them.
-
-    Tests may have had others compiled, or for more arguments: these prove nothing of the warm-up.
-    Where the demonstration has not compiled them all the whole is of no use, since what is compiled
-    already asks for nothing that it calls.
-    """
-    ready = kernel_folder() / "all.ready"
-    ended_at = ready.stat().st_mtime_ns if ready.exists() else 0
-
-    def is_as_it_was(folder: Path) -> bool:
-        try:
-            times = [path.stat().st_mtime_ns for path in folder.iterdir()]
-        except FileNotFoundError:  # somebody writes there
-            return False
-        num_kernels, num_compiled = (len(list(folder.glob(f"*.{end}"))) for end in ("nbi", "nbc"))
-        return num_kernels == num_compiled and max(times, default=0) <= ended_at
-
-    folders = list(kernel_folder().glob("planner_core.*"))
-    taken = [each for each in folders if is_as_it_was(each)]
-    left = [path for each in folders if each not in taken for path in each.glob("*.nbi")]
-    is_whole = all((demonstrated / path.parent.name / path.name).exists() for path in left)
-    return taken if is_whole else []
 
 
 @pytest.fixture(scope="session")
@@ -120,19 +113,18 @@ def prefix(demonstrated: Demonstrated) -> Iterator[Path]:
     """The program as the image has it, in a folder that all may read.
 
     What the demonstration has compiled its build finds there, and what else the warm-up of this
-    checkout has, but for a module: to compile all of it would take two minutes once more.
+    checkout has, but for a module.
     """
     folder = Path(tempfile.mkdtemp())
     folder.chmod(0o755)
     prefix, user = folder / "slewline", demonstrated.user
     kernels = user.kernels
-    compiled = prefix / kernels.relative_to(user.folder / "venv")
+    place = prefix / kernels.relative_to(user.folder / "venv")
     environment = os.environ | {"PYTHON": sys.executable}
-    given = [each for each in warmed_up(kernels) if each.name != _LEFT]
     commands: list[list[str | Path]] = [
         [ROOT / "docker" / "install", "libraries", prefix],
-        ["mkdir", "-p", compiled],
-        ["cp", "-R", *given, f"{kernels}/.", compiled],
+        ["mkdir", "-p", place],
+        ["cp", "-R", *compiled("all", _LEFT_TO_IMAGE), f"{kernels}/.", place],
         [ROOT / "docker" / "install", "program", prefix],
     ]
     try:
