@@ -131,6 +131,7 @@ _AGE_ON_BOARD: Final = {
     "half-life-3h-share-paper-300": 8.0,
 }  # fmt: skip
 _FEW_OF_AGE: Final = {"half-life-3h-100": 8.0}
+_OF_AGE: Final = {"half-life-3h-100": 8.0, "half-life-12h-1000": 12.0}
 _FEW_OF_AGE_SHARED: Final = {"half-life-3h-fleet-4x80": 10.0}
 _OWN_CONTACTS: Final = {"weights-1000": 20.0, "clouds-1000": 15.0, "share-paper-500": 15.0}
 _SHARED: Final = {"share-fleet-paper-4x500": 12.0}
@@ -168,6 +169,13 @@ STRATEGIES: Final[Mapping[str, Change]] = {
             "plans without the half-life": _AGE_ON_BOARD,
             "images by the contact that brings them down": _FEW_OF_AGE_SHARED,
             "windows by small programs": _FEW_OF_AGE,
+            "windows of the first plan": {"half-life-12h-1000": 12.0},
+            "days planned anew": {"half-life-6h-network-4x400": 20.0},
+            "multipliers of contacts": _OF_AGE,
+            "queues": _OF_AGE,
+            "plans by their contacts": _OF_AGE,
+            "queues again": _OF_AGE,
+            "last bound with a half-life": _OF_AGE,
             "windows with free starts": _FREE,
             # Their first tables alone take six seconds.
             "multipliers of chains": {"continuous-1000": 30.0},

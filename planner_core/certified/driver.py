@@ -141,6 +141,11 @@ class Search:
         ]
         return Search(best, seed, strategies, like=like)
 
+    @property
+    def is_promising(self) -> bool:
+        """Whether any strategy has gained anything of late."""
+        return self.num_idle < TUNING.rounds
+
     def solved(self) -> Solution:
         """Search until plan and bound are close enough, or no strategy gets any further."""
         close_in(self)

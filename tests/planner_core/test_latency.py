@@ -31,6 +31,7 @@ from planner_core.certified.solver import Certified
 from planner_core.certified.strategies import days
 from planner_core.certified.strategies.days import DayByDay
 from planner_core.certified.strategies.every import STRATEGIES
+from planner_core.certified.strategies.half_life_steps import Contacts
 from planner_core.certified.strategies.resource_steps import ResourceSearch
 from planner_core.certified.strategies.whole_program import exhaust
 from planner_core.certified.tuning import tuned
@@ -304,23 +305,23 @@ def test_a_fleet_s_search_for_plans_is_interrupted_for_better_days(
 ) -> None:
     """After a quarter of the time, then after half of what is left, and each time it ends.
 
-    The whole program before it has told of itself twice.
+    The whole program before it has told of itself twice, multipliers in between once.
     """
 
-    def told_30_times(best: Incumbent, seed: int) -> None:
-        for _ in range(30):
+    def told_40_times(best: Incumbent, seed: int) -> None:
+        for _ in range(40):
             best.report("plans")
         # Another plan for each seed.
         best.plan = Plan(Rule().solve(best.problem, Budget(), 0).plan.actions[:seed])
 
     budget, left = Reports(100), list[int]()
-    _search_beside_by(told_30_times, monkeypatch)
+    _search_beside_by(told_40_times, monkeypatch)
     monkeypatch.setattr(DayByDay, "better", lambda *_: left.append(budget.left))
     problem = random_problem(2, num_collects=40, num_contacts=4, num_satellites=2)
     hurried = with_objective(problem, Objective(collected_share=0.0, half_life_s=4000.0))
     solution = Certified().solve(hurried, budget, 0)
     assert replay(hurried, solution.plan).is_valid
-    assert left[:4] == [73, 68, 38, 36]
+    assert left[:4] == [73, 58, 36, 17]
 
 
 def test_a_fleet_s_search_that_ends_with_the_same_plan_again_is_not_begun_afresh(
@@ -348,8 +349,8 @@ def test_a_fleet_s_days_begin_with_the_best_plan(monkeypatch: pytest.MonkeyPatch
 
     monkeypatch.setattr(days, "replanned_day", noted)
     best = Incumbent(hurried, Budget(), 0.0, plan=good)
-    engine = Search(best, 0, STRATEGIES).engine(ResourceSearch)
-    DayByDay(engine).better(worse)
+    search = Search(best, 0, STRATEGIES)
+    DayByDay(search.engine(ResourceSearch), search.engine(Contacts)).better(worse)
     assert begun
     assert replay(hurried, begun[0]).reward >= replay(hurried, good).reward
 

@@ -14,13 +14,10 @@ from planner_core.certified.driver import Search
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.queue_plans import replanned_day
 from planner_core.certified.lns.settled_contacts import with_contacts
-from planner_core.certified.multipliers.latency import LatencyAscent
 from planner_core.certified.strategies.half_life_steps import (
-    NamedContacts,
+    Contacts,
     bettered_by_windows,
     contacts_of,
-    lower,
-    prove_at_last,
 )
 from planner_core.certified.strategies.resource_steps import ResourceSearch
 from planner_core.certified.strategies.supports import is_fleet
@@ -40,7 +37,7 @@ def days(search: Search) -> Iterator[None]:
     """
     best, engine = search.best, search.engine(ResourceSearch)
     undecayed = without_half_life(search.problem)
-    days, breaks = DayByDay(engine), _Breaks(search.budget)
+    days, breaks = DayByDay(engine, search.engine(Contacts)), _Breaks(search.budget)
     num_idle, ended = 0, list[Plan]()
     while num_idle < TUNING.patience and not best.is_done:
         before = best.reward
@@ -49,9 +46,8 @@ def days(search: Search) -> Iterator[None]:
         num_idle = 0 if best.reward > before else num_idle + 1
         yield
         if plan in ended:
-            break  # so few tasks that every search ends with the same
+            return  # so few tasks that every search ends with the same
         ended.append(plan)
-    days.prove()
 
 
 def _without_half_life(
@@ -104,10 +100,8 @@ class DayByDay:
     12 and 3 h, and 413.6 and 304.3 by contacts that the ascent names.
     """
 
-    def __init__(self, search: ResourceSearch) -> None:
-        self._search, self._best = search, search.best
-        self._ascent = LatencyAscent(search.problem, search.prices())
-        self._number = 0
+    def __init__(self, search: ResourceSearch, contacts: Contacts) -> None:
+        self._search, self._contacts, self._number = search, contacts, 0
 
     def better(self, plan: Plan) -> None:
         """Plan days anew from a plan, as long as a round of them gains anything.
@@ -117,20 +111,15 @@ class DayByDay:
         plan
             One in which images come down, as it is without a half-life.
         """
-        best = self._best
         plan = _offered(self._search, plan)
         if self._number == 0:
-            lower(best, self._ascent, TUNING.rounds)
+            self._contacts.lower(TUNING.rounds)
         reached = -np.inf
-        while (earned := _earned(best, plan)) > reached:
+        while (earned := _earned(self._search.best, plan)) > reached:
             reached = earned
             plan = _replanned(self._search, plan, self._search.seed + self._number)
             self._number += 1
-            lower(best, self._ascent, TUNING.rounds)
-
-    def prove(self) -> None:
-        """Say what the best multipliers prove, if there is time left."""
-        prove_at_last(self._best, self._ascent, NamedContacts(self._best, self._ascent))
+            self._contacts.lower(TUNING.rounds)
 
 
 def _earned(best: Incumbent, plan: Plan) -> float:

@@ -21,15 +21,12 @@ from planner_core.certified.lns.choices import ChoiceSearch
 from planner_core.certified.lns.queue_plans import plan_with_queues
 from planner_core.certified.lns.settled_contacts import served, with_contacts
 from planner_core.certified.mip.program_windows import ProgramWindows
-from planner_core.certified.multipliers.latency import LatencyAscent
 from planner_core.certified.proofs.lagrangian import lagrangian_bound
 from planner_core.certified.strategies.first_plan import rule
 from planner_core.certified.strategies.half_life_steps import (
-    NamedContacts,
+    Contacts,
     bettered_by_windows,
     contacts_of,
-    lower,
-    prove_at_last,
 )
 from planner_core.certified.strategies.resource_steps import ResourceSearch
 from planner_core.certified.strategies.resources import (
@@ -37,7 +34,6 @@ from planner_core.certified.strategies.resources import (
     choices_from_the_best,
     windows_and_choices,
 )
-from planner_core.certified.strategies.supports import is_large
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import CONTACT, Floats, Problem
 from planner_core.problem.delivery import without_half_life
@@ -96,59 +92,71 @@ def program_windows(search: Search) -> Iterator[None]:
             num_tasks, num_idle = 2 * num_tasks, 0
 
 
-def on_the_ground(search: Search) -> Iterator[None]:
-    """Search for contacts, bounds and plans in turn, until none gets anywhere."""
-    best, engine = search.best, search.engine(ResourceSearch)
-    ascent = LatencyAscent(best.problem, engine.prices())
+def multipliers(search: Search) -> Iterator[None]:
+    """Lower the bound by multipliers of targets and contacts."""
+    shared = search.engine(Contacts)
+    shared.lower(TUNING.rounds // 2)
+    yield
+    while search.is_promising and not shared.ascent.is_settled:
+        shared.lower(TUNING.rounds)
+        yield
+
+
+def queues(search: Search) -> Iterator[None]:
+    """Name contacts by exact programmes over queues, and bound plans by them."""
+    shared = search.engine(Contacts)
+    shared.lower(3 * TUNING.rounds // 2)
+    shared.name()
+    yield
+    shared.prove()
+    yield
+
+
+def queues_again(search: Search) -> Iterator[None]:
+    """Bound plans by such programmes with better multipliers."""
+    search.engine(Contacts).prove_again()
+    yield
+
+
+def last_bound(search: Search) -> Iterator[None]:
+    """Say what the best multipliers prove."""
+    search.engine(Contacts).prove_at_last()
+    yield
+
+
+def windows_of_the_first(search: Search) -> Iterator[None]:
+    """Plan windows of the first plan anew, its contacts as they are."""
+    best = search.best
+    contacts = list(contacts_of(best.problem, best.plan))
+    part = with_contacts(best.problem, contacts, best.plan, best.judge(best.plan))
+    better = bettered_by_windows(best, part, best.plan, search.seed)
+    search.engine(ResourceSearch).offer(better)
+    best.report("plans")
+    yield
+
+
+def plans_by_contacts(search: Search) -> Iterator[None]:
+    """Search for plans that take contacts which the bounds name, or others near the best plan's."""
+    best, engine, shared = search.best, search.engine(ResourceSearch), search.engine(Contacts)
     tried: set[tuple[int, ...]] = set()
     rng = np.random.default_rng(search.seed)
-    num_idle = number = 0
-    if is_large(engine.problem):
-        _better_with_its_contacts(engine)
-        yield
-    lower(best, ascent, TUNING.rounds // 2)
-    yield
-    named = NamedContacts(best, ascent)
-    if len(best.problem.satellites) == 1:
-        # A fleet's programmes take too long.
-        lower(best, ascent, 3 * TUNING.rounds // 2)
-        named.begin()
-        yield
-    if not named.contacts:
+    number = 0
+    if not shared.named:
         yield from choices(search)
-    while num_idle < TUNING.patience and not best.is_done:
-        before = best.reward
+    while search.is_promising:
         own = contacts_of(best.problem, best.plan)
         offered = (
-            *reversed(named.contacts),
-            *reversed(ascent.contact_sets),
+            *reversed(shared.named),
+            *reversed(shared.ascent.contact_sets),
             own,
             *_near(best.problem, own, rng),
         )
         contacts = next((one for one in offered if one not in tried), own)
         tried.add(contacts)
         levels = TUNING.levels_per_collect // (1 if number else 2)
-        _plan_with(best, contacts, named.prices, engine.unit, search.seed + number, levels)
-        yield
+        _plan_with(best, contacts, shared.prices, engine.unit, search.seed + number, levels)
         number += 1
-        num_idle = 0 if best.reward > before else num_idle + 1
-        if number == 1:
-            named.prove()
-        elif num_idle == TUNING.tries:
-            named.prove_again()
-            tried.difference_update(named.contacts[-1:])
-        lower(best, ascent, TUNING.several)
         yield
-    prove_at_last(best, ascent, named)
-
-
-def _better_with_its_contacts(search: ResourceSearch) -> None:
-    """Plan windows of the first plan anew, its contacts as they are."""
-    best = search.best
-    contacts = list(contacts_of(best.problem, best.plan))
-    part = with_contacts(best.problem, contacts, best.plan, best.judge(best.plan))
-    search.offer(bettered_by_windows(best, part, best.plan, search.seed))
-    best.report("plans")
 
 
 def _near(

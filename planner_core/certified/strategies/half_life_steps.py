@@ -1,6 +1,6 @@
-"""The steps where images are worth less the later they come down.
+"""What the strategies share where images are worth less the later they come down.
 
-`half_life.py` makes slices of them for one satellite or few, `days.py` for fleets.
+`half_life.py` makes slices of these steps for one satellite or few, `days.py` for fleets.
 """
 
 from __future__ import annotations
@@ -12,128 +12,120 @@ from planner_core.certified.lns.resource_search import ResourceWindows
 from planner_core.certified.multipliers.latency import LatencyAscent
 from planner_core.certified.multipliers.queues import priced_by_queues
 from planner_core.certified.proofs.bound import Bound, rounded_bound
+from planner_core.certified.proofs.lagrangian import lagrangian_bound
 from planner_core.certified.proofs.queues import queue_value
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import CONTACT, Floats, Problem
 from planner_core.problem.plan import Plan
 
 
-class NamedContacts:
-    """Contacts that exact programmes over queues name, and multipliers that suit them.
+class Contacts:
+    """The ascent on multipliers of contacts, and contacts that exact programmes over queues name.
 
     Attributes
     ----------
-    contacts
+    named
         Those of the best paths, the latest last; none where such programmes take too long.
     """
 
-    def __init__(self, best: Incumbent, ascent: LatencyAscent) -> None:
-        self._best, self._ascent = best, ascent
+    def __init__(self, best: Incumbent, _seed: int) -> None:
+        self._best = best
+        known = best.bound.prices
+        if known is None:
+            known = lagrangian_bound(best.problem, best.reward).prices
+        assert known is not None
+        self.ascent = LatencyAscent(best.problem, known)
         self._prices: Floats | None = None
-        self.contacts: list[tuple[int, ...]] = []
+        self.named: list[tuple[int, ...]] = []
 
     @property
     def prices(self) -> Floats:
         """The multipliers of targets. Shape ``(num_targets,)``."""
-        return self._ascent.prices if self._prices is None else self._prices
+        return self.ascent.prices if self._prices is None else self._prices
 
-    def begin(self) -> None:
+    def lower(self, num_rounds: int, *, is_last: bool = False) -> None:
+        """Go on with the ascent for a while, at most for a part of the time that is left."""
+        best, ascent = self._best, self.ascent
+        part = best.budget.part(TUNING.beginning)
+        for _ in range(num_rounds):
+            if part.is_spent():
+                break
+            # Until a good plan is known a value near the bound stands for it.
+            level = max(best.reward, (1.0 - TUNING.little) * ascent.value)
+            ascent.improve(1, level, best.budget.stop)
+        bound = ascent.bound(is_last=is_last)
+        best.lower(replace(bound, value=rounded_bound(best.problem, bound.value, best.reward)))
+        best.report("prices")
+
+    def name(self) -> None:
         """Find contacts, with few levels of energy at first, and multipliers."""
-        best, ascent = self._best, self._ascent
-        hoped = max(best.reward, (1.0 - 2.0 * TUNING.little) * ascent.value)
+        hoped = max(self._best.reward, (1.0 - 2.0 * TUNING.little) * self.ascent.value)
         self._find(TUNING.fine, hoped)
         self._price()
 
     def prove(self) -> None:
         """Prove a bound, which may name other contacts."""
-        if self.contacts and not self._best.is_done:
-            known = self.contacts[-1]
+        if self.named and not self._best.is_done:
+            known = self.named[-1]
             self._find(TUNING.levels_per_collect, self._best.reward)
-            if self.contacts[-1] != known:
+            if self.named[-1] != known:
                 self._price()
 
     def prove_again(self) -> None:
         """Prove a bound by better multipliers."""
-        if self.contacts and not self._best.is_done:
+        if self.named and not self._best.is_done:
             self._price()
             self._find(TUNING.levels_per_collect, self._best.reward)
 
+    def prove_at_last(self) -> None:
+        """Say what the best multipliers prove, with queues too, if there is time left."""
+        if not self._best.is_done:
+            self.lower(0, is_last=True)
+            exact = contacts_of(self._best.problem, self._best.plan)
+            self._lower_by_queues(TUNING.levels_per_collect, self._best.reward, exact)
+
     def _find(self, per_collect: int, level: float) -> None:
-        exact = self.contacts[-1] if self.contacts else ()
-        contacts = _lower_by_queues(
-            self._best, self._ascent, self.prices, per_collect, level, exact
-        )
+        exact = self.named[-1] if self.named else ()
+        contacts = self._lower_by_queues(per_collect, level, exact)
         if contacts:
-            self.contacts.append(contacts)
+            self.named.append(contacts)
 
     def _price(self) -> None:
-        if self.contacts and not self._best.is_done:
+        if self.named and not self._best.is_done:
             self._prices = priced_by_queues(
                 self._best.problem,
-                self.contacts[-1],
+                self.named[-1],
                 self.prices,
                 TUNING.rounds // 2,
                 self._best.budget.stop,
             )
 
-
-def lower(
-    best: Incumbent, ascent: LatencyAscent, num_rounds: int, *, is_last: bool = False
-) -> None:
-    """Go on with the ascent for a while, at most for a part of the time that is left."""
-    part = best.budget.part(TUNING.beginning)
-    for _ in range(num_rounds):
-        if part.is_spent():
-            break
-        ascent.improve(1, _level(best, ascent), best.budget.stop)
-    bound = ascent.bound(is_last=is_last)
-    best.lower(replace(bound, value=rounded_bound(best.problem, bound.value, best.reward)))
-    best.report("prices")
-
-
-def prove_at_last(best: Incumbent, ascent: LatencyAscent, named: NamedContacts) -> None:
-    """Say what the best multipliers prove, with queues too, if there is time left."""
-    if not best.is_done:
-        lower(best, ascent, 0, is_last=True)
-        exact = contacts_of(best.problem, best.plan)
-        _lower_by_queues(best, ascent, named.prices, TUNING.levels_per_collect, best.reward, exact)
-
-
-def _level(best: Incumbent, ascent: LatencyAscent) -> float:
-    """Return what the best plan earns, or a value near the bound until a good one is known."""
-    return max(best.reward, (1.0 - TUNING.little) * ascent.value)
-
-
-def _lower_by_queues(
-    best: Incumbent,
-    ascent: LatencyAscent,
-    prices: Floats,
-    per_collect: int,
-    level: float,
-    exact: tuple[int, ...],
-) -> tuple[int, ...]:
-    """Let exact programmes of queues bound the plans; return the contacts of the best paths."""
-    value, rows = queue_value(
-        best.problem,
-        prices,
-        per_collect,
-        best.budget.stop,
-        contact_prices=ascent.contact_prices,
-        exact_contacts=exact,
-        level=level,
-    )
-    best.lower(
-        Bound(
-            value=value,
-            proof="dp",
-            prices=prices,
-            contact_prices=ascent.contact_prices,
-            queue_levels=per_collect,
+    def _lower_by_queues(
+        self, per_collect: int, level: float, exact: tuple[int, ...]
+    ) -> tuple[int, ...]:
+        """Let exact programmes of queues bound the plans; return the contacts of the best paths."""
+        best, contact_prices = self._best, self.ascent.contact_prices
+        value, rows = queue_value(
+            best.problem,
+            self.prices,
+            per_collect,
+            best.budget.stop,
+            contact_prices=contact_prices,
             exact_contacts=exact,
+            level=level,
         )
-    )
-    best.report("queues")
-    return tuple(sorted(rows[best.problem.opportunities.kind[rows] == CONTACT].tolist()))
+        best.lower(
+            Bound(
+                value=value,
+                proof="dp",
+                prices=self.prices,
+                contact_prices=contact_prices,
+                queue_levels=per_collect,
+                exact_contacts=exact,
+            )
+        )
+        best.report("queues")
+        return tuple(sorted(rows[best.problem.opportunities.kind[rows] == CONTACT].tolist()))
 
 
 def bettered_by_windows(best: Incumbent, part: Problem, plan: Plan, seed: int) -> Plan:

@@ -23,11 +23,6 @@ from planner_core.certified.tuning import TUNING
 from planner_core.problem import Bools
 
 
-def _is_promising(search: Search) -> bool:
-    """Return whether any strategy has gained anything of late."""
-    return search.num_idle < TUNING.rounds
-
-
 def resource_bound(search: Search) -> Iterator[None]:
     """Bound plans without a search."""
     search.best.lower(quick_bound(search.problem, search.best.reward))
@@ -59,7 +54,7 @@ def windows_and_choices(search: Search) -> Iterator[None]:
     """Search windows and choices of tasks in turn, from the best plan that others have found."""
     engine, best = search.engine(ResourceSearch), search.best
     known = best.reward
-    while _is_promising(search):
+    while search.is_promising:
         if best.reward > known:
             # Programs leave room for windows: under clouds 231.9 for 231.6, with rewards of 1 to
             # 10 2,505 for 2,499 of 2,534 after 20 CPU seconds.
@@ -72,7 +67,7 @@ def windows_and_choices(search: Search) -> Iterator[None]:
 def own_contacts(search: Search) -> Iterator[None]:
     """Look for better plans with the contacts of the best one, by a small program."""
     engine = search.engine(ResourceSearch)
-    while _is_promising(search):
+    while search.is_promising:
         engine.fix_own_contacts()
         yield
 
@@ -88,7 +83,7 @@ def choices_from_the_best(search: Search) -> Iterator[None]:
     engine, best = search.engine(ResourceSearch), search.best
     choices = ChoiceSearch(search.problem, engine.unit, search.seed, search.budget.stop)
     is_better = True
-    while is_better and _is_promising(search):
+    while is_better and search.is_promising:
         choices.adopt(best.plan)
         known, num_idle = best.reward, 0
         while num_idle < TUNING.rounds and not best.is_done:
@@ -111,7 +106,7 @@ def multipliers(search: Search) -> Iterator[None]:
     engine = search.engine(ResourceSearch)
     prices = engine.price_search
     yield
-    while _is_promising(search):
+    while search.is_promising:
         engine.price(prices, TUNING.tries)
         yield
 
@@ -119,7 +114,7 @@ def multipliers(search: Search) -> Iterator[None]:
 def programs(search: Search) -> Iterator[None]:
     """Relax sets of contacts, and look for better plans by small programs with one of them."""
     engine = search.engine(ResourceSearch)
-    while _is_promising(search):
+    while search.is_promising:
         is_new = engine.relax_sets(engine.price_search, engine.turn_search)
         if is_new:
             # How low the bound gets by them says which sets are worth a program.

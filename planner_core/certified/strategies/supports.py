@@ -138,11 +138,15 @@ def is_aging(problem: Problem) -> bool:
     return has_limits(problem) and has_half_life(problem)
 
 
+def is_aging_alone(problem: Problem) -> bool:
+    """Whether images of one satellite do."""
+    return is_aging(problem) and not is_shared(problem)
+
+
 def is_aging_on_board(problem: Problem) -> bool:
     """Whether many images of one satellite do, and earn the larger part when they are taken."""
-    is_one = is_aging(problem) and not is_shared(problem)
     is_many = len(problem.opportunities) > TUNING.open_tasks
-    return is_one and is_many and problem.objective.collected_share > 0.5
+    return is_aging_alone(problem) and is_many and problem.objective.collected_share > 0.5
 
 
 def is_aging_in_programs(problem: Problem) -> bool:
