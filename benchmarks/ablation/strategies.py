@@ -174,8 +174,6 @@ STRATEGIES: Final[Mapping[str, Change]] = {
             "multipliers of contacts": _OF_AGE,
             "queues": _OF_AGE,
             "plans by their contacts": _OF_AGE,
-            "queues again": _OF_AGE,
-            "last bound with a half-life": _OF_AGE,
             "windows with free starts": _FREE,
             # Their first tables alone take six seconds.
             "multipliers of chains": {"continuous-1000": 30.0},

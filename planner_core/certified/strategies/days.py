@@ -46,8 +46,9 @@ def days(search: Search) -> Iterator[None]:
         num_idle = 0 if best.reward > before else num_idle + 1
         yield
         if plan in ended:
-            return  # so few tasks that every search ends with the same
+            break  # so few tasks that every search ends with the same
         ended.append(plan)
+    search.engine(Contacts).lower(0, is_last=True)
 
 
 def _without_half_life(

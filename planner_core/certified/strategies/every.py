@@ -234,21 +234,9 @@ STRATEGIES: Final = (
         patience=lambda: TUNING.patience,
     ),
     Strategy(
-        name="queues again",
-        supports=is_aging_alone,
-        slices=half_life.queues_again,
-        begin=Begin.STALLED,
-    ),
-    Strategy(
         name="windows by small programs",
         supports=is_aging_in_programs,
         slices=half_life.program_windows,
-        begin=Begin.STALLED,
-    ),
-    Strategy(
-        name="last bound with a half-life",
-        supports=is_aging,
-        slices=half_life.last_bound,
         begin=Begin.STALLED,
     ),
     # Free starts.

