@@ -108,7 +108,7 @@ def check_limits(
 
 def _what_breaks(problem: Problem, kept: Sequence[Kept]) -> str:
     alone = replace(problem, pinned=Pinned())
-    timeline = replay(alone, Plan.of(problem, [k.row for k in kept]))
+    timeline = replay(alone, Plan.of(problem, [k.row for k in kept]), in_detail=False)
     broken = [v for v in timeline.violations if v.code in ("battery", "recorder")]
     return broken[0].detail if broken else "Battery or recorder would reach its limit."
 

@@ -100,10 +100,10 @@ def _forced(problem: Problem, plan: Plan, timeline: Timeline, target: int) -> li
             positions = tuple(sorted(planned.positions[dropped].tolist()))
             (added,) = Plan.of(problem, [row]).actions
             order = sorted([*plan.actions, added])
-            forced = replay(problem, Plan(tuple(order)))
+            forced = replay(problem, Plan(tuple(order)), in_detail=False)
             place = {action: position for position, action in enumerate(plan.actions)}
             left = [a for position, a in enumerate(plan.actions) if position not in positions]
-            after = replay(problem, Plan(tuple(sorted([*left, added]))))
+            after = replay(problem, Plan(tuple(sorted([*left, added]))), in_detail=False)
             attempts.append(
                 Attempt(
                     opportunity=int(source[row]),

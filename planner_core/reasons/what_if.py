@@ -193,7 +193,7 @@ def _with_time(
 def _cheapest(problem: Problem, plan: Plan, action: PinnedAction) -> int | None:
     """Return the image of a target that costs the plan least reward, the earliest of those."""
     target = problem.target_ids.index(str(action.target_id))
-    timeline = replay(problem, plan)
+    timeline = replay(problem, plan, in_detail=False)
     held = timeline.collected.get(target)
     table = problem.opportunities
     best: tuple[bool, float, int] | None = None

@@ -130,7 +130,7 @@ class Question:
     def judged(self, plan: Plan) -> Timeline:
         """Return the referee's verdict; of the last plans asked about it is kept."""
         verdicts = self._verdicts
-        found = verdicts.pop(plan, None) or replay(self.problem, plan)
+        found = verdicts.pop(plan, None) or replay(self.problem, plan, in_detail=False)
         verdicts[plan] = found
         if len(verdicts) > _KEPT_VERDICTS:
             del verdicts[next(iter(verdicts))]
@@ -177,7 +177,7 @@ class Question:
 
     def down_s(self, plan: Plan) -> dict[int, float]:
         """Return when the first image of each target is on the ground, of those that are."""
-        timeline = replay(replace(self.problem, on_board=self.on_board), plan)
+        timeline = replay(replace(self.problem, on_board=self.on_board), plan, in_detail=False)
         found = {
             target: image.delivered_s
             for target, image in timeline.collected.items()

@@ -28,7 +28,7 @@ def repaired(problem: Problem, rows: Collection[int], protected: Collection[int]
     """
     plan = Plan.of(problem, set(rows)).with_kept(problem)
     for _ in range(len(plan.actions) + 1):
-        timeline = replay(problem, plan)
+        timeline = replay(problem, plan, in_detail=False)
         broken = [v for v in timeline.violations if v.code != "duplicate" and not v.inherited]
         if not broken:
             return plan
@@ -51,10 +51,10 @@ def _with_contact(problem: Problem, plan: Plan, broken: Violation) -> Plan | Non
         for row in own[::-1]
         if table.kind[row] == CONTACT and table.start_s[row] < broken.at_s and row not in taken
     ]
-    before = replay(problem, plan)
+    before = replay(problem, plan, in_detail=False)
     for row in [row for row in free if not conflicts(problem, row, taken)][:_MOST_TRIED]:
         trial = Plan.of(problem, [*taken, row])
-        after = replay(problem, trial)
+        after = replay(problem, trial, in_detail=False)
         own_broken = [
             v for v in after.violations if v.satellite == broken.satellite and not v.inherited
         ]

@@ -233,7 +233,10 @@ def with_choices(problem: Problem, solution: Solution, budget: Budget, seed: int
         if budget.is_spent():
             break
         moves.move()
-    before, after = replay(problem, solution.plan), replay(problem, moves.plan)
+    before, after = (
+        replay(problem, solution.plan, in_detail=False),
+        replay(problem, moves.plan, in_detail=False),
+    )
     if not after.is_valid or after.reward <= before.reward:
         return solution
     return replace(solution, plan=moves.plan)

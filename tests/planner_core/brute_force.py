@@ -22,7 +22,7 @@ Rows = tuple[int, ...]
 def best_reward(problem: Problem) -> float:
     """Return the highest reward of any valid plan, judged by the referee; 0 where none is."""
     best = best_plan(problem)
-    return 0.0 if best is None else replay(problem, best).reward
+    return 0.0 if best is None else replay(problem, best, in_detail=False).reward
 
 
 def best_plan(problem: Problem) -> Plan | None:

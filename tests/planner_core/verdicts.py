@@ -38,7 +38,7 @@ def encloses(problem: Problem, best: float, draw: int = 0) -> bool:
         The number of the problem, which decides about the constants of the search.
     """
     solution = certified(problem, draw)
-    timeline = replay(problem, solution.plan)
+    timeline = replay(problem, solution.plan, in_detail=False)
     assert solution.bound is not None
     assert solution.bound >= best - 1e-6
     assert timeline.is_valid

@@ -82,7 +82,7 @@ class ContinuousSearch:
 
     def __init__(self, problem: Problem, plan: Plan, budget: Budget, seed: int) -> None:
         self.problem, self.budget = problem, budget
-        timeline = replay(problem, plan)
+        timeline = replay(problem, plan, in_detail=False)
         self.plan, self.reward, self._is_valid = plan, timeline.reward, timeline.is_valid
         self._draws = draws_of(seed)
         self.satellites = [
@@ -176,6 +176,6 @@ class ContinuousSearch:
             rows = satellite.spans.row[satellite.tasks].tolist()
             actions += [action_of(self.problem, *pair) for pair in zip(rows, starts, strict=True)]
         plan = Plan(tuple(sorted(actions)))
-        timeline = replay(self.problem, plan)
+        timeline = replay(self.problem, plan, in_detail=False)
         if (timeline.is_valid, timeline.reward) > (self._is_valid, self.reward):
             self.plan, self.reward, self._is_valid = plan, timeline.reward, timeline.is_valid

@@ -33,7 +33,7 @@ from planner_core.referee.replay import replay
 
 def filled_with_resources(problem: Problem, plan: Plan, budget: Budget) -> Plan:
     """Return a plan that earns no less, with what fits between its tasks once those may move."""
-    timeline = replay(problem, plan)
+    timeline = replay(problem, plan, in_detail=False)
     if not timeline.is_valid:
         return plan
     for index in range(len(problem.satellites)):
@@ -90,7 +90,7 @@ def _filled(
     if len(spans.row) == 0:
         return plan
     tasks = [_task_of(problem, spans, action) for action in own]
-    reward = replay(problem, plan).reward
+    reward = replay(problem, plan, in_detail=False).reward
     left = num_trials
     while left > 0 and not budget.is_spent():
         route = _route_of(spans, view, tasks)

@@ -49,7 +49,7 @@ def plan_with_queues(
     """
     for keeps_recorder in (False, True):
         plan = _plan(problem, price, rng, stop, per_collect, keeps_recorder=keeps_recorder)
-        if plan is None or stop[0] or replay(problem, plan).is_valid:
+        if plan is None or stop[0] or replay(problem, plan, in_detail=False).is_valid:
             break
     return plan
 

@@ -99,7 +99,7 @@ class PlanPool:
         """Return what a plan is worth, None if it is not valid; take it if it is the best."""
         if (known := self._worth.get(rows_of(plan))) is not None:
             return known
-        timeline = replay(self._problem, plan)
+        timeline = replay(self._problem, plan, in_detail=False)
         if not timeline.is_valid:
             return None
         if timeline.reward > self.reward:

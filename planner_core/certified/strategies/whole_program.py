@@ -75,7 +75,7 @@ class WholeProgram:
         plan = _plan_of(problem, outcome)
         for offered in (plan, _repaired(problem, plan)):
             best.offer(offered)
-        if not replay(problem, plan).is_valid and not budget.is_spent():
+        if not replay(problem, plan, in_detail=False).is_valid and not budget.is_spent():
             clear = self._search(problem, budget, seed, best, INSIDE)
             best.offer(_plan_of(problem, clear))
         if best.is_valid:
@@ -205,7 +205,7 @@ def _repaired(problem: Problem, plan: Plan) -> Plan:
     """Return the plan without the collects that bring it to a limit, the latest ones first."""
     table = problem.opportunities
     while True:
-        timeline = replay(problem, plan)
+        timeline = replay(problem, plan, in_detail=False)
         broken = [v for v in timeline.violations if v.code in ("battery", "recorder")]
         if not broken:
             return plan
