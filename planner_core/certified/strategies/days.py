@@ -48,7 +48,8 @@ def days(search: Search) -> Iterator[None]:
         if plan in ended:
             break  # so few tasks that every search ends with the same
         ended.append(plan)
-    search.engine(Contacts).lower(0, is_last=True)
+    if not best.is_done:
+        search.engine(Contacts).lower(0, is_last=True)
 
 
 def _without_half_life(
